@@ -1,0 +1,137 @@
+"""A frame: what a renderer hands to the denoiser, as named layers of one size.
+
+1. The registry says which layers exist, how many channels each has and what they mean [`LAYERS`].
+2. A frame maps layer names to arrays (H, W, C) and carries facts about its origin as text [`Frame`].
+3. A frame that comes from outside is checked once, at the border; everything behind it relies on that
+   [`validate`].
+
+Row 0 is the top of the picture, column 0 its left edge. Every layer is the mean over the pixel's samples, so
+a normal on an edge is shorter than 1 and an albedo there is a mixture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+
+Floats = NDArray[Any]
+"""An array of float32 or float64, whichever the caller chose; results keep it."""
+
+FLOAT_KINDS = ("float32", "float64")
+"""The element types of layers: the executors' and the reference's."""
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A kind of layer: its name, its number of channels, what it holds and in which unit."""
+
+    name: str
+    channels: int
+    meaning: str
+
+
+LAYERS: Mapping[str, Layer] = {
+    layer.name: layer
+    for layer in (
+        Layer("color", 3, "linear radiance: red, green, blue"),
+        Layer("albedo", 3, "reflectance of the first hit in [0, 1]; 0 where nothing is hit"),
+        Layer(
+            "normal",
+            3,
+            "unit normal of the first hit in world space, on the ray's side; 0 where nothing is hit",
+        ),
+        Layer("depth", 1, "distance along the ray to the first hit, in scene units; 0 where nothing is hit"),
+        Layer("position", 3, "first hit in world space, in scene units; 0 where nothing is hit"),
+        Layer("direction", 3, "unit direction of the camera ray in world space"),
+    )
+}
+"""Every layer that a frame may have; a new one is one line here."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Layers (H, W, C) of one picture by name, and facts about it (scene, time, spp, seed, ...) as text."""
+
+    layers: Mapping[str, Floats]
+    info: Mapping[str, str] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Floats:
+        """Return the layer `name` (H, W, C), or say which layers there are."""
+        if name not in self.layers:
+            raise InputError(
+                "the frame's list of layers", ", ".join(self.layers), f"layer {name!r} is needed", "render it"
+            )
+        return self.layers[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Tell whether the frame has the layer `name`."""
+        return name in self.layers
+
+    @property
+    def height(self) -> int:
+        """Number of rows, in pixels."""
+        return int(next(iter(self.layers.values())).shape[0])
+
+    @property
+    def width(self) -> int:
+        """Number of columns, in pixels."""
+        return int(next(iter(self.layers.values())).shape[1])
+
+
+def validate(frame: Frame) -> None:
+    """Raise InputError unless the layers are known, of one size, of floats, and finite in every pixel."""
+    if not frame.layers:
+        raise InputError("the frame's list of layers", "empty", "at least one layer is needed", _known())
+    for name, values in frame.layers.items():
+        _check_form(name, values)
+    _check_sizes(frame.layers)
+    for name, values in frame.layers.items():
+        check_finite(f"layer {name!r}", values)
+
+
+def check_finite(what: str, image: Floats) -> None:
+    """Refuse an `image` (H, W, C) with a NaN or an infinity: name the first such pixel and their number."""
+    bad = ~np.isfinite(image)
+    if bad.any():
+        y, x, channel = (int(index) for index in np.argwhere(bad)[0])
+        count = int(bad.any(axis=-1).sum())
+        where = f"{what} at x={x}, y={y} (first of {count} such pixel{'s' if count > 1 else ''})"
+        raise InputError(
+            where, str(image[y, x, channel]), "every pixel must be finite", "render or repair these pixels"
+        )
+
+
+def _check_form(name: str, values: Floats) -> None:
+    """Refuse a layer with an unknown name, another element type, another number of channels or no pixel."""
+    if name not in LAYERS:
+        raise InputError("layer name", name, "it is not a known layer", _known())
+    if not isinstance(values, np.ndarray) or values.dtype.name not in FLOAT_KINDS:
+        kind = getattr(values, "dtype", type(values).__name__)
+        raise InputError(
+            f"element type of layer {name!r}", str(kind), "it must be float32 or float64", "convert it"
+        )
+    channels = LAYERS[name].channels
+    if values.ndim != 3 or values.shape[-1] != channels or values.size == 0:
+        rule = f"it must be (height, width, {channels}) with at least one pixel"
+        raise InputError(f"shape of layer {name!r}", values.shape, rule, "reshape or render it again")
+
+
+def _check_sizes(layers: Mapping[str, Floats]) -> None:
+    """Refuse layers of different height or width."""
+    sizes = {name: values.shape[:2] for name, values in layers.items()}
+    if len(set(sizes.values())) > 1:
+        text = ", ".join(f"{name} {width}x{height}" for name, (height, width) in sizes.items())
+        raise InputError(
+            "sizes of the layers", text, "all layers must have one size", "render them in one run"
+        )
+
+
+def _known() -> str:
+    """Return the way out of a wrong layer name."""
+    return "use one of " + ", ".join(LAYERS)

@@ -1,0 +1,138 @@
+"""Sampling of the distributions that light transport needs, each as three functions.
+
+For a distribution X: `sample_x(u, ...)` maps uniform numbers in [0, 1) to a sample, `x_pdf(...)` is the density of
+that sample, `invert_x_sample(...)` gives the uniform numbers back. The triad is pbrt's habit (Pharr, Jakob and
+Humphreys, "Physically Based Rendering", 4th edition, appendix A). Random numbers are arguments.
+
+1. concentric disk: Shirley and Chiu, "A Low Distortion Map Between Disk and Square", 1997.
+2. cosine hemisphere: Malley's method, the disk lifted to the hemisphere around +z; density cos(theta) / pi.
+3. quad: uniform in area over a parallelogram.
+4. discrete: an index with given probabilities.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from . import vectors
+
+INV_PI = 1.0 / np.pi
+"""1 / pi: the normalisation of the cosine density over the hemisphere, in 1 / sr."""
+
+_TINY = 1e-30
+"""Stands in for a zero divisor where the dividend is zero too; any positive normal float32 would do."""
+
+
+def sample_concentric_disk(u0: Any, u1: Any) -> tuple[Any, Any]:
+    """Map u0, u1 (...) in [0, 1) to x, y (...) in the unit disk; squares around the centre become circles."""
+    a, b = 2.0 * u0 - 1.0, 2.0 * u1 - 1.0
+    # In the wedge around the x axis a is the radius, else b; the other one gives the angle.
+    around_x = np.abs(a) > np.abs(b)
+    radius = np.where(around_x, a, b)
+    other = np.where(around_x, b, a)
+    ratio = other / np.where(radius == 0.0, _TINY, radius)
+    phi = np.where(around_x, 0.25 * np.pi * ratio, 0.5 * np.pi - 0.25 * np.pi * ratio)
+    return radius * np.cos(phi), radius * np.sin(phi)
+
+
+def concentric_disk_pdf(x: Any, y: Any) -> Any:
+    """Return the density 1 / pi, in 1 / area, at x, y (...) of the unit disk."""
+    return 0.0 * (x + y) + INV_PI
+
+
+def invert_concentric_disk_sample(x: Any, y: Any) -> tuple[Any, Any]:
+    """Return the u0, u1 (...) that [`sample_concentric_disk`] maps to x, y (...)."""
+    # The wedge around the x axis holds |y| < |x|; radius and angle are measured from its signed axis.
+    around_x = np.abs(x) > np.abs(y)
+    axis, other = np.where(around_x, x, y), np.where(around_x, y, x)
+    radius = np.where(axis < 0.0, -1.0, 1.0) * np.sqrt(x * x + y * y)
+    ratio = np.arctan(other / np.where(axis == 0.0, _TINY, axis)) * (4.0 / np.pi)
+    a = np.where(around_x, radius, ratio * radius)
+    b = np.where(around_x, ratio * radius, radius)
+    return 0.5 * (a + 1.0), 0.5 * (b + 1.0)
+
+
+def sample_cosine_hemisphere(u0: Any, u1: Any) -> Any:
+    """Map u0, u1 (...) to unit directions (..., 3) around +z with density cos(theta) / pi."""
+    x, y = sample_concentric_disk(u0, u1)
+    return vectors.vector(x, y, np.sqrt(np.maximum(0.0, 1.0 - x * x - y * y)))
+
+
+def cosine_hemisphere_pdf(cos_theta: Any) -> Any:
+    """Return the density cos(theta) / pi, in 1 / sr, for cos_theta (...) >= 0; below the horizon it is 0."""
+    return np.maximum(cos_theta, 0.0) * INV_PI
+
+
+def invert_cosine_hemisphere_sample(wi: Any) -> tuple[Any, Any]:
+    """Return the u0, u1 (...) that [`sample_cosine_hemisphere`] maps to wi (..., 3)."""
+    return invert_concentric_disk_sample(wi[..., 0], wi[..., 1])
+
+
+def sample_quad(u0: Any, u1: Any, corner: Any, edge_u: Any, edge_v: Any) -> Any:
+    """Map u0, u1 (...) to points (..., 3) of the parallelogram corner + u0 edge_u + u1 edge_v, uniform in area."""
+    return corner + vectors.scale(edge_u, u0) + vectors.scale(edge_v, u1)
+
+
+def quad_pdf(edge_u: Any, edge_v: Any) -> Any:
+    """Return the density 1 / area (...) over the parallelogram that edge_u, edge_v (..., 3) span."""
+    normal = vectors.cross(edge_u, edge_v)
+    return 1.0 / np.sqrt(vectors.dot(normal, normal))
+
+
+def invert_quad_sample(p: Any, corner: Any, edge_u: Any, edge_v: Any) -> tuple[Any, Any]:
+    """Return the u0, u1 (...) that [`sample_quad`] maps to the points p (..., 3) of the parallelogram."""
+    # Solve p - corner = u0 edge_u + u1 edge_v by the vectors dual to the edges.
+    offset, normal = p - corner, vectors.cross(edge_u, edge_v)
+    square = vectors.dot(normal, normal)
+    u0 = vectors.dot(vectors.cross(offset, edge_v), normal) / square
+    u1 = vectors.dot(vectors.cross(edge_u, offset), normal) / square
+    return u0, u1
+
+
+def sample_discrete(u: Any, cumulative: Any) -> Any:
+    """Map u (...) in [0, 1) to indices (...): how many of the bounds cumulative[:-1] are at most u.
+
+    cumulative (K,) are the running sums of the probabilities, the last one being 1.
+    """
+    index = np.zeros_like(u, dtype=np.int32)
+    for bound in cumulative[:-1]:
+        index = index + np.where(u >= bound, np.int32(1), np.int32(0))
+    return index
+
+
+def discrete_pdf(index: Any, cumulative: Any) -> Any:
+    """Return the probability (...) of each index (...) under the running sums cumulative (K,)."""
+    return np.take(np.diff(cumulative, prepend=cumulative.dtype.type(0)), index)
+
+
+def invert_discrete_sample(index: Any, cumulative: Any) -> Any:
+    """Return the middle (...) of the interval of uniform numbers that [`sample_discrete`] maps to index (...)."""
+    upper = np.take(cumulative, index)
+    return upper - 0.5 * discrete_pdf(index, cumulative)
+
+
+def tangent_frame(normal: Any) -> tuple[Any, Any]:
+    """Return two unit tangents (..., 3) that form a right-handed frame with the unit normal (..., 3).
+
+    Duff et al., "Building an Orthonormal Basis, Revisited", Journal of Computer Graphics Techniques 6(1), 2017:
+    no branch, and no loss of accuracy near the pole.
+    """
+    x, y, z = normal[..., 0], normal[..., 1], normal[..., 2]
+    sign = np.where(z < 0.0, -np.ones_like(z), np.ones_like(z))
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    tangent = vectors.vector(1.0 + sign * x * x * a, sign * b, -sign * x)
+    bitangent = vectors.vector(b, sign + y * y * a, -y)
+    return tangent, bitangent
+
+
+def to_world(local: Any, normal: Any) -> Any:
+    """Turn directions local (..., 3), given around +z, into directions around normal (..., 3)."""
+    tangent, bitangent = tangent_frame(normal)
+    return (
+        vectors.scale(tangent, local[..., 0])
+        + vectors.scale(bitangent, local[..., 1])
+        + vectors.scale(normal, local[..., 2])
+    )

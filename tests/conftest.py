@@ -1,0 +1,139 @@
+"""What all tests share: repeatable Hypothesis runs, executors as a fixture, golden files.
+
+1. Hypothesis draws the same examples on every run, without a deadline: a test's result is a function of the
+   code. HYPOTHESIS_PROFILE=long draws twenty times as many.
+2. `executor` runs one test body on every executor [`EXECUTORS`]. One that is missing fails its tests when
+   WAMNET_REQUIRE names it, as `make test` does; else they are skipped. Either way the summary says what was
+   missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
+3. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import hypothesis
+import pytest
+
+EXECUTORS = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
+"""Every way to run a kernel that the tests know; an OpenGL executor is named with the kind of its context."""
+
+hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, database=None, print_blob=True)
+hypothesis.settings.register_profile("long", hypothesis.settings.get_profile("ci"), max_examples=2000)
+hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+_state_key = pytest.StashKey[dict[str, str]]()
+"""Where a run keeps `name -> "ok (device)"` or `name -> "MISSING: reason"` of each executor it has asked for."""
+
+
+def required_executors() -> frozenset[str]:
+    """Return the executors that WAMNET_REQUIRE lists, separated by commas; numpy needs no naming."""
+    names = frozenset(name.strip() for name in os.environ.get("WAMNET_REQUIRE", "").split(",")) - {""}
+    if unknown := sorted(names - set(EXECUTORS)):
+        raise pytest.UsageError(f"WAMNET_REQUIRE names {unknown}: it may list only {', '.join(EXECUTORS)}")
+    return names
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--update-golden", action="store_true", help="write tests/golden instead of comparing with it"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    required_executors()
+    config.stash[_state_key] = {}
+
+
+# ---- executors -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session")
+def executor_named(pytestconfig: pytest.Config) -> Iterator[Callable[[str], Any]]:
+    """Give a function that opens an executor by its name in EXECUTORS, once a session, under the policy above."""
+    opened: dict[str, Any] = {}
+    state = pytestconfig.stash[_state_key]
+
+    def open_once(name: str) -> Any:
+        if name not in state:
+            opened[name], state[name] = _open(name)
+        if opened[name] is not None:
+            return opened[name]
+        if name in required_executors():
+            pytest.fail(f"executor {name} is required by WAMNET_REQUIRE and {state[name]}", pytrace=False)
+        pytest.skip(f"executor {name} is {state[name]}")
+
+    yield open_once
+    for executor in opened.values():
+        if executor is not None:
+            executor.__exit__(None, None, None)
+
+
+@pytest.fixture(scope="session", params=EXECUTORS)
+def executor(request: pytest.FixtureRequest, executor_named: Callable[[str], Any]) -> Any:
+    """Give each executor in turn: one test body for all of them."""
+    return executor_named(request.param)
+
+
+def _open(name: str) -> tuple[Any, str]:
+    """Return the executor and "ok (device)", or None and "MISSING: reason"."""
+    from wamnet import kernels
+    from wamnet.refimpl.errors import ExecutorUnavailable
+
+    kind, _, context = name.partition("-")
+    try:
+        executor = kernels.open_executor(kind, **({"context": context} if context else {}))
+    except ExecutorUnavailable as error:
+        return None, f"MISSING: {error}"
+    return executor.__enter__(), f"ok ({executor.device})"
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Hand what a worker process has found to the process that writes the summary."""
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["executors"] = session.config.stash[_state_key]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """Collect what one worker process has found; a process that crashed has nothing to tell."""
+    node.config.stash[_state_key].update(getattr(node, "workeroutput", {}).get("executors", {}))
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """Say of each executor whether it ran; loudly when it did not."""
+    state = config.stash[_state_key]
+    if not state:
+        return
+    terminalreporter.section("executors")
+    for name in EXECUTORS:
+        text = state.get(name, "not asked for by any test that ran")
+        colour = {"ok": {"green": True}, "MISSING": {"red": True, "bold": True}}.get(
+            text.partition(" ")[0].rstrip(":"), {}
+        )
+        terminalreporter.write_line(f"{name}: {text}", **colour)
+
+
+# ---- golden files --------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def golden(pytestconfig: pytest.Config) -> Callable[[str, str], None]:
+    """Give `check(name, text)`: the text must equal tests/golden/NAME to the byte; a missing file fails."""
+    folder = Path(__file__).parent / "golden"
+
+    def check(name: str, text: str) -> None:
+        path = folder / name
+        if pytestconfig.getoption("--update-golden"):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(text.encode())
+        way_out = (
+            "run pytest --update-golden, read the difference with git diff, and commit it if it is meant"
+        )
+        assert path.exists(), f"tests/golden/{name} does not exist; {way_out}"
+        assert text == path.read_bytes().decode(), f"the text is not that of tests/golden/{name}; {way_out}"
+
+    return check

@@ -1,0 +1,66 @@
+"""The executor policy of tests/conftest.py: missing and required fails, missing and not required is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytest_plugins = ["pytester"]
+
+STUB = """
+from wamnet import kernels
+from wamnet.refimpl.errors import ExecutorUnavailable
+
+class Numpy:
+    device = "this processor"
+    def __enter__(self): return self
+    def __exit__(self, *_): pass
+
+def open_executor(name, **options):
+    if name == "numpy":
+        return Numpy()
+    raise ExecutorUnavailable(f"no {name} with {options}")
+
+kernels.open_executor = open_executor
+
+def test_it(executor):
+    assert executor.device == "this processor"
+"""
+"""A test file that replaces the executors: NumPy exists, nothing else does."""
+
+
+@pytest.fixture
+def run(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch):
+    """Give a function that runs STUB under the real conftest with a given WAMNET_REQUIRE."""
+    pytester.makeconftest((Path(__file__).parents[1] / "conftest.py").read_text())
+    pytester.makepyfile(STUB)
+
+    def run_with(require: str, *options: str) -> pytest.RunResult:
+        monkeypatch.setenv("WAMNET_REQUIRE", require)
+        return pytester.runpytest_subprocess("-p", "no:cacheprovider", *options)
+
+    return run_with
+
+
+@pytest.mark.parametrize("options", [(), ("-n", "1")])
+def test_missing_executor_is_skipped_and_told(run, options):
+    result = run("", *options)
+    result.assert_outcomes(passed=1, skipped=3)
+    result.stdout.fnmatch_lines(
+        ["numpy: ok (this processor)", "opengl-osmesa: MISSING: no opengl with {'context': 'osmesa'}"]
+    )
+
+
+def test_missing_executor_that_is_required_fails(run):
+    result = run("opencl")
+    result.assert_outcomes(passed=1, skipped=2, errors=1)
+    result.stdout.fnmatch_lines(
+        ["executor opencl is required by WAMNET_REQUIRE and MISSING: no opencl with {}"]
+    )
+
+
+def test_unknown_name_is_refused(run):
+    result = run("opencl,metal")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*WAMNET_REQUIRE names ?'metal'?: it may list only numpy, opencl*"])

@@ -1,0 +1,40 @@
+# Each target does its own set-up (.ci/setup); `make` alone lists them.
+#
+# VENV=.venv       the virtual environment to make and use
+# PYTHON=python3   the Python that makes it, 3.10 or newer
+# WAMNET_REQUIRE=  executors whose absence fails `make test`; empty: skip, and say so, what is not there
+
+VENV ?= .venv
+PYTHON ?= python3
+WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa
+PYTEST_OPTIONS ?= -n 2
+export VENV PYTHON WAMNET_REQUIRE
+
+# Two workers share two cores: one thread of linear algebra each.
+ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint clean distclean
+
+help: ## List the targets
+	@grep -hE '^[a-z]+: .*## ' Makefile | sed -E 's/^([a-z]+):.*## (.*)/  make \1	\2/' | expand -t 20
+
+setup: ## Make the environment with everything in it
+	@.ci/setup all
+
+demo: ## Render, train, compile, run and compare; results in out/demo (5 minutes on two cores)
+	@.ci/setup opencl,opengl,cli,report
+	@$(VENV)/bin/wamnet demo -o out/demo
+
+test: setup ## Run all tests (15 minutes at most on two cores)
+	@$(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS)
+
+lint: setup ## Check style, format, types on the installed wheel, and the house rules
+	@.ci/lint
+
+clean: ## Remove results and caches
+	rm -rf out build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	find . -name __pycache__ -not -path './.venv*' -prune -exec rm -rf {} +
+
+distclean: clean ## Remove the virtual environment too
+	rm -rf .venv

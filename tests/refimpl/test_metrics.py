@@ -1,0 +1,189 @@
+"""Tests of the metrics: worked examples, scikit-image as oracle, symmetry, edge cases, refusals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+from skimage import metrics as oracle
+
+from wamnet.refimpl import metrics
+from wamnet.refimpl.errors import InputError
+
+ALL = [metric.function for metric in metrics.METRICS.values()]
+U64 = 2.0**-53
+"""Unit roundoff of float64."""
+
+
+def picture(seed: int, shape: tuple[int, ...] = (17, 23, 3)) -> np.ndarray:
+    """Return a smooth picture with noise, values in [0, 1]."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[0 : shape[0], 0 : shape[1]]
+    smooth = 0.5 + 0.3 * np.sin(0.4 * x + 0.3 * y)[..., None]
+    return np.clip(smooth + 0.15 * rng.standard_normal(shape), 0.0, 1.0)
+
+
+def test_mse_and_psnr_by_hand() -> None:
+    """Differences 0, 1/4, 1/2, 0: mean (1/16 + 1/4) / 4 = 5/64, 10 log10(64/5) = 11.0720996964787 dB."""
+    a, b = np.array([0.0, 0.25, 1.0, 0.5]), np.array([0.0, 0.5, 0.5, 0.5])
+    assert metrics.mse(a, b) == 5 / 64
+    assert abs(metrics.psnr(a, b) - 11.0720996964787) <= 1e-13  # digits of the worked value
+    # Another range: 20 log10(255) = 48.1308036086791 dB more.
+    assert abs(metrics.psnr(a, b, 255.0) - 59.2029033051578) <= 1e-12  # digits of the worked value
+
+
+def test_relmse_and_smape_by_hand() -> None:
+    """One pixel 0.3 against 0.1, one 0 against 0: 0.04 / 0.02 and 0; 0.2 / 0.41 and 0."""
+    a, b = np.array([0.3, 0.0]), np.array([0.1, 0.0])
+    assert abs(metrics.relmse(a, b) - 1.0) <= 16 * U64  # at most 8 rounded operations on numbers up to 2
+    assert abs(metrics.smape(a, b) - 0.2 / 0.41 / 2) <= 16 * U64
+
+
+def test_the_papers_psnr_is_a_natural_logarithm() -> None:
+    """Its Table 1 pairs MSE 82.93 (of 255) with 66.67: 10 ln(255**2 / MSE); in decibels 28.94."""
+    a = np.zeros(1)
+    b = np.full(1, math.sqrt(82.93))
+    assert abs(metrics.psnr(a, b, 255.0) - 28.94) <= 0.005  # the table's digits
+    assert abs(math.log(10.0) * metrics.psnr(a, b, 255.0) - 66.67) <= 0.07  # the table's inner consistency
+
+
+@pytest.mark.parametrize("shape", [(11, 11, 1), (17, 23, 3), (64, 12, 3)])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_against_scikit_image(shape: tuple[int, ...], dtype: type) -> None:
+    """The same conventions, another program.
+
+    A window mean takes 24 rounded operations on numbers in [0, 1], so a variance is off by at most 3 * 24 u
+    in both programs; divided by c2 = 9e-4, with a factor 4 for numerator and denominator of both: 4e-11.
+    """
+    a: np.ndarray = picture(1, shape).astype(dtype)
+    b: np.ndarray = picture(2, shape).astype(dtype)
+    wide_a, wide_b = a.astype(np.float64), b.astype(np.float64)
+    want = oracle.structural_similarity(
+        wide_a,
+        wide_b,
+        data_range=1.0,
+        gaussian_weights=True,
+        sigma=1.5,
+        use_sample_covariance=False,
+        channel_axis=-1,
+    )
+    assert abs(metrics.ssim(a, b) - want) <= 4 * 3 * 24 * U64 / 9e-4 * 2
+    # Means of n terms: at most n + 4 rounded operations of a value below 1, relative to itself.
+    slack = 2 * (a.size + 4) * U64
+    assert abs(metrics.mse(a, b) - oracle.mean_squared_error(wide_a, wide_b)) <= slack
+    assert (
+        abs(metrics.psnr(a, b) - oracle.peak_signal_noise_ratio(wide_a, wide_b, data_range=1.0)) <= 10 * slack
+    )
+
+
+def test_ssim_of_constant_images_by_hand() -> None:
+    """Variances vanish: what is left is the luminance term (2 a b + c1) / (a a + b b + c1)."""
+    a, b, c1 = 0.25, 0.75, 1e-4
+    got = metrics.ssim(np.full((11, 11, 3), a), np.full((11, 11, 3), b))
+    # The vanishing variances leave rounding of 3 * 24 u each over c2 = 9e-4.
+    assert abs(got - (2 * a * b + c1) / (a * a + b * b + c1)) <= 4 * 3 * 24 * U64 / 9e-4
+
+
+def test_ssim_of_one_bright_pixel_by_hand() -> None:
+    """An 11x11 picture has one window; a lone pixel at its centre has the weight w = g0 * g0.
+
+    Against black: mean w, variance w - w w, covariance 0: c1 / (w w + c1) * c2 / (w - w w + c2).
+    """
+    g = np.exp(-0.5 * (np.arange(-5, 6) / 1.5) ** 2)
+    w = float(g[5] / g.sum()) ** 2
+    dot, black = np.zeros((11, 11, 1)), np.zeros((11, 11, 1))
+    dot[5, 5, 0] = 1.0
+    want = 1e-4 / (w * w + 1e-4) * 9e-4 / (w - w * w + 9e-4)
+    # Only a handful of roundings of w matter: no cancellation, the other products are zero.
+    assert abs(metrics.ssim(dot, black) - want) <= 64 * U64
+
+
+@pytest.mark.parametrize("value", [None, 0.0, 0.5, 1.0])
+def test_identical_images(value: float | None) -> None:
+    """Exactly no error, exactly similarity 1, infinite PSNR: also for constant and black images."""
+    a = picture(3) if value is None else np.full((12, 12, 3), value)
+    assert metrics.mse(a, a) == 0.0
+    assert metrics.psnr(a, a) == math.inf
+    assert metrics.ssim(a, a) == 1.0
+    assert metrics.relmse(a, a) == 0.0
+    assert metrics.smape(a, a) == 0.0
+
+
+IMAGES = arrays.arrays(np.float64, (11, 12, 1), elements=st.floats(0.0, 1.0))
+
+
+@given(IMAGES, IMAGES)
+def test_symmetry_and_ranges(a: np.ndarray, b: np.ndarray) -> None:
+    """All but relMSE (whose reference is special) are symmetric to the bit; ranges hold."""
+    for metric in (metrics.mse, metrics.psnr, metrics.ssim, metrics.smape):
+        assert metric(a, b) == metric(b, a)
+    assert 0.0 <= metrics.mse(a, b) <= 1.0
+    assert metrics.psnr(a, b) >= 0.0
+    # Up to the rounding of the variances, 3 * 24 u over c2 = 9e-4, in both terms.
+    assert abs(metrics.ssim(a, b)) <= 1.0 + 4 * 3 * 24 * U64 / 9e-4
+    assert metrics.relmse(a, b) >= 0.0
+    assert 0.0 <= metrics.smape(a, b) < 1.0
+
+
+@given(IMAGES, st.floats(0.25, 1.0))
+def test_a_larger_error_is_a_worse_score(a: np.ndarray, step: float) -> None:
+    """Moving every pixel away from the reference by one common step worsens every error."""
+    for metric in (metrics.mse, metrics.relmse, metrics.smape):
+        assert metric(a + 2 * step, a) > metric(a + step, a) > metric(a, a)
+    assert metrics.psnr(a + 2 * step, a) < metrics.psnr(a + step, a)
+
+
+def test_float64_inside() -> None:
+    """A float32 sum of many small squares would lose digits; the result is that of float64 copies."""
+    a, b = picture(4, (300, 300, 3)).astype(np.float32), picture(5, (300, 300, 3)).astype(np.float32)
+    for metric in ALL:
+        assert metric(a, b) == metric(a.astype(np.float64), b.astype(np.float64))
+
+
+@pytest.mark.parametrize("metric", ALL)
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_values_that_are_not_finite_are_refused(metric: Callable[..., float], value: float) -> None:
+    """On either side, with their number."""
+    good, bad = picture(6), picture(6)
+    bad[2, 3, 1] = bad[4, 5, 2] = value
+    with pytest.raises(
+        InputError, match=rf"a value of the image is {value}: every value .* and 2 of 1173 are not"
+    ):
+        metric(bad, good)
+    with pytest.raises(InputError, match=f"a value of the reference is {value}"):
+        metric(good, bad)
+
+
+@pytest.mark.parametrize("metric", ALL)
+def test_shapes_that_do_not_match_are_refused(metric: Callable[..., float]) -> None:
+    """Nothing is broadcast silently; an empty pair has no mean."""
+    with pytest.raises(
+        InputError, match=r"shape of the images is \(17, 23, 3\) against \(17, 23, 1\): both must"
+    ):
+        metric(picture(7), picture(7)[..., :1])
+    with pytest.raises(InputError, match=r"both must have one shape, not empty"):
+        metric(np.zeros((0, 3, 3)), np.zeros((0, 3, 3)))
+
+
+@pytest.mark.parametrize("shape", [(10, 40, 3), (40, 10, 3), (40, 40)])
+def test_ssim_needs_a_whole_window(shape: tuple[int, ...]) -> None:
+    """Images smaller than 11 pixels have no window inside; two axes leave the channels open."""
+    with pytest.raises(
+        InputError, match=r"SSIM needs \(height, width, channels\) with at least 11 rows and columns"
+    ):
+        metrics.ssim(np.zeros(shape), np.zeros(shape))
+
+
+@pytest.mark.parametrize("data_range", [0.0, -1.0, math.inf, math.nan])
+@pytest.mark.parametrize("metric", [metrics.psnr, metrics.ssim])
+def test_data_range_must_be_positive(metric: Callable[..., float], data_range: float) -> None:
+    """Zero, negative, infinite and NaN."""
+    with pytest.raises(
+        InputError, match=r"data_range is .*: the distance from black to white must be positive"
+    ):
+        metric(picture(8), picture(9), data_range)

@@ -26,7 +26,7 @@ hypothesis.settings.register_profile("long", hypothesis.settings.get_profile("ci
 hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 _state_key = pytest.StashKey[dict[str, str]]()
-"""Where a run keeps `name -> "ok (device)"` or `name -> "MISSING: reason"` of each executor it has asked for."""
+"""Where a run keeps "ok (device)" or "MISSING: reason" of each executor that it has asked for, by name."""
 
 
 def required_executors() -> frozenset[str]:
@@ -48,12 +48,12 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[_state_key] = {}
 
 
-# ---- executors -----------------------------------------------------------------------------------------------
+# ---- executors ------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="session")
 def executor_named(pytestconfig: pytest.Config) -> Iterator[Callable[[str], Any]]:
-    """Give a function that opens an executor by its name in EXECUTORS, once a session, under the policy above."""
+    """Give a function that opens an executor by its name, once a session, under the policy above."""
     opened: dict[str, Any] = {}
     state = pytestconfig.stash[_state_key]
 
@@ -63,7 +63,8 @@ def executor_named(pytestconfig: pytest.Config) -> Iterator[Callable[[str], Any]
         if opened[name] is not None:
             return opened[name]
         if name in required_executors():
-            pytest.fail(f"executor {name} is required by WAMNET_REQUIRE and {state[name]}", pytrace=False)
+            way_out = "to go on without it, list what you have: make test WAMNET_REQUIRE=opencl"
+            pytest.fail(f"executor {name} is required and {state[name]}; {way_out}", pytrace=False)
         pytest.skip(f"executor {name} is {state[name]}")
 
     yield open_once
@@ -117,7 +118,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         terminalreporter.write_line(f"{name}: {text}", **colour)
 
 
-# ---- golden files --------------------------------------------------------------------------------------------
+# ---- golden files ---------------------------------------------------------------------------------------
 
 
 @pytest.fixture

@@ -1,0 +1,97 @@
+"""The repository as data for the house rules: its files, their syntax trees, and one way to refuse.
+
+A rule is one test. It lists its violations as `path:line: what` and hands them to `refuse` with one sentence
+that states the rule and the fix.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+"""The repository's root folder."""
+
+PARTS = ("refimpl", "compiler", "kernels", "cli")
+"""The folders that make up the package, in the order of imports: each may import those before it."""
+
+FOREIGN = {"out", "build", "dist", "__pycache__", "node_modules"}
+"""Folders that hold no source; so do hidden ones (but .ci and .github) and virtual environments."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """One Python file: its path relative to the root, its text and its syntax tree."""
+
+    path: str
+    text: str
+
+    @property
+    def part(self) -> str:
+        return self.path.partition("/")[0]
+
+    @cached_property
+    def lines(self) -> list[str]:
+        return self.text.splitlines()
+
+    @cached_property
+    def tree(self) -> ast.Module:
+        return ast.parse(self.text, self.path)
+
+    def functions(self) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+        """Yield every function and method, nested ones included."""
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                yield node
+
+    def at(self, node: ast.AST, what: str) -> str:
+        return f"{self.path}:{getattr(node, 'lineno', 1)}: {what}"
+
+
+@dataclass(frozen=True)
+class House:
+    """The repository: `house.python("refimpl")` gives sources, `house.files()` every path."""
+
+    root: Path
+
+    def files(self) -> Iterator[Path]:
+        """Yield every file that belongs to the project, in a fixed order."""
+        yield from _files(self.root)
+
+    def python(self, *folders: str) -> list[Source]:
+        """Return the Python files under the named folders; without a name, all."""
+        paths = [p for p in self.files() if p.suffix == ".py"]
+        sources = [Source(p.relative_to(self.root).as_posix(), p.read_text()) for p in paths]
+        return [s for s in sources if not folders or s.part in folders]
+
+    def parts(self) -> list[Source]:
+        """Return the Python files of the package."""
+        return self.python(*PARTS)
+
+    @staticmethod
+    def refuse(violations: Iterable[str], rule: str) -> None:
+        """Fail with the rule in one sentence and a line for each violation; pass when there are none."""
+        if found := list(violations):
+            pytest.fail("\n  ".join([f"{rule} ({len(found)} violations)", *found]), pytrace=False)
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for path in sorted(folder.iterdir()):
+        hidden = path.name.startswith(".") and path.name not in {".ci", ".github"}
+        if path.is_file():
+            yield path
+        elif not (
+            hidden or path.name in FOREIGN or path.suffix == ".egg-info" or (path / "pyvenv.cfg").exists()
+        ):
+            yield from _files(path)
+
+
+@pytest.fixture(scope="session")
+def house() -> House:
+    """Give the repository."""
+    return House(ROOT)

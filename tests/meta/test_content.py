@@ -1,0 +1,58 @@
+"""House rules about text: nothing in the repository depends on one machine or points outside the project."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+FORBIDDEN = {
+    "a path of one machine": r"(?<![\w.}])/(work|home|root|Users)/\w|/tmp/brief|[A-Z]:\\\\Users",
+    "a package registry's host": r"pypi\.org|pythonhosted\.org|npmjs\.(com|org)|crates\.io|/opt/pypi",
+    "a document from outside": r"\b(DESIGN|STYLE|EVIDENCE|NOTES|ANCHORS-\w+)\.md|\.\./shared",
+    "unfinished work": r"\b(TODO|FIXME|XXX|HACK)\b",
+    "a writing tool": r"(?i)\b(chatgpt|copilot|claude|gemini|language model|ai assistant|co-authored-by)\b",
+}
+"""What no file may contain: the name of the reason, and the pattern."""
+
+
+def test_no_forbidden_content(house):
+    wrong = []
+    for path in house.files():
+        if path.name == "test_content.py" or not (text := text_of(path)):
+            continue
+        for number, line in enumerate(text.splitlines(), 1):
+            reasons = [reason for reason, pattern in FORBIDDEN.items() if re.search(pattern, line)]
+            wrong += [
+                f"{path.relative_to(house.root)}:{number}: {reason}: {line.strip()[:80]}"
+                for reason in reasons
+            ]
+    house.refuse(
+        wrong,
+        "A file holds nothing of one machine, outside the project or unfinished: rewrite it.",
+    )
+
+
+def text_of(path) -> str:
+    """Return a file's text; that of a binary file is empty."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        return ""
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("cd /work/main", "a path of one machine"),
+        ("see /home/anna/x", "a path of one machine"),
+        ("framework/work/x and {out}/work/x", None),
+        ("# FIXME later", "unfinished work"),
+        ("as in ../shared/paper", "a document from outside"),
+        ("hackneyed methods", None),
+    ],
+)
+def test_the_patterns(line, reason):
+    assert [name for name, pattern in FORBIDDEN.items() if re.search(pattern, line)] == (
+        [reason] if reason else []
+    )

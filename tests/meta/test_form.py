@@ -1,0 +1,118 @@
+"""House rules about the form of the code: contracts, strings under constants, types, sizes, errors."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+import pytest
+
+MAX_FILE_LINES = 600
+MAX_FUNCTION_LINES = 60
+CONSTANT = re.compile(r"_?[A-Z][A-Z0-9_]*")
+
+BUILT_IN_ERRORS = {"Exception", "ValueError", "RuntimeError", "KeyError", "IndexError", "OSError"}
+"""What no user should meet; TypeError, AssertionError, NotImplementedError tell a caller's mistake."""
+
+
+def test_modules_open_with_their_contract(house):
+    wrong = [s.at(s.tree, "no docstring") for s in house.python() if not ast.get_docstring(s.tree)]
+    house.refuse(wrong, "A module opens with a docstring that says what it is and its steps: write it.")
+
+
+def test_constants_carry_a_string(house):
+    wrong = []
+    for source in house.parts():
+        for node, after in zip(source.tree.body, [*source.tree.body[1:], None], strict=True):
+            name = constant_name(node)
+            if name and not (isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)):
+                wrong.append(source.at(node, name))
+    house.refuse(
+        wrong, "A constant has a string under it: say its meaning, its unit and why it has this value."
+    )
+
+
+def constant_name(node: ast.stmt) -> str | None:
+    """Return the name of a module's constant that a statement defines; a type variable is none."""
+    if isinstance(node, ast.Assign) and len(node.targets) == 1:
+        target, value = node.targets[0], node.value
+    elif isinstance(node, ast.AnnAssign):
+        target, value = node.target, node.value
+    else:
+        return None
+    if isinstance(value, ast.Call) and ast.unparse(value.func).endswith(("TypeVar", "ParamSpec")):
+        return None
+    return target.id if isinstance(target, ast.Name) and CONSTANT.fullmatch(target.id) else None
+
+
+def test_public_names_are_documented(house):
+    wrong = []
+    for source in house.parts():
+        for owner in [source.tree, *(n for n in source.tree.body if isinstance(n, ast.ClassDef))]:
+            for node in owner.body:
+                named = isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_")
+                if named and not ast.get_docstring(node) and not is_declared_elsewhere(node):
+                    wrong.append(source.at(node, node.name))
+    house.refuse(wrong, "A public class or function has a docstring: say what it returns, shapes first.")
+
+
+def is_declared_elsewhere(node: ast.stmt) -> bool:
+    """Tell methods whose contract stands at another place: overloads and overrides."""
+    decorators = [ast.unparse(d) for d in getattr(node, "decorator_list", [])]
+    return any(d.endswith(("overload", "override", ".setter")) for d in decorators)
+
+
+def test_functions_are_typed(house):
+    wrong = []
+    for source in house.parts():
+        for node in source.functions():
+            a = node.args
+            arguments = [*a.posonlyargs, *a.args, *a.kwonlyargs, *filter(None, [a.vararg, a.kwarg])]
+            bare = [x.arg for x in arguments if x.annotation is None and x.arg not in {"self", "cls"}]
+            if bare or node.returns is None:
+                wrong.append(source.at(node, f"{node.name}: {', '.join(bare) or 'its result'}"))
+    house.refuse(wrong, "Every argument and result is annotated: annotations are the only place for types.")
+
+
+def test_files_are_short(house):
+    wrong = [f"{s.path}: {len(s.lines)} lines" for s in house.python() if len(s.lines) > MAX_FILE_LINES]
+    house.refuse(wrong, f"A file has at most {MAX_FILE_LINES} lines: split it by idea.")
+
+
+def test_functions_are_short(house):
+    wrong = []
+    for source in house.python():
+        for node in source.functions():
+            lines = (node.end_lineno or node.lineno) - node.lineno + 1
+            if lines > MAX_FUNCTION_LINES:
+                wrong.append(source.at(node, f"{node.name} has {lines} lines"))
+    house.refuse(wrong, f"A function has at most {MAX_FUNCTION_LINES} lines: give its paragraphs names.")
+
+
+def test_errors_come_from_one_module(house):
+    wrong = []
+    for source in house.parts():
+        nodes = list(ast.walk(source.tree))
+        caught = " ".join(ast.unparse(n.type) for n in nodes if isinstance(n, ast.ExceptHandler) and n.type)
+        for node in nodes:
+            if isinstance(node, ast.Raise) and node.exc is not None:
+                name = ast.unparse(node.exc.func if isinstance(node.exc, ast.Call) else node.exc)
+                if name in BUILT_IN_ERRORS and name not in caught:
+                    wrong.append(source.at(node, f"raise {name}"))
+    house.refuse(
+        wrong, "A user meets only errors of refimpl/errors.py: raise one of them, or catch it in its module."
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        ("A_B = 1", "A_B"),
+        ("_LIMIT_PX: int = 3", "_LIMIT_PX"),
+        ("Float = int", None),
+        ("T = TypeVar('T')", None),
+        ("a.B = 1", None),
+    ],
+)
+def test_the_rule_knows_a_constant(line, name):
+    assert constant_name(ast.parse(line).body[0]) == name

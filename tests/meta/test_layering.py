@@ -1,0 +1,133 @@
+"""House rules about imports: one direction, few dependencies, one name for each module."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+ALLOWED = {
+    "refimpl": {"numpy"},
+    "compiler": {"numpy", "safetensors"},
+    "kernels": {"numpy", "pyopencl", "pocl", "moderngl"},
+    "cli": {"numpy", "OpenEXR", "PIL", "typer", "click", "rich", "matplotlib", "jinja2"},
+}
+"""What each part may import besides the standard library; its keys are in the order of imports."""
+
+ORDER = tuple(ALLOWED)
+OUTSIDE = ("tests", "bench", "experiments", "docs")
+"""Folders that may import everything and that nothing may import."""
+
+
+def imports(source) -> Iterator[tuple[ast.AST, str]]:
+    """Yield every import, also inside functions, as an absolute dotted name."""
+    package = ["wamnet", *source.path.split("/")[:-1]]
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node, alias.name
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*base, *(node.module or "").split(".")]).strip(".")
+            for alias in node.names:
+                yield node, f"{module}.{alias.name}"
+
+
+def test_imports_go_one_way(house):
+    wrong = []
+    for source in house.parts():
+        for node, name in imports(source):
+            top, _, rest = name.partition(".")
+            target = rest.partition(".")[0]
+            if top == "wamnet" and (target not in ORDER or ORDER.index(target) > ORDER.index(source.part)):
+                wrong.append(source.at(node, f"{source.part} imports {target}"))
+    house.refuse(wrong, "Imports go refimpl <- compiler <- kernels <- cli: move the code to the later part.")
+
+
+def test_parts_import_only_what_they_may(house):
+    wrong = []
+    for source in house.parts():
+        for node, name in imports(source):
+            top = name.partition(".")[0]
+            if top not in sys.stdlib_module_names | {"wamnet"} | ALLOWED[source.part]:
+                wrong.append(source.at(node, f"{source.part} imports {top}"))
+    house.refuse(
+        wrong, "A part imports only what test_layering.py's table allows: do without, or move the code."
+    )
+
+
+def test_devices_are_used_in_kernels_only(house):
+    wrong = [
+        source.at(node, name)
+        for source in house.python()
+        if source.part not in {"kernels", "tests"}
+        for node, name in imports(source)
+        if name.partition(".")[0] in {"pyopencl", "moderngl", "pocl"}
+    ]
+    house.refuse(wrong, "Only kernels/ talks to devices: call wamnet.kernels.open_executor instead.")
+
+
+def test_no_bare_imports(house):
+    wrong = [
+        source.at(node, name)
+        for source in house.python()
+        for node, name in imports(source)
+        if name.partition(".")[0] in ORDER
+    ]
+    house.refuse(
+        wrong, "A bare import makes a second copy of a module: import wamnet.refimpl, or relatively inside."
+    )
+
+
+def test_imports_inside_are_relative(house):
+    wrong = [
+        source.at(node, "absolute import of wamnet")
+        for source in house.parts()
+        for node in ast.walk(source.tree)
+        if (isinstance(node, ast.ImportFrom) and not node.level and (node.module or "").startswith("wamnet"))
+        or (isinstance(node, ast.Import) and any(alias.name.startswith("wamnet") for alias in node.names))
+    ]
+    house.refuse(
+        wrong,
+        "Inside the package imports are relative, so that they match the folders: from ..refimpl import x.",
+    )
+
+
+def test_nobody_imports_what_is_outside(house):
+    wrong = [
+        source.at(node, name)
+        for source in house.python()
+        for node, name in imports(source)
+        if name.partition(".")[0] in OUTSIDE
+    ]
+    house.refuse(
+        wrong, "Nothing imports tests, bench, experiments or docs: move what is shared into the package."
+    )
+
+
+def test_no_hidden_random_state(house):
+    wrong = [
+        source.at(node, ast.unparse(node))
+        for source in house.parts()
+        for node in ast.walk(source.tree)
+        if isinstance(node, ast.Attribute) and ast.unparse(node) in {"np.random", "numpy.random"}
+    ]
+    house.refuse(
+        wrong, "No function owns a random generator: take random numbers as arguments, from refimpl/rng.py."
+    )
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "names"),
+    [
+        ("compiler/passes/fold.py", "from .. import ir", ["wamnet.compiler.ir"]),
+        ("compiler/passes/fold.py", "from ...refimpl.siren import forward", ["wamnet.refimpl.siren.forward"]),
+        ("cli/main.py", "def f():\n    import os.path, typer", ["os.path", "typer"]),
+        ("kernels/__init__.py", "from .registry import open", ["wamnet.kernels.registry.open"]),
+    ],
+)
+def test_the_rules_see_every_form_of_import(house, path, text, names):
+    source = type(house.python("refimpl")[0])(path, text)
+    assert [name for _, name in imports(source)] == names

@@ -1,0 +1,109 @@
+"""House rules about the spec: a clause has one number and names code that exists; a module has a chapter."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+CLAUSE = re.compile(r"^\*\*([A-Z0-9]+-\d+[a-z]?)\*\*", re.MULTILINE)
+"""A clause opens a paragraph with its number, as **RNG-1**."""
+
+CODE = re.compile(r"`((?:refimpl|compiler|kernels|cli)/[\w/]+\.py): *([\w., ]+)`")
+"""Code is named by path and names: `refimpl/rng.py: pcg4d`; several names are separated by commas."""
+
+REFERENCE = re.compile(r"\b([A-Z]{2,5}-\d+[a-z]?)\b")
+"""A mention of a clause, in the spec or in the code."""
+
+NO_CHAPTER = {"__init__", "errors"}
+"""Modules of refimpl without a chapter: the first holds nothing, the second only the form of messages."""
+
+
+class Clause(NamedTuple):
+    """A numbered paragraph of the spec: where it is, and the text up to the next clause or heading."""
+
+    where: str
+    number: str
+    text: str
+
+
+def clauses(house) -> Iterator[Clause]:
+    for path in sorted((house.root / "spec").glob("*.md")):
+        text = path.read_text()
+        starts = list(CLAUSE.finditer(text))
+        for match, after in zip(starts, [*starts[1:], None], strict=True):
+            line = text.count("\n", 0, match.start()) + 1
+            body = text[match.end() : after.start() if after else len(text)]
+            yield Clause(f"spec/{path.name}:{line}", match[1], body)
+
+
+def defined_names(house, path: str) -> set[str]:
+    """Return what a module defines: functions, classes, `Class.member` and constants."""
+    tree = ast.parse((house.root / path).read_text())
+    names = set()
+    for node in tree.body:
+        names |= set(names_of(node))
+        if isinstance(node, ast.ClassDef):
+            names |= {f"{node.name}.{name}" for member in node.body for name in names_of(member)}
+    return names
+
+
+def names_of(node: ast.stmt) -> list[str]:
+    if isinstance(node, ast.FunctionDef | ast.ClassDef):
+        return [node.name]
+    targets = (
+        node.targets
+        if isinstance(node, ast.Assign)
+        else [node.target]
+        if isinstance(node, ast.AnnAssign)
+        else []
+    )
+    return [target.id for target in targets if isinstance(target, ast.Name)]
+
+
+def test_clause_numbers_are_unique(house):
+    seen: dict[str, str] = {}
+    wrong = []
+    for clause in clauses(house):
+        if clause.number in seen:
+            wrong.append(f"{clause.where}: {clause.number} is also at {seen[clause.number]}")
+        seen[clause.number] = clause.where
+    house.refuse(wrong, "A clause's number is used once: give the later one the next free number.")
+
+
+def test_clauses_name_code(house):
+    wrong = [f"{c.where}: {c.number}" for c in clauses(house) if not CODE.search(c.text)]
+    house.refuse(
+        wrong, "A clause names the code that it governs: add (`refimpl/rng.py: pcg4d`), or remove the clause."
+    )
+
+
+def test_named_code_exists(house):
+    wrong = []
+    for chapter in sorted((house.root / "spec").glob("*.md")):
+        for path, names in CODE.findall(chapter.read_text()):
+            if not (house.root / path).exists():
+                wrong.append(f"spec/{chapter.name}: {path} does not exist")
+                continue
+            missing = {n.strip() for n in names.split(",")} - defined_names(house, path)
+            wrong += [f"spec/{chapter.name}: {path} has no {name}" for name in sorted(missing)]
+    house.refuse(wrong, "Code that the spec names exists: correct the name in the spec.")
+
+
+def test_mentioned_clauses_exist(house):
+    known = {c.number for c in clauses(house)}
+    prefixes = {number.partition("-")[0] for number in known}
+    wrong = []
+    for path in [*sorted((house.root / "spec").glob("*.md")), *(house.root / s.path for s in house.python())]:
+        unknown = set(REFERENCE.findall(path.read_text())) - known
+        dangling = sorted(n for n in unknown if n.partition("-")[0] in prefixes)
+        wrong += [f"{path.relative_to(house.root)}: {number}" for number in dangling]
+    house.refuse(wrong, "A clause that is mentioned exists: correct the number.")
+
+
+def test_every_reference_module_has_a_chapter(house):
+    stems = {Path(source.path).stem for source in house.python("refimpl")} - NO_CHAPTER
+    wrong = [f"refimpl/{stem}.py" for stem in sorted(stems) if not (house.root / f"spec/{stem}.md").exists()]
+    house.refuse(wrong, "A module of refimpl has a chapter of the same stem in spec/: write it.")

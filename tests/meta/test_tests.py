@@ -1,0 +1,144 @@
+"""House rules about tests: they can fail, say how exact they are, and do not depend on speed."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+import pytest
+
+CLOCK = re.compile(r"\b(perf_counter|monotonic|process_time|time\.time|seconds\w*|elapsed\w*)\b")
+"""What an asserted time is made of."""
+
+TOLERANCE_BELOW = 0.05
+"""A literal float between 0 and this on the bounding side is a tolerance; larger ones are values."""
+
+
+def comparisons(source):
+    """Yield (assert statement, comparison) of all asserts."""
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.Assert):
+            for part in ast.walk(node.test):
+                if isinstance(part, ast.Compare):
+                    yield node, part
+
+
+def orders(compare: ast.Compare) -> bool:
+    return any(isinstance(op, ast.Lt | ast.LtE | ast.Gt | ast.GtE) for op in compare.ops)
+
+
+def test_no_asserted_times(house):
+    wrong = [
+        source.at(node, ast.unparse(compare))
+        for source in house.python("tests", "bench")
+        for node, compare in comparisons(source)
+        if orders(compare) and asserts_a_time(compare)
+    ]
+    house.refuse(wrong, "No test asserts a wall-clock time: measure it in bench/ and report it.")
+
+
+def asserts_a_time(compare: ast.Compare) -> bool:
+    """Tell whether a clock's value is compared with something other than 0."""
+    sides = [ast.unparse(side) for side in [compare.left, *compare.comparators]]
+    return any(CLOCK.search(side) for side in sides) and not any(side in {"0", "0.0"} for side in sides)
+
+
+def test_literal_tolerances_are_derived(house):
+    wrong = []
+    for source in house.python("tests"):
+        explained = [f for f in source.functions() if re.search(r"\d", ast.get_docstring(f) or "")]
+        for node, compare in comparisons(source):
+            beside = source.lines[node.lineno - 2 : node.end_lineno]
+            in_docstring = any(f.lineno <= node.lineno <= (f.end_lineno or 0) for f in explained)
+            if has_tolerance(compare) and not in_docstring and not any("#" in line for line in beside):
+                wrong.append(source.at(node, ast.unparse(compare)))
+    house.refuse(
+        wrong, "A literal tolerance has its derivation beside it: compute it, or say in a comment why."
+    )
+
+
+def has_tolerance(compare: ast.Compare) -> bool:
+    """Tell whether the bounding side of an ordering has a small literal float."""
+    bounds = []
+    for op, left, right in zip(
+        compare.ops, [compare.left, *compare.comparators], compare.comparators, strict=False
+    ):
+        bounds += (
+            [right]
+            if isinstance(op, ast.Lt | ast.LtE)
+            else [left]
+            if isinstance(op, ast.Gt | ast.GtE)
+            else []
+        )
+    constants = [n.value for bound in bounds for n in ast.walk(bound) if isinstance(n, ast.Constant)]
+    return any(isinstance(value, float) and 0.0 < abs(value) < TOLERANCE_BELOW for value in constants)
+
+
+def test_tolerances_are_not_left_to_defaults(house):
+    wrong = [
+        source.at(node, ast.unparse(node.func))
+        for source in house.python("tests")
+        for node in ast.walk(source.tree)
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func).rpartition(".")[2] in {"approx", "allclose", "isclose", "assert_allclose"}
+        and not {k.arg for k in node.keywords} & {"abs", "rel", "atol", "rtol", "abs_tol", "rel_tol"}
+    ]
+    house.refuse(wrong, "A tolerance is stated: write assert abs(a - b) <= bound with a derived bound.")
+
+
+def test_comparisons_fail_on_nan(house):
+    wrong = [
+        source.at(node, ast.unparse(node))
+        for source in house.python("tests")
+        for node in ast.walk(source.tree)
+        if isinstance(node, ast.Assert)
+        and isinstance(node.test, ast.UnaryOp)
+        and isinstance(node.test.op, ast.Not)
+        and isinstance(node.test.operand, ast.Compare)
+        and orders(node.test.operand)
+    ]
+    house.refuse(wrong, "NaN fails: write assert err <= bound in place of assert not err > bound.")
+
+
+def test_refusals_are_matched(house):
+    wrong = [
+        source.at(node, ast.unparse(node))
+        for source in house.python("tests")
+        for node in ast.walk(source.tree)
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func) == "pytest.raises"
+        and "match" not in {k.arg for k in node.keywords}
+        and ast.unparse(node.args[0]) not in {"SystemExit", "KeyboardInterrupt"}
+    ]
+    house.refuse(wrong, "A test of an error checks its sentence: pytest.raises(InputError, match=...).")
+
+
+def test_nothing_is_printed_in_place_of_asserted(house):
+    wrong = []
+    for source in house.python("tests"):
+        for function in source.functions():
+            text = ast.unparse(function)
+            checks = re.search(
+                r"\bassert\b|\braises\(|\bwarns\(|refuse\(|\bfail\(|check\w*\(|assert_\w+\(|golden\(", text
+            )
+            if function.name.startswith("test_") and not checks:
+                wrong.append(source.at(function, function.name))
+    house.refuse(wrong, "A test asserts something: a test that cannot fail is removed or completed.")
+
+
+@pytest.mark.parametrize(
+    ("line", "tolerance", "time"),
+    [
+        ("a <= 1e-6", True, False),
+        ("1e-6 > a", True, False),
+        ("a <= 3 * U64", False, False),
+        ("1e-3 <= a", False, False),
+        ("p >= 0.5", False, False),
+        ("seconds < 5", False, True),
+        ("result.seconds_run > 0", False, False),
+        ("time.perf_counter() - start < 2", False, True),
+    ],
+)
+def test_the_rules_know_tolerances_and_times(line, tolerance, time):
+    compare = ast.parse(line).body[0].value
+    assert (has_tolerance(compare), asserts_a_time(compare)) == (tolerance, time)

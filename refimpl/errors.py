@@ -7,7 +7,7 @@ Programs catch [`WamnetError`]; the command line prints its text and exits with 
 from __future__ import annotations
 
 _SHOWN_CHARACTERS = 120
-"""Longest piece of an offending value that a message repeats, in characters: one terminal line, not a dump."""
+"""Longest piece of an offending value that a message repeats, in characters: a line, not a dump."""
 
 
 class WamnetError(Exception):

@@ -3,11 +3,11 @@
 1. Four 32-bit counters name a block of random numbers: the run's seed, the pixel, the sample within the
    pixel and the block along the path [`random_block`].
 2. PCG4D mixes them [`pcg4d`]: Jarzynski and Olano, "Hash Functions for GPU Rendering", Journal of Computer
-   Graphics Techniques 9(3), 2020. It needs only 32-bit multiplication, addition, shift and exclusive or, which
-   all shading languages have with the same result, and it has no state, so lanes, tiles and processes may
-   work in any order.
-3. The upper 24 bits of a word become a float in [0, 1) [`uniform_floats`]: every float32 of the form n / 2**24 is
-   exact, so float32 and float64 see the same number.
+   Graphics Techniques 9(3), 2020. It needs only 32-bit multiplication, addition, shift and exclusive or,
+   which all shading languages have with the same result, and it has no state, so lanes, tiles and processes
+   may work in any order.
+3. The upper 24 bits of a word become a float in [0, 1) [`uniform_floats`]: every float32 of the form n /
+   2**24 is exact, so float32 and float64 see the same number.
 
 No function in this project owns a generator: random numbers are arguments.
 """
@@ -66,9 +66,8 @@ def random_block(seed: Any, pixel: Any, sample: Any, block: Any) -> Block:
 
 
 def uniform_floats(bits: Any, dtype: DTypeLike = np.float32) -> Any:
-    """Turn uint32 words (...) into floats n / 2**24 in [0, 1), exact in every float type of 24 bits or more."""
-    kind = np.dtype(dtype).type
-    return (bits >> np.uint32(32 - MANTISSA_BITS)).astype(kind) * kind(2.0**-MANTISSA_BITS)
+    """Turn uint32 words (...) into floats n / 2**24 in [0, 1), exact in float32 and float64."""
+    return (bits >> np.uint32(32 - MANTISSA_BITS)).astype(dtype) * 2.0**-MANTISSA_BITS
 
 
 def uniforms(seed: Any, pixel: Any, sample: Any, block: Any, dtype: DTypeLike = np.float32) -> Block:
@@ -83,5 +82,5 @@ def uniforms(seed: Any, pixel: Any, sample: Any, block: Any, dtype: DTypeLike = 
 
 
 def counter(values: Any) -> Uint32:
-    """Return integers as uint32 counters, modulo 2**32; an array of at least one axis, whose overflow is silent."""
+    """Return integers as uint32 counters, modulo 2**32: an array, since NumPy warns of a scalar's overflow."""
     return np.atleast_1d(np.asarray(np.asarray(values, dtype=np.int64) & 0xFFFFFFFF, dtype=np.uint32))

@@ -1,8 +1,9 @@
 """Sampling of the distributions that light transport needs, each as three functions.
 
-For a distribution X: `sample_x(u, ...)` maps uniform numbers in [0, 1) to a sample, `x_pdf(...)` is the density of
-that sample, `invert_x_sample(...)` gives the uniform numbers back. The triad is pbrt's habit (Pharr, Jakob and
-Humphreys, "Physically Based Rendering", 4th edition, appendix A). Random numbers are arguments.
+For a distribution X: `sample_x(u, ...)` maps uniform numbers in [0, 1) to a sample, `x_pdf(...)` is the
+density of that sample, `invert_x_sample(...)` gives the uniform numbers back. The triad is pbrt's habit
+(Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition, appendix A). Random numbers are
+arguments.
 
 1. concentric disk: Shirley and Chiu, "A Low Distortion Map Between Disk and Square", 1997.
 2. cosine hemisphere: Malley's method, the disk lifted to the hemisphere around +z; density cos(theta) / pi.
@@ -47,7 +48,8 @@ def invert_concentric_disk_sample(x: Any, y: Any) -> tuple[Any, Any]:
     # The wedge around the x axis holds |y| < |x|; radius and angle are measured from its signed axis.
     around_x = np.abs(x) > np.abs(y)
     axis, other = np.where(around_x, x, y), np.where(around_x, y, x)
-    radius = np.where(axis < 0.0, -1.0, 1.0) * np.sqrt(x * x + y * y)
+    length = np.sqrt(x * x + y * y)
+    radius = np.where(axis < 0.0, -length, length)
     ratio = np.arctan(other / np.where(axis == 0.0, _TINY, axis)) * (4.0 / np.pi)
     a = np.where(around_x, radius, ratio * radius)
     b = np.where(around_x, ratio * radius, radius)
@@ -71,7 +73,7 @@ def invert_cosine_hemisphere_sample(wi: Any) -> tuple[Any, Any]:
 
 
 def sample_quad(u0: Any, u1: Any, corner: Any, edge_u: Any, edge_v: Any) -> Any:
-    """Map u0, u1 (...) to points (..., 3) of the parallelogram corner + u0 edge_u + u1 edge_v, uniform in area."""
+    """Map u0, u1 (...) to points (..., 3) corner + u0 edge_u + u1 edge_v, uniform in area."""
     return corner + vectors.scale(edge_u, u0) + vectors.scale(edge_v, u1)
 
 
@@ -108,7 +110,7 @@ def discrete_pdf(index: Any, cumulative: Any) -> Any:
 
 
 def invert_discrete_sample(index: Any, cumulative: Any) -> Any:
-    """Return the middle (...) of the interval of uniform numbers that [`sample_discrete`] maps to index (...)."""
+    """Return the middle (...) of the uniform numbers that [`sample_discrete`] maps to index (...)."""
     upper = np.take(cumulative, index)
     return upper - 0.5 * discrete_pdf(index, cumulative)
 
@@ -116,8 +118,8 @@ def invert_discrete_sample(index: Any, cumulative: Any) -> Any:
 def tangent_frame(normal: Any) -> tuple[Any, Any]:
     """Return two unit tangents (..., 3) that form a right-handed frame with the unit normal (..., 3).
 
-    Duff et al., "Building an Orthonormal Basis, Revisited", Journal of Computer Graphics Techniques 6(1), 2017:
-    no branch, and no loss of accuracy near the pole.
+    Duff et al., "Building an Orthonormal Basis, Revisited", Journal of Computer Graphics Techniques 6(1),
+    2017: no branch, and no loss of accuracy near the pole.
     """
     x, y, z = normal[..., 0], normal[..., 1], normal[..., 2]
     sign = np.where(z < 0.0, -np.ones_like(z), np.ones_like(z))

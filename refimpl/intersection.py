@@ -1,0 +1,431 @@
+"""Rays against the scene's primitives: closed formulas, one function per kind, all lanes at once.
+
+1. [`build`] lays the scene out as constants of one float type [`Geometry`]: boxes are grouped by the rotation
+   that they share, so that a ray is turned once per group, and every surface gets a number (*surface id*).
+2. [`closest_hit`] asks each primitive for the distance along the ray [`room_distance`, `box_distance`,
+   `sphere_distance`, `quad_distance`] and keeps the least positive one with its id.
+3. [`surface_at`] evaluates the winner once more for its normal, and looks its material up by id.
+4. [`occluded`] is the shadow ray's question: does anything stand between two points?
+5. [`spawn_origin`] lifts an origin off its surface, by an amount that follows the rounding error of a hit.
+
+Sources: slabs, Kay and Kajiya 1986, in the centre and half-extent form; sphere, Haines et al., "Precision
+Improvements for Ray/Sphere Intersection", Ray Tracing Gems, 2019 (no cancellation for far or large spheres).
+
+Hard cases and their rules. A component of the direction that is (nearly) zero is replaced by
+[`LEAST_COMPONENT`], so there is no 0 * infinity. Coincident faces: the primitive listed first wins, since a
+later one must be strictly closer. A ray that starts inside a box or sphere meets it from inside. Normals
+always face the ray's origin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from . import vectors
+from .scene import BLACK, IDENTITY, WALLS, Box, Light, Quad, Scene, Sphere, Vector
+
+MISS = 1e30
+"""Distance of a ray that hits nothing, in scene units; finite, so that no executor needs infinities."""
+
+LEAST_COMPONENT = 1e-15
+"""Least magnitude of a direction's component in a slab test, and of a cosine in a plane test. Over any
+distance below 1e8 scene units the ray is moved by less than float32 can tell."""
+
+SPAWN_OFFSET = 64 * 2.0**-24
+"""Offset of a spawned ray's origin along the normal, relative to the size of the numbers involved. A hit
+point carries a rounding error of about 10 units of 2**-24 (distance, product, sum, and a rotation there and
+back); 64 leaves a margin and is still far below what can be seen. The same in float64, so that both types
+trace the same paths."""
+
+
+@dataclass(frozen=True)
+class BoxGroup:
+    """Boxes that share rotation (3, 3); per box: center in rotated axes (3,), half extent (3,)."""
+
+    rotation: Any
+    rotated: bool
+    first_id: int
+    centers: tuple[Any, ...]
+    half_extents: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A scene as constants of one float type. S surfaces have the ids 0 .. S-1; S itself means "nothing".
+
+    Tables have a row per id (and a last row for "nothing"): reflectance and emission (S+1, 3), light (S+1,)
+    the light's index or -1. Quads and lights: corner, the two dual edges and the unit normal, (3,) each.
+    """
+
+    dtype: Any
+    room: tuple[Any, Any] | None
+    room_id: int
+    groups: tuple[BoxGroup, ...]
+    spheres: tuple[tuple[Any, Any], ...]
+    sphere_id: int
+    quads: tuple[tuple[Any, Any, Any, Any], ...]
+    quad_id: int
+    reflectance: Any
+    emission: Any
+    one_sided: Any
+    light: Any
+    background: Any
+
+    @property
+    def nothing(self) -> int:
+        """The surface id of a ray that hits nothing."""
+        return len(self.light) - 1
+
+
+class Hit(NamedTuple):
+    """Where rays meet the scene: distance t (...) (or [`MISS`]) and surface id (...)."""
+
+    t: Any
+    surface: Any
+
+
+class Surface(NamedTuple):
+    """Facts about hits: point, normal, reflectance, emission (..., 3) and light index (...)."""
+
+    point: Any
+    normal: Any
+    reflectance: Any
+    emission: Any
+    light: Any
+
+
+# -----------------------------------------------------------------------------------------------------------
+# Layout
+
+
+def build(scene: Scene, dtype: DTypeLike = np.float32) -> Geometry:
+    """Return the scene's geometry as constants; computed in float64 and then rounded to dtype."""
+    walls = len(WALLS) if scene.room is not None else 0
+    boxes = sorted(scene.boxes, key=lambda box: _rotations(scene).index(box.rotation))
+    sphere_id = walls + len(boxes)
+    quad_id = sphere_id + len(scene.spheres)
+    quads: tuple[Quad | Light, ...] = scene.quads + scene.lights
+    rows = _material_rows(scene, boxes)
+    light = [-1] * (quad_id + len(scene.quads)) + list(range(len(scene.lights))) + [-1]
+
+    def constant(value: Any) -> NDArray[Any]:
+        return np.asarray(value, dtype)
+
+    return Geometry(
+        dtype=np.dtype(dtype),
+        room=None if scene.room is None else (constant(scene.room.low), constant(scene.room.high)),
+        room_id=0,
+        groups=_box_groups(scene, walls, constant),
+        spheres=tuple((constant(s.center), constant(s.radius)) for s in scene.spheres),
+        sphere_id=sphere_id,
+        quads=tuple(tuple(map(constant, _quad_constants(q))) for q in quads),  # type: ignore[misc]
+        quad_id=quad_id,
+        reflectance=constant([r for r, _ in rows]),
+        emission=constant([e for _, e in rows]),
+        one_sided=np.array(light) >= 0,
+        light=np.array(light, np.int32),
+        background=constant(scene.background),
+    )
+
+
+def _rotations(scene: Scene) -> list[Any]:
+    """Return the different rotations of the scene's boxes, in order of first use."""
+    return list(dict.fromkeys(box.rotation for box in scene.boxes))
+
+
+def _box_groups(scene: Scene, first_id: int, constant: Any) -> tuple[BoxGroup, ...]:
+    """Group the boxes by rotation, and turn their centres into the rotated axes."""
+    groups = []
+    for rotation in _rotations(scene):
+        members: list[Box] = [box for box in scene.boxes if box.rotation == rotation]
+        matrix = np.array(rotation, np.float64)
+        groups.append(
+            BoxGroup(
+                rotation=constant(matrix),
+                rotated=rotation != IDENTITY,
+                first_id=first_id,
+                centers=tuple(constant(matrix @ np.array(box.center)) for box in members),
+                half_extents=tuple(constant(box.half_extent) for box in members),
+            )
+        )
+        first_id += len(members)
+    return tuple(groups)
+
+
+def _quad_constants(quad: Quad | Light) -> tuple[Any, Any, Any, Any]:
+    """Return corner, dual edges and unit normal: (p - corner) . dual is p's coordinate along the edge."""
+    u, v = np.array(quad.edge_u, np.float64), np.array(quad.edge_v, np.float64)
+    normal = vectors.cross(u, v)
+    square = vectors.dot(normal, normal)
+    dual_u, dual_v = vectors.cross(v, normal) / square, vectors.cross(normal, u) / square
+    return np.array(quad.corner, np.float64), dual_u, dual_v, normal / np.sqrt(square)
+
+
+def _material_rows(scene: Scene, boxes: list[Box]) -> list[tuple[Vector, Vector]]:
+    """Return (reflectance, emission) of each surface in the order of ids; the last row is the background."""
+    rows: list[tuple[Vector, Vector]] = []
+    if scene.room is not None:
+        rows += [(reflectance, scene.room.emission) for reflectance in scene.room.reflectances]
+    parts: tuple[Box | Sphere | Quad, ...] = (*boxes, *scene.spheres, *scene.quads)
+    rows += [(part.reflectance, part.emission) for part in parts]
+    rows += [(BLACK, light_radiance(light)) for light in scene.lights]
+    return [*rows, (BLACK, scene.background)]
+
+
+def light_radiance(light: Light) -> Vector:
+    """Return the radiance per channel, W / (sr m^2), that a light emits: power color / (pi area)."""
+    area = 1.0 / quad_area_pdf(light)
+    red, green, blue = (light.power * c / (np.pi * area) for c in light.color)
+    return red, green, blue
+
+
+def quad_area_pdf(quad: Quad | Light) -> float:
+    """Return 1 / area of a quad."""
+    normal = np.cross(np.array(quad.edge_u, np.float64), np.array(quad.edge_v, np.float64))
+    return float(1.0 / np.sqrt(normal @ normal))
+
+
+# -----------------------------------------------------------------------------------------------------------
+# One primitive
+
+
+def slabs(center: Any, half_extent: Any, origin: Any, inverse: Any) -> tuple[Any, Any]:
+    """Return the distances (..., 3) at which rays enter and leave the three slabs of a box.
+
+    origin and inverse (1 / direction) are (..., 3), in the box's axes.
+    """
+    middle, half = (center - origin) * inverse, half_extent * np.abs(inverse)
+    return middle - half, middle + half
+
+
+def box_distance(enter: Any, leave: Any) -> Any:
+    """Return the distance (...) at which rays meet a box, given [`slabs`]; from inside, that of the exit."""
+    t_near, t_far = vectors.largest(enter), vectors.smallest(leave)
+    return np.where((t_near <= t_far) & (t_far > 0.0), np.where(t_near > 0.0, t_near, t_far), MISS)
+
+
+def room_distance(enter: Any, leave: Any) -> Any:
+    """Return the distance (...) at which rays leave a room; the near walls are not there."""
+    t_near, t_far = vectors.largest(enter), vectors.smallest(leave)
+    return np.where((t_near <= t_far) & (t_far > 0.0), t_far, MISS)
+
+
+def sphere_distance(center: Any, radius: Any, origin: Any, direction: Any) -> Any:
+    """Return the distance (...) at which rays meet a sphere; from inside, that of the exit."""
+    f = origin - center
+    b = -vectors.dot(f, direction)
+    # The discriminant, from the point of the ray that is nearest to the centre.
+    nearest = f + vectors.scale(direction, b)
+    discriminant = radius * radius - vectors.dot(nearest, nearest)
+    root = np.sqrt(np.maximum(discriminant, 0.0))
+    # Add numbers of the same sign for one root; the other follows from their product.
+    q = b + np.where(b < 0.0, -root, root)
+    other = (vectors.dot(f, f) - radius * radius) / np.where(q == 0.0, LEAST_COMPONENT, q)
+    t_near, t_far = np.minimum(q, other), np.maximum(q, other)
+    return np.where((discriminant > 0.0) & (t_far > 0.0), np.where(t_near > 0.0, t_near, t_far), MISS)
+
+
+def quad_distance(quad: tuple[Any, Any, Any, Any], origin: Any, direction: Any) -> Any:
+    """Return the distance (...) at which rays meet a quad (corner, dual edges, normal) from either side."""
+    corner, dual_u, dual_v, normal = quad
+    t = vectors.dot(corner - origin, normal) / _away_from_zero(vectors.dot(direction, normal))
+    offset = origin + vectors.scale(direction, t) - corner
+    a, b = vectors.dot(offset, dual_u), vectors.dot(offset, dual_v)
+    return np.where((t > 0.0) & (a >= 0.0) & (a <= 1.0) & (b >= 0.0) & (b <= 1.0), t, MISS)
+
+
+def _away_from_zero(x: Any) -> Any:
+    """Return x (...) with its magnitude raised to [`LEAST_COMPONENT`] where it is smaller."""
+    return np.where(np.abs(x) < LEAST_COMPONENT, np.where(x < 0.0, -LEAST_COMPONENT, LEAST_COMPONENT), x)
+
+
+def _inverse(direction: Any) -> Any:
+    """Return 1 / direction (..., 3), finite for rays that are parallel to an axis."""
+    return np.reciprocal(_away_from_zero(direction))
+
+
+# -----------------------------------------------------------------------------------------------------------
+# The scene
+
+
+def closest_hit(geometry: Geometry, origin: Any, direction: Any) -> Hit:
+    """Return the nearest surface that rays (origin, unit direction; (..., 3)) meet; of equals the first."""
+    t = np.full_like(direction[..., 0], MISS)
+    surface = np.full_like(direction[..., 0], geometry.nothing, dtype=np.int32)
+    for t_new, surface_new in _distances(geometry, origin, direction):
+        surface = np.where(t_new < t, np.int32(surface_new), surface)
+        t = np.minimum(t, t_new)
+    if geometry.room is not None:
+        surface = np.where(surface == geometry.room_id, _wall(geometry, origin, direction), surface)
+    return Hit(t, surface)
+
+
+def occluded(geometry: Geometry, origin: Any, direction: Any, t_max: Any) -> Any:
+    """Tell (...) whether rays meet anything nearer than t_max (...)."""
+    t = np.full_like(direction[..., 0], MISS)
+    for t_new, _ in _distances(geometry, origin, direction):
+        t = np.minimum(t, t_new)
+    return t < t_max
+
+
+def _distances(geometry: Geometry, origin: Any, direction: Any) -> Iterator[tuple[Any, int]]:
+    """Yield each primitive's distance (...) along the rays and its id; a room has that of its first wall."""
+    if geometry.room is not None:
+        yield room_distance(*_room_slabs(geometry, origin, direction)), geometry.room_id
+    for group in geometry.groups:
+        local_origin, local_direction = _into_group(group, origin, direction)
+        inverse = _inverse(local_direction)
+        for i, (center, half_extent) in enumerate(zip(group.centers, group.half_extents, strict=True)):
+            yield box_distance(*slabs(center, half_extent, local_origin, inverse)), group.first_id + i
+    for i, (center, radius) in enumerate(geometry.spheres):
+        yield sphere_distance(center, radius, origin, direction), geometry.sphere_id + i
+    for i, quad in enumerate(geometry.quads):
+        yield quad_distance(quad, origin, direction), geometry.quad_id + i
+
+
+def _room_slabs(geometry: Geometry, origin: Any, direction: Any) -> tuple[Any, Any]:
+    """Return the slab distances of the room."""
+    assert geometry.room is not None
+    low, high = geometry.room
+    return slabs(0.5 * (low + high), 0.5 * (high - low), origin, _inverse(direction))
+
+
+def _wall(geometry: Geometry, origin: Any, direction: Any) -> Any:
+    """Return the id (...) of the wall through which rays leave the room: the axis whose slab ends first."""
+    _, leave = _room_slabs(geometry, origin, direction)
+    x_id, y_id, z_id = (
+        np.where(
+            direction[..., i] > 0.0,
+            np.int32(geometry.room_id + 2 * i + 1),
+            np.int32(geometry.room_id + 2 * i),
+        )
+        for i in range(3)
+    )
+    leaves_x, leaves_y = _least_axis(leave)
+    return np.where(leaves_x, x_id, np.where(leaves_y, y_id, z_id))
+
+
+def _least_axis(a: Any) -> tuple[Any, Any]:
+    """Tell (...) whether x, and if not whether y, is the least component of a (..., 3)."""
+    return (a[..., 0] <= a[..., 1]) & (a[..., 0] <= a[..., 2]), a[..., 1] <= a[..., 2]
+
+
+def _into_group(group: BoxGroup, origin: Any, direction: Any) -> tuple[Any, Any]:
+    """Return rays in the axes of a group of boxes."""
+    if not group.rotated:
+        return origin, direction
+    return vectors.rotate(group.rotation, origin), vectors.rotate(group.rotation, direction)
+
+
+def spawn_origin(point: Any, normal: Any, t: Any) -> Any:
+    """Return the origin (..., 3) of a ray that leaves a surface on the side of its normal.
+
+    point is origin + t direction of the ray that arrived: its error grows with its coordinates and with t
+    (...).
+    """
+    size = vectors.largest(np.abs(point)) + t
+    return point + vectors.scale(normal, SPAWN_OFFSET * size)
+
+
+# -----------------------------------------------------------------------------------------------------------
+# The surface at a hit
+
+
+def surface_at(geometry: Geometry, hit: Hit, origin: Any, direction: Any) -> Surface:
+    """Return point, normal and material of hits; for misses the background as emission, and zeros."""
+    found = hit.surface < geometry.nothing
+    t = np.where(found, hit.t, 0.0)
+    point = choose_or_zero(found, origin + vectors.scale(direction, t))
+    normal = choose_or_zero(found, _normal(geometry, hit, point, origin, direction))
+    emission = _look_up(geometry.emission, hit.surface)
+    # Lights are black behind.
+    light = np.take(geometry.light, hit.surface)
+    if geometry.quads:
+        front = _look_up(_quad_normals(geometry), hit.surface)
+        behind = np.take(geometry.one_sided, hit.surface) & (vectors.dot(front, direction) > 0.0)
+        emission = vectors.choose(behind, 0.0, emission)
+    return Surface(point, normal, _look_up(geometry.reflectance, hit.surface), emission, light)
+
+
+def choose_or_zero(condition: Any, a: Any) -> Any:
+    """Return vectors a (..., 3) where condition (...) holds, else zero."""
+    return vectors.choose(condition, a, 0.0)
+
+
+def _look_up(table: Any, index: Any) -> Any:
+    """Return the rows (..., 3) of a constant table (K, 3) at index (...)."""
+    return vectors.vector(*(np.take(table[:, i], index) for i in range(3)))
+
+
+def _quad_normals(geometry: Geometry) -> Any:
+    """Return the table (S+1, 3) of the quads' own normals; zero for other surfaces."""
+    table = np.zeros((geometry.nothing + 1, 3), geometry.dtype)
+    for i, quad in enumerate(geometry.quads):
+        table[geometry.quad_id + i] = quad[3]
+    return table
+
+
+def _normal(geometry: Geometry, hit: Hit, point: Any, origin: Any, direction: Any) -> Any:
+    """Return the unit normals (..., 3), facing the rays' origins, from the kinds that the scene has."""
+    normal = 0.0 * direction
+    if geometry.room is not None:
+        _, leave = _room_slabs(geometry, origin, direction)
+        normal = _axis_normal(*_least_axis(leave), direction)
+    for group in geometry.groups:
+        inside = (hit.surface >= group.first_id) & (hit.surface < group.first_id + len(group.centers))
+        normal = vectors.choose(inside, _box_normal(group, hit, origin, direction), normal)
+    if geometry.spheres:
+        inside = (hit.surface >= geometry.sphere_id) & (hit.surface < geometry.quad_id)
+        normal = vectors.choose(inside, _sphere_normal(geometry, hit, point, direction), normal)
+    if geometry.quads:
+        inside = (hit.surface >= geometry.quad_id) & (hit.surface < geometry.nothing)
+        front = _look_up(_quad_normals(geometry), hit.surface)
+        normal = vectors.choose(inside, _facing(front, direction), normal)
+    return normal
+
+
+def _facing(normal: Any, direction: Any) -> Any:
+    """Turn normals (..., 3) against the directions (..., 3) of the rays that meet them."""
+    return vectors.choose(vectors.dot(normal, direction) > 0.0, -normal, normal)
+
+
+def _axis_normal(is_x: Any, is_y: Any, direction: Any) -> Any:
+    """Return the axis-parallel normals (..., 3) against direction: of x, else of y, else of z."""
+    against = np.where(direction > 0.0, -np.ones_like(direction), np.ones_like(direction))
+    x, y, z = against[..., 0], against[..., 1], against[..., 2]
+    nothing = np.zeros_like(x)
+    return vectors.vector(
+        np.where(is_x, x, nothing),
+        np.where(~is_x & is_y, y, nothing),
+        np.where(~is_x & ~is_y, z, nothing),
+    )
+
+
+def _box_normal(group: BoxGroup, hit: Hit, origin: Any, direction: Any) -> Any:
+    """Return the normals (..., 3) of hits on a group's boxes.
+
+    The winner's slabs are evaluated once more, in the same way as in [`closest_hit`], so the face is the one
+    that gave the distance, also at edges.
+    """
+    local_origin, local_direction = _into_group(group, origin, direction)
+    index = np.minimum(np.maximum(hit.surface - np.int32(group.first_id), 0), len(group.centers) - 1)
+    center = _look_up(np.stack(group.centers), index)
+    half_extent = _look_up(np.stack(group.half_extents), index)
+    enter, leave = slabs(center, half_extent, local_origin, _inverse(local_direction))
+    # From outside the last slab entered decides, from inside the first one left.
+    face = vectors.choose(vectors.largest(enter) > 0.0, -enter, leave)
+    normal = _axis_normal(*_least_axis(face), local_direction)
+    return vectors.rotate(np.swapaxes(group.rotation, 0, 1), normal) if group.rotated else normal
+
+
+def _sphere_normal(geometry: Geometry, hit: Hit, point: Any, direction: Any) -> Any:
+    """Return the normals (..., 3) of hits on spheres, for points (..., 3) on them."""
+    index = np.minimum(np.maximum(hit.surface - np.int32(geometry.sphere_id), 0), len(geometry.spheres) - 1)
+    center = _look_up(np.stack([center for center, _ in geometry.spheres]), index)
+    radius = np.take(np.array([radius for _, radius in geometry.spheres], geometry.dtype), index)
+    return _facing((point - center) / radius[..., np.newaxis], direction)

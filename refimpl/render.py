@@ -1,0 +1,200 @@
+"""The driver: from a scene to a frame, in tiles of pixels, one sample of every pixel at a time.
+
+1. [`render`] walks over the image in tiles, and over the samples of a tile.
+2. [`trace`] sends one path through each pixel of a tile and bounces until none is alive; paths that have
+   ended leave the arrays, which is the only thing that this driver does for speed.
+3. Means and variances are taken over the samples in their order, in float64. A pixel's random numbers depend
+   on (seed, pixel, sample) alone, so neither tile size nor row range changes a bit of the result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import intersection, rng, transport, vectors
+from .camera import CameraBasis, camera_basis, camera_ray
+from .errors import InputError
+from .frame import LAYERS, Frame
+from .intersection import Hit, Surface
+from .scene import Scene, scene_digest
+from .transport import Path, Settings, World
+
+MAX_IMAGE_SIDE_PX = 1 << 16
+"""Largest width or height, in pixels: x and y share one 32-bit counter of the random generator."""
+
+MAX_SAMPLES = 1 << 32
+"""Largest number of the last sample plus one: samples are counted in 32 bits."""
+
+TILE_PIXELS = 8192
+"""Pixels in a tile: arrays of this length stay in a core's cache. The image does not depend on it."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to render, besides the scene: size in pixels, samples per pixel, seed, transport, float type.
+
+    `first_sample` is the number of the first sample: jobs with different ranges are independent parts of one
+    render.
+    """
+
+    width: int
+    height: int
+    spp: int = 1
+    seed: int = 0
+    settings: Settings = field(default_factory=Settings)
+    dtype: str = "float32"
+    first_sample: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse sizes and counts outside their rules."""
+        for name in ("width", "height"):
+            _check_range(name, getattr(self, name), 1, MAX_IMAGE_SIDE_PX)
+        _check_range("spp", self.spp, 1, MAX_SAMPLES)
+        _check_range("seed", self.seed, 0, (1 << 32) - 1)
+        _check_range("first_sample", self.first_sample, 0, MAX_SAMPLES - self.spp)
+        if self.dtype not in ("float32", "float64"):
+            raise InputError("dtype", self.dtype, "it must be float32 or float64", "choose one of them")
+
+
+@dataclass(frozen=True, eq=False)
+class Render:
+    """A rendered frame (or some of its rows) and color_variance (H, W, 3), the variance of one sample."""
+
+    frame: Frame
+    color_variance: NDArray[np.float64]
+
+
+def _check_range(name: str, value: Any, low: int, high: int) -> None:
+    """Refuse an argument that is no integer from low to high."""
+    if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or not low <= value <= high:
+        raise InputError(name, value, f"it must be an integer from {low} to {high}", "choose another value")
+
+
+def render(
+    scene: Scene,
+    job: Job,
+    *,
+    rows: tuple[int, int] | None = None,
+    tile_pixels: int = TILE_PIXELS,
+    on_progress: Callable[[int], None] | None = None,
+) -> Render:
+    """Render the rows [first, last) of a scene, all by default.
+
+    on_progress is called with the number of samples that were just finished.
+    """
+    first, last = rows if rows is not None else (0, job.height)
+    if not 0 <= first < last <= job.height:
+        raise InputError("rows", rows, f"they must be a range within 0 to {job.height}", "give first < last")
+    _check_range("tile_pixels", tile_pixels, 1, MAX_IMAGE_SIDE_PX**2)
+    world = transport.build(scene, job.settings, job.dtype)
+    basis = camera_basis(scene.camera, job.dtype)
+    pixels = np.arange(first * job.width, last * job.width)
+    tiles = [
+        _render_tile(world, basis, job, pixels[start : start + tile_pixels], on_progress)
+        for start in range(0, len(pixels), tile_pixels)
+    ]
+    shape = (last - first, job.width)
+    means = {name: np.concatenate([means[name] for means, _ in tiles]).reshape(*shape, -1) for name in LAYERS}
+    variance = np.concatenate([variance for _, variance in tiles]).reshape(*shape, 3)
+    layers = {name: mean.astype(job.dtype) for name, mean in means.items()}
+    return Render(Frame(layers, _info(scene, job)), variance)
+
+
+def _render_tile(
+    world: World,
+    basis: CameraBasis,
+    job: Job,
+    pixels: NDArray[Any],
+    on_progress: Callable[[int], None] | None,
+) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
+    """Return the layers' means (P, C) over the samples of P pixels, and the variance (P, 3) of a colour."""
+    y, x = np.divmod(pixels, job.width)
+    sums = {name: np.zeros((len(pixels), layer.channels)) for name, layer in LAYERS.items()}
+    # Welford's running variance: no cancellation where the mean is large.
+    squares = np.zeros((len(pixels), 3))
+    for n in range(job.spp):
+        layers = trace(world, basis, job, x, y, job.first_sample + n)
+        for name, values in layers.items():
+            sample = values.astype(np.float64)
+            if name == "color" and n > 0:
+                squares += (n * sample - sums[name]) ** 2 / (n * (n + 1))
+            sums[name] += sample
+        if on_progress is not None:
+            on_progress(len(pixels))
+    means = {name: total / job.spp for name, total in sums.items()}
+    return means, squares / max(job.spp - 1, 1)
+
+
+def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: int) -> dict[str, Any]:
+    """Trace one path through each pixel x, y (P,) and return its layers (P, C)."""
+    dtype = world.geometry.dtype
+    seed, number = rng.counter(job.seed), rng.counter(sample)
+    pixel = pixel_counter(x, y)
+    u, v, _, _ = rng.uniforms(seed, pixel, number, np.uint32(0), dtype)
+    origin, direction = camera_ray(basis, x.astype(dtype), y.astype(dtype), u, v, job.width, job.height)
+    path = transport.camera_path(origin, direction)
+    color = np.zeros((len(x), 3), dtype)
+    lanes = np.arange(len(x))
+    layers: dict[str, Any] = {}
+    for depth in range(job.settings.max_depth + 1):
+        path, surface, hit, alive = transport.bounce(world, path, depth, seed, pixel, number)
+        if depth == 0:
+            layers = first_hit_layers(world, surface, hit, direction)
+        # Put down what paths that end have gathered, and go on with the others.
+        ended = np.flatnonzero(~alive)
+        color[lanes[ended]] = path.radiance[ended]
+        if len(ended) == len(lanes):
+            break
+        if len(ended) > 0:
+            going = np.flatnonzero(alive)
+            lanes, pixel = lanes[going], pixel[going]
+            path = Path(*(_select(part, going) for part in path))
+    return {"color": color, **layers}
+
+
+def pixel_counter(x: Any, y: Any) -> Any:
+    """Return the random generator's counter (...) of pixel x, y (...): x + 2**16 y in images of any size."""
+    return rng.counter(x + MAX_IMAGE_SIDE_PX * y)
+
+
+def first_hit_layers(world: World, surface: Surface, hit: Hit, direction: Any) -> dict[str, Any]:
+    """Return the feature layers (P, C) of camera rays' first hits; 0 where nothing is hit."""
+    found = hit.surface < world.geometry.nothing
+    return {
+        "albedo": surface.reflectance,
+        "normal": surface.normal,
+        "depth": np.where(found, hit.t, 0.0)[..., np.newaxis],
+        "position": intersection.choose_or_zero(found, surface.point),
+        "direction": direction,
+    }
+
+
+def _select(values: Any, index: Any) -> Any:
+    """Return the lanes `index` of values (P,) or (P, 3), keeping the planes of vectors apart in memory."""
+    if values.ndim == 1:
+        return np.take(values, index)
+    return vectors.vector(*(np.take(values[:, i], index) for i in range(3)))
+
+
+def join_rows(parts: list[Render]) -> Render:
+    """Return one render from renders of consecutive row ranges, top to bottom."""
+    layers = {name: np.concatenate([part.frame[name] for part in parts]) for name in parts[0].frame.layers}
+    variance = np.concatenate([part.color_variance for part in parts])
+    return Render(replace(parts[0].frame, layers=layers), variance)
+
+
+def _info(scene: Scene, job: Job) -> dict[str, str]:
+    """Return what the frame's reader may want to know of its making, as text."""
+    return {
+        **scene.info,
+        "scene": scene.name,
+        "scene_digest": scene_digest(scene),
+        "spp": str(job.spp),
+        "seed": str(job.seed),
+        "max_depth": str(job.settings.max_depth),
+    }

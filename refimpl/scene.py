@@ -1,0 +1,416 @@
+"""Scenes as frozen data, and their JSON form, validated at the border.
+
+A scene has a pinhole camera, a constant background radiance, at most one room, and any number of boxes,
+spheres, quads and area lights. Lengths are in scene units, colours are linear RGB. Coordinates are
+right-handed with y up.
+
+1. [`from_json`] reads a text, refuses what breaks a rule with the path of the value
+   (`scene.boxes[2].rotation`), and returns a [`Scene`]; [`validate`] applies the same rules to a scene made
+   in Python.
+2. [`to_json`] writes the canonical text: `from_json(to_json(s)) == s`.
+3. [`scene_digest`] names a scene by the SHA-256 of that text.
+
+Inside, nothing is checked again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from typing import Any, TypeVar, get_args, get_type_hints
+
+from .errors import InputError
+
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+
+BLACK: Vector = (0.0, 0.0, 0.0)
+"""No light: the default of emissions and of the background, in W / (sr m^2) per channel."""
+
+IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+"""The rotation that leaves a box parallel to the axes."""
+
+FORMAT = "wamnet-scene"
+"""Value of the JSON key `format`, by which a scene file is recognised."""
+
+VERSION = 1
+"""Version of the JSON form; readers refuse others."""
+
+ROTATION_TOLERANCE = 1e-6
+"""Largest entry of R R^T - I that is still taken for a rotation: JSON written with seven digits passes."""
+
+WALLS = ("low_x", "high_x", "low_y", "high_y", "low_z", "high_z")
+"""Order of a room's walls: 2 * axis + (1 at the high end). `low_y` is the floor."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Pinhole camera at `position` looking at `look_at`; `vertical_fov_deg` spans the image's height."""
+
+    position: Vector
+    look_at: Vector
+    up: Vector = (0.0, 1.0, 0.0)
+    vertical_fov_deg: float = 40.0
+
+
+@dataclass(frozen=True)
+class Room:
+    """Axis-aligned box seen from inside: a wall is only there for rays that leave through it.
+
+    A camera outside therefore looks in through the near walls. `reflectances` follow the order of [`WALLS`].
+    """
+
+    low: Vector
+    high: Vector
+    reflectances: tuple[Vector, Vector, Vector, Vector, Vector, Vector]
+    emission: Vector = BLACK
+
+
+@dataclass(frozen=True)
+class Box:
+    """Oriented box; `rotation` turns world vectors into the box's own axes (its rows are those axes)."""
+
+    center: Vector
+    half_extent: Vector
+    reflectance: Vector
+    rotation: Matrix = IDENTITY
+    emission: Vector = BLACK
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """Sphere of `radius` around `center`."""
+
+    center: Vector
+    radius: float
+    reflectance: Vector
+    emission: Vector = BLACK
+
+
+@dataclass(frozen=True)
+class Quad:
+    """Parallelogram corner + a edge_u + b edge_v for a, b in [0, 1]; both sides reflect and emit alike."""
+
+    corner: Vector
+    edge_u: Vector
+    edge_v: Vector
+    reflectance: Vector
+    emission: Vector = BLACK
+
+
+@dataclass(frozen=True)
+class Light:
+    """Parallelogram that emits from the side of edge_u x edge_v, and reflects nothing.
+
+    `power` (W) times `color` (relative, linear RGB) is the flux that leaves it, so its radiance per channel
+    is power * color / (pi * area): a Lambertian emitter.
+    """
+
+    corner: Vector
+    edge_u: Vector
+    edge_v: Vector
+    color: Vector
+    power: float
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that a picture depends on except its size, samples and seed."""
+
+    name: str
+    camera: Camera
+    room: Room | None = None
+    boxes: tuple[Box, ...] = ()
+    spheres: tuple[Sphere, ...] = ()
+    quads: tuple[Quad, ...] = ()
+    lights: tuple[Light, ...] = ()
+    background: Vector = BLACK
+    info: dict[str, str] = field(default_factory=dict, compare=False)
+
+
+# -----------------------------------------------------------------------------------------------------------
+# JSON out
+
+
+def to_json(scene: Scene) -> str:
+    """Return the canonical JSON text of a scene: fixed key order, shortest numbers that round-trip."""
+    data = {"format": FORMAT, "version": VERSION, **_plain(scene)}
+    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def scene_digest(scene: Scene) -> str:
+    """Return the SHA-256, in hexadecimal, of the scene's canonical JSON without its free-form `info`."""
+    data = _plain(scene)
+    del data["info"]
+    return hashlib.sha256(json.dumps(data, allow_nan=False).encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """Turn dataclasses and tuples into dictionaries and lists, and every number into a float."""
+    if is_dataclass(value):
+        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return float(value) if isinstance(value, int) else value
+
+
+# -----------------------------------------------------------------------------------------------------------
+# JSON in
+
+
+def from_json(text: str) -> Scene:
+    """Return the scene in a JSON text; raise InputError, with the value's path, where it breaks a rule."""
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(
+            "scene text", f"no JSON ({error})", "a scene is a JSON object", "mend the text"
+        ) from None
+    if not isinstance(data, dict) or data.pop("format", None) != FORMAT:
+        raise InputError(
+            "scene.format", "something else", f'it must be "{FORMAT}"', "take the key from a scene that works"
+        )
+    version = data.pop("version", None)
+    if version != VERSION:
+        raise InputError(
+            "scene.version", version, f"it must be {VERSION}", "convert the file or update wamnet"
+        )
+    return validate(_build(Scene, data, "scene"))
+
+
+_Built = TypeVar("_Built")
+
+
+def _build(kind: type[_Built], data: Any, path: str) -> _Built:
+    """Make the dataclass `kind` from a JSON object, each field by its annotation."""
+    if not isinstance(data, dict):
+        raise InputError(
+            path, data, "it must be a JSON object", f"give the keys of a {kind.__name__.lower()}"
+        )
+    known = {f.name: f for f in fields(kind)}  # type: ignore[arg-type]
+    for key in data:
+        if key not in known:
+            raise InputError(
+                f"{path}.{key}",
+                data[key],
+                f"{kind.__name__} has no such key",
+                f"known are {', '.join(known)}",
+            )
+    hints = get_type_hints(kind)
+    values = {}
+    for name, spec in known.items():
+        if name in data:
+            values[name] = _convert(hints[name], data[name], f"{path}.{name}")
+        elif spec.default is MISSING and spec.default_factory is MISSING:
+            raise InputError(f"{path}.{name}", "missing", "it is required", f"add the key to {path}")
+    return kind(**values)
+
+
+def _convert(hint: Any, value: Any, path: str) -> Any:
+    """Convert a JSON value to what the annotation `hint` asks for."""
+    if hint is float:
+        return _number(value, path)
+    if hint is str:
+        return _text(value, path)
+    if hint == dict[str, str]:
+        if not isinstance(value, dict):
+            raise InputError(path, value, "it must map texts to texts", "write {} for none")
+        return {str(key): _text(item, f"{path}.{key}") for key, item in value.items()}
+    if is_dataclass(hint):
+        return _build(hint, value, path)  # type: ignore[arg-type]
+    arguments = get_args(hint)
+    if type(None) in arguments:
+        return None if value is None else _convert(arguments[0], value, path)
+    if not isinstance(value, list):
+        raise InputError(path, value, "it must be a list", "write it in square brackets")
+    if arguments[-1] is Ellipsis:
+        return tuple(_convert(arguments[0], item, f"{path}[{i}]") for i, item in enumerate(value))
+    if len(value) != len(arguments):
+        raise InputError(path, value, f"it must have {len(arguments)} entries", "add or remove entries")
+    return tuple(
+        _convert(h, item, f"{path}[{i}]") for i, (h, item) in enumerate(zip(arguments, value, strict=True))
+    )
+
+
+def _number(value: Any, path: str) -> float:
+    """Return a JSON number as a finite float."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise InputError(path, value, "it must be a finite number", "write a decimal number")
+    return float(value)
+
+
+def _text(value: Any, path: str) -> str:
+    """Return a JSON string."""
+    if not isinstance(value, str):
+        raise InputError(path, value, "it must be a text", "put it in quotation marks")
+    return value
+
+
+# -----------------------------------------------------------------------------------------------------------
+# Rules
+
+Rule = Callable[[Any], bool]
+
+
+def validate(scene: Scene) -> Scene:
+    """Return the scene itself, or raise InputError with the path of the first value that breaks a rule."""
+    _check_camera(scene.camera)
+    _check(
+        scene.background, "scene.background", _not_negative, "radiance must not be negative", "use 0 or more"
+    )
+    for path, part in _parts(scene):
+        _check_finite(part, path)
+        if not isinstance(part, Light):
+            _check(
+                part.emission,
+                f"{path}.emission",
+                _not_negative,
+                "emission must not be negative",
+                "use 0 or more",
+            )
+        if isinstance(part, (Box, Sphere, Quad)):
+            _check(part.reflectance, f"{path}.reflectance", _is_share, *_SHARE_RULE)
+        _CHECKS[type(part)](part, path)
+    return scene
+
+
+def _parts(scene: Scene) -> Iterable[tuple[str, Any]]:
+    """Yield (path, primitive) for all of the scene's primitives."""
+    if scene.room is not None:
+        yield "scene.room", scene.room
+    for kind in ("boxes", "spheres", "quads", "lights"):
+        for i, part in enumerate(getattr(scene, kind)):
+            yield f"scene.{kind}[{i}]", part
+
+
+def _check(value: Any, path: str, rule: Rule, says: str, way_out: str) -> None:
+    """Raise InputError unless rule(value) holds."""
+    if not rule(value):
+        raise InputError(path, value, says, way_out)
+
+
+def _check_finite(part: Any, path: str) -> None:
+    """Refuse NaN and infinities anywhere in a primitive."""
+    for f in fields(part):
+        value = getattr(part, f.name)
+        _check(value, f"{path}.{f.name}", _is_finite, "all numbers must be finite", "mend the number")
+
+
+def _check_camera(camera: Camera) -> None:
+    _check_finite(camera, "scene.camera")
+    path, fov = "scene.camera", camera.vertical_fov_deg
+    if not 0.0 < fov < 180.0:
+        raise InputError(
+            f"{path}.vertical_fov_deg", fov, "it must lie between 0 and 180", "40 is a usual angle"
+        )
+    forward = _difference(camera.look_at, camera.position)
+    if _length(forward) == 0.0:
+        raise InputError(
+            f"{path}.look_at", camera.look_at, "it must differ from position", "move one of them"
+        )
+    if not _spans_area(forward, camera.up):
+        raise InputError(f"{path}.up", camera.up, "it must not be parallel to the view", "choose another up")
+
+
+def _check_room(room: Room, path: str) -> None:
+    for i, (low, high) in enumerate(zip(room.low, room.high, strict=True)):
+        if not low < high:
+            raise InputError(
+                f"{path}.high[{i}]", high, f"it must exceed low[{i}] = {low}", "swap or move them"
+            )
+    for i, reflectance in enumerate(room.reflectances):
+        _check(reflectance, f"{path}.reflectances[{i}]", _is_share, *_SHARE_RULE)
+
+
+def _check_box(box: Box, path: str) -> None:
+    _check(
+        box.half_extent,
+        f"{path}.half_extent",
+        lambda h: min(h) > 0.0,
+        "half extents must be positive",
+        "use a quad",
+    )
+    _check(
+        box.rotation, f"{path}.rotation", _is_rotation, "its rows must be orthonormal", "normalise the rows"
+    )
+
+
+def _check_sphere(sphere: Sphere, path: str) -> None:
+    _check(sphere.radius, f"{path}.radius", lambda r: r > 0.0, "it must be positive", "use a positive radius")
+
+
+def _check_quad(quad: Quad | Light, path: str) -> None:
+    if not _spans_area(quad.edge_u, quad.edge_v):
+        raise InputError(
+            f"{path}.edge_v", quad.edge_v, "the edges must span an area", "make it not parallel to edge_u"
+        )
+
+
+def _check_light(light: Light, path: str) -> None:
+    _check_quad(light, path)
+    _check(light.color, f"{path}.color", _not_negative, "a colour must not be negative", "use 0 or more")
+    _check(light.power, f"{path}.power", lambda p: p >= 0.0, "power must not be negative", "use 0 or more")
+
+
+_CHECKS: dict[type, Callable[[Any, str], None]] = {
+    Room: _check_room,
+    Box: _check_box,
+    Sphere: _check_sphere,
+    Quad: _check_quad,
+    Light: _check_light,
+}
+"""The rules of each kind of primitive: a new kind needs a line here."""
+
+_SHARE_RULE = ("a reflectance must lie in [0, 1]", "energy cannot grow: scale it down")
+"""Rule and way out for values that are shares of the incoming energy."""
+
+
+def _numbers(value: Any) -> Iterable[float]:
+    """Yield all numbers in nested tuples."""
+    if isinstance(value, tuple):
+        for item in value:
+            yield from _numbers(item)
+    elif isinstance(value, (int, float)):
+        yield value
+
+
+def _is_finite(value: Any) -> bool:
+    return all(math.isfinite(x) for x in _numbers(value))
+
+
+def _not_negative(value: Vector) -> bool:
+    return min(value) >= 0.0
+
+
+def _is_share(value: Vector) -> bool:
+    return min(value) >= 0.0 and max(value) <= 1.0
+
+
+def _is_rotation(rows: Matrix) -> bool:
+    products = ((i, j, _inner(rows[i], rows[j])) for i in range(3) for j in range(3))
+    orthonormal = all(abs(p - (i == j)) <= ROTATION_TOLERANCE for i, j, p in products)
+    return orthonormal and _inner(_cross(rows[0], rows[1]), rows[2]) > 0.0
+
+
+def _inner(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _length(a: Vector) -> float:
+    return math.sqrt(_inner(a, a))
+
+
+def _difference(a: Vector, b: Vector) -> Vector:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def _spans_area(a: Vector, b: Vector) -> bool:
+    """Tell whether a and b are clearly not parallel: the sine between them exceeds 1e-6, float32's reach."""
+    return _length(_cross(a, b)) > 1e-6 * _length(a) * _length(b)

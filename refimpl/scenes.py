@@ -1,0 +1,158 @@
+"""The canonical scenes, as functions of time and a few parameters.
+
+`minicubes` is the kind of scene that the paper describes: a room with tinted walls, 27 mini cubes of
+different colours in a 3x3x3 frame that turns with time, two coloured area lights, soft shadows. The paper
+does not give its geometry; the numbers here are decisions (spec/scenes.md). `cornell` is a box with two
+blocks; `furnace`, `lone_light` and `empty` have answers in closed form.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from itertools import product
+from typing import Any
+
+from .errors import InputError
+from .scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Vector, validate
+
+TURN_SECONDS = 8.0
+"""Time in which the mini cubes turn once, in seconds: slow enough to follow, fast enough for a loop."""
+
+CUBE_SPACING = 0.72
+"""Distance between the centres of neighbouring mini cubes, in scene units (the room is 4 wide)."""
+
+CUBE_HALF_EXTENT = 0.25
+"""Half the edge of a mini cube, in scene units. The gaps, 0.22 wide, let light through, and the turning frame,
+of radius 1.68, stays inside the room."""
+
+TILT_RAD = math.radians(28.0)
+"""Tilt of the mini cubes' axis of rotation against the vertical, so that their tops are seen."""
+
+WARM: Vector = (1.0, 0.72, 0.42)
+"""Colour of the first light of `minicubes`, linear RGB, relative."""
+
+COOL: Vector = (0.45, 0.66, 1.0)
+"""Colour of the second light of `minicubes`, linear RGB, relative."""
+
+
+def minicubes(
+    time: float = 0.0,
+    warm: Vector = WARM,
+    cool: Vector = COOL,
+    orbit_deg: float = 0.0,
+) -> Scene:
+    """Return the scene of the mini cubes at a time in seconds; light colours and camera orbit are parameters.
+
+    orbit_deg turns the camera around the vertical through the cubes; 0 looks along -z.
+    """
+    white, red, green = (0.74, 0.74, 0.72), (0.70, 0.26, 0.22), (0.26, 0.56, 0.30)
+    room = Room((-2.0, -2.0, -2.0), (2.0, 2.0, 2.0), (red, green, white, white, (0.42, 0.46, 0.66), white))
+    # The warm light hangs below the ceiling, the cool one stands before the right wall.
+    ceiling = Light((-1.1, 1.98, -0.5), (1.2, 0.0, 0.0), (0.0, 0.0, 1.2), warm, 48.0)
+    side = Light((1.98, -0.6, -1.2), (0.0, 0.0, 1.0), (0.0, 1.4, 0.0), cool, 30.0)
+    angle = math.radians(orbit_deg)
+    position = (6.6 * math.sin(angle), 0.25, 6.6 * math.cos(angle))
+    camera = Camera(position, (0.0, -0.05, 0.0), vertical_fov_deg=41.0)
+    return Scene(
+        "minicubes", camera, room, boxes=_cubes(time), lights=(ceiling, side), info={"time": repr(time)}
+    )
+
+
+def _cubes(time: float) -> tuple[Box, ...]:
+    """Return the 27 cubes; position in the frame gives the colour."""
+    rotation = _turn(2.0 * math.pi * time / TURN_SECONDS)
+    half = (CUBE_HALF_EXTENT,) * 3
+    boxes = []
+    for cell in product((-1, 0, 1), repeat=3):
+        offset = [CUBE_SPACING * c for c in cell]
+        # The rows of a rotation are the box's axes: the centre is the sum of axes times offsets.
+        center = tuple(sum(offset[k] * rotation[k][i] for k in range(3)) for i in range(3))
+        reflectance = tuple(0.48 + 0.34 * c for c in cell)
+        boxes.append(Box(center, half, reflectance, rotation))  # type: ignore[arg-type]
+    return tuple(boxes)
+
+
+def _turn(angle_rad: float) -> Matrix:
+    """Return the box axes of the frame: turned about its own axis, which is tilted about x."""
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    ct, st = math.cos(TILT_RAD), math.sin(TILT_RAD)
+    return ((c, s * st, -s * ct), (0.0, ct, st), (s, -c * st, c * ct))
+
+
+def cornell(time: float = 0.0) -> Scene:
+    """Return a box with a red and a green wall, two turned blocks and one light; time changes nothing."""
+    white, red, green = (0.73, 0.73, 0.73), (0.65, 0.06, 0.05), (0.12, 0.45, 0.15)
+    room = Room((-1.0, 0.0, -1.0), (1.0, 2.0, 1.0), (red, green, white, white, white, white))
+    blocks = (
+        Box((-0.33, 0.6, -0.30), (0.29, 0.6, 0.29), white, _about_y(math.radians(17.0))),
+        Box((0.35, 0.3, 0.28), (0.29, 0.3, 0.29), white, _about_y(math.radians(-18.0))),
+    )
+    light = Light((-0.25, 1.99, -0.25), (0.5, 0.0, 0.0), (0.0, 0.0, 0.5), (1.0, 0.78, 0.5), 14.0)
+    camera = Camera((0.0, 1.0, 4.4), (0.0, 1.0, 0.0), vertical_fov_deg=37.0)
+    return Scene("cornell", camera, room, boxes=blocks, lights=(light,), info={"time": repr(time)})
+
+
+def _about_y(angle_rad: float) -> Matrix:
+    """Return the box axes of a block that is turned about the vertical."""
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return ((c, 0.0, -s), (0.0, 1.0, 0.0), (s, 0.0, c))
+
+
+def furnace(time: float = 0.0, albedo: float = 0.5, emission: float = 1.0) -> Scene:
+    """Return a closed box whose walls all reflect `albedo` and emit `emission`.
+
+    Radiance is the same everywhere and in every direction: emission (1 + a + a^2 + ...) = emission / (1 - a).
+    """
+    room = Room((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), ((albedo,) * 3,) * 6, (emission,) * 3)
+    camera = Camera((0.1, 0.2, 0.7), (0.0, 0.0, -1.0), vertical_fov_deg=60.0)
+    return Scene("furnace", camera, room, info={"time": repr(time)})
+
+
+def lone_light(
+    time: float = 0.0, reflectance: float = 0.5, height: float = 1.0, power: float = 10.0
+) -> Scene:
+    """Return one square light, two units wide, at `height` over the centre of a wide plane that it faces.
+
+    Where the plane reflects once, radiance is reflectance / pi times the irradiance of a parallel rectangle,
+    which has a closed form (tests/refimpl/test_closed_forms.py).
+    """
+    plane = Quad((-50.0, 0.0, -50.0), (0.0, 0.0, 100.0), (100.0, 0.0, 0.0), (reflectance,) * 3)
+    light = Light((-1.0, height, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), (1.0, 1.0, 1.0), power)
+    camera = Camera((0.0, 0.5 * height, 6.0), (0.0, 0.0, 0.0), vertical_fov_deg=30.0)
+    return Scene("lone_light", camera, quads=(plane,), lights=(light,), info={"time": repr(time)})
+
+
+def empty(time: float = 0.0, background: float = 0.25) -> Scene:
+    """Return a scene with nothing in it: every pixel shows the background's radiance."""
+    camera = Camera((0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
+    return Scene("empty", camera, background=(background,) * 3, info={"time": repr(time)})
+
+
+CANONICAL: dict[str, Callable[..., Scene]] = {
+    "minicubes": minicubes,
+    "cornell": cornell,
+    "furnace": furnace,
+    "lone_light": lone_light,
+    "empty": empty,
+}
+"""The canonical scenes by name: a new one is a function and a line here."""
+
+
+def canonical(name: str, **parameters: Any) -> Scene:
+    """Return a canonical scene by name; raise InputError for an unknown name or parameter."""
+    if name not in CANONICAL:
+        raise InputError(
+            "scene", name, "no canonical scene has this name", f"known are {', '.join(CANONICAL)}"
+        )
+    known = inspect.signature(CANONICAL[name]).parameters
+    for parameter in parameters:
+        if parameter not in known:
+            raise InputError(
+                f"parameter {parameter}",
+                parameters[parameter],
+                f"{name} has none such",
+                f"known are {', '.join(known)}",
+            )
+    return validate(CANONICAL[name](**parameters))

@@ -1,0 +1,268 @@
+"""Unidirectional path tracing of one path, over lanes: pure functions from state to state.
+
+A path starts at the camera. At each vertex [`bounce`]
+
+1. finds the next surface [`closest_hit`] and adds what it emits, weighted against the light sample that could
+   have found the same light [`emission_weight`];
+2. samples a point on a light, and adds its light when nothing is in between [`direct_light`] (next-event
+   estimation);
+3. samples a cosine-weighted direction and multiplies the throughput beta by the reflectance (f cos / pdf of a
+   Lambertian surface is just that);
+4. ends the path where nothing was hit, by Russian roulette if asked for, and after `max_depth` scatterings.
+
+Both ways to find a light are combined by multiple importance sampling (Veach, "Robust Monte Carlo Methods for
+Light Transport Simulation", 1997, chapter 9) with the balance or the power heuristic; each way alone is an
+unbiased estimator as well, which the tests use. Emission of surfaces that are no lights, and of the
+background, is found by the second way alone and has weight 1.
+
+The functions hold no state, write nothing in place, use no mask as an index, and get their random numbers
+from (seed, pixel, sample), so that lanes are independent: this is what the compiler traces. Drivers loop.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from . import intersection, rng, sampling, vectors
+from .errors import InputError
+from .intersection import Geometry, Hit, Surface
+from .scene import Scene
+
+HEURISTICS = {"balance": 1, "power": 2}
+"""Exponent of the densities in the multiple importance sampling weight, by the heuristic's name."""
+
+STRATEGIES = ("mis", "light", "bsdf")
+"""Ways to find a light: both combined, light samples alone, directions of the BSDF alone."""
+
+BLOCKS_PER_BOUNCE = 2
+"""Blocks of four random numbers that a bounce uses; block 0 belongs to the camera."""
+
+ROULETTE_LIMIT = 0.95
+"""Greatest probability to go on after Russian roulette, so that paths between white walls end too."""
+
+LEAST_DENSITY = 1e-15
+"""Floor of cosines and densities that divide: its inverse squared is still finite in float32."""
+
+LEAST_SQUARE = 1e-30
+"""Floor of squared distances that divide, in scene units squared; it acts on coincident points alone."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How light is gathered. `max_depth` is the greatest number of scatterings; 0 shows emission alone.
+
+    `roulette_depth` is the number of scatterings after which Russian roulette begins; None turns it off.
+    """
+
+    max_depth: int = 5
+    roulette_depth: int | None = None
+    strategy: str = "mis"
+    heuristic: str = "power"
+
+    def __post_init__(self) -> None:
+        """Refuse settings outside their rules."""
+        if not isinstance(self.max_depth, int) or self.max_depth < 0:
+            raise InputError(
+                "max_depth", self.max_depth, "it counts scatterings", "use an integer of 0 or more"
+            )
+        if self.roulette_depth is not None and self.roulette_depth < 0:
+            raise InputError(
+                "roulette_depth", self.roulette_depth, "it must be 0 or more", "use None for none"
+            )
+        if self.strategy not in STRATEGIES:
+            raise InputError("strategy", self.strategy, "it is unknown", f"known are {', '.join(STRATEGIES)}")
+        if self.heuristic not in HEURISTICS:
+            raise InputError(
+                "heuristic", self.heuristic, "it is unknown", f"known are {', '.join(HEURISTICS)}"
+            )
+
+
+@dataclass(frozen=True)
+class Lights:
+    """The scene's lights as constants, per light: corner and edges (3,), normal (3,), radiance (3,), area ().
+
+    `cumulative` (K,) are the running sums of the probabilities with which light sampling picks each light.
+    """
+
+    corner: Any
+    edge_u: Any
+    edge_v: Any
+    normal: Any
+    radiance: Any
+    area: Any
+    cumulative: Any
+    probability: Any
+
+
+@dataclass(frozen=True)
+class World:
+    """All constants of light transport in one float type."""
+
+    geometry: Geometry
+    lights: Lights | None
+    settings: Settings
+
+
+class Path(NamedTuple):
+    """State of paths between bounces: the ray, what is gathered so far, and what the next hit needs to know.
+
+    origin, direction, beta (throughput), radiance (..., 3); pdf (...) of the direction by the BSDF, in 1/sr.
+    """
+
+    origin: Any
+    direction: Any
+    beta: Any
+    radiance: Any
+    pdf: Any
+
+
+def build(scene: Scene, settings: Settings, dtype: DTypeLike = np.float32) -> World:
+    """Lay out a scene as constants of one float type."""
+    geometry = intersection.build(scene, dtype)
+    powered = [light for light in scene.lights if light.power * sum(light.color) > 0.0]
+    return World(geometry, _build_lights(scene, dtype) if powered else None, settings)
+
+
+def _build_lights(scene: Scene, dtype: DTypeLike) -> Lights:
+    """Return the tables of the lights; a light is picked in proportion to its power times its mean colour."""
+    lights = scene.lights
+    edge_u, edge_v = (
+        np.array([light.edge_u for light in lights]),
+        np.array([light.edge_v for light in lights]),
+    )
+    normal = vectors.normalize(vectors.cross(edge_u, edge_v))
+    weight = np.array([light.power * sum(light.color) for light in lights], np.float64)
+    cumulative = np.cumsum(weight) / np.sum(weight)
+    cumulative[-1] = 1.0
+    # Probabilities are differences of the rounded sums, so that sampling and density agree to the bit.
+    cumulative = cumulative.astype(dtype)
+    tables = (
+        [light.corner for light in lights],
+        edge_u,
+        edge_v,
+        normal,
+        [intersection.light_radiance(light) for light in lights],
+        [1.0 / intersection.quad_area_pdf(light) for light in lights],
+        cumulative,
+        sampling.discrete_pdf(np.arange(len(lights)), cumulative),
+    )
+    return Lights(*(np.asarray(table, dtype) for table in tables))
+
+
+def camera_path(origin: Any, direction: Any) -> Path:
+    """Return the state of paths that leave the camera; pdf 0 says that light sampling was no alternative."""
+    one, zero = np.ones_like(direction), np.zeros_like(direction)
+    return Path(origin, direction, one, zero, np.zeros_like(direction[..., 0]))
+
+
+def bounce(
+    world: World, path: Path, depth: int, seed: Any, pixel: Any, sample: Any
+) -> tuple[Path, Surface, Hit, Any]:
+    """Advance paths by one vertex; return state, the surface met, the hit and where (...) paths go on.
+
+    depth counts the scatterings so far; seed, pixel, sample are the counters (...) of the random numbers.
+    """
+    # Find the next surface and add its emission.
+    hit = intersection.closest_hit(world.geometry, path.origin, path.direction)
+    surface = intersection.surface_at(world.geometry, hit, path.origin, path.direction)
+    weight = emission_weight(world, path, hit, surface, depth)
+    radiance = path.radiance + path.beta * vectors.scale(surface.emission, weight)
+    alive = hit.surface < world.geometry.nothing
+    if depth == world.settings.max_depth:
+        return path._replace(radiance=radiance), surface, hit, alive & False
+    # Add light that a sampled point of a light sends here.
+    first_block = 1 + BLOCKS_PER_BOUNCE * depth
+    u_pick, u0, u1, u_roulette = _uniforms(world, seed, pixel, sample, first_block)
+    origin = intersection.spawn_origin(surface.point, surface.normal, np.where(alive, hit.t, 0.0))
+    beta = path.beta * surface.reflectance
+    if world.lights is not None and world.settings.strategy != "bsdf":
+        light = direct_light(world, origin, surface.normal, u_pick, u0, u1)
+        radiance = radiance + beta * vectors.choose(alive, light, 0.0)
+    # Sample the next direction.
+    u0, u1, _, _ = _uniforms(world, seed, pixel, sample, first_block + 1)
+    local = sampling.sample_cosine_hemisphere(u0, u1)
+    direction = sampling.to_world(local, surface.normal)
+    pdf = sampling.cosine_hemisphere_pdf(local[..., 2])
+    # End paths that carry nothing, and some others by Russian roulette.
+    alive = alive & (vectors.largest(beta) > 0.0)
+    if world.settings.roulette_depth is not None and depth >= world.settings.roulette_depth:
+        survival = np.minimum(vectors.largest(beta), ROULETTE_LIMIT)
+        alive = alive & (u_roulette < survival)
+        beta = beta / np.maximum(survival, LEAST_DENSITY)[..., np.newaxis]
+    return Path(origin, direction, beta, radiance, pdf), surface, hit, alive
+
+
+def _uniforms(world: World, seed: Any, pixel: Any, sample: Any, block: int) -> rng.Block:
+    """Return four uniform numbers (...) of the given block in the world's float type."""
+    return rng.uniforms(seed, pixel, sample, np.uint32(block), world.geometry.dtype)
+
+
+def emission_weight(world: World, path: Path, hit: Hit, surface: Surface, depth: int) -> Any:
+    """Return the weight (...) of emission that a BSDF sample (or the camera) has found."""
+    if depth == 0 or world.lights is None or world.settings.strategy == "bsdf":
+        return np.ones_like(hit.t)
+    # Only lights can be found by light sampling.
+    is_light = surface.light >= 0
+    if world.settings.strategy == "light":
+        return np.where(is_light, np.zeros_like(hit.t), np.ones_like(hit.t))
+    index = np.maximum(surface.light, 0)
+    cos_light = np.abs(vectors.dot(surface.normal, path.direction))
+    pdf_light = light_pdf(world.lights, index, hit.t * hit.t, cos_light)
+    return np.where(is_light, mis_weight(world.settings, path.pdf, pdf_light), np.ones_like(hit.t))
+
+
+def direct_light(world: World, origin: Any, normal: Any, u_pick: Any, u0: Any, u1: Any) -> Any:
+    """Return the reflected light (..., 3), per unit of reflectance, of one point sampled on the lights."""
+    lights = world.lights
+    assert lights is not None
+    # Pick a light and a point on it, a little off its surface.
+    index = sampling.sample_discrete(u_pick, lights.cumulative)
+    corner, edge_u, edge_v, light_normal, radiance = (
+        _look_up(table, index)
+        for table in (lights.corner, lights.edge_u, lights.edge_v, lights.normal, lights.radiance)
+    )
+    point = sampling.sample_quad(u0, u1, corner, edge_u, edge_v)
+    target = intersection.spawn_origin(point, light_normal, vectors.largest(np.abs(origin)))
+    # Measure direction, distance and the cosines at both ends.
+    offset = target - origin
+    square = np.maximum(vectors.dot(offset, offset), LEAST_SQUARE)
+    distance = np.sqrt(square)
+    wi = offset / distance[..., np.newaxis]
+    cos_surface = np.maximum(vectors.dot(normal, wi), 0.0)
+    cos_light = np.maximum(-vectors.dot(light_normal, wi), 0.0)
+    # Weight by f cos / pdf and by the heuristic, where both sides face each other and nothing is in between.
+    pdf = light_pdf(lights, index, square, cos_light)
+    weight = sampling.INV_PI * cos_surface / pdf
+    if world.settings.strategy == "mis":
+        weight = weight * mis_weight(world.settings, pdf, sampling.cosine_hemisphere_pdf(cos_surface))
+    facing = (cos_surface > 0.0) & (cos_light > 0.0)
+    visible = facing & ~intersection.occluded(world.geometry, origin, wi, distance)
+    return vectors.scale(radiance, np.where(visible, weight, 0.0))
+
+
+def light_pdf(lights: Lights, index: Any, square: Any, cos_light: Any) -> Any:
+    """Return the density (...), in 1/sr, with which light sampling finds a point of light `index` (...).
+
+    square is the squared distance (...), cos_light (...) the cosine at the light.
+    """
+    area, probability = np.take(lights.area, index), np.take(lights.probability, index)
+    return probability * square / (area * np.maximum(cos_light, LEAST_DENSITY))
+
+
+def mis_weight(settings: Settings, pdf: Any, other_pdf: Any) -> Any:
+    """Return the weight (...) of samples of density pdf (...) where another technique has other_pdf (...).
+
+    Veach's balance (exponent 1) and power (2) heuristics, through the ratio, so that large densities do not
+    overflow.
+    """
+    ratio = np.minimum(other_pdf / np.maximum(pdf, LEAST_DENSITY), 1.0 / LEAST_DENSITY)
+    return 1.0 / (1.0 + ratio ** HEURISTICS[settings.heuristic])
+
+
+def _look_up(table: Any, index: Any) -> Any:
+    """Return the rows (..., 3) of a constant table (K, 3) at index (...)."""
+    return vectors.vector(*(np.take(table[:, i], index) for i in range(3)))

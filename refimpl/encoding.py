@@ -4,7 +4,8 @@
 2. The result is clipped to [0, 1], because a screen has a white [`to_display`].
 3. The sRGB transfer function of IEC 61966-2-1 encodes it [`srgb_encode`], and its inverse decodes it
    [`srgb_decode`], [`from_display`].
-4. For files of 8 bits a channel the encoded value is rounded to the nearest of 256 levels [`to_8bit`].
+4. For files of 8 bits a channel the encoded value is rounded to the nearest of 256 levels [`to_8bit`]; a
+   level stands for one encoded value [`from_8bit`].
 
 Only the transfer function is taken from sRGB: no colour space is converted, the three channels stay what the
 scene says they are. The clip is the one step that loses information, so `from_display` inverts `to_display`
@@ -54,7 +55,7 @@ def srgb_decode(encoded: Floats) -> Floats:
 
 def expose(linear: Floats, exposure_stops: float) -> Floats:
     """Scale linear radiance (...) by 2**exposure_stops."""
-    return linear * 2.0**exposure_stops
+    return linear * float(2.0**exposure_stops)
 
 
 def to_display(linear: Floats, exposure_stops: float = 0.0) -> Floats:
@@ -72,6 +73,11 @@ def to_8bit(encoded: Floats) -> NDArray[np.uint8]:
     # Round in float64, so that float32 and float64 images of the same values give the same file.
     levels: Any = np.floor(LEVELS * np.clip(np.asarray(encoded, np.float64), 0.0, 1.0) + 0.5)
     return np.asarray(levels, np.uint8)
+
+
+def from_8bit(levels: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Return the encoded values (...) in [0, 1] that levels 0 ... 255 stand for."""
+    return levels / float(LEVELS)
 
 
 def normal_to_display(normal: Floats) -> Floats:

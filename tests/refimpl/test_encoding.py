@@ -82,6 +82,13 @@ def test_8bit_rounds_halves_up_and_clips() -> None:
     assert (encoding.to_8bit(np.array([-3.0, 7.0])) == [0, 255]).all()
 
 
+def test_8bit_levels_come_back() -> None:
+    """Every level stands for a value that is rounded to it again."""
+    levels = np.arange(256, dtype=np.uint8)
+    assert (encoding.to_8bit(encoding.from_8bit(levels)) == levels).all()
+    assert encoding.from_8bit(levels)[-1] == 1.0
+
+
 def test_negative_values_follow_the_line() -> None:
     """A negative value is no NaN."""
     x = np.array([-0.5, -1e-3])

@@ -1,0 +1,176 @@
+"""Frames as multi-layer OpenEXR files.
+
+1. A layer is a group of channels: `R,G,B` is colour, then `albedo.R`, `normal.X`, `depth.Z`, `position.X`,
+   `direction.X` and so on [`CHANNELS`]; float32, losslessly compressed, facts about the frame as text
+   attributes [`write_frame`].
+2. Reading also knows the names that other renderers and denoisers use [`ALIASES`], in upper or lower case and
+   behind a prefix such as a view layer's; half floats are widened, other channels ignored [`read_frame`].
+3. The picture is the data window; where it lies in the display window does not matter to a denoiser.
+4. What comes from a file is checked before anything else sees it; errors start with the file's name.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..refimpl.errors import InputError
+from ..refimpl.frame import LAYERS, Floats, Frame, validate
+from .outputs import replacing
+from .packages import need
+
+CHANNELS: Mapping[str, tuple[str, ...]] = {
+    "color": ("R", "G", "B"),
+    "albedo": ("albedo.R", "albedo.G", "albedo.B"),
+    "normal": ("normal.X", "normal.Y", "normal.Z"),
+    "depth": ("depth.Z",),
+    "position": ("position.X", "position.Y", "position.Z"),
+    "direction": ("direction.X", "direction.Y", "direction.Z"),
+}
+"""The channels that hold each layer in the files that are written here."""
+
+ALIASES: Mapping[str, tuple[str, ...]] = {
+    "color": ("", "color", "rgb", "rgba", "beauty", "combined", "noisy image"),
+    "albedo": ("albedo", "denoising albedo", "diffuse_albedo", "diffusealbedo"),
+    "normal": ("normal", "normals", "n", "denoising normal", "sh_normal"),
+    "depth": ("depth", "z", "denoising depth", ""),
+    "position": ("position", "p"),
+    "direction": ("direction", "raydirection"),
+}
+"""Names of each layer on reading, lower case, best first: as in Blender, pbrt, Mitsuba, Arnold and here."""
+
+COMPONENTS: Mapping[int, tuple[tuple[str, ...], ...]] = {
+    3: (("r", "g", "b"), ("x", "y", "z")),
+    1: (("z",), ("v",), ("y",), ("t",), ("depth",)),
+}
+"""Last parts of the channels' names of a layer of 3 or 1 channels, lower case, best first."""
+
+INFO_PREFIX = "wamnet."
+"""Before each name of the frame's info among the file's attributes, so that it meets no other program's."""
+
+Group = Mapping[str, Any]
+"""Channels of one layer by the lower-case last part of their names."""
+
+
+def write_frame(path: Path, frame: Frame) -> None:
+    """Write a valid frame as float32, losslessly compressed, all of it or nothing."""
+    validate(frame)
+    openexr = need("OpenEXR", "to write EXR files", "files")
+    channels = {
+        name: np.ascontiguousarray(values[:, :, index], np.float32)
+        for layer, values in frame.layers.items()
+        for index, name in enumerate(CHANNELS[layer])
+    }
+    header = {"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}
+    header |= {INFO_PREFIX + name: text for name, text in frame.info.items()}
+    with replacing(path) as new:
+        openexr.File(header, channels).write(str(new))
+
+
+def read_frame(path: Path) -> Frame:
+    """Read the known layers of an EXR file as a valid float32 frame."""
+    channels, header = _read_channels(path)
+    groups = _group(channels)
+    found = {name: _layer(path, name, groups) for name in LAYERS}
+    layers = {name: values for name, values in found.items() if values is not None}
+    if not layers:
+        names = ", ".join(sorted(channels))
+        rule = "no known layer is among them"
+        raise InputError(
+            f"{path}: list of channels", names, rule, "name colour R,G,B and normals normal.X,..."
+        )
+    info = {k.removeprefix(INFO_PREFIX): str(v) for k, v in header.items() if k.startswith(INFO_PREFIX)}
+    frame = Frame(layers, info)
+    try:
+        validate(frame)
+    except InputError as error:
+        raise InputError(f"{path}: {error.what}", error.value, error.rule, error.way_out) from None
+    return frame
+
+
+def _read_channels(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return all channels of all parts by name, and the first part's header."""
+    if not path.is_file():
+        raise InputError("input file", str(path), "it does not exist", "check the name")
+    openexr = need("OpenEXR", "to read EXR files", "files")
+    try:
+        with _quiet():
+            expected = len(openexr.File(str(path), header_only=True).parts)
+            parts = openexr.File(str(path), separate_channels=True).parts
+    except (RuntimeError, ValueError, TypeError):
+        raise InputError(
+            "input file", str(path), "it is not an OpenEXR image", "render or export it as .exr"
+        ) from None
+    # The package reports a part that it cannot read by leaving it out.
+    if len(parts) < expected or not parts:
+        rule = "its pixels cannot be read (cut short, damaged, or subsampled)"
+        raise InputError("input file", str(path), rule, "export it again, without subsampling")
+    windows = {str([corner.tolist() for corner in part.header["dataWindow"]]) for part in parts}
+    if len(windows) > 1:
+        text = ", ".join(sorted(windows))
+        raise InputError(f"{path}: data windows", text, "all parts must have the same", "export full frames")
+    return {name: channel for part in parts for name, channel in part.channels.items()}, parts[0].header
+
+
+def _group(channels: Mapping[str, Any]) -> dict[str, dict[str, Group]]:
+    """Group channels by layer: alias of the layer -> full prefix -> last part of the name -> pixels."""
+    groups: dict[str, dict[str, dict[str, Any]]] = defaultdict(lambda: defaultdict(dict))
+    for name, channel in channels.items():
+        prefix, _, component = name.rpartition(".")
+        alias = prefix.rpartition(".")[2].lower()
+        groups[alias][prefix][component.lower()] = channel.pixels
+    return {alias: dict(prefixes) for alias, prefixes in groups.items()}
+
+
+def _layer(path: Path, name: str, groups: Mapping[str, Mapping[str, Group]]) -> Floats | None:
+    """Return layer `name` (H, W, C) under the best of its aliases, or None if the file has none of them."""
+    for alias in ALIASES[name]:
+        candidates = groups.get(alias, {})
+        whole = {prefix: found for prefix, group in candidates.items() if (found := _components(name, group))}
+        if len(whole) > 1:
+            text = ", ".join(sorted(whole))
+            rule = f"each of them could be {name}"
+            raise InputError(f"{path}: layers", text, rule, "leave one of them out of the file")
+        if whole:
+            return _stack(path, name, next(iter(whole.values())))
+    return None
+
+
+def _components(name: str, group: Group) -> list[Any] | None:
+    """Return the pixels of the channels that make up a layer, in order, or None if one is missing."""
+    for components in COMPONENTS[LAYERS[name].channels]:
+        if all(component in group for component in components):
+            return [group[component] for component in components]
+    return None
+
+
+def _stack(path: Path, name: str, planes: list[Any]) -> Floats:
+    """Return the planes (H, W) of one layer as float32 (H, W, C)."""
+    kinds = sorted({str(plane.dtype) for plane in planes})
+    if not set(kinds) <= {"float16", "float32"}:
+        rule = "they must be half or float"
+        raise InputError(
+            f"{path}: pixels of {name}", ", ".join(kinds), rule, "export them as 16 or 32 bit floats"
+        )
+    return np.stack([plane.astype(np.float32) for plane in planes], axis=-1)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Silence what the OpenEXR package prints by itself about a bad file: our error says it in one line."""
+    saved, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        with redirect_stdout(StringIO()):
+            yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(nowhere)

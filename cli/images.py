@@ -1,0 +1,69 @@
+"""Pictures on disk: PNG for looking, EXR for computing, and one way to open either.
+
+1. PNG holds display-encoded colour in 8 bits a channel [`write_png`], [`read_png`].
+2. A picture to be compared is a PNG or the colour of an EXR; either knows its display-encoded and its linear
+   form [`read_image`], [`Image`].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..refimpl import encoding
+from ..refimpl.errors import InputError
+from ..refimpl.frame import Floats
+from . import exr
+from .outputs import replacing
+from .packages import need
+
+EIGHT_BIT_MODES = ("1", "L", "LA", "P", "RGB", "RGBA")
+"""Pillow's modes that fit 8 bits a channel; others would lose precision silently."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """Colour (H, W, 3) display-encoded in [0, 1], and as linear radiance."""
+
+    display: Floats
+    linear: Floats
+
+
+def write_png(path: Path, encoded: Floats) -> None:
+    """Write display-encoded colour (H, W, 3) in [0, 1] as an 8-bit PNG, all of it or nothing."""
+    pillow = need("PIL.Image", "to write PNG files", "files")
+    picture = pillow.fromarray(encoding.to_8bit(encoded))
+    with replacing(path) as new:
+        picture.save(new, format="PNG")
+
+
+def read_png(path: Path) -> Floats:
+    """Read a PNG of 8 bits a channel as display-encoded colour (H, W, 3); transparency is ignored."""
+    if not path.is_file():
+        raise InputError("input file", str(path), "it does not exist", "check the name")
+    pillow = need("PIL.Image", "to read PNG files", "files")
+    try:
+        with pillow.open(path, formats=["PNG"]) as picture:
+            mode = picture.mode
+            levels = np.asarray(picture.convert("RGB"))
+    except (OSError, SyntaxError, ValueError):
+        raise InputError("input file", str(path), "it is not a readable PNG", "export it again") from None
+    if mode not in EIGHT_BIT_MODES:
+        raise InputError(
+            f"{path}: pixel format", mode, "a PNG must have 8 bits a channel", "use .exr for more"
+        )
+    return encoding.from_8bit(levels)
+
+
+def read_image(path: Path, exposure_stops: float = 0.0) -> Image:
+    """Read a PNG, or the colour of an EXR, in both forms at the given exposure."""
+    suffix = path.suffix.lower()
+    if suffix == ".png":
+        display = read_png(path)
+        return Image(display, encoding.from_display(display, exposure_stops))
+    if suffix == ".exr":
+        linear = exr.read_frame(path)["color"]
+        return Image(encoding.to_display(linear, exposure_stops), linear)
+    raise InputError("input file", str(path), "its name must end in .exr or .png", "convert it")

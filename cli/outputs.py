@@ -1,0 +1,70 @@
+"""Writing files so that nothing is ever half written or lost.
+
+1. Before long work starts, the output's name is checked: the folder exists and can be written, the name is no
+   folder and none of the inputs [`check_output`].
+2. The content goes into a new file of another name in the same folder; only when it is complete does it take
+   the output's name, in one step of the file system [`replacing`]. Whatever ends the writer before that (an
+   error, Ctrl-C) removes the new file and leaves the old one.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..refimpl.errors import InputError
+
+
+def check_output(path: Path, suffixes: Sequence[str] = (), inputs: Sequence[Path] = ()) -> None:
+    """Refuse an output path that could not be written, or whose writing would destroy an input."""
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise InputError(
+            "output file", str(path), f"its name must end in {' or '.join(suffixes)}", "rename it"
+        )
+    if path.is_dir():
+        raise InputError("output file", str(path), "it is a folder", "give the name of a file")
+    if path.exists() and not path.is_file():
+        raise InputError(
+            "output file", str(path), "it is a device or the like", "give the name of a plain file"
+        )
+    folder = path.parent
+    if not folder.is_dir():
+        raise InputError("output folder", str(folder), "it does not exist", f"create it: mkdir -p '{folder}'")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError("output folder", str(folder), "it cannot be written", "choose another with -o")
+    for source in inputs:
+        if path.exists() and source.exists() and path.samefile(source):
+            raise InputError(
+                "output file", str(path), "it is an input of this command", "choose another name"
+            )
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield the name of a new file beside `path`: when the block ends well it replaces it, else it goes."""
+    check_output(path)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    new = Path(name)
+    try:
+        yield new
+        _give_usual_rights(new)
+        new.replace(path)
+    finally:
+        new.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write `text` to `path`, all of it or none."""
+    with replacing(path) as new:
+        new.write_text(text, encoding="utf-8")
+
+
+def _give_usual_rights(path: Path) -> None:
+    """Give a temporary file, which only its owner may read, the rights of any new file."""
+    mask = os.umask(0)
+    os.umask(mask)
+    path.chmod(0o666 & ~mask)

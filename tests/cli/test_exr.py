@@ -1,0 +1,259 @@
+"""Tests of frames in EXR files: round trip to the bit, other programs' names, and every refusal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.cli import exr
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.frame import LAYERS, Frame
+
+
+def random_frame(height: int, width: int, seed: int = 0, names: tuple[str, ...] = tuple(LAYERS)) -> Frame:
+    """Return a frame of float32 bit patterns of all magnitudes (denormal to huge), finite."""
+    rng = np.random.default_rng(seed)
+    layers = {}
+    for name in names:
+        bits = rng.integers(0, 2**32, (height, width, LAYERS[name].channels), dtype=np.uint32)
+        values = bits.view(np.float32)
+        layers[name] = np.where(np.isfinite(values), values, np.float32(0.5))
+    return Frame(layers, {"scene": "minicubes", "time": "0.5", "note": "été ✓ ", "empty": ""})
+
+
+def write(path: Path, channels: dict[str, Any], **header: Any) -> Path:
+    """Write channels as given, by the OpenEXR package itself."""
+    OpenEXR.File({"type": OpenEXR.scanlineimage, **header}, channels).write(str(path))
+    return path
+
+
+def plane(value: float, dtype: type = np.float32, shape: tuple[int, int] = (2, 3)) -> np.ndarray:
+    """Return one constant channel."""
+    return np.full(shape, value, dtype)
+
+
+def rgb(*values: float, prefix: str = "", names: str = "RGB") -> dict[str, np.ndarray]:
+    """Return three constant channels."""
+    return {prefix + name: plane(value) for name, value in zip(names, values, strict=True)}
+
+
+def assert_same(a: Frame, b: Frame) -> None:
+    """The same layers to the bit (signs of zero and denormals too) and the same info."""
+    assert a.layers.keys() == b.layers.keys()
+    for name, values in a.layers.items():
+        assert b[name].dtype == np.float32
+        assert values.shape == b[name].shape
+        assert values.tobytes() == b[name].tobytes()
+    assert dict(a.info) == dict(b.info)
+
+
+@pytest.mark.parametrize(("height", "width"), [(1, 1), (1, 7), (7, 1), (17, 33), (40, 5)])
+def test_round_trip_of_every_layer(tmp_path: Path, height: int, width: int) -> None:
+    """All layers, odd sizes, info with accents, spaces and an empty value."""
+    frame = random_frame(height, width)
+    exr.write_frame(tmp_path / "a.exr", frame)
+    assert_same(frame, exr.read_frame(tmp_path / "a.exr"))
+
+
+@given(
+    st.integers(1, 40),
+    st.integers(1, 40),
+    st.integers(0, 99),
+    st.sets(st.sampled_from(list(LAYERS)), min_size=1),
+)
+def test_round_trip_of_any_size_and_selection(
+    tmp_path_factory: pytest.TempPathFactory, height: int, width: int, seed: int, names: set[str]
+) -> None:
+    """Any size, any selection of layers, any bits."""
+    path = tmp_path_factory.mktemp("exr") / "a.exr"
+    frame = random_frame(height, width, seed, tuple(name for name in LAYERS if name in names))
+    exr.write_frame(path, frame)
+    assert_same(frame, exr.read_frame(path))
+
+
+def test_float64_is_rounded_to_float32(tmp_path: Path) -> None:
+    """EXR has no wider float; rounding is NumPy's, to nearest."""
+    frame = Frame({"color": np.random.default_rng(1).random((4, 5, 3))})
+    exr.write_frame(tmp_path / "a.exr", frame)
+    assert (exr.read_frame(tmp_path / "a.exr")["color"] == frame["color"].astype(np.float32)).all()
+
+
+def test_what_others_see(tmp_path: Path) -> None:
+    """The channel names of the specification, float32, lossless, text attributes."""
+    exr.write_frame(tmp_path / "a.exr", random_frame(3, 2))
+    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
+        names = sorted(file.channels())
+        header = dict(file.header())
+    assert names == sorted(name for group in exr.CHANNELS.values() for name in group)
+    assert header["compression"] == OpenEXR.ZIP_COMPRESSION
+    assert header["wamnet.scene"] == "minicubes"
+
+
+@pytest.mark.parametrize(
+    ("layer", "channels"),
+    [
+        ("color", rgb(1, 2, 3)),
+        ("color", rgb(1, 2, 3, prefix="ViewLayer.Combined.")),
+        ("albedo", rgb(1, 2, 3, prefix="Albedo.", names="rgb")),
+        ("albedo", rgb(1, 2, 3, prefix="ViewLayer.Denoising Albedo.")),
+        ("normal", rgb(1, 2, 3, prefix="N.", names="XYZ")),
+        ("normal", rgb(1, 2, 3, prefix="Normal.", names="XYZ")),
+        ("normal", rgb(1, 2, 3, prefix="normal.")),
+        ("position", rgb(1, 2, 3, prefix="P.", names="XYZ")),
+        ("depth", {"Z": plane(1)}),
+        ("depth", {"depth.V": plane(1)}),
+        ("depth", {"ViewLayer.Depth.Z": plane(1)}),
+    ],
+)
+def test_names_of_other_programs(tmp_path: Path, layer: str, channels: dict[str, np.ndarray]) -> None:
+    """Aliases, letter case, prefixes, components named as colours or as axes; other channels are ignored."""
+    extra = {"A": plane(9), "variance.R": plane(9)}
+    frame = exr.read_frame(write(tmp_path / "a.exr", channels | extra))
+    assert list(frame.layers) == [layer]
+    assert (frame[layer] == np.arange(1.0, 1.0 + LAYERS[layer].channels)).all()
+
+
+def test_the_best_alias_wins(tmp_path: Path) -> None:
+    """Plain R, G, B before a layer called beauty."""
+    path = write(tmp_path / "a.exr", rgb(4, 5, 6, prefix="beauty.") | rgb(1, 2, 3))
+    assert (exr.read_frame(path)["color"] == [1, 2, 3]).all()
+
+
+def test_half_floats_are_widened(tmp_path: Path) -> None:
+    """Each half is a float32."""
+    path = write(tmp_path / "a.exr", {name: plane(0.1, np.float16) for name in "RGB"})
+    color = exr.read_frame(path)["color"]
+    assert color.dtype == np.float32
+    assert (color == np.float32(np.float16(0.1))).all()
+
+
+def test_tiles_and_windows(tmp_path: Path) -> None:
+    """A tiled file, and one whose data window starts at (-2, 3) inside a display window of another size."""
+    tiles = {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()}
+    assert (exr.read_frame(write(tmp_path / "a.exr", rgb(1, 2, 3), **tiles))["color"] == [1, 2, 3]).all()
+    corners = {
+        "dataWindow": (np.array([-2, 3], np.int32), np.array([0, 4], np.int32)),
+        "displayWindow": (np.array([0, 0], np.int32), np.array([9, 9], np.int32)),
+    }
+    frame = exr.read_frame(write(tmp_path / "b.exr", rgb(1, 2, 3), **corners))
+    assert (frame.height, frame.width) == (2, 3)
+
+
+def test_several_parts(tmp_path: Path) -> None:
+    """Layers may lie in parts of their own."""
+    parts = [
+        OpenEXR.Part({"name": "a", "type": OpenEXR.scanlineimage}, rgb(1, 2, 3)),
+        OpenEXR.Part({"name": "b", "type": OpenEXR.scanlineimage}, rgb(4, 5, 6, prefix="albedo.")),
+    ]
+    OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
+    frame = exr.read_frame(tmp_path / "a.exr")
+    assert (frame["color"] == [1, 2, 3]).all()
+    assert (frame["albedo"] == [4, 5, 6]).all()
+
+
+def test_parts_that_do_not_coincide_are_refused(tmp_path: Path) -> None:
+    """Two parts of one size at different places would be shifted silently."""
+    shifted = {"dataWindow": (np.array([1, 0], np.int32), np.array([3, 1], np.int32))}
+    parts = [
+        OpenEXR.Part({"name": "a", "type": OpenEXR.scanlineimage}, rgb(1, 2, 3)),
+        OpenEXR.Part({"name": "b", "type": OpenEXR.scanlineimage, **shifted}, rgb(4, 5, 6, prefix="albedo.")),
+    ]
+    OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
+    with pytest.raises(
+        InputError, match=r"data windows is .*: all parts must have the same; export full frames"
+    ):
+        exr.read_frame(tmp_path / "a.exr")
+
+
+def test_a_missing_file(tmp_path: Path) -> None:
+    """It is named."""
+    with pytest.raises(InputError, match=r"input file is .*none\.exr: it does not exist"):
+        exr.read_frame(tmp_path / "none.exr")
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"\x76\x2f\x31\x01"])
+def test_a_file_that_is_no_exr(tmp_path: Path, content: bytes, capfd: pytest.CaptureFixture[str]) -> None:
+    """Empty, text, the magic number alone; the library's own messages do not reach the terminal."""
+    (tmp_path / "a.exr").write_bytes(content)
+    with pytest.raises(InputError, match=r"input file is .*a\.exr: it is not an OpenEXR image"):
+        exr.read_frame(tmp_path / "a.exr")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_file_cut_short(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """The header is whole, the pixels are not."""
+    path = tmp_path / "a.exr"
+    exr.write_frame(path, random_frame(30, 30))
+    path.write_bytes(path.read_bytes()[:-300])
+    with pytest.raises(InputError, match="its pixels cannot be read"):
+        exr.read_frame(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_no_known_layer(tmp_path: Path) -> None:
+    """The message lists the channels; an incomplete colour is no layer."""
+    path = write(tmp_path / "a.exr", {"G": plane(1), "R": plane(1), "mask.A": plane(1)})
+    with pytest.raises(InputError, match=r"list of channels is G, R, mask\.A: no known layer is among them"):
+        exr.read_frame(path)
+
+
+def test_two_layers_of_one_meaning(tmp_path: Path) -> None:
+    """Left and right eye: no guess."""
+    channels = rgb(1, 2, 3, prefix="left.albedo.") | rgb(1, 2, 3, prefix="right.albedo.")
+    with pytest.raises(
+        InputError, match=r"layers is left\.albedo, right\.albedo: each of them could be albedo"
+    ):
+        exr.read_frame(write(tmp_path / "a.exr", channels))
+
+
+def test_integer_pixels(tmp_path: Path) -> None:
+    """Object identifiers are no colour."""
+    path = write(tmp_path / "a.exr", {name: plane(1, np.uint32) for name in "RGB"})
+    with pytest.raises(InputError, match="pixels of color is uint32: they must be half or float"):
+        exr.read_frame(path)
+
+
+def test_pixels_that_are_not_finite(tmp_path: Path) -> None:
+    """The file, the layer, the place and the number are told."""
+    channels = rgb(1, 2, 3)
+    channels["G"][1, 2] = np.nan
+    channels["B"][0, 1] = np.inf
+    path = write(tmp_path / "a.exr", channels)
+    text = r"a\.exr: layer 'color' at x=1, y=0 \(first of 2 such pixels\) is inf: every pixel must be finite"
+    with pytest.raises(InputError, match=text):
+        exr.read_frame(path)
+
+
+def test_an_invalid_frame_is_not_written(tmp_path: Path) -> None:
+    """Nothing appears on disk."""
+    with pytest.raises(InputError, match="layer 'color' at x=0, y=0"):
+        exr.write_frame(tmp_path / "a.exr", Frame({"color": np.full((1, 1, 3), np.nan)}))
+    assert not list(tmp_path.iterdir())
+
+
+def test_ctrl_c_while_writing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The writer dies in the middle of the file: the old file is as it was, and nothing else is there."""
+    out = tmp_path / "a.exr"
+    exr.write_frame(out, random_frame(2, 2))
+    before = out.read_bytes()
+
+    class Interrupted:
+        ZIP_COMPRESSION = scanlineimage = None
+
+        def File(self, *_: object) -> Interrupted:
+            return self
+
+        def write(self, name: str) -> None:
+            Path(name).write_bytes(b"half")
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(exr, "need", lambda *_: Interrupted())
+    with pytest.raises(KeyboardInterrupt):
+        exr.write_frame(out, random_frame(3, 3))
+    assert [p.read_bytes() for p in tmp_path.iterdir()] == [before]

@@ -1,0 +1,92 @@
+"""Tests of safe writing: all or nothing, and every refusal before the work starts."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from wamnet.cli.outputs import check_output, replacing, write_text
+from wamnet.refimpl.errors import InputError
+
+
+def test_a_complete_file_replaces_the_old_one(tmp_path: Path) -> None:
+    """The new content is there, nothing else is, and everyone may read it who may read new files."""
+    out = tmp_path / "a.txt"
+    out.write_text("old")
+    write_text(out, "new")
+    assert out.read_text() == "new"
+    assert list(tmp_path.iterdir()) == [out]
+    other = tmp_path / "b.txt"
+    other.touch()
+    assert out.stat().st_mode == other.stat().st_mode
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError, SystemExit])
+@pytest.mark.parametrize("existed", [False, True])
+def test_an_interrupted_writer_leaves_no_trace(tmp_path: Path, error: type, existed: bool) -> None:
+    """Ctrl-C in the middle: the old file stays as it was, or there is none."""
+    out = tmp_path / "a.exr"
+    if existed:
+        out.write_text("old")
+
+    def write_and_fail() -> None:
+        with replacing(out) as new:
+            assert new.suffix == ".exr"
+            new.write_text("half")
+            raise error
+
+    with pytest.raises(error):
+        write_and_fail()
+    assert [p.read_text() for p in tmp_path.iterdir()] == (["old"] if existed else [])
+
+
+def test_the_new_file_lies_beside_the_old_one(tmp_path: Path) -> None:
+    """Only within one file system is replacing one step."""
+    with replacing(tmp_path / "a.png") as new:
+        assert new.parent == tmp_path
+        assert new.name != "a.png"
+
+
+def test_wrong_suffix(tmp_path: Path) -> None:
+    """The message lists what may be written."""
+    with pytest.raises(InputError, match=r"output file is .*a\.jpg: its name must end in \.exr or \.png"):
+        check_output(tmp_path / "a.jpg", (".exr", ".png"))
+    check_output(tmp_path / "a.EXR", (".exr", ".png"))
+
+
+def test_a_folder_is_no_file(tmp_path: Path) -> None:
+    """An existing folder is never replaced."""
+    with pytest.raises(InputError, match="it is a folder; give the name of a file"):
+        check_output(tmp_path)
+
+
+def test_a_device_is_no_file() -> None:
+    """Replacing a device by a file would break the machine."""
+    with pytest.raises(InputError, match="it is a device or the like"):
+        check_output(Path(os.devnull))
+
+
+def test_a_missing_folder(tmp_path: Path) -> None:
+    """The way out is a command."""
+    with pytest.raises(InputError, match=r"output folder is .*none: it does not exist; create it: mkdir -p"):
+        check_output(tmp_path / "none" / "a.exr")
+
+
+def test_a_folder_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The super user may write anywhere, so the system's answer is replaced."""
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(InputError, match=r"output folder is .* it cannot be written; choose another with -o"):
+        check_output(tmp_path / "a.exr")
+
+
+def test_an_input_is_never_overwritten(tmp_path: Path) -> None:
+    """Also not under another name for the same file."""
+    source, link = tmp_path / "in.exr", tmp_path / "link.exr"
+    source.write_text("data")
+    link.symlink_to(source)
+    for name in (source, link):
+        with pytest.raises(InputError, match="it is an input of this command; choose another name"):
+            check_output(name, inputs=(source,))
+    check_output(tmp_path / "out.exr", inputs=(source, tmp_path / "missing.exr"))

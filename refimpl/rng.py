@@ -82,5 +82,5 @@ def uniforms(seed: Any, pixel: Any, sample: Any, block: Any, dtype: DTypeLike = 
 
 
 def counter(values: Any) -> Uint32:
-    """Return integers as uint32 counters, modulo 2**32: an array, since NumPy warns of a scalar's overflow."""
+    """Return integers as uint32 counters, modulo 2**32, in an array: NumPy warns of overflow in scalars."""
     return np.atleast_1d(np.asarray(np.asarray(values, dtype=np.int64) & 0xFFFFFFFF, dtype=np.uint32))

@@ -24,7 +24,7 @@ CUBE_SPACING = 0.72
 """Distance between the centres of neighbouring mini cubes, in scene units (the room is 4 wide)."""
 
 CUBE_HALF_EXTENT = 0.25
-"""Half the edge of a mini cube, in scene units. The gaps, 0.22 wide, let light through, and the turning frame,
+"""Half the edge of a mini cube, in scene units. The gaps, 0.22 wide, let light through; the turning frame,
 of radius 1.68, stays inside the room."""
 
 TILT_RAD = math.radians(28.0)

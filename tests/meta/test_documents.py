@@ -26,7 +26,7 @@ DOCUMENTS = [path for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob
 SETUP = re.compile(
     r"(git clone|cd|make|sudo apt-get install|python3 -m venv|(\S+/)?pip install|\.ci/run)\b.*"
 )
-"""Commands that need not run here: they make the environment in which this test runs, or are CI's own calls."""
+"""Commands that need not run here: they make the environment of this test, or CI calls them itself."""
 
 BLOCK = re.compile(r"(?:<!-- not run: (.+?) -->\s*)?^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 """An optional mark, then a fenced block."""

@@ -1,0 +1,341 @@
+"""From frames to training examples: features by name, windows around pixels, targets.
+
+1. A feature turns a layer of a frame into numbers near [-1, 1] [`FEATURES`], with scales that belong to the
+   model, not to the frame [`Normalization`], [`normalization_of`].
+2. The chosen features, one after another on the channel axis, are the feature image [`feature_image`].
+3. The image is padded by the border rule [`pad`], so that every pixel has a full window; the window of a
+   pixel is the network's input vector [`windows_at`].
+4. Training draws pixels uniformly from all frames with the counter generator [`sample_pixels`] and gathers
+   windows and targets from one table [`build`], [`examples_at`].
+
+The window's size is the paper's (*WAMnet for Image Denoising*); which of its pixels is the centre, the border
+rule and the encodings are decisions, explained in the chapter of this module.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .encoding import to_display
+from .errors import InputError
+from .frame import Frame
+from .rng import counter, random_block
+
+Array = NDArray[Any]
+Indices = NDArray[np.int64]
+
+PIXEL_TAG = 0x50495845
+"""Counter `block` of the words that choose pixels ("PIXE" in ASCII); light paths use small numbers."""
+
+LARGEST_WINDOW_PX = 64
+"""Largest window: 64 x 64 pixels of 16 channels are 65,536 numbers a pixel, far beyond any use, and a typing
+error is told before it takes all memory."""
+
+
+@dataclass(frozen=True)
+class Normalization:
+    """Scales that bring a scene's numbers near [-1, 1]; part of the model, the same for all its frames.
+
+    `depth_scale` and `position_scale` in scene units; `position_center` in world space.
+    """
+
+    exposure_stops: float = 0.0
+    depth_scale: float = 1.0
+    position_center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    position_scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A network input: `encode` turns `layer` (..., channels) into numbers in [low, high]."""
+
+    name: str
+    layer: str
+    channels: int
+    low: float
+    high: float
+    encode: Callable[[Array, Normalization], Array]
+
+
+def encode_color(values: Array, normalization: Normalization) -> Array:
+    """Encode linear radiance (..., 3) for display, to [0, 1]."""
+    return to_display(values, normalization.exposure_stops)
+
+
+def encode_albedo(values: Array, normalization: Normalization) -> Array:
+    """Clip reflectance (..., 3) to [0, 1]."""
+    return np.clip(values, 0.0, 1.0)
+
+
+def encode_signed(values: Array, normalization: Normalization) -> Array:
+    """Clip components of a unit vector (..., 3) to [-1, 1]; a pixel's mean may be shorter than 1."""
+    return np.clip(values, -1.0, 1.0)
+
+
+def encode_depth(values: Array, normalization: Normalization) -> Array:
+    """Scale distances (..., 1) to [0, 1]; what is farther than depth_scale counts as 1."""
+    return np.clip(values / normalization.depth_scale, 0.0, 1.0)
+
+
+def encode_position(values: Array, normalization: Normalization) -> Array:
+    """Scale world positions (..., 3) to [-1, 1] around position_center."""
+    centred: Array = values - np.asarray(normalization.position_center, values.dtype)
+    return np.clip(centred / normalization.position_scale, -1.0, 1.0)
+
+
+FEATURES: Mapping[str, Feature] = {
+    feature.name: feature
+    for feature in (
+        Feature("color", "color", 3, 0.0, 1.0, encode_color),
+        Feature("normal", "normal", 3, -1.0, 1.0, encode_signed),
+        Feature("albedo", "albedo", 3, 0.0, 1.0, encode_albedo),
+        Feature("depth", "depth", 1, 0.0, 1.0, encode_depth),
+        Feature("position", "position", 3, -1.0, 1.0, encode_position),
+        Feature("direction", "direction", 3, -1.0, 1.0, encode_signed),
+    )
+}
+"""Every feature that a model may use; a new one is one line here and one `encode_*` function."""
+
+BORDERS: Mapping[str, str] = {"clamp": "edge", "zero": "constant"}
+"""Border rules, by name, as NumPy's padding modes: repeat the nearest pixel, or see zeros."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """The pixels that the network sees: `size` x `size` around a pixel, `border` outside the image."""
+
+    size: int = 12
+    border: str = "clamp"
+
+    @property
+    def before(self) -> int:
+        """Taps above (and left of) the pixel; as many less one are below when the size is even."""
+        return self.size // 2
+
+    @property
+    def after(self) -> int:
+        """Taps below (and right of) the pixel."""
+        return self.size - self.size // 2 - 1
+
+
+def check_window(window: Window) -> None:
+    """Refuse a size or a border rule that means nothing."""
+    if not isinstance(window.size, int) or not 1 <= window.size <= LARGEST_WINDOW_PX:
+        rule = f"a whole number from 1 to {LARGEST_WINDOW_PX}"
+        raise InputError("window size", window.size, rule, "the paper's is 12")
+    if window.border not in BORDERS:
+        raise InputError("window border", window.border, "a known rule", f"use one of {', '.join(BORDERS)}")
+
+
+def check_features(features: Sequence[str]) -> None:
+    """Refuse feature names that are unknown, repeated or none."""
+    known = ", ".join(FEATURES)
+    for name in features:
+        if name not in FEATURES:
+            raise InputError("feature name", name, "not a known feature", f"use some of {known}")
+    if not features or len(set(features)) != len(features):
+        raise InputError("features", ", ".join(features), "at least one, each once", f"use some of {known}")
+
+
+def check_normalization(normalization: Normalization) -> None:
+    """Refuse scales that are not finite, or not positive where they divide."""
+    for name in ("exposure_stops", "depth_scale", "position_scale"):
+        value = getattr(normalization, name)
+        if not math.isfinite(value) or (name != "exposure_stops" and value <= 0.0):
+            raise InputError(name, value, "finite, and > 0 for a scale", "use normalization_of(frames)")
+    center = normalization.position_center
+    if len(center) != 3 or not all(math.isfinite(value) for value in center):
+        raise InputError("position_center", center, "three finite numbers", "use normalization_of(frames)")
+
+
+def channels_of(features: Sequence[str]) -> int:
+    """Return the number of channels of a feature image."""
+    return sum(FEATURES[name].channels for name in features)
+
+
+def n_inputs(features: Sequence[str], window: Window) -> int:
+    """Return D_in, the length of a window vector."""
+    return window.size * window.size * channels_of(features)
+
+
+def normalization_of(frames: Sequence[Frame], exposure_stops: float = 0.0) -> Normalization:
+    """Measure the scales: the farthest depth, and the cube around all positions that are not exactly 0."""
+    far = max((float(frame["depth"].max()) for frame in frames if "depth" in frame.layers), default=0.0)
+    hits = [_hits(frame["position"]) for frame in frames if "position" in frame.layers]
+    points = np.concatenate(hits) if hits else np.zeros((0, 3))
+    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.zeros(3))
+    x, y, z = (float(value) for value in (low + high) / 2)
+    extent = float((high - low).max()) / 2
+    return Normalization(exposure_stops, far if far > 0 else 1.0, (x, y, z), extent if extent > 0 else 1.0)
+
+
+def _hits(position: Array) -> Array:
+    """Return as float64 (N, 3) the positions (H, W, 3) of pixels that hit something: not 0."""
+    points = position.reshape(-1, 3).astype(np.float64)
+    hits: Array = points[np.any(points != 0.0, axis=-1)]
+    return hits
+
+
+def feature_image(frame: Frame, features: Sequence[str], normalization: Normalization) -> NDArray[np.float32]:
+    """Encode the features in float64, round once to float32, join them in the order of names: (H, W, C)."""
+    check_features(features)
+    encoded = [_encoded(frame, FEATURES[name], normalization) for name in features]
+    return np.concatenate(encoded, axis=-1).astype(np.float32)
+
+
+def _encoded(frame: Frame, feature: Feature, normalization: Normalization) -> Array:
+    """Return one encoded feature (H, W, channels) in float64, or say which layer is missing."""
+    if feature.layer not in frame.layers:
+        what = f"feature {feature.name!r}: layers of the frame"
+        rule = f"layer {feature.layer!r} must be present"
+        raise InputError(what, ", ".join(frame.layers), rule, "render it, or choose other features")
+    return feature.encode(frame[feature.layer].astype(np.float64), normalization)
+
+
+def target_image(reference: Frame, normalization: Normalization) -> NDArray[np.float32]:
+    """Return the colours (H, W, 3) to learn: the reference's, encoded as the color feature is."""
+    return feature_image(reference, ("color",), normalization)
+
+
+def pad(image: Array, window: Window) -> Array:
+    """Extend (H, W, C) by the border rule to (H + size - 1, W + size - 1, C)."""
+    margin = (window.before, window.after)
+    mode: Any = BORDERS[window.border]
+    padded: Array = np.pad(image, (margin, margin, (0, 0)), mode=mode)
+    return padded
+
+
+def windows_at(image: Array, y: Any, x: Any, window: Window) -> Array:
+    """Return the window vectors (N, size * size * C) of the pixels y (N,), x (N,) of image (H, W, C).
+
+    Element (dy, dx, c) in C order is channel c of the pixel at (y + dy - size // 2, x + dx - size // 2).
+    """
+    padded = pad(image, window)
+    corner = np.asarray(y, np.int64) * padded.shape[1] + np.asarray(x, np.int64)
+    return _gather(padded.reshape(-1), corner, padded.shape[1], image.shape[2], window.size)
+
+
+def all_windows(padded: Array, window: Window) -> Array:
+    """Return the windows (H, W, size * size * C) of all pixels of the image that was padded to `padded`."""
+    views = np.lib.stride_tricks.sliding_window_view(padded, (window.size, window.size), axis=(0, 1))
+    height, width = views.shape[:2]
+    # NumPy puts the window's axes last, (H, W, C, dy, dx); a window vector has the channel last.
+    return views.transpose(0, 1, 3, 4, 2).reshape(height, width, -1)
+
+
+def _gather(values: Array, corner: Indices, row_px: Any, channels: int, size: int) -> Array:
+    """Return windows (N, size * size * channels) of padded images, laid out flat in `values` (P * channels,).
+
+    `corner` (N,) is the flat pixel index of each window's first tap, `row_px` the pixels from row to row. The
+    taps of one window row are neighbours in memory: a run of size * channels numbers.
+    """
+    runs = np.lib.stride_tricks.sliding_window_view(values, size * channels)[::channels]
+    rows = corner[:, None] + np.arange(size) * np.reshape(row_px, (-1, 1))
+    windows: Array = runs[rows].reshape(len(corner), -1)
+    return windows
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Padded feature images and targets of all frames, end to end.
+
+    `values` (P * C,) and `targets` (all pixels, 3); per frame (F,): `start_px` of its padded image in
+    `values`, `row_px` of that image, `first` row of its targets; `shapes` are the (H, W) of the frames.
+    """
+
+    values: NDArray[np.float32]
+    targets: NDArray[np.float32]
+    start_px: Indices
+    row_px: Indices
+    first: Indices
+    shapes: tuple[tuple[int, int], ...]
+    channels: int
+    window: Window
+
+    @property
+    def digest(self) -> str:
+        """Return a SHA-256 of everything that training sees, in hexadecimal."""
+        text = repr((self.shapes, self.channels, self.window.size)).encode()
+        return hashlib.sha256(text + self.values.tobytes() + self.targets.tobytes()).hexdigest()
+
+
+def build(
+    pairs: Sequence[tuple[Frame, Frame]],
+    features: Sequence[str],
+    window: Window,
+    normalization: Normalization,
+) -> Dataset:
+    """Lay out the examples of (noisy, reference) pairs; the sizes of different pairs may differ."""
+    _check_pairs(pairs)
+    images = [pad(feature_image(noisy, features, normalization), window) for noisy, _ in pairs]
+    targets = [target_image(reference, normalization).reshape(-1, 3) for _, reference in pairs]
+    return Dataset(
+        values=np.concatenate([image.reshape(-1) for image in images]),
+        targets=np.concatenate(targets),
+        start_px=_starts([image.shape[0] * image.shape[1] for image in images]),
+        row_px=np.array([image.shape[1] for image in images], np.int64),
+        first=_starts([len(target) for target in targets]),
+        shapes=tuple((noisy.height, noisy.width) for noisy, _ in pairs),
+        channels=channels_of(features),
+        window=window,
+    )
+
+
+def _check_pairs(pairs: Sequence[tuple[Frame, Frame]]) -> None:
+    """Refuse no pairs, and pairs whose pictures differ in size."""
+    if not pairs:
+        raise InputError("training pairs", "none", "at least one", "give a noisy frame and its reference")
+    for index, (noisy, reference) in enumerate(pairs):
+        sizes = [f"{frame.width}x{frame.height}" for frame in (noisy, reference)]
+        if sizes[0] != sizes[1]:
+            raise InputError(
+                f"training pair {index}: sizes of noisy and reference frame",
+                " and ".join(sizes),
+                "must be equal",
+                "render both at one size",
+            )
+
+
+def _starts(lengths: Sequence[int]) -> Indices:
+    """Return where each of several runs begins when they lie end to end."""
+    return np.cumsum([0, *lengths[:-1]], dtype=np.int64)
+
+
+def examples_at(dataset: Dataset, frame: Indices, y: Indices, x: Indices) -> tuple[Array, Array]:
+    """Return window vectors (N, D_in) and target colours (N, 3) of pixels given as frame, y, x (N,)."""
+    row_px = dataset.row_px[frame]
+    corner = dataset.start_px[frame] + y * row_px + x
+    width = row_px - dataset.window.size + 1
+    windows = _gather(dataset.values, corner, row_px, dataset.channels, dataset.window.size)
+    return windows, dataset.targets[dataset.first[frame] + y * width + x]
+
+
+def sample_pixels(
+    seed: int, stream: int, count: int, shapes: Sequence[tuple[int, int]]
+) -> tuple[Indices, Indices, Indices]:
+    """Draw frame, y, x (count,) uniformly, with replacement, from all pixels of frames of `shapes` (H, W)."""
+    sizes = [height * width for height, width in shapes]
+    index = sample_indices(seed, stream, PIXEL_TAG, count, sum(sizes))
+    first = _starts(sizes)
+    frame = np.searchsorted(first, index, side="right") - 1
+    width = np.array([width for _, width in shapes], np.int64)[frame]
+    y, x = np.divmod(index - first[frame], width)
+    return frame, y, x
+
+
+def sample_indices(seed: int, stream: int, tag: int, count: int, n: int) -> Indices:
+    """Draw (count,) whole numbers in [0, n), with replacement: floor(word n / 2**32), n < 2**31.
+
+    Number i of a stream is made of word i % 4 of the block (seed, i // 4, stream, tag).
+    """
+    blocks = counter(np.arange((count + 3) // 4))
+    words = np.stack(random_block(counter(seed), blocks, counter(stream), counter(tag)), axis=-1)
+    scaled = words.reshape(-1)[:count].astype(np.uint64) * np.uint64(n)
+    return (scaled >> np.uint64(32)).astype(np.int64)

@@ -1,0 +1,114 @@
+"""Denoise a frame with a trained network: the definition that every kernel is compared with.
+
+1. Encode the features of the frame that the model names [`dataset.feature_image`].
+2. For every pixel take its window and run the network, [`denoise_pixel`]: the function of one pixel that
+   the compiler traces.
+3. Do that for a block of rows at a time, because all windows of a picture fill the memory [`denoise`].
+
+The result is display-encoded colour in [0, 1], as the training targets were. Source of the method: *WAMnet
+for Image Denoising*.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from . import dataset
+from .dataset import Normalization, Window
+from .errors import InputError
+from .frame import Frame
+from .siren import Siren, check_shape, forward
+
+Array = NDArray[np.floating[Any]]
+
+BLOCK_NUMBERS = 2**22
+"""Numbers in the windows of one block of rows: 32 MiB in float64, for frames of any height."""
+
+OUTPUT_CHANNELS = 3
+"""Channels of the result: red, green, blue."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """All that is needed to denoise a frame: network, what it looks at, scales; `info` tells its origin."""
+
+    siren: Siren
+    features: tuple[str, ...]
+    window: Window
+    normalization: Normalization
+    info: Mapping[str, str] = field(default_factory=dict)
+
+
+def check_model(model: Model) -> None:
+    """Refuse a model whose parts do not fit each other or whose parameters are not finite numbers."""
+    dataset.check_features(model.features)
+    dataset.check_window(model.window)
+    dataset.check_normalization(model.normalization)
+    _check_layers(model.siren)
+    check_shape(model.siren.widths, model.siren.omega_0_first, model.siren.omega_0_hidden)
+    n_inputs = dataset.n_inputs(model.features, model.window)
+    if model.siren.widths[0] != n_inputs:
+        size = model.window.size
+        rule = f"{size} x {size} pixels of {', '.join(model.features)} are {n_inputs} numbers"
+        raise InputError("inputs of the first layer", model.siren.widths[0], rule, "train the model again")
+    if model.siren.widths[-1] != OUTPUT_CHANNELS:
+        rule = "a colour has 3 channels"
+        raise InputError("outputs of the last layer", model.siren.widths[-1], rule, "train the model again")
+
+
+def _check_layers(siren: Siren) -> None:
+    """Refuse layers of other types, whose shapes do not chain, or that hold a NaN or an infinity."""
+    kinds = sorted({parameter.dtype.name for parameter in siren.weights + siren.biases})
+    if kinds not in (["float32"], ["float64"]):
+        rule = "all must be float32, or all float64"
+        raise InputError("types of the parameters", ", ".join(kinds), rule, "convert them with as_dtype")
+    n_in: int | None = None
+    for layer, (weight, bias) in enumerate(zip(siren.weights, siren.biases, strict=True)):
+        shapes = f"weights {weight.shape}, biases {bias.shape}"
+        if weight.ndim != 2 or bias.shape != weight.shape[:1] or n_in not in (None, weight.shape[1]):
+            rule = f"weights (D_out, {n_in or 'D_in'}) and biases (D_out,) must chain"
+            raise InputError(f"layer {layer}", shapes, rule, "train the model again")
+        bad = np.size(weight) + np.size(bias) - np.isfinite(weight).sum() - np.isfinite(bias).sum()
+        if bad:
+            raise InputError(
+                f"layer {layer}: number of NaN or infinite parameters",
+                int(bad),
+                "all must be finite",
+                "train the model again, with a lower learning rate",
+            )
+        n_in = weight.shape[0]
+
+
+def denoise_pixel(siren: Siren, window_vector: Any) -> Any:
+    """Map window vectors (..., D_in) to display-encoded colours (..., 3) in [0, 1]; may be traced."""
+    return np.minimum(np.maximum(forward(siren, window_vector), 0.0), 1.0)
+
+
+def denoise(model: Model, frame: Frame, dtype: DTypeLike = np.float32) -> Array:
+    """Return the denoised picture (H, W, 3), display-encoded, with the network computed in `dtype`."""
+    siren = as_dtype(model.siren, dtype)
+    image = dataset.feature_image(frame, model.features, model.normalization).astype(dtype)
+    height, width, _ = image.shape
+    padded = dataset.pad(image, model.window)
+    rows = max(1, BLOCK_NUMBERS // (width * siren.widths[0]))
+    blocks = []
+    for top in range(0, height, rows):
+        # These rows and the margin around them are all that their pixels see.
+        strip = padded[top : min(top + rows, height) + model.window.size - 1]
+        blocks.append(denoise_pixel(siren, dataset.all_windows(strip, model.window)))
+    return np.concatenate(blocks)
+
+
+def as_dtype(siren: Siren, dtype: DTypeLike) -> Siren:
+    """Return the same network with parameters of type `dtype`."""
+    return Siren(
+        tuple(weight.astype(dtype) for weight in siren.weights),
+        tuple(bias.astype(dtype) for bias in siren.biases),
+        siren.omega_0_first,
+        siren.omega_0_hidden,
+    )

@@ -1,0 +1,122 @@
+"""Adam: hand-worked first steps, PyTorch's numbers, and gradients that are zero, tiny and huge."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wamnet.refimpl import adam
+
+U = 2.0**-53
+"""Unit roundoff of float64."""
+
+
+def run(theta: Any, gradients: Any, learning_rate: float, **options: float) -> list[Any]:
+    """Return the parameter after each of several steps."""
+    parameters, path = (np.array(theta),), []
+    state = adam.init(parameters)
+    for gradient in gradients:
+        parameters, state = adam.step(
+            parameters, (np.array(gradient, parameters[0].dtype),), state, learning_rate, **options
+        )
+        path.append(parameters[0])
+    return path
+
+
+def test_two_steps_by_hand() -> None:
+    """With beta_1 = 1/2, beta_2 = 3/4, epsilon = 1, learning rate 1/2, theta = 1 and gradients 4, then -2:
+
+    | t | m                  | v                      | m_hat          | v_hat           | theta             |
+    |---|--------------------|------------------------|----------------|-----------------|-------------------|
+    | 1 | 4/2 = 2            | 16/4 = 4               | 2/(1/2) = 4    | 4/(1/4) = 16    | 1 - 1/2 4/(4 + 1) |
+    | 2 | 2/2 - 2/2 = 0      | 3 + 4/4 = 4            | 0              | 4/(7/16) = 64/7 | unchanged         |
+
+    so theta is 3/5 after both steps: one rounding of 4/5, one of the product, one of the difference.
+    """
+    path = run([1.0], [[4.0], [-2.0]], 0.5, beta_1=0.5, beta_2=0.75, epsilon=1.0)
+    assert abs(path[0][0] - 0.6) <= 4 * U
+    assert path[1][0] == path[0][0]
+
+
+def test_third_step_by_hand_has_both_moments() -> None:
+    """Go on with gradient 8: m = 4, v = 3 + 16 = 19, m_hat = 4/(7/8) = 32/7, v_hat = 19/(37/64) = 1216/37.
+
+    theta = 3/5 - 1/2 (32/7) / (sqrt(1216/37) + 1) = 3/5 - (16/7) / 6.732793...
+    """
+    path = run([1.0], [[4.0], [-2.0], [8.0]], 0.5, beta_1=0.5, beta_2=0.75, epsilon=1.0)
+    expected = 0.6 - 16 / 7 / ((1216 / 37) ** 0.5 + 1)
+    # Under ten roundings of numbers below 1 in magnitude, on either side.
+    assert abs(path[2][0] - expected) <= 20 * U
+
+
+TORCH = [
+    ["0x1.fae147afcc48ep-1", "-0x1.fae147ae826e6p-1", "0x1.0000000000000p-2"],
+    ["0x1.f61b741c91f6ap-1", "-0x1.fc25f29e6a488p-1", "0x1.0000000000000p-2"],
+    ["0x1.f729ee09f6efcp-1", "-0x1.fd20eac3fa3ecp-1", "0x1.f2eac6e789951p-3"],
+    ["0x1.f7b380ab467f6p-1", "-0x1.fa2738a24a764p-1", "0x1.e8334c19422dep-3"],
+]
+
+
+def test_matches_pytorch() -> None:
+    """Numbers printed by PyTorch 2.13.0 (CPU) with this script:
+
+        import torch
+        torch.set_default_dtype(torch.float64)
+        gradients = [[0.5, -2.0, 0.0], [0.25, 3.0, 0.0], [-1.0, 1e-6, 4.0], [0.125, -1e6, 0.0]]
+        theta = torch.tensor([1.0, -1.0, 0.25], requires_grad=True)
+        adam = torch.optim.Adam([theta], lr=0.01)
+        for gradient in gradients:
+            theta.grad = torch.tensor(gradient)
+            adam.step()
+            print([float(value).hex() for value in theta.detach()])
+
+    Bound: both sides compute each move (|move| <= 0.032: lr / sqrt(1 - beta_2) times 1 - beta_1 is 0.0316)
+    with fewer than 20 roundings, and 1 - beta_2**t carries the rounding of beta_2 magnified by
+    beta_2 / (1 - beta_2), at most 1000; each subtraction rounds a number below 1. Four steps of both sides
+    add up.
+    """
+    gradients = [[0.5, -2.0, 0.0], [0.25, 3.0, 0.0], [-1.0, 1e-6, 4.0], [0.125, -1e6, 0.0]]
+    path = run([1.0, -1.0, 0.25], gradients, 0.01)
+    bound = 2 * 4 * (0.032 * (20 + 1000) * U + U)
+    for ours, theirs in zip(path, TORCH, strict=True):
+        assert np.abs(ours - [float.fromhex(value) for value in theirs]).max() <= bound
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("gradient", [1e-3, -1.0, 1e3, -1e15])
+def test_bias_correction_makes_the_first_step_the_learning_rate(gradient: float, dtype: Any) -> None:
+    """m_hat / sqrt(v_hat) = +-1 at step 1; epsilon takes off at most epsilon / |gradient| = 1e-5 of it."""
+    moved = run(np.zeros(1, dtype), [[gradient]], 0.125)[0][0]
+    # Ten roundings in the array's type cover the moments, their corrections, the root and the quotient.
+    bound = 0.125 * (1e-8 / abs(gradient) + 10 * float(np.finfo(dtype).eps))
+    assert abs(float(moved) + 0.125 * np.sign(gradient)) <= bound
+
+
+def test_zero_gradient_moves_nothing() -> None:
+    assert run([1.5, -2.0], [[0.0, 0.0]] * 3, 0.1)[-1].tolist() == [1.5, -2.0]
+
+
+def test_tiny_gradient_is_damped_by_epsilon() -> None:
+    """|g| = 1e-20 is far below epsilon = 1e-8: the step is g / epsilon learning rates, not one."""
+    moved = run([0.0], [[1e-20]], 1.0)[0][0]
+    # epsilon dominates: sqrt(v_hat) = 1e-20 changes the quotient by 1e-12 of itself.
+    assert abs(moved + 1e-12) <= 1e-12 * (1e-12 + 20 * U)
+
+
+def test_square_that_overflows_stops_the_parameter_instead_of_breaking_it() -> None:
+    """In float32 the square of 1e30 is infinite: the quotient m_hat / sqrt(v_hat) is 0, never NaN."""
+    with np.errstate(over="ignore"):
+        path = run(np.ones(1, np.float32), [[1e30], [1.0]], 0.1)
+    assert [float(value[0]) for value in path] == [1.0, 1.0]
+
+
+def test_step_changes_nothing_in_place_and_keeps_the_type() -> None:
+    theta, gradient = np.ones(2, np.float32), np.full(2, 0.5, np.float32)
+    before = adam.init((theta,))
+    (moved,), after = adam.step((theta,), (gradient,), before, 0.1)
+    assert moved.dtype == after.m[0].dtype == after.v[0].dtype == np.float32
+    assert theta.tolist() == [1.0, 1.0]
+    assert before.m[0].tolist() == [0.0, 0.0]
+    assert (before.t, after.t) == (0, 1)

@@ -1,0 +1,269 @@
+"""Windows against a loop over pixels, features and their errors, normalization, sampling."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.refimpl import dataset
+from wamnet.refimpl.dataset import FEATURES, Normalization, Window
+from wamnet.refimpl.encoding import to_display
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.frame import LAYERS, Frame
+
+
+def frame_of(height: int, width: int, seed: int = 0, dtype: Any = np.float32) -> Frame:
+    """Return a frame with every layer, filled with numbers in [-2, 2]."""
+    rng = np.random.default_rng(seed)
+    layers = {
+        name: rng.uniform(-2, 2, (height, width, layer.channels)).astype(dtype)
+        for name, layer in LAYERS.items()
+    }
+    layers["color"], layers["depth"] = np.abs(layers["color"]), np.abs(layers["depth"])
+    return Frame(layers)
+
+
+# ---- windows ---------------------------------------------------------------------------------------------
+
+
+def slow_window(image: Any, y: int, x: int, window: Window) -> Any:
+    """Return the window vector by the words of the spec: one tap, one channel at a time."""
+    height, width, channels = image.shape
+    vector = []
+    for dy in range(-(window.size // 2), window.size - window.size // 2):
+        for dx in range(-(window.size // 2), window.size - window.size // 2):
+            inside = 0 <= y + dy < height and 0 <= x + dx < width
+            tap = image[min(max(y + dy, 0), height - 1), min(max(x + dx, 0), width - 1)]
+            seen = inside or window.border == "clamp"
+            vector.extend(tap[channel] if seen else 0.0 for channel in range(channels))
+    return np.array(vector, image.dtype)
+
+
+SHAPES = st.tuples(st.integers(1, 9), st.integers(1, 9), st.integers(1, 3))
+"""Height, width, channels: 1x1, 1xN and images smaller than the window are all among them."""
+
+
+@given(shape=SHAPES, size=st.integers(1, 13), border=st.sampled_from(sorted(dataset.BORDERS)))
+def test_windows_match_a_loop_over_taps(shape: tuple[int, int, int], size: int, border: str) -> None:
+    image = np.random.default_rng(size).random(shape)
+    window = Window(size, border)
+    y, x = (index.reshape(-1) for index in np.indices(shape[:2]))
+    expected = np.array([slow_window(image, *pixel, window) for pixel in zip(y, x, strict=True)])
+    assert np.array_equal(dataset.windows_at(image, y, x, window), expected)
+    every = dataset.all_windows(dataset.pad(image, window), window)
+    assert every.shape == (*shape[:2], size * size * shape[2])
+    assert np.array_equal(every.reshape(len(y), -1), expected)
+
+
+def test_centre_tap_of_an_even_window_has_index_half_its_size() -> None:
+    image = np.arange(20 * 20, dtype=np.float64).reshape(20, 20, 1)
+    vector = dataset.windows_at(image, [10], [9], Window(12))[0].reshape(12, 12)
+    assert vector[6, 6] == image[10, 9, 0]
+    assert (vector[0, 0], vector[11, 11]) == (image[4, 3, 0], image[15, 14, 0])
+    assert (Window(12).before, Window(12).after, Window(3).before, Window(3).after) == (6, 5, 1, 1)
+
+
+@given(
+    sizes=st.lists(st.tuples(st.integers(1, 5), st.integers(1, 5)), min_size=1, max_size=4),
+    size=st.integers(1, 6),
+    border=st.sampled_from(sorted(dataset.BORDERS)),
+)
+def test_examples_of_frames_of_any_sizes_match_their_windows_and_targets(
+    sizes: list[tuple[int, int]], size: int, border: str
+) -> None:
+    pairs = [(frame_of(*s, seed=i), frame_of(*s, seed=100 + i)) for i, s in enumerate(sizes)]
+    window, scales, features = Window(size, border), Normalization(), ("color", "depth")
+    data = dataset.build(pairs, features, window, scales)
+    for index, ((height, width), (noisy, reference)) in enumerate(zip(sizes, pairs, strict=True)):
+        y, x = (positions.reshape(-1) for positions in np.indices((height, width)))
+        windows, targets = dataset.examples_at(data, np.full(len(y), index), y, x)
+        image = dataset.feature_image(noisy, features, scales)
+        assert np.array_equal(windows, dataset.windows_at(image, y, x, window))
+        assert np.array_equal(
+            targets, to_display(reference["color"].astype(np.float64)).astype(np.float32)[y, x]
+        )
+
+
+def test_digest_names_the_data() -> None:
+    def digest(seed: int, size: int) -> str:
+        pairs = [(frame_of(3, 4, seed), frame_of(3, 4, 9))]
+        return dataset.build(pairs, ("color",), Window(size), Normalization()).digest
+
+    assert digest(0, 2) == digest(0, 2)
+    assert len({digest(0, 2), digest(1, 2), digest(0, 3)}) == 3
+
+
+# ---- features --------------------------------------------------------------------------------------------
+
+
+def test_feature_ranges_channels_and_order() -> None:
+    frame = frame_of(5, 4)
+    scales = Normalization(depth_scale=1.5, position_scale=1.5)
+    image = dataset.feature_image(frame, tuple(FEATURES), scales)
+    assert image.dtype == np.float32
+    assert image.shape == (5, 4, dataset.channels_of(tuple(FEATURES))) == (5, 4, 16)
+    first = 0
+    for feature in FEATURES.values():
+        assert feature.channels == LAYERS[feature.layer].channels
+        part = image[..., first : first + feature.channels]
+        assert np.array_equal(part, dataset.feature_image(frame, (feature.name,), scales))
+        assert part.min() >= feature.low
+        assert part.max() <= feature.high
+        # Layers reach beyond the range, so the clip is seen; the interior is seen too.
+        assert (part == feature.high).any()
+        assert ((part > feature.low) & (part < feature.high)).any()
+        first += feature.channels
+
+
+def test_features_by_hand() -> None:
+    """One pixel, numbers that float32 holds exactly, so that every result is exact."""
+    one = np.ones((1, 1, 1))
+    frame = Frame(
+        {
+            "color": one * [0.0, 0.25, 9.0],
+            "albedo": one * [-0.5, 0.5, 1.5],
+            "normal": one * [-2.0, 0.5, 1.0],
+            "depth": one * [3.0],
+            "position": one * [1.0, 5.0, -9.0],
+            "direction": one * [0.0, -1.0, 0.5],
+        }
+    )
+    scales = Normalization(2.0, 4.0, (1.0, 1.0, 1.0), 8.0)
+    expected = {
+        "color": [0.0, 1.0, 1.0],  # exposed by two stops: 0, 1, 36
+        "albedo": [0.0, 0.5, 1.0],
+        "normal": [-1.0, 0.5, 1.0],
+        "depth": [0.75],
+        "position": [0.0, 0.5, -1.0],
+        "direction": [0.0, -1.0, 0.5],
+    }
+    for name, values in expected.items():
+        assert dataset.feature_image(frame, (name,), scales)[0, 0].tolist() == values
+
+
+def test_features_do_not_depend_on_the_frames_float_type() -> None:
+    narrow = frame_of(3, 3)
+    wide = Frame({name: values.astype(np.float64) for name, values in narrow.layers.items()})
+    images = [dataset.feature_image(frame, tuple(FEATURES), Normalization()) for frame in (narrow, wide)]
+    assert np.array_equal(*images)
+
+
+def test_missing_layer_is_named() -> None:
+    frame = Frame({"color": np.zeros((2, 2, 3))})
+    message = "feature 'normal': layers of the frame is color: layer 'normal' must be present; render it"
+    with pytest.raises(InputError, match=re.escape(message)):
+        dataset.feature_image(frame, ("color", "normal"), Normalization())
+
+
+def test_feature_names_are_checked() -> None:
+    with pytest.raises(
+        InputError, match="feature name is colour: not a known feature; use some of color, normal"
+    ):
+        dataset.feature_image(frame_of(1, 1), ("colour",), Normalization())
+    for names in ((), ("color", "color")):
+        with pytest.raises(InputError, match=r"features is .*at least one, each once"):
+            dataset.check_features(names)
+
+
+# ---- normalization ---------------------------------------------------------------------------------------
+
+
+def test_normalization_by_hand() -> None:
+    """Positions (1, 2, 3) and (5, 2, -3): the box's centre is (3, 2, 0), its half extents 2, 0 and 3."""
+    position = np.array([[[1.0, 2.0, 3.0], [5.0, 2.0, -3.0], [0.0, 0.0, 0.0]]])
+    frame = Frame({"position": position, "depth": np.array([[[2.0], [7.0], [0.0]]])})
+    assert dataset.normalization_of([frame]) == Normalization(0.0, 7.0, (3.0, 2.0, 0.0), 3.0)
+    both = dataset.normalization_of([frame, Frame({"depth": np.full((1, 1, 1), 9.0)})], exposure_stops=1.0)
+    assert both == Normalization(1.0, 9.0, (3.0, 2.0, 0.0), 3.0)
+
+
+def test_normalization_without_layers_or_hits_divides_by_one() -> None:
+    assert dataset.normalization_of([Frame({"color": np.zeros((1, 1, 3))})]) == Normalization()
+    blind = Frame({"depth": np.zeros((2, 2, 1)), "position": np.zeros((2, 2, 3))})
+    assert dataset.normalization_of([blind]) == Normalization()
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"depth_scale": 0.0},
+        {"position_scale": -1.0},
+        {"position_scale": math.inf},
+        {"exposure_stops": math.nan},
+        {"position_center": (0.0, math.nan, 0.0)},
+        {"position_center": (0.0, 0.0)},
+    ],
+)
+def test_normalization_is_checked(values: Any) -> None:
+    with pytest.raises(InputError, match=f"{next(iter(values))} is .*finite"):
+        dataset.check_normalization(Normalization(**values))
+
+
+# ---- checks ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [0, -1, 65, 1.5])
+def test_window_sizes_are_checked(size: Any) -> None:
+    with pytest.raises(InputError, match=r"window size is .*a whole number from 1 to 64"):
+        dataset.check_window(Window(size))
+
+
+def test_window_borders_are_checked() -> None:
+    with pytest.raises(InputError, match="window border is wrap: a known rule; use one of clamp, zero"):
+        dataset.check_window(Window(12, "wrap"))
+
+
+def test_pairs_are_checked() -> None:
+    with pytest.raises(InputError, match="training pairs is none: at least one"):
+        dataset.build([], ("color",), Window(), Normalization())
+    message = "training pair 1: sizes of noisy and reference frame is 3x2 and 2x3: must be equal"
+    pairs = [(frame_of(2, 2), frame_of(2, 2)), (frame_of(2, 3), frame_of(3, 2))]
+    with pytest.raises(InputError, match=message):
+        dataset.build(pairs, ("color",), Window(), Normalization())
+
+
+# ---- sampling --------------------------------------------------------------------------------------------
+
+
+def test_samples_lie_in_their_frames_and_are_uniform() -> None:
+    """Chi-square over all 46 pixels of three frames, 46,000 draws; 45 degrees of freedom, significance 1e-6.
+
+    The quantile is 113.2 (Wilson and Hilferty: 45 (1 - 2/405 + 4.753 sqrt(2/405))^3 = 113.1).
+    """
+    shapes = [(3, 4), (1, 9), (5, 5)]
+    frame, y, x = dataset.sample_pixels(7, 0, 46_000, shapes)
+    heights, widths = np.array(shapes).T
+    assert np.all((y >= 0) & (y < heights[frame]) & (x >= 0) & (x < widths[frame]))
+    first = np.array([0, 12, 21])
+    counts = np.bincount(first[frame] + y * widths[frame] + x, minlength=46)
+    assert np.sum((counts - 1000.0) ** 2 / 1000.0) <= 113.2
+
+
+def test_samples_are_functions_of_seed_and_stream() -> None:
+    draws = [
+        np.stack(dataset.sample_pixels(seed, stream, 50, [(100, 100)])).tolist()
+        for seed, stream in ((1, 1), (1, 1), (1, 2), (2, 1))
+    ]
+    assert draws[0] == draws[1]
+    assert draws[0] != draws[2]
+    assert draws[0] != draws[3]
+
+
+def test_a_longer_draw_begins_with_the_shorter_one() -> None:
+    long, short = (dataset.sample_indices(3, 4, 5, count, 1000) for count in (11, 6))
+    assert long[:6].tolist() == short.tolist()
+
+
+def test_index_is_the_scaled_word() -> None:
+    """n = 1 always gives 0; the largest words give n - 1, never n, up to the largest n."""
+    assert dataset.sample_indices(0, 0, 0, 9, 1).tolist() == [0] * 9
+    top = dataset.sample_indices(0, 0, 0, 4096, 2**31 - 1)
+    assert 0 <= top.min() <= top.max() < 2**31 - 1
+    # 4096 uniform draws all miss the upper 1 % with probability 0.99**4096 < 1e-17.
+    assert top.max() >= 0.99 * 2**31

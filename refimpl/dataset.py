@@ -15,6 +15,7 @@ rule and the encodings are decisions, explained in the chapter of this module.
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -153,6 +154,18 @@ def check_normalization(normalization: Normalization) -> None:
     center = normalization.position_center
     if len(center) != 3 or not all(math.isfinite(value) for value in center):
         raise InputError("position_center", center, "three finite numbers", "use normalization_of(frames)")
+
+
+def normalization_from_json(text: str) -> Normalization:
+    """Return the normalization written in `text`, or say what is wrong with it."""
+    try:
+        values = json.loads(text)
+        normalization = Normalization(**{**values, "position_center": tuple(values["position_center"])})
+        check_normalization(normalization)
+    except (TypeError, KeyError, json.JSONDecodeError) as error:
+        rule = f"JSON of a normalization ({error})"
+        raise InputError("normalization", text, rule, "train the model again") from None
+    return normalization
 
 
 def channels_of(features: Sequence[str]) -> int:

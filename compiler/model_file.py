@@ -1,0 +1,236 @@
+"""Models and checkpoints as files: safetensors with the facts about them in the header.
+
+1. A file holds named tensors and, in its header, named texts; the text `format` says which kind of file it is
+   and `version` how to read it [`save_model`], [`save_checkpoint`].
+2. The same content gives the same bytes: the header is written with sorted keys [`_encode`]. The safetensors
+   library writes its metadata in the order of a hash table, so it only reads here.
+3. A file appears under its name when it is complete: it is written beside it and then renamed [`_write`].
+4. Nothing in a file is believed: what is missing, of another kind, too large, not finite or not fitting is
+   refused with one line [`load_model`], [`load_checkpoint`].
+
+The format of the container is safetensors' own: 8 bytes of header length, little-endian; a JSON header,
+padded with spaces to a multiple of 8; the tensors' bytes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load as decode_tensors
+
+from ..refimpl import train
+from ..refimpl.dataset import Window, normalization_from_json
+from ..refimpl.denoise import Model, check_model
+from ..refimpl.errors import InputError
+from ..refimpl.siren import Siren
+from ..refimpl.train import TrainState
+
+Tensors = Mapping[str, NDArray[Any]]
+Texts = Mapping[str, str]
+
+MODEL_FORMAT = "wamnet-model"
+"""Value of the header's text `format` in a model file."""
+
+CHECKPOINT_FORMAT = "wamnet-checkpoint"
+"""Value of the header's text `format` in a checkpoint file."""
+
+VERSION = "1"
+"""Value of the header's text `version`; it changes when older readers would misread the file."""
+
+LARGEST_FILE_BYTES = 256 * 2**20
+"""Largest file that is read: thousands of times a usual model, and it still fits the memory."""
+
+INFO_PREFIX = "info."
+"""Put before the names of a model's own facts in the header, so that they cannot hide a field."""
+
+_DTYPES = {"float32": "F32", "float64": "F64", "int64": "I64"}
+"""Element types that are written, by NumPy's name, as safetensors names them."""
+
+
+def save_model(path: str | os.PathLike[str], model: Model) -> None:
+    """Write a model that [`load_model`] reads back to the same bits."""
+    check_model(model)
+    tensors: dict[str, NDArray[Any]] = {}
+    for layer, (weight, bias) in enumerate(zip(model.siren.weights, model.siren.biases, strict=True)):
+        tensors[f"layer{layer}.weight"], tensors[f"layer{layer}.bias"] = weight, bias
+    texts = {
+        "features": json.dumps(model.features),
+        "window": json.dumps(asdict(model.window), sort_keys=True),
+        "omega_0_first": repr(model.siren.omega_0_first),
+        "omega_0_hidden": repr(model.siren.omega_0_hidden),
+        "normalization": json.dumps(asdict(model.normalization), sort_keys=True),
+        **{INFO_PREFIX + name: text for name, text in model.info.items()},
+    }
+    _write(Path(path), _encode(MODEL_FORMAT, tensors, texts))
+
+
+def load_model(path: str | os.PathLike[str]) -> Model:
+    """Read a model, or raise InputError that says what is wrong with the file."""
+    path = Path(path)
+    tensors, texts = _read(path, MODEL_FORMAT)
+    n_layers = sum(name.endswith(".weight") for name in tensors)
+    model = Model(
+        siren=Siren(
+            tuple(_tensor(path, tensors, f"layer{layer}.weight") for layer in range(max(n_layers, 1))),
+            tuple(_tensor(path, tensors, f"layer{layer}.bias") for layer in range(max(n_layers, 1))),
+            _parsed(path, texts, "omega_0_first", float),
+            _parsed(path, texts, "omega_0_hidden", float),
+        ),
+        features=_parsed(path, texts, "features", _names),
+        window=_parsed(path, texts, "window", lambda text: Window(**json.loads(text))),
+        normalization=_parsed(path, texts, "normalization", normalization_from_json),
+        info={
+            name.removeprefix(INFO_PREFIX): text
+            for name, text in sorted(texts.items())
+            if name.startswith(INFO_PREFIX)
+        },
+    )
+    _check(path, check_model, model)
+    return model
+
+
+def save_checkpoint(path: str | os.PathLike[str], state: TrainState) -> None:
+    """Write a state of training that [`load_checkpoint`] reads back to the same bits."""
+    tensors, texts = train.state_to_arrays(state)
+    _write(Path(path), _encode(CHECKPOINT_FORMAT, tensors, texts))
+
+
+def load_checkpoint(path: str | os.PathLike[str]) -> TrainState:
+    """Read a state of training, or raise InputError that says what is wrong with the file."""
+    path = Path(path)
+    tensors, texts = _read(path, CHECKPOINT_FORMAT)
+    try:
+        state = train.state_from_arrays(tensors, texts)
+    except KeyError as error:
+        what = f"{path}: list of entries"
+        rule = f"{error.args[0]!r} must be among them"
+        raise InputError(what, ", ".join(sorted({*tensors, *texts})), rule, "start a new run") from None
+    except ValueError as error:
+        raise _inside(path, error) from None
+    _check(path, train.check_state, state)
+    return state
+
+
+def _encode(kind: str, tensors: Tensors, texts: Texts) -> bytes:
+    """Return the file's bytes: header with sorted keys, then the tensors in the order of their names."""
+    header: dict[str, Any] = {"__metadata__": {"format": kind, "version": VERSION, **texts}}
+    data, end = [], 0
+    # Eight-byte elements first: every tensor then starts at a multiple of its element's size.
+    for name in sorted(tensors, key=lambda name: (-tensors[name].dtype.itemsize, name)):
+        values = np.ascontiguousarray(tensors[name])
+        raw = values.astype(values.dtype.newbyteorder("<")).tobytes()
+        span = [end, end + len(raw)]
+        header[name] = {"dtype": _DTYPES[values.dtype.name], "shape": values.shape, "data_offsets": span}
+        data.append(raw)
+        end += len(raw)
+    text = json.dumps(header, sort_keys=True, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 8)
+    return b"".join([len(text).to_bytes(8, "little"), text, *data])
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Give `path` the content, whole or not at all."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_bytes(content)
+        temporary.replace(path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(
+            "output file", str(path), f"cannot be written ({reason})", "choose another"
+        ) from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Return tensors and texts of a file of this kind and version."""
+    try:
+        size = path.stat().st_size
+        if size > LARGEST_FILE_BYTES:
+            rule = f"at most {LARGEST_FILE_BYTES} bytes are read"
+            raise InputError(f"size of {path} in bytes", size, rule, f"give a {kind} file")
+        content = path.read_bytes()
+    except OSError as error:
+        rule = f"cannot be read ({error.strerror or error})"
+        raise InputError(f"{kind} file", str(path), rule, "check the path") from None
+    try:
+        tensors = decode_tensors(content)
+    except (SafetensorError, KeyError, ValueError) as error:
+        rule = f"not a safetensors file ({error})"
+        raise InputError(f"{kind} file", str(path), rule, "write it with `wamnet train`") from None
+    texts = _header_texts(content)
+    _check_kind(path, texts, kind)
+    return tensors, texts
+
+
+def _header_texts(content: bytes) -> dict[str, str]:
+    """Return the header's texts; the library has found the header sound, but keeps them to itself."""
+    length = int.from_bytes(content[:8], "little")
+    texts: dict[str, str] = json.loads(content[8 : 8 + length]).get("__metadata__") or {}
+    return texts
+
+
+def _check_kind(path: Path, texts: Texts, kind: str) -> None:
+    """Refuse a file of another kind or version."""
+    found = texts.get("format", "missing")
+    if found != kind:
+        raise InputError(f"{path}: format", found, f"must be {kind}", "give a file that wamnet wrote")
+    version = texts.get("version", "missing")
+    if version != VERSION:
+        rule = f"this program reads version {VERSION}"
+        raise InputError(f"{path}: version", version, rule, "use the wamnet that wrote it")
+
+
+def _tensor(path: Path, tensors: Tensors, name: str) -> NDArray[Any]:
+    """Return a tensor, or say that it is missing."""
+    if name not in tensors:
+        present = ", ".join(sorted(tensors)) or "empty"
+        raise InputError(f"{path}: list of tensors", present, f"{name!r} must be among them", "train again")
+    return tensors[name]
+
+
+def _parsed(path: Path, texts: Texts, name: str, parse: Callable[[str], Any]) -> Any:
+    """Return the header's text `name` as `parse` reads it, or say that it is missing or unreadable."""
+    if name not in texts:
+        present = ", ".join(sorted(texts))
+        raise InputError(
+            f"{path}: list of header texts", present, f"{name!r} must be among them", "train again"
+        )
+    try:
+        return parse(texts[name])
+    except InputError as error:
+        raise _inside(path, error) from None
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{path}: {name}", texts[name], f"cannot be read ({error})", "train again") from None
+
+
+def _names(text: str) -> tuple[str, ...]:
+    """Return a JSON list of strings."""
+    names = json.loads(text)
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ValueError("a list of names is needed")
+    return tuple(names)
+
+
+def _check(path: Path, check: Callable[[Any], None], content: Any) -> None:
+    """Run a check of the reference, and name the file in what it refuses."""
+    try:
+        check(content)
+    except InputError as error:
+        raise _inside(path, error) from None
+
+
+def _inside(path: Path, error: ValueError) -> InputError:
+    """Return the error with the file's name before the thing that it names."""
+    if isinstance(error, InputError):
+        return InputError(f"{path}: {error.what}", error.value, error.rule, error.way_out)
+    return InputError(f"{path}: content", str(error), "cannot be read", "start a new run")

@@ -1,0 +1,386 @@
+"""Training: fit the network to pairs of a noisy frame and its reference.
+
+1. Lay out all windows and targets of the pairs as one table [`dataset.build`].
+2. Each step, draw a minibatch of pixels [`draw_batch`]: any pixels of any frame, or members of a pool that
+   was drawn once, as in the paper.
+3. Compute the mean squared error of display-encoded colour and its derivative [`loss_and_gradients`].
+4. Follow it with Adam, at a learning rate given by the schedule [`SCHEDULES`].
+5. Everything that the next step depends on is in [`TrainState`], so training can stop after any step and go
+   on later to the same bits [`state_to_arrays`], [`state_from_arrays`].
+
+Source: *WAMnet for Image Denoising* for the protocol of the preset `paper`. No generator has a state:
+minibatch k depends on (seed, k) alone. Bits repeat on one machine with one BLAS and one number of BLAS
+threads; another BLAS sums in another order.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from . import adam, dataset, siren
+from .adam import AdamState
+from .dataset import Dataset, Normalization, Window
+from .denoise import OUTPUT_CHANNELS, Model
+from .errors import InputError, TrainingError
+from .frame import Frame
+from .siren import Siren
+
+Array = NDArray[np.floating[Any]]
+
+POOL_STREAM = 0xFFFFFFFF
+"""Counter `sample` of the words that draw the pool; steps use their own number, which is smaller."""
+
+PICK_TAG = 0x5049434B
+"""Counter `block` of the words that pick members of the pool ("PICK" in ASCII)."""
+
+
+def constant(step: int, steps: int) -> float:
+    """Keep the learning rate."""
+    return 1.0
+
+
+def cosine(step: int, steps: int) -> float:
+    """Fall from 1 at the first step along half a cosine towards 0 after the last."""
+    return 0.5 * (1.0 + math.cos(math.pi * step / steps))
+
+
+SCHEDULES: Mapping[str, Callable[[int, int], float]] = {"constant": constant, "cosine": cosine}
+"""Factors of the learning rate at a step of `steps`, by name; a new one is one function and one line here."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """All choices of a training run; `widths` are those of the hidden layers.
+
+    `n_windows` is the size of the pool that minibatches are picked from; 0 draws new pixels every step.
+    `log_every` is in steps.
+    """
+
+    features: tuple[str, ...]
+    window: Window
+    widths: tuple[int, ...]
+    omega_0_first: float
+    omega_0_hidden: float
+    n_windows: int
+    batch: int
+    steps: int
+    learning_rate: float
+    schedule: str
+    seed: int = 0
+    log_every: int = 100
+
+    @property
+    def layer_widths(self) -> tuple[int, ...]:
+        """Return (D_in, hidden widths ..., 3)."""
+        return (dataset.n_inputs(self.features, self.window), *self.widths, OUTPUT_CHANNELS)
+
+
+PAPER = Recipe(
+    features=("color", "normal"),
+    window=Window(12, "clamp"),
+    widths=(32, 32, 32, 32),
+    omega_0_first=1.0,
+    omega_0_hidden=1.0,
+    n_windows=20_000,
+    batch=10_000,
+    steps=20_000,
+    learning_rate=1e-3,
+    schedule="constant",
+)
+"""The paper's protocol; what the paper leaves open (omega_0, learning rate) is decided in the spec."""
+
+SHORT = Recipe(
+    features=("color", "normal", "albedo", "position"),
+    window=Window(12, "clamp"),
+    widths=(32, 32, 32, 32),
+    omega_0_first=3.0,
+    omega_0_hidden=3.0,
+    n_windows=0,
+    batch=1024,
+    steps=8_000,
+    learning_rate=3e-3,
+    schedule="cosine",
+)
+"""Better than the paper's protocol on unseen frames in about a minute; chosen by `experiments/presets.py`."""
+
+PRESETS: Mapping[str, Recipe] = {"paper": PAPER, "short": SHORT}
+"""Recipes by name; change single choices with `dataclasses.replace`."""
+
+
+def check_recipe(recipe: Recipe) -> None:
+    """Refuse a recipe with a value that means nothing."""
+    dataset.check_features(recipe.features)
+    dataset.check_window(recipe.window)
+    siren.check_shape(recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden)
+    for name, least in (("batch", 1), ("steps", 1), ("log_every", 1), ("n_windows", 0), ("seed", 0)):
+        value = getattr(recipe, name)
+        if not isinstance(value, int) or not least <= value < POOL_STREAM:
+            rule = f"a whole number from {least} to {POOL_STREAM - 1}"
+            raise InputError(f"recipe: {name}", value, rule, "see the presets " + ", ".join(PRESETS))
+    if not (math.isfinite(recipe.learning_rate) and recipe.learning_rate > 0):
+        raise InputError("recipe: learning_rate", recipe.learning_rate, "finite and > 0", "try 0.001")
+    if recipe.schedule not in SCHEDULES:
+        known = ", ".join(SCHEDULES)
+        raise InputError("recipe: schedule", recipe.schedule, "not a known schedule", f"use one of {known}")
+
+
+def recipe_to_json(recipe: Recipe) -> str:
+    """Return the recipe as JSON text with sorted keys."""
+    return json.dumps(asdict(recipe), sort_keys=True)
+
+
+def recipe_from_json(text: str) -> Recipe:
+    """Return the recipe written in `text`, or say what is wrong with it."""
+    try:
+        values = json.loads(text)
+        values["features"], values["widths"] = tuple(values["features"]), tuple(values["widths"])
+        recipe = Recipe(**{**values, "window": Window(**values["window"])})
+    except (TypeError, ValueError, KeyError) as error:
+        raise InputError(
+            "recipe", text, f"JSON of a recipe ({error})", "write it with recipe_to_json"
+        ) from None
+    check_recipe(recipe)
+    return recipe
+
+
+@dataclass(frozen=True)
+class TrainState:
+    """All that the next step depends on, after `step` steps; `history` holds (step, loss before that step).
+
+    `digest` names the data, so that training is not resumed on other frames by mistake.
+    """
+
+    siren: Siren
+    moments: AdamState
+    step: int
+    recipe: Recipe
+    normalization: Normalization
+    digest: str
+    history: tuple[tuple[int, float], ...] = ()
+
+
+Progress = Callable[[TrainState, float], None]
+"""Called with the state after a step and the loss before it."""
+
+Checkpoint = Callable[[TrainState], None]
+"""Called with a state that should be kept."""
+
+
+def start(
+    recipe: Recipe, normalization: Normalization, digest: str, dtype: DTypeLike = np.float32
+) -> TrainState:
+    """Return the state before the first step."""
+    check_recipe(recipe)
+    network = siren.init(recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden, recipe.seed, dtype)
+    return TrainState(network, adam.init(network.weights + network.biases), 0, recipe, normalization, digest)
+
+
+def train(
+    recipe: Recipe,
+    pairs: Sequence[tuple[Frame, Frame]],
+    *,
+    state: TrainState | None = None,
+    until: int | None = None,
+    dtype: DTypeLike = np.float32,
+    on_progress: Progress | None = None,
+    on_checkpoint: Checkpoint | None = None,
+    checkpoint_every: int | None = None,
+) -> TrainState:
+    """Train on (noisy, reference) pairs from the start or from `state`, up to step `until` (all by default).
+
+    `on_progress` is called every recipe.log_every steps and after the last. `on_checkpoint` is called every
+    `checkpoint_every` steps, after the last, on an interrupt, and before TrainingError is raised: then
+    with the last state whose loss is finite, if this call has seen one.
+    """
+    check_recipe(recipe)
+    normalization = (
+        dataset.normalization_of([noisy for noisy, _ in pairs]) if state is None else state.normalization
+    )
+    data = dataset.build(pairs, recipe.features, recipe.window, normalization)
+    if state is None:
+        state = start(recipe, normalization, data.digest, dtype)
+    state = _resumed(state, recipe, data.digest)
+    pool = draw_pool(recipe, data)
+    end = recipe.steps if until is None else min(until, recipe.steps)
+    keep = on_checkpoint or _forget
+    good: TrainState | None = None
+    try:
+        while state.step < end:
+            after, loss = train_step(state, data, pool)
+            # The loss of a state is known one step later: now that of `state` is known to be finite.
+            good, state = state, after
+            if on_progress and (state.step % recipe.log_every == 0 or state.step == end):
+                on_progress(state, loss)
+            if checkpoint_every and state.step % checkpoint_every == 0 and state.step < end:
+                keep(state)
+        _check_parameters(state)
+    except KeyboardInterrupt:
+        keep(state)
+        raise
+    except TrainingError:
+        if good is not None:
+            keep(good)
+        raise
+    keep(state)
+    return state
+
+
+def _check_parameters(state: TrainState) -> None:
+    """Refuse to hand out parameters that the last step made infinite or NaN."""
+    if not all(np.isfinite(array).all() for array in state.siren.weights + state.siren.biases):
+        raise TrainingError(
+            f"parameters after step {state.step} are not finite: they must be; lower the learning rate "
+            f"({state.recipe.learning_rate}) or check the frames"
+        )
+
+
+def _forget(state: TrainState) -> None:
+    """Keep no checkpoint."""
+
+
+def _resumed(state: TrainState, recipe: Recipe, digest: str) -> TrainState:
+    """Return `state` under `recipe`, which may change the number of steps and of log lines, nothing else."""
+    same = replace(recipe, steps=state.recipe.steps, log_every=state.recipe.log_every)
+    if same != state.recipe:
+        names = [name for name in asdict(same) if getattr(same, name) != getattr(state.recipe, name)]
+        rule = "a resumed run keeps its recipe, but for steps and log_every"
+        raise InputError("changed parts of the recipe", ", ".join(names), rule, "start a new run")
+    if digest != state.digest:
+        rule = f"the run was started on frames with digest {state.digest[:12]}"
+        raise InputError("digest of the training frames", digest[:12], rule, "give the same frames, in order")
+    if state.step > recipe.steps:
+        rule = f"the run has done {state.step} steps"
+        raise InputError("steps", recipe.steps, rule, f"give at least {state.step}, or start a new run")
+    return replace(state, recipe=recipe)
+
+
+def train_step(state: TrainState, data: Dataset, pool: Pixels | None) -> tuple[TrainState, float]:
+    """Return the state after one more step and the loss before it; TrainingError if that is not finite."""
+    recipe, network = state.recipe, state.siren
+    windows, targets = dataset.examples_at(data, *draw_batch(recipe, state.step, data, pool))
+    # A run that diverges overflows on its way; the loss tells, so NumPy need not warn.
+    with np.errstate(over="ignore", invalid="ignore"):
+        loss, gradients = loss_and_gradients(
+            network, windows.astype(network.dtype), targets.astype(network.dtype)
+        )
+        if not math.isfinite(loss):
+            raise TrainingError(
+                f"loss at step {state.step} is {loss}: it must stay finite; lower the learning rate "
+                f"({recipe.learning_rate}) or check the frames"
+            )
+        rate = recipe.learning_rate * SCHEDULES[recipe.schedule](state.step, recipe.steps)
+        parameters, moments = adam.step(
+            network.weights + network.biases, gradients.dweights + gradients.dbiases, state.moments, rate
+        )
+    layers = len(network.weights)
+    moved = replace(network, weights=parameters[:layers], biases=parameters[layers:])
+    history = state.history
+    if state.step % recipe.log_every == 0:
+        history = (*history, (state.step, loss))
+    return replace(state, siren=moved, moments=moments, step=state.step + 1, history=history), loss
+
+
+Pixels = tuple[dataset.Indices, dataset.Indices, dataset.Indices]
+"""Frame, y and x (N,) of N pixels."""
+
+
+def draw_pool(recipe: Recipe, data: Dataset) -> Pixels | None:
+    """Draw the pixels that minibatches are picked from, or none when every step draws its own."""
+    if recipe.n_windows == 0:
+        return None
+    return dataset.sample_pixels(recipe.seed, POOL_STREAM, recipe.n_windows, data.shapes)
+
+
+def draw_batch(recipe: Recipe, step: int, data: Dataset, pool: Pixels | None) -> Pixels:
+    """Draw the pixels of one minibatch, a function of (recipe.seed, step) alone."""
+    if pool is None:
+        return dataset.sample_pixels(recipe.seed, step, recipe.batch, data.shapes)
+    pick = dataset.sample_indices(recipe.seed, step, PICK_TAG, recipe.batch, recipe.n_windows)
+    frame, y, x = pool
+    return frame[pick], y[pick], x[pick]
+
+
+def loss_and_gradients(network: Siren, windows: Array, targets: Array) -> tuple[float, siren.Gradients]:
+    """Return the mean squared error of windows (N, D_in) against targets (N, 3), and its derivatives.
+
+    Outputs are not clipped here: the derivative of a clipped output is 0 where it matters most.
+    """
+    outputs, cache = siren.forward_cached(network, windows)
+    error = outputs - targets
+    loss = float(np.mean(np.square(error), dtype=np.float64))
+    # d/dy of sum((y - t)^2) / (3 N).
+    return loss, siren.backward(network, cache, error * (2.0 / error.size), with_dx=False)
+
+
+def model_of(state: TrainState, info: Mapping[str, str] | None = None) -> Model:
+    """Return the trained model; its `info` holds the recipe, the steps done and the caller's facts."""
+    facts = {
+        "recipe": recipe_to_json(state.recipe),
+        "steps_done": str(state.step),
+        "data_digest": state.digest,
+        **(info or {}),
+    }
+    return Model(state.siren, state.recipe.features, state.recipe.window, state.normalization, facts)
+
+
+def state_to_arrays(state: TrainState) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Return the state as arrays by name and text by name: the content of a checkpoint file."""
+    arrays: dict[str, NDArray[Any]] = {}
+    for layer, (weight, bias) in enumerate(zip(state.siren.weights, state.siren.biases, strict=True)):
+        arrays[f"layer{layer}.weight"], arrays[f"layer{layer}.bias"] = weight, bias
+    for index, (m, v) in enumerate(zip(state.moments.m, state.moments.v, strict=True)):
+        arrays[f"adam.m{index}"], arrays[f"adam.v{index}"] = m, v
+    arrays["history.step"] = np.array([step for step, _ in state.history], np.int64)
+    arrays["history.loss"] = np.array([loss for _, loss in state.history], np.float64)
+    text = {
+        "recipe": recipe_to_json(state.recipe),
+        "normalization": json.dumps(asdict(state.normalization), sort_keys=True),
+        "step": str(state.step),
+        "digest": state.digest,
+    }
+    return arrays, text
+
+
+def state_from_arrays(arrays: Mapping[str, NDArray[Any]], text: Mapping[str, str]) -> TrainState:
+    """Return the state that [`state_to_arrays`] wrote; the names that it needs must be there."""
+    recipe = recipe_from_json(text["recipe"])
+    layers = range(len(recipe.widths) + 1)
+    network = Siren(
+        tuple(arrays[f"layer{layer}.weight"] for layer in layers),
+        tuple(arrays[f"layer{layer}.bias"] for layer in layers),
+        recipe.omega_0_first,
+        recipe.omega_0_hidden,
+    )
+    step, moments = int(text["step"]), range(2 * len(layers))
+    m = tuple(arrays[f"adam.m{index}"] for index in moments)
+    v = tuple(arrays[f"adam.v{index}"] for index in moments)
+    steps, losses = arrays["history.step"].tolist(), arrays["history.loss"].tolist()
+    history = tuple(zip(steps, losses, strict=True))
+    normalization = dataset.normalization_from_json(text["normalization"])
+    return TrainState(network, AdamState(m, v, step), step, recipe, normalization, text["digest"], history)
+
+
+def check_state(state: TrainState) -> None:
+    """Refuse a state whose arrays do not have the shapes and the finite numbers that its recipe calls for."""
+    widths = state.recipe.layer_widths
+    shapes = [(n_out, n_in) for n_in, n_out in pairwise(widths)] + [(n_out,) for n_out in widths[1:]]
+    parameters = state.siren.weights + state.siren.biases
+    groups = {"parameter": parameters, "first moment": state.moments.m, "second moment": state.moments.v}
+    for name, arrays in groups.items():
+        for index, (array, shape) in enumerate(zip(arrays, shapes, strict=True)):
+            what, way_out = f"{name} {index}", "start a new run"
+            if array.shape != shape or array.dtype != state.siren.dtype or array.dtype.kind != "f":
+                rule = f"its recipe calls for {shape}, all of one float type"
+                raise InputError(what, f"{array.dtype} {array.shape}", rule, way_out)
+            if name == "parameter" and not np.isfinite(array).all():
+                raise InputError(what, "NaN or infinite", "parameters must be finite", way_out)
+    if not 0 <= state.step <= state.recipe.steps:
+        raise InputError("step", state.step, f"from 0 to {state.recipe.steps}", "start a new run")

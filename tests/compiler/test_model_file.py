@@ -1,0 +1,296 @@
+"""Model and checkpoint files: round trips to the bit, equal bytes, one line for everything that is wrong."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from safetensors import safe_open
+
+from wamnet.compiler import model_file
+from wamnet.refimpl import siren, train
+from wamnet.refimpl.dataset import FEATURES, Normalization, Window, n_inputs
+from wamnet.refimpl.denoise import Model
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.train import Recipe
+
+
+def model_of(features: tuple[str, ...] = ("color", "depth"), size: int = 2, dtype: Any = np.float32) -> Model:
+    """Return an untrained model with awkward numbers in its scales."""
+    window = Window(size, "zero")
+    network = siren.init((n_inputs(features, window), 4, 3), 3.3, 0.1, seed=2, dtype=dtype)
+    scales = Normalization(0.1, 1 / 3, (1e-300, -0.1, 3.0), 2.0**-40)
+    return Model(network, features, window, scales, {"recipe": "{}", "scene": 'mini "cubes" \u2603\n'})
+
+
+def same(one: Model, other: Model) -> bool:
+    """Tell whether two models are equal to the bit."""
+    arrays = zip(one.siren.weights + one.siren.biases, other.siren.weights + other.siren.biases, strict=True)
+    bits = all(a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes() for a, b in arrays)
+    return bits and replace(one, siren=other.siren) == other
+
+
+# ---- models ----------------------------------------------------------------------------------------------
+
+
+@given(
+    features=st.lists(st.sampled_from(sorted(FEATURES)), min_size=1, unique=True).map(tuple),
+    size=st.integers(1, 3),
+    dtype=st.sampled_from([np.float32, np.float64]),
+)
+def test_a_model_comes_back_to_the_bit(
+    tmp_path_factory: pytest.TempPathFactory, features: tuple[str, ...], size: int, dtype: Any
+) -> None:
+    path = tmp_path_factory.mktemp("models") / "model.safetensors"
+    model = model_of(features, size, dtype)
+    model_file.save_model(path, model)
+    assert same(model_file.load_model(path), model)
+
+
+def test_equal_models_are_equal_bytes_whatever_the_order_of_their_facts(tmp_path: Path) -> None:
+    facts = {f"fact{n}": str(n) for n in range(20)}
+    backwards = dict(reversed(facts.items()))
+    for name, info in (("a", facts), ("b", backwards)):
+        model_file.save_model(tmp_path / name, replace(model_of(), info=info))
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_the_library_reads_what_is_written(tmp_path: Path) -> None:
+    path, model = tmp_path / "model.safetensors", model_of()
+    model_file.save_model(path, model)
+    with safe_open(path, framework="numpy") as file:
+        texts = file.metadata()
+        assert (texts["format"], texts["version"]) == ("wamnet-model", "1")
+        assert json.loads(texts["features"]) == ["color", "depth"]
+        assert json.loads(texts["window"]) == {"size": 2, "border": "zero"}
+        assert float(texts["omega_0_first"]) == 3.3
+        assert texts["info.scene"] == model.info["scene"]
+        assert sorted(file.keys()) == ["layer0.bias", "layer0.weight", "layer1.bias", "layer1.weight"]
+        assert np.array_equal(file.get_tensor("layer1.weight"), model.siren.weights[1])
+    # The container aligns data: the header's end is a multiple of 8.
+    assert int.from_bytes(path.read_bytes()[:8], "little") % 8 == 0
+
+
+def test_a_broken_model_is_not_saved(tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    with pytest.raises(InputError, match="features is : at least one"):
+        model_file.save_model(path, replace(model_of(), features=()))
+    assert list(tmp_path.iterdir()) == []
+
+
+# ---- writing ---------------------------------------------------------------------------------------------
+
+
+def test_a_failed_or_interrupted_write_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "model.safetensors"
+    model_file.save_model(path, model_of())
+    before = path.read_bytes()
+
+    def interrupted(self: Path, target: Path) -> Path:
+        raise KeyboardInterrupt
+
+    def full(self: Path, target: Path) -> Path:
+        raise OSError(28, os.strerror(28))
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        model_file.save_model(path, model_of(size=3))
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(InputError, match=r"output file is .*cannot be written \(No space left on device\)"):
+        model_file.save_model(path, model_of(size=3))
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_missing_folder_is_told(tmp_path: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"output file is .*: cannot be written \(No such file or directory\)"
+    ):
+        model_file.save_model(tmp_path / "missing" / "model.safetensors", model_of())
+
+
+# ---- reading ---------------------------------------------------------------------------------------------
+
+
+def without(name: str) -> Callable[[Any, Any], None]:
+    """Return an edit that removes a tensor or a text."""
+
+    def edit(tensors: Any, texts: Any) -> None:
+        (tensors if name in tensors else texts).pop(name)
+
+    return edit
+
+
+def with_text(name: str, text: str) -> Callable[[Any, Any], None]:
+    """Return an edit that sets a text."""
+    return lambda tensors, texts: texts.update({name: text})
+
+
+def with_tensor(name: str, values: Any) -> Callable[[Any, Any], None]:
+    """Return an edit that sets a tensor."""
+    return lambda tensors, texts: tensors.update({name: values})
+
+
+DAMAGE = {
+    "no tensors": (
+        lambda tensors, texts: tensors.clear(),
+        "list of tensors is empty: 'layer0.weight' must be",
+    ),
+    "no bias": (without("layer1.bias"), "list of tensors is .*: 'layer1.bias' must be among them"),
+    "a layer left out": (
+        with_tensor("layer3.weight", np.zeros((3, 3), np.float32)),
+        "'layer2.weight' must be",
+    ),
+    "no features": (without("features"), "list of header texts is .*: 'features' must be among them"),
+    "features unknown": (
+        with_text("features", '["glow"]'),
+        r"model: feature name is glow: not a known feature",
+    ),
+    "features no list": (with_text("features", '"color"'), "features is .*: cannot be read .a list of names"),
+    "features no JSON": (with_text("features", "color"), "features is color: cannot be read"),
+    "other features": (
+        with_text("features", '["color"]'),
+        "inputs of the first layer is 16: 2 x 2 pixels of color",
+    ),
+    "window": (with_text("window", '{"size": 0}'), "window size is 0"),
+    "window no JSON": (with_text("window", "12"), "window is 12: cannot be read"),
+    "window parts": (with_text("window", '{"width": 12}'), "window is .*: cannot be read"),
+    "omega": (with_text("omega_0_first", "nan"), "omega_0_first is nan: finite and > 0"),
+    "omega no number": (with_text("omega_0_hidden", "big"), "omega_0_hidden is big: cannot be read"),
+    "scales": (with_text("normalization", "{}"), "model: normalization is {}: JSON of a normalization"),
+    "not finite": (
+        with_tensor("layer1.bias", np.array([0, np.nan, np.inf], np.float32)),
+        "layer 1: number of NaN or infinite parameters is 2",
+    ),
+    "shape": (with_tensor("layer1.weight", np.zeros((3, 5), np.float32)), r"layer 1 is weights \(3, 5\)"),
+    "type": (with_tensor("layer1.bias", np.zeros(3, np.int64)), "types of the parameters is float32, int64"),
+    "format": (with_text("format", "other"), "format is other: must be wamnet-model"),
+    "version": (with_text("version", "2"), "version is 2: this program reads version 1; use the wamnet that"),
+}
+
+
+@pytest.mark.parametrize("case", DAMAGE)
+def test_a_damaged_model_is_refused_in_one_line(case: str, tmp_path: Path) -> None:
+    path = tmp_path / "model"
+    edit, message = DAMAGE[case]
+    model_file.save_model(path, model_of())
+    tensors, texts = model_file._read(path, model_file.MODEL_FORMAT)
+    edit(tensors, texts)
+    path.write_bytes(model_file._encode("ignored", tensors, texts))
+    with pytest.raises(InputError, match=message) as refusal:
+        model_file.load_model(path)
+    assert str(refusal.value).startswith(str(path)[:20])
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("content", [b"", b"P6 1 1", b"\xff" * 64, (8).to_bytes(8, "little") + b"notjson!"])
+def test_a_file_of_another_kind_is_refused(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"wamnet-model file is .*: not a safetensors file"):
+        model_file.load_model(path)
+
+
+def test_element_types_that_numpy_lacks_are_refused(tmp_path: Path) -> None:
+    """Numbers of 16 bits with 8 of exponent (bfloat16) are valid in the container and unknown to NumPy."""
+    header = b'{"layer0.weight":{"dtype":"BF16","shape":[1],"data_offsets":[0,2]}}'
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(len(header).to_bytes(8, "little") + header + b"\0\0")
+    with pytest.raises(
+        InputError, match=r"wamnet-model file is .*: not a safetensors file|format is missing"
+    ):
+        model_file.load_model(path)
+
+
+def test_a_file_without_texts_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    path.write_bytes((2).to_bytes(8, "little") + b"{}")
+    with pytest.raises(InputError, match="format is missing: must be wamnet-model"):
+        model_file.load_model(path)
+
+
+def test_a_truncated_file_is_refused_at_every_length(tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    model_file.save_model(path, model_of(size=1))
+    content = path.read_bytes()
+    for length in range(0, len(content), 7):
+        path.write_bytes(content[:length])
+        with pytest.raises(InputError, match="not a safetensors file"):
+            model_file.load_model(path)
+
+
+def test_a_missing_file_and_a_folder_are_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"cannot be read \(No such file or directory\); check the path"):
+        model_file.load_model(tmp_path / "none")
+    with pytest.raises(InputError, match=r"wamnet-model file is .*cannot be read \(Is a directory\)"):
+        model_file.load_model(tmp_path)
+
+
+def test_a_huge_file_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "model"
+    model_file.save_model(path, model_of())
+    monkeypatch.setattr(model_file, "LARGEST_FILE_BYTES", 100)
+    with pytest.raises(InputError, match=r"size of .*model in bytes is \d+: at most 100 bytes are read"):
+        model_file.load_model(path)
+
+
+# ---- checkpoints -----------------------------------------------------------------------------------------
+
+RECIPE = Recipe(("color",), Window(2), (4,), 3.0, 3.0, 0, 8, 20, 1e-2, "cosine", log_every=2)
+"""A run of twenty tiny steps."""
+
+
+def pairs() -> list[tuple[Frame, Frame]]:
+    """Return one pair of random frames."""
+    rng = np.random.default_rng(0)
+    noisy, reference = (Frame({"color": rng.random((5, 6, 3)).astype(np.float32)}) for _ in range(2))
+    return [(noisy, reference)]
+
+
+def test_training_through_a_file_gives_the_same_bits(tmp_path: Path) -> None:
+    path = tmp_path / "run.checkpoint"
+    train.train(
+        RECIPE, pairs(), until=10, on_checkpoint=lambda state: model_file.save_checkpoint(path, state)
+    )
+    resumed = train.train(RECIPE, pairs(), state=model_file.load_checkpoint(path))
+    whole = train.train(RECIPE, pairs())
+    for name, state in (("resumed", resumed), ("whole", whole)):
+        model_file.save_checkpoint(tmp_path / name, state)
+    assert (tmp_path / "resumed").read_bytes() == (tmp_path / "whole").read_bytes()
+    assert resumed.history == whole.history
+
+
+CHECKPOINT_DAMAGE = {
+    "no moments": (without("adam.v3"), "list of entries is .*: 'adam.v3' must be among them"),
+    "no step": (without("step"), "list of entries is .*: 'step' must be among them"),
+    "step": (with_text("step", "ten"), "content is .*ten.*: cannot be read"),
+    "step too large": (with_text("step", "21"), "run: step is 21: from 0 to 20"),
+    "recipe": (with_text("recipe", "{}"), "run: recipe is {}: JSON of a recipe"),
+    "shape": (with_tensor("layer0.bias", np.zeros(3, np.float32)), r"run: parameter 2 is float32 \(3,\)"),
+    "history": (with_tensor("history.step", np.zeros(1, np.int64)), "content is .*: cannot be read"),
+    "model": (with_text("format", "wamnet-model"), "format is wamnet-model: must be wamnet-checkpoint"),
+}
+
+
+@pytest.mark.parametrize("case", CHECKPOINT_DAMAGE)
+def test_a_damaged_checkpoint_is_refused_in_one_line(case: str, tmp_path: Path) -> None:
+    path = tmp_path / "run"
+    edit, message = CHECKPOINT_DAMAGE[case]
+    model_file.save_checkpoint(path, train.train(RECIPE, pairs(), until=3))
+    tensors, texts = model_file._read(path, model_file.CHECKPOINT_FORMAT)
+    edit(tensors, texts)
+    path.write_bytes(model_file._encode("ignored", tensors, texts))
+    with pytest.raises(InputError, match=message) as refusal:
+        model_file.load_checkpoint(path)
+    assert "\n" not in str(refusal.value)

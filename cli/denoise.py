@@ -1,0 +1,90 @@
+"""`wamnet denoise` and `wamnet executors`: a model on a frame, and what there is to run it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..refimpl.errors import ExecutorUnavailable
+from . import options
+from .options import ExecutorName
+from .outputs import check_output
+from .terminal import say, table
+
+if TYPE_CHECKING:
+    from ..refimpl.denoise import Model
+    from ..refimpl.frame import Frame
+
+DENOISE_EXAMPLES = """Examples:
+
+wamnet denoise model.safetensors noisy.exr -o denoised.png
+
+wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr"""
+"""Shown below the help of `wamnet denoise`."""
+
+EXECUTORS_EXAMPLES = """Example:
+
+wamnet executors"""
+"""Shown below the help of `wamnet executors`."""
+
+
+def denoise(
+    model: options.ModelFile,
+    frame: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FRAME", help="Noisy frame with the model's layers (.exr).", show_default=False
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Linear colour (.exr) or picture (.png).")
+    ] = Path("denoised.png"),
+    executor: options.Executor = ExecutorName.numpy,
+) -> None:
+    """Denoise a frame with a trained model."""
+    from ..compiler.model_file import load_model
+    from ..kernels import denoise_on, open_executor
+    from . import exr
+
+    check_output(output, (".exr", ".png"), [model, frame])
+    network, noisy = load_model(model), exr.read_frame(frame)
+    with open_executor(executor.value) as runner:
+        result = denoise_on(runner, network, noisy)
+    write_denoised(output, result.image, network, noisy)
+    say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")
+    say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation")
+
+
+def write_denoised(path: Path, encoded: Any, model: Model, noisy: Frame) -> None:
+    """Write display-encoded colour (H, W, 3): as it is to PNG, as linear radiance to EXR."""
+    from ..refimpl.encoding import from_display
+    from ..refimpl.frame import Frame
+    from . import exr, images
+
+    if path.suffix.lower() == ".png":
+        images.write_png(path, encoded)
+    else:
+        color = from_display(encoded, model.normalization.exposure_stops)
+        exr.write_frame(path, Frame({"color": color}, {**noisy.info, "denoised": "true"}))
+
+
+def executors() -> None:
+    """List what can run a kernel here, or what is missing for it."""
+    table(
+        "Executors",
+        ("name", "state", "device or what is missing"),
+        [probe(name.value) for name in ExecutorName],
+    )
+
+
+def probe(name: str) -> tuple[str, str, str]:
+    """Return an executor's name, whether it works here, and its device or the reason why not."""
+    from ..kernels import open_executor
+
+    try:
+        with open_executor(name) as executor:
+            return name, "ready", executor.device
+    except ExecutorUnavailable as error:
+        return name, "missing", str(error)

@@ -1,0 +1,104 @@
+"""The command `wamnet`: its commands, and the one place where errors become a line and an exit status.
+
+1. Commands are registered with typer in the order of a first session [`app`].
+2. [`main`] runs one of them. Whatever a user can cause ends in one line on standard error and status 2;
+   Ctrl-C ends in status 130; anything else is a bug and shows its traceback.
+
+Modules that compute are imported when a command runs, so that a help text appears at once.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
+
+import typer
+
+from ..refimpl.errors import WamnetError
+from . import compare, denoise, render, train
+from .compile import EXAMPLES as COMPILE_EXAMPLES
+from .compile import compile_model
+
+STATUS_BAD_INPUT = 2
+"""Exit status when a file, an option or the machine is not as it must be."""
+
+STATUS_INTERRUPTED = 130
+"""Exit status after Ctrl-C: 128 + SIGINT, as shells report it."""
+
+app = typer.Typer(
+    name="wamnet",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _register(command: Callable[..., None], examples: str, name: str | None = None) -> None:
+    """Add a command whose help is its docstring, each paragraph on one line, as typer wants it."""
+    paragraphs = (command.__doc__ or "").split("\n\n")
+    text = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
+    app.command(name, help=text, epilog=examples)(command)
+
+
+_register(render.render, render.RENDER_EXAMPLES)
+_register(render.scene, render.SCENE_EXAMPLES)
+_register(train.train, train.EXAMPLES)
+_register(compile_model, COMPILE_EXAMPLES, "compile")
+_register(denoise.denoise, denoise.DENOISE_EXAMPLES)
+_register(compare.compare, compare.EXAMPLES)
+_register(denoise.executors, denoise.EXECUTORS_EXAMPLES)
+
+
+@app.callback(invoke_without_command=True)
+def root(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Show the version and end.")] = False,
+) -> None:
+    """Render a scene, train a small network that denoises it, and run that network anywhere.
+
+    Start with [bold]wamnet demo[/], which does all of it in a few minutes and writes a report.
+    """
+    if version:
+        from importlib.metadata import version as installed
+
+        typer.echo(f"wamnet {installed('wamnet')}")
+    elif context.invoked_subcommand is None:
+        context.get_help()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line (by default the process's) and return its exit status."""
+    try:
+        status = app(
+            None if arguments is None else list(arguments), prog_name="wamnet", standalone_mode=False
+        )
+    except WamnetError as error:
+        return _fail(str(error))
+    except OSError as error:
+        where = f": {error.filename}" if error.filename else ""
+        return _fail(f"{error.strerror or error}{where}")
+    except (KeyboardInterrupt, typer.Abort):
+        status = STATUS_INTERRUPTED
+    except Exception as error:
+        # A wrong option: typer's own exceptions have this method, wherever their class lives.
+        if not hasattr(error, "format_message"):
+            raise
+        return _fail(_usage(error))
+    if status == STATUS_INTERRUPTED:
+        sys.stderr.write("wamnet: interrupted\n")
+    return status if isinstance(status, int) else 0
+
+
+def _usage(error: Any) -> str:
+    """Return what is wrong with an option, and where help is."""
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context else "wamnet"
+    return f"{error.format_message().rstrip('.')}; see {command} --help"
+
+
+def _fail(message: str) -> int:
+    """Say in one line on standard error what is wrong."""
+    sys.stderr.write(f"wamnet: error: {' '.join(message.split())}\n")
+    return STATUS_BAD_INPUT

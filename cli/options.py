@@ -1,0 +1,114 @@
+"""The options that several commands share, each defined once, and the parsing of their values.
+
+Ranges are not repeated here: what a number may be is said by the function of the reference that takes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..refimpl.errors import InputError
+
+
+class ExecutorName(str, Enum):
+    """What runs a kernel; equal to the registry in kernels, which is not imported for a help text."""
+
+    numpy = "numpy"
+    opencl = "opencl"
+    opengl = "opengl"
+
+
+class Renderer(str, Enum):
+    """What traces paths: so far the reference alone."""
+
+    numpy = "numpy"
+
+
+class Target(str, Enum):
+    """Languages that a model is compiled to."""
+
+    opencl = "opencl"
+    glsl = "glsl"
+
+
+class FloatType(str, Enum):
+    """Element types of the reference's arithmetic."""
+
+    float32 = "float32"
+    float64 = "float64"
+
+
+class Preset(str, Enum):
+    """Training protocols by name; equal to the registry in refimpl."""
+
+    paper = "paper"
+    short = "short"
+
+
+Executor = Annotated[
+    ExecutorName,
+    typer.Option(
+        "--executor", help="What runs the kernel; see which are there with [bold]wamnet executors[/]."
+    ),
+]
+Exposure = Annotated[
+    float, typer.Option("--exposure", help="Stops by which pictures are brightened; +1 doubles the light.")
+]
+ModelFile = Annotated[
+    Path, typer.Argument(metavar="MODEL", help="Trained model (.safetensors).", show_default=False)
+]
+Profile = Annotated[
+    str,
+    typer.Option(
+        "--profile",
+        help="What the arithmetic promises: [bold]ieee[/] brings its own sine and a bound on the error, "
+        "[bold]native[/] uses the target's sine.",
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", help="Any other number gives other random numbers.")]
+Time = Annotated[
+    float | None, typer.Option("--time", help="Time in the animation, in seconds.", show_default="0")
+]
+Parameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Parameter of a canonical scene: a number or three with commas; repeat for more.",
+        show_default=False,
+    ),
+]
+SceneName = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENE",
+        help="Canonical scene (minicubes, cornell, furnace, lone_light, empty) or scene file (.json).",
+        show_default=False,
+    ),
+]
+
+
+def parse_parameters(texts: Sequence[str]) -> dict[str, float | tuple[float, ...]]:
+    """Return parameters of a scene from texts like `albedo=0.8` and `warm=1,0.5,0.2`."""
+    parameters: dict[str, float | tuple[float, ...]] = {}
+    for text in texts:
+        name, sign, value = text.partition("=")
+        try:
+            numbers = tuple(float(part) for part in value.split(","))
+        except ValueError:
+            numbers = ()
+        if not sign or len(numbers) not in (1, 3):
+            rule = "it must be NAME=NUMBER or NAME=NUMBER,NUMBER,NUMBER"
+            raise InputError("--set", text, rule, "for example --set orbit_deg=20")
+        parameters[name.strip()] = numbers if len(numbers) > 1 else numbers[0]
+    return parameters
+
+
+def parse_names(text: str) -> tuple[str, ...]:
+    """Return names that are separated by commas."""
+    return tuple(part.strip() for part in text.split(",") if part.strip())

@@ -1,0 +1,153 @@
+"""`wamnet render` and `wamnet scene`: from a scene to a frame, and from a scene's name to its text."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..refimpl.errors import InputError
+from . import options
+from .options import FloatType, Renderer
+from .outputs import check_output, write_text
+from .terminal import progress, say
+
+if TYPE_CHECKING:
+    from ..refimpl.scene import Scene
+
+RENDER_EXAMPLES = """Examples:
+
+wamnet render minicubes
+
+wamnet render minicubes --time 2.5 --spp 64 --width 512 --height 512 -o reference.exr
+
+wamnet render furnace --set albedo=0.8 --max-depth 20 -o furnace.png"""
+"""Shown below the help of `wamnet render`."""
+
+SCENE_EXAMPLES = """Examples:
+
+wamnet scene minicubes
+
+wamnet scene minicubes --time 2.5 --set warm=1,0.5,0.2 -o mine.json
+
+wamnet render mine.json"""
+"""Shown below the help of `wamnet scene`."""
+
+
+def render(
+    scene: options.SceneName,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Frame with all layers (.exr), or a picture of its colour (.png).",
+            show_default="SCENE.exr",
+        ),
+    ] = None,
+    width: Annotated[int, typer.Option(help="Width in pixels.")] = 256,
+    height: Annotated[int, typer.Option(help="Height in pixels.")] = 256,
+    spp: Annotated[int, typer.Option(help="Paths per pixel: 1 is noisy, 1024 is smooth.")] = 1,
+    seed: options.Seed = 0,
+    time: options.Time = None,
+    parameters: options.Parameters = None,
+    max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
+    dtype: Annotated[FloatType, typer.Option(help="Arithmetic; files hold float32.")] = FloatType.float32,
+    executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes that share the work.", show_default="one per core")
+    ] = None,
+    exposure: options.Exposure = 0.0,
+) -> None:
+    """Path-trace a scene: colour, and albedo, normal, depth, position and ray direction with it.
+
+    The same scene, size, samples and seed give the same frame, whatever the number of workers.
+    """
+    from ..kernels.render_pool import render_parallel
+    from ..refimpl.render import Job
+    from ..refimpl.transport import Settings
+
+    loaded = load_scene(scene, time, parameters or [])
+    path = output or Path(f"{Path(scene).stem}.exr")
+    check_output(path, (".exr", ".png"), [Path(scene)])
+    job = Job(width, height, spp, seed, Settings(max_depth=max_depth), dtype.value)
+    started = clock.perf_counter()
+    with progress(f"rendering {scene}", width * height * spp) as advance:
+        frame = render_parallel(loaded, job, workers=workers, on_progress=advance).frame
+    seconds = clock.perf_counter() - started
+    write_picture(path, frame, exposure)
+    say(f"{path}: {width}x{height} pixels, {spp} spp, {seconds:.1f} s")
+
+
+def write_picture(path: Path, frame: Any, exposure: float) -> None:
+    """Write all layers of a frame as EXR, or its colour at an exposure as PNG, as the name says."""
+    from ..refimpl.encoding import to_display
+    from . import exr, images
+
+    if path.suffix.lower() == ".exr":
+        exr.write_frame(path, frame)
+    else:
+        images.write_png(path, to_display(frame["color"], exposure))
+
+
+def scene(
+    name: options.SceneName,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default="the terminal"),
+    ] = None,
+    time: options.Time = None,
+    parameters: options.Parameters = None,
+) -> None:
+    """Write a scene as JSON text, to be changed and rendered."""
+    from ..refimpl.scene import to_json
+
+    text = to_json(load_scene(name, time, parameters or []))
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    check_output(output, (".json",), [Path(name)])
+    write_text(output, text)
+    say(str(output))
+
+
+def load_scene(name: str, time: float | None, assignments: Sequence[str]) -> Scene:
+    """Return a canonical scene by name, or the scene in a JSON file."""
+    from ..refimpl.scene import from_json
+    from ..refimpl.scenes import CANONICAL, canonical
+
+    parameters = options.parse_parameters(assignments)
+    if time is not None:
+        parameters["time"] = time
+    path = Path(name)
+    if path.suffix.lower() != ".json":
+        if name in CANONICAL:
+            _check_kinds(name, parameters)
+        return canonical(name, **parameters)
+    if parameters:
+        rule = "a scene file has no parameters"
+        raise InputError("option for the scene", ", ".join(parameters), rule, "change the file")
+    try:
+        return from_json(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text"
+        raise InputError("scene file", str(path), f"it cannot be read ({reason})", "check the name") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error.what}", error.value, error.rule, error.way_out) from None
+
+
+def _check_kinds(name: str, parameters: dict[str, Any]) -> None:
+    """Refuse three numbers where a scene wants one, and one where it wants three."""
+    import inspect
+
+    from ..refimpl.scenes import CANONICAL
+
+    for parameter, known in inspect.signature(CANONICAL[name]).parameters.items():
+        value = parameters.get(parameter, known.default)
+        if isinstance(value, tuple) != isinstance(known.default, tuple):
+            wanted = "three numbers with commas" if isinstance(known.default, tuple) else "one number"
+            raise InputError(f"parameter {parameter}", value, f"{name} wants {wanted}", "change --set")

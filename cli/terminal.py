@@ -1,0 +1,53 @@
+"""What the commands print: results on standard output, progress on standard error if that is a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+from rich import box
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+
+Advance = Callable[[float], None]
+"""Called with the work done since the last call, in the unit of the total."""
+
+
+def say(text: str) -> None:
+    """Print one line of result; `text` may use rich's markup."""
+    Console(highlight=False, soft_wrap=True).print(text)
+
+
+@contextmanager
+def progress(title: str, total: float) -> Iterator[Advance]:
+    """Show a progress bar on a terminal, and nothing where standard error is a file or a pipe."""
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+        TextColumn("of about"),
+        TimeRemainingColumn(elapsed_when_finished=True),
+    )
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(title, total=total)
+        yield lambda done: bar.update(task, advance=done)
+
+
+def table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table: first column to the left, the others to the right."""
+    grid = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    for index, name in enumerate(header):
+        grid.add_column(name, justify="right" if index else "left")
+    for row in rows:
+        grid.add_row(*row)
+    Console(highlight=False).print(grid)

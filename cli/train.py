@@ -1,0 +1,153 @@
+"""`wamnet train`: from pairs of a noisy frame and its reference to a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..refimpl.errors import InputError
+from . import options
+from .options import Preset
+from .outputs import check_output
+from .terminal import progress, say
+
+if TYPE_CHECKING:
+    from ..refimpl.frame import Frame
+    from ..refimpl.train import Recipe, TrainState
+
+EXAMPLES = """Examples:
+
+wamnet train -i noisy.exr -t reference.exr -o model.safetensors
+
+wamnet train -i n0.exr -t r0.exr -i n1.exr -t r1.exr --features color,normal --steps 4000
+
+wamnet train -i noisy.exr -t reference.exr --resume --steps 20000"""
+"""Shown below the help of `wamnet train`."""
+
+CHECKPOINT_INTERVAL_S = 30.0
+"""Seconds between two checkpoints: what a power cut may cost. Ctrl-C costs nothing."""
+
+
+def train(
+    inputs: Annotated[
+        list[Path],
+        typer.Option("-i", "--input", metavar="FILE", help="Noisy frame (.exr); repeat.", show_default=False),
+    ],
+    targets: Annotated[
+        list[Path],
+        typer.Option(
+            "-t", "--target", metavar="FILE", help="Its reference, in the same order.", show_default=False
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Model to write (.safetensors).")
+    ] = Path("model.safetensors"),
+    preset: Annotated[
+        Preset, typer.Option(help="Protocol: the paper's own, or one that is as good in a minute or so.")
+    ] = Preset.short,
+    features: Annotated[
+        str | None,
+        typer.Option(
+            help="What the network sees, with commas: color, normal, albedo, depth, position, direction.",
+            show_default="the preset's",
+        ),
+    ] = None,
+    steps: Annotated[int | None, typer.Option(help="Training steps.", show_default="the preset's")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the first weights and of the draws.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint beside MODEL.")] = False,
+) -> None:
+    """Train a network on noisy frames and their references.
+
+    A checkpoint is kept beside the model. After Ctrl-C, --resume goes on from there, to the same bits; with
+    more --steps it goes on after the end.
+    """
+    from ..compiler.model_file import load_checkpoint
+
+    check_output(output, (".safetensors",), [*inputs, *targets])
+    check_output(checkpoint_path(output))
+    state = load_checkpoint(checkpoint_path(output)) if resume else None
+    choices = {"features": options.parse_names(features) if features else None, "steps": steps, "seed": seed}
+    recipe = choose_recipe(preset.value, state, choices)
+    state, _ = fit(recipe, read_pairs(inputs, targets), output, state)
+    say(f"{output}: {state.step} steps; checkpoint in {checkpoint_path(output)}")
+
+
+def choose_recipe(preset: str, state: TrainState | None, choices: dict[str, Any]) -> Recipe:
+    """Return the checkpoint's recipe, or the preset's, with the choices that were made (not None)."""
+    from ..refimpl.train import PRESETS
+
+    base = PRESETS[preset] if state is None else state.recipe
+    return replace(base, **{name: value for name, value in choices.items() if value is not None})
+
+
+def read_pairs(inputs: Sequence[Path], targets: Sequence[Path]) -> list[tuple[Frame, Frame]]:
+    """Read the noisy frames and their references."""
+    from . import exr
+
+    if len(inputs) != len(targets):
+        rule = f"each --input needs its --target, and there are {len(inputs)} inputs"
+        raise InputError("number of targets", len(targets), rule, "repeat -i and -t in the same order")
+    return [
+        (exr.read_frame(noisy), exr.read_frame(target)) for noisy, target in zip(inputs, targets, strict=True)
+    ]
+
+
+@dataclass(frozen=True)
+class LogLine:
+    """Steps done, seconds since the start of this run, and the loss of the last step."""
+
+    step: int
+    seconds: float
+    loss: float
+
+
+def fit(
+    recipe: Recipe, pairs: Sequence[tuple[Frame, Frame]], output: Path, state: TrainState | None = None
+) -> tuple[TrainState, list[LogLine]]:
+    """Train with a progress bar and checkpoints beside `output`, and write the model there."""
+    from ..compiler.model_file import save_checkpoint, save_model
+    from ..refimpl.train import model_of, train
+
+    saved, done = checkpoint_path(output), state.step if state is not None else 0
+    log: list[LogLine] = []
+    started = kept = monotonic()
+    with progress("training", recipe.steps - done) as advance:
+
+        def on_progress(now: TrainState, loss: float) -> None:
+            nonlocal kept
+            advance(now.step - (log[-1].step if log else done))
+            log.append(LogLine(now.step, monotonic() - started, loss))
+            if monotonic() - kept > CHECKPOINT_INTERVAL_S:
+                save_checkpoint(saved, now)
+                kept = monotonic()
+
+        state = train(
+            recipe,
+            pairs,
+            state=state,
+            on_progress=on_progress,
+            on_checkpoint=lambda now: save_checkpoint(saved, now),
+        )
+    save_model(output, model_of(state, facts(pairs)))
+    return state, log
+
+
+def facts(pairs: Sequence[tuple[Frame, Frame]]) -> dict[str, str]:
+    """Return what the training frames say of themselves, each value once: facts for the model's reader."""
+    names = dict.fromkeys(name for pair in pairs for name in pair[0].info)
+    return {
+        f"trained_on_{name}": ", ".join(
+            dict.fromkeys(noisy.info[name] for noisy, _ in pairs if name in noisy.info)
+        )
+        for name in names
+    }
+
+
+def checkpoint_path(output: Path) -> Path:
+    """Return the file beside a model that keeps the state of its training: NAME.checkpoint.safetensors."""
+    return output.with_suffix(".checkpoint" + output.suffix)

@@ -1,0 +1,159 @@
+"""Scenes: JSON in and out, and a clear refusal of everything that breaks a rule."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.refimpl import scene as S
+from wamnet.refimpl import scenes
+from wamnet.refimpl.errors import InputError
+
+GREY = (0.5, 0.5, 0.5)
+EVERYTHING = S.Scene(
+    "everything",
+    S.Camera((0.0, 0.0, 5.0), (0.0, 0.0, 0.0)),
+    room=S.Room((-2.0, -2.0, -2.0), (2.0, 2.0, 2.0), (GREY,) * 6),
+    boxes=(S.Box((0.0, 0.0, 0.0), (0.5, 0.5, 0.5), GREY),),
+    spheres=(S.Sphere((1.0, 0.0, 0.0), 0.25, GREY),),
+    quads=(S.Quad((-1.0, -1.0, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), GREY),),
+    lights=(S.Light((-0.5, 1.9, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0), 10.0),),
+    background=(0.1, 0.1, 0.1),
+)
+
+
+@pytest.mark.parametrize(
+    "scene", [EVERYTHING, *(make() for make in scenes.CANONICAL.values())], ids=lambda s: s.name
+)
+def test_json_round_trip(scene):
+    again = S.from_json(S.to_json(scene))
+    assert again == scene
+    assert S.to_json(again) == S.to_json(scene)
+    assert S.scene_digest(again) == S.scene_digest(scene)
+
+
+@given(st.lists(st.floats(-1e6, 1e6, width=64), min_size=3, max_size=3).map(tuple))
+def test_json_keeps_every_bit_of_a_number(center):
+    scene = replace(EVERYTHING, spheres=(S.Sphere(center, 0.25, GREY),))
+    assert S.from_json(S.to_json(scene)).spheres[0].center == center
+
+
+def test_digest_depends_on_content_and_not_on_spelling():
+    data = json.loads(S.to_json(EVERYTHING))
+    spelled = json.dumps(dict(reversed(data.items()))).replace("5.0", "5")
+    assert S.scene_digest(S.from_json(spelled)) == S.scene_digest(EVERYTHING)
+    moved = replace(EVERYTHING, background=(0.1, 0.1, 0.2))
+    assert S.scene_digest(moved) != S.scene_digest(EVERYTHING)
+    assert S.scene_digest(replace(EVERYTHING, info={"note": "x"})) == S.scene_digest(EVERYTHING)
+
+
+def changed(path: str, value: object) -> str:
+    """Return the JSON of EVERYTHING with the value at a dotted path replaced; a value of ... removes the
+    key."""
+    data = json.loads(S.to_json(EVERYTHING))
+    *parents, last = [int(key) if key.isdigit() else key for key in path.split(".")]
+    target = data
+    for key in parents:
+        target = target[key]
+    if value is ...:
+        del target[last]
+    else:
+        target[last] = value
+    return json.dumps(data)
+
+
+REFUSALS = [
+    ("format", "other", r"scene.format .* take the key"),
+    ("version", 2, r"scene.version is 2: it must be 1"),
+    ("name", 3, r"scene.name is 3: it must be a text"),
+    ("name", ..., r"scene.name is missing: it is required"),
+    ("info", [], r"scene.info is \[\]: it must map texts to texts"),
+    ("colour", 1, r"scene.colour is 1: Scene has no such key; known are name, camera"),
+    ("camera", 1, r"scene.camera is 1: it must be a JSON object; give the keys of a camera"),
+    ("camera.position", [0, 0], r"scene.camera.position is \[0, 0\]: it must have 3 entries"),
+    ("camera.position", "x", r"scene.camera.position is x: it must be a list"),
+    ("camera.position.1", True, r"scene.camera.position\[1\] is True: it must be a finite number"),
+    ("camera.position.1", "1", r"scene.camera.position\[1\] is 1: it must be a finite number"),
+    ("camera.vertical_fov_deg", 180, r"vertical_fov_deg is 180.0: it must lie between 0 and 180"),
+    ("camera.look_at", [0, 0, 5], r"look_at is .*: it must differ from position"),
+    ("camera.up", [0, 0, 1], r"up is .*: it must not be parallel to the view"),
+    ("background", [0, -1, 0], r"scene.background is .*: radiance must not be negative"),
+    ("room.high.1", -2.0, r"scene.room.high\[1\] is -2.0: it must exceed low\[1\] = -2.0"),
+    (
+        "room.reflectances.2",
+        [0, 0, 1.5],
+        r"scene.room.reflectances\[2\] is .*: a reflectance must lie in \[0, 1\]",
+    ),
+    ("room.emission", [0, 0, -1], r"scene.room.emission is .*: emission must not be negative"),
+    ("boxes.0.half_extent", [1, 0, 1], r"scene.boxes\[0\].half_extent is .*: half extents must be positive"),
+    ("boxes.0.rotation.0", [2, 0, 0], r"scene.boxes\[0\].rotation is .*: its rows must be orthonormal"),
+    ("boxes.0.rotation.0", [-1, 0, 0], r"scene.boxes\[0\].rotation is .*: its rows must be orthonormal"),
+    ("boxes.0.reflectance", [1.1, 0, 0], r"scene.boxes\[0\].reflectance is .*: energy|a reflectance"),
+    ("spheres.0.radius", 0, r"scene.spheres\[0\].radius is 0.0: it must be positive"),
+    ("quads.0.edge_v", [1, 0, 0], r"scene.quads\[0\].edge_v is .*: the edges must span an area"),
+    ("lights.0.color", [-1, 0, 0], r"scene.lights\[0\].color is .*: a colour must not be negative"),
+    ("lights.0.power", -1, r"scene.lights\[0\].power is -1.0: power must not be negative"),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "message"), REFUSALS, ids=[f"{p}={v}" for p, v, _ in REFUSALS])
+def test_refuses(path, value, message):
+    with pytest.raises(InputError, match=message):
+        S.from_json(changed(path, value))
+
+
+@pytest.mark.parametrize("text", ["", "{", "[1]", '"x"', "NaN"])
+def test_refuses_texts_that_are_no_scene(text):
+    with pytest.raises(InputError, match=r"scene text|scene.format"):
+        S.from_json(text)
+
+
+def test_refuses_infinite_numbers_in_scenes_made_in_python():
+    scene = replace(EVERYTHING, spheres=(S.Sphere((float("inf"), 0.0, 0.0), 0.25, GREY),))
+    with pytest.raises(InputError, match=r"scene.spheres\[0\].center is .*: all numbers must be finite"):
+        S.validate(scene)
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
+def test_refuses_infinite_numbers_in_json(number):
+    text = S.to_json(EVERYTHING).replace("0.25", number)
+    with pytest.raises(InputError, match=r"scene.spheres\[0\].radius is .*: it must be a finite number"):
+        S.from_json(text)
+
+
+def test_unknown_canonical_scene_lists_the_known_ones():
+    with pytest.raises(
+        InputError, match=r"scene is teapot: .* known are minicubes, cornell, furnace, lone_light, empty"
+    ):
+        scenes.canonical("teapot")
+    with pytest.raises(
+        InputError, match="parameter size is 3: minicubes has none such; known are time, warm, cool"
+    ):
+        scenes.canonical("minicubes", size=3)
+
+
+@pytest.mark.parametrize("time", [0.0, 0.3, 1.7, 5.0, 7.99])
+def test_minicubes_turn_inside_their_room(time):
+    """27 cubes, rigid: every corner stays in the room, distances between centres do not depend on time."""
+    scene = scenes.minicubes(time=time)
+    assert len(scene.boxes) == 27
+    assert len({box.reflectance for box in scene.boxes}) == 27
+    reach = (
+        max(sum(c * c for c in box.center) ** 0.5 for box in scene.boxes) + 3**0.5 * scenes.CUBE_HALF_EXTENT
+    )
+    assert reach < 2.0
+    first, last = scene.boxes[0].center, scene.boxes[-1].center
+    distance = sum((a - b) ** 2 for a, b in zip(first, last, strict=True)) ** 0.5
+    assert distance == pytest.approx(
+        2 * scenes.CUBE_SPACING * 3**0.5, rel=1e-12
+    )  # a rotation in float64: some ulps
+
+
+def test_minicubes_come_back_after_a_turn_and_differ_in_between():
+    start, half, turn = (scenes.minicubes(time=t).boxes[0].center for t in (0.0, 4.0, scenes.TURN_SECONDS))
+    assert start == pytest.approx(turn, abs=1e-14)  # cos and sin of 2 pi: some ulps of 1
+    assert max(abs(a - b) for a, b in zip(start, half, strict=True)) > 0.5

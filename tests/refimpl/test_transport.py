@@ -1,0 +1,229 @@
+"""Light transport: the ways to find a light agree, energy is kept, and errors fall as they must."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+from statistical import SIGNIFICANCE, assert_all_plausible, sidak, welch_p
+
+from wamnet.refimpl import render as R
+from wamnet.refimpl import scenes, transport
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.scene import Box, Camera, Light, Room, Scene
+from wamnet.refimpl.transport import Settings
+
+
+def render(scene, size=12, spp=64, seed=1, dtype="float32", **settings) -> R.Render:
+    return R.render(scene, R.Job(size, size, spp, seed, Settings(**settings), dtype))
+
+
+def assert_same_image(a: R.Render, b: R.Render, count_a: int, count_b: int) -> None:
+    """Welch's test on every pixel's luminance-like sum; pixels without noise must be equal to rounding."""
+    mean_a, mean_b = (r.frame["color"].astype(np.float64).mean(-1).ravel() for r in (a, b))
+    # The variance of the channels' mean is at most the mean of their variances.
+    variance_a, variance_b = (r.color_variance.mean(-1).ravel() for r in (a, b))
+    noisy = (variance_a > 0) & (variance_b > 0)
+    assert noisy.sum() > 100
+    p = welch_p(mean_a[noisy], variance_a[noisy], count_a, mean_b[noisy], variance_b[noisy], count_b)
+    assert_all_plausible(p)
+    # The whole image as one number finds a bias too small for a single pixel.
+    error = np.sqrt((variance_a / count_a + variance_b / count_b).mean() / mean_a.size)
+    z = abs(mean_a.mean() - mean_b.mean()) / error
+    assert 2 * stats.norm.sf(z) >= SIGNIFICANCE
+
+
+STRATEGIES = [
+    ("light", "power"),
+    ("bsdf", "power"),
+    ("mis", "balance"),
+]
+
+
+@pytest.mark.parametrize(("strategy", "heuristic"), STRATEGIES)
+@pytest.mark.parametrize("name", ["minicubes", "cornell", "lone_light"])
+def test_strategies_agree(name, strategy, heuristic):
+    """Light samples alone, BSDF samples alone and both combined estimate the same image (different seeds)."""
+    scene = scenes.canonical(name)
+    combined = render(scene, spp=256, seed=1, max_depth=3)
+    other = render(scene, spp=1024, seed=2, max_depth=3, strategy=strategy, heuristic=heuristic)
+    assert_same_image(combined, other, 256, 1024)
+
+
+def test_strategy_test_finds_a_bias(monkeypatch):
+    """The test above can fail: a light density that is wrong by a tenth is found."""
+    scene = scenes.canonical("cornell")
+    right = render(scene, spp=256, max_depth=2)
+    true_pdf = transport.light_pdf
+    monkeypatch.setattr(transport, "light_pdf", lambda *arguments: 1.1 * true_pdf(*arguments))
+    wrong = render(scene, spp=256, seed=2, max_depth=2, strategy="light")
+    with pytest.raises(AssertionError):
+        assert_same_image(right, wrong, 256, 256)
+
+
+@pytest.mark.parametrize("name", ["minicubes", "cornell"])
+def test_russian_roulette_keeps_the_mean(name):
+    scene = scenes.canonical(name)
+    without = render(scene, spp=256, seed=1, max_depth=6)
+    with_roulette = render(scene, spp=512, seed=2, max_depth=6, roulette_depth=1)
+    assert_same_image(without, with_roulette, 256, 512)
+
+
+def test_float32_and_float64_agree():
+    """Same random numbers, so nearly the same image: Welch's test on the same seed finds no difference
+    either."""
+    scene = scenes.canonical("minicubes")
+    single, double = (render(scene, spp=64, dtype=dtype) for dtype in ("float32", "float64"))
+    assert_same_image(single, double, 64, 64)
+    difference = np.abs(single.frame["color"].astype(np.float64) - double.frame["color"])
+    # A few paths fall on the other side of an edge; all others agree to rounding.
+    assert (
+        np.mean(difference > 1e-4) <= 0.02
+    )  # of 144 pixels x 3: at most 8, each from one of 64 paths x 6 rays
+
+
+@pytest.mark.parametrize("name", ["cornell", "minicubes"])
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_scale_changes_nothing(name, scale):
+    """Lengths times s, powers times s^2 give the same radiance. By a power of two: to the bit; else
+    statistically."""
+
+    def scaled(scene: Scene, s: float) -> Scene:
+        def v(x):
+            return tuple(s * c for c in x)
+
+        assert scene.room is not None
+        return replace(
+            scene,
+            camera=replace(scene.camera, position=v(scene.camera.position), look_at=v(scene.camera.look_at)),
+            room=replace(scene.room, low=v(scene.room.low), high=v(scene.room.high)),
+            boxes=tuple(replace(b, center=v(b.center), half_extent=v(b.half_extent)) for b in scene.boxes),
+            lights=tuple(
+                replace(q, corner=v(q.corner), edge_u=v(q.edge_u), edge_v=v(q.edge_v), power=s * s * q.power)
+                for q in scene.lights
+            ),
+        )
+
+    scene = scenes.canonical(name)
+    base = render(scene, spp=32)
+    assert_same_image(base, render(scaled(scene, scale), spp=32, seed=2), 32, 32)
+    near_power_of_two = 2.0 ** round(np.log2(scale))
+    same = render(scaled(scene, near_power_of_two), spp=4, dtype="float64")
+    again = render(scene, spp=4, dtype="float64")
+    difference = np.abs(same.frame["color"] - again.frame["color"])
+    # Constants are exact multiples, so all roundings are alike; the floors (1e-15, 1e-30) never act here.
+    assert np.array_equal(difference, np.zeros_like(difference))
+
+
+def test_variance_of_the_mean_falls_as_one_over_n():
+    """Means of n samples: the variance over 48 independent renders times n is constant.
+
+    For normal means, variance ratios follow F; an image-wide ratio over P independent pixels with 47 degrees
+    of freedom each has a standard error of sqrt(4 / (47 P)) of the logarithm (times a kurtosis factor that is
+    near 1 for means of 8 and more samples: a factor of 3 is allowed for it).
+    """
+    scene = scenes.canonical("cornell")
+    counts, repeats, size = (8, 32), 48, 8
+    variances = []
+    for n in counts:
+        images = np.stack(
+            [
+                render(scene, size, n, seed=100 * n + k, max_depth=2).frame["color"][..., 0]
+                for k in range(repeats)
+            ]
+        )
+        variances.append(images.astype(np.float64).var(axis=0, ddof=1))
+    noisy = (variances[0] > 1e-12) & (variances[1] > 1e-12)
+    log_ratio = np.log(variances[0][noisy] / variances[1][noisy])
+    expected = np.log(counts[1] / counts[0])
+    error = 3.0 * np.sqrt(4.0 / (repeats - 1) / noisy.sum())
+    z = stats.norm.isf(SIGNIFICANCE / 2)
+    assert abs(np.mean(log_ratio) - expected) <= z * error
+
+
+REFLECTANCE = st.tuples(*(st.floats(0.0, 1.0),) * 3)
+
+
+@given(REFLECTANCE, REFLECTANCE, st.floats(0.0, 1.0), st.integers(0, 2**32 - 1))
+def test_throughput_never_grows(wall, block, angle, seed):
+    """beta of every path never exceeds 1 without roulette, and is never negative, whatever the
+    reflectances."""
+    c, s = np.cos(angle), np.sin(angle)
+    scene = Scene(
+        "energy",
+        Camera((0.0, 0.0, 0.9), (0.0, 0.0, 0.0)),
+        room=Room((-1.0,) * 3, (1.0,) * 3, (wall,) * 6),
+        boxes=(Box((0.0, -0.5, 0.0), (0.3, 0.3, 0.3), block, ((c, 0.0, -s), (0.0, 1.0, 0.0), (s, 0.0, c))),),
+        lights=(Light((-0.2, 0.99, -0.2), (0.4, 0.0, 0.0), (0.0, 0.0, 0.4), (1.0, 1.0, 1.0), 1.0),),
+    )
+    for path in paths(scene, seed):
+        assert np.all(path.beta >= 0.0)
+        assert np.all(path.beta <= 1.0)
+        assert np.all(np.isfinite(path.radiance))
+        assert np.all(path.radiance >= 0.0)
+        # Directions stay unit vectors: a frame of some 20 roundings.
+        assert np.max(np.abs(np.sum(path.direction**2, -1) - 1.0)) <= 40 * np.finfo(np.float32).eps
+
+
+def paths(scene: Scene, seed: int, size: int = 8, depth: int = 4):
+    """Yield the states of one path per pixel after each bounce."""
+    from wamnet.refimpl import rng
+    from wamnet.refimpl.camera import camera_basis, camera_ray
+
+    world = transport.build(scene, Settings(max_depth=depth), np.float32)
+    y, x = np.divmod(np.arange(size * size), size)
+    counters = rng.counter(seed), R.pixel_counter(x, y), rng.counter(0)
+    u, v, _, _ = rng.uniforms(*counters, np.uint32(0), np.float32)
+    basis = camera_basis(scene.camera, np.float32)
+    path = transport.camera_path(*camera_ray(basis, x.astype("f4"), y.astype("f4"), u, v, size, size))
+    for k in range(depth):
+        path, _, _, _ = transport.bounce(world, path, k, *counters)
+        yield path
+
+
+def test_radiance_is_bounded_by_the_furnace():
+    """Light that a closed room with albedo a can hold: no pixel's mean exceeds emission / (1 - a) of its
+    brightest part."""
+    scene = scenes.canonical("minicubes")
+    dark = replace(scene, lights=(), room=replace(scene.room, emission=(1.0, 1.0, 1.0)))
+    color = render(dark, spp=16, max_depth=12).frame["color"]
+    largest = max(max(r) for r in (*scene.room.reflectances, *(b.reflectance for b in scene.boxes)))
+    assert np.max(color) <= 1.0 / (1.0 - largest)
+
+
+def test_depth_adds_light_and_nothing_else():
+    """With the same random numbers, one more scattering never darkens a pixel."""
+    scene = scenes.canonical("cornell")
+    images = [render(scene, spp=8, max_depth=d, strategy="light").frame["color"] for d in range(5)]
+    for less, more in pairwise(images):
+        assert np.all(more >= less)
+    assert np.all(images[-1].sum() > images[0].sum())
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"max_depth": -1}, "max_depth is -1: it counts scatterings"),
+        ({"max_depth": 2.5}, "max_depth is 2.5: it counts scatterings"),
+        ({"roulette_depth": -1}, "roulette_depth is -1: it must be 0 or more"),
+        ({"strategy": "photon"}, "strategy is photon: it is unknown; known are mis, light, bsdf"),
+        ({"heuristic": "max"}, "heuristic is max: it is unknown; known are balance, power"),
+    ],
+)
+def test_refuses_settings(settings, message):
+    with pytest.raises(InputError, match=message):
+        Settings(**settings)
+
+
+def test_mis_weights_of_both_techniques_add_up_to_one():
+    a, b = np.array([1e-3, 1.0, 50.0, 0.0, 1e12]), np.array([1.0, 1.0, 1e-6, 2.0, 3.0])
+    for heuristic in transport.HEURISTICS:
+        settings = Settings(heuristic=heuristic)
+        total = transport.mis_weight(settings, a, b) + transport.mis_weight(settings, b, a)
+        assert np.max(np.abs(total - 1.0)) <= 8 * 2.0**-52  # four roundings in each weight
+    assert sidak(0.01, 1) == pytest.approx(0.01, rel=1e-12)  # log1p and expm1 are inverse to some ulps

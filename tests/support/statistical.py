@@ -1,0 +1,79 @@
+"""Statistical verdicts for tests of random numbers and of noisy estimators.
+
+Every test states its significance: the chance that it fails although the code is right. Seeds are fixed, so a
+verdict does not change from run to run; the significance says how lucky the seed may be. Where a test makes m
+comparisons, each is held to the level that Sidak's correction gives [`sidak`], so that the chance of any
+false alarm stays at the stated one. Follows Nori's and Mitsuba's habit of testing samplers and renderers by
+hypothesis tests, and Jung, Hanika and Dachsbacher, "Detecting Bias in Monte Carlo Renderers using Welch's
+t-test", JCGT 9(2), 2020.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import stats
+
+SIGNIFICANCE = 0.01
+"""Chance of a false alarm of one test function, over all its comparisons."""
+
+LEAST_EXPECTED = 5.0
+"""Cells of a chi-square test with a lower expected count are pooled: the usual rule for its approximation."""
+
+
+def sidak(significance: float, comparisons: int) -> float:
+    """Return the level of each of several comparisons that together have the given significance."""
+    return float(-np.expm1(np.log1p(-significance) / comparisons))
+
+
+def chi_square_p(observed: np.ndarray, expected: np.ndarray) -> float:
+    """Return the p-value of observed against expected counts; cells with low expectation are pooled.
+
+    A cell that cannot be reached (expectation 0) must be empty, else the p-value is 0.
+    """
+    observed, expected = observed.ravel().astype(float), expected.ravel().astype(float)
+    assert np.all(np.isfinite(expected)), "expected counts must be finite"
+    assert np.all(expected >= 0.0), "expected counts must not be negative"
+    if np.any(observed[expected == 0.0] > 0):
+        return 0.0
+    # Pool from the rarest cell upwards.
+    order = np.argsort(expected)
+    groups = np.floor(np.cumsum(expected[order]) / LEAST_EXPECTED).astype(int)
+    groups = np.minimum(groups, max(groups[-1] - 1, 0))
+    observed, expected = (np.bincount(groups, weights=counts[order]) for counts in (observed, expected))
+    used = expected > 0.0
+    statistic = np.sum((observed[used] - expected[used]) ** 2 / expected[used])
+    return float(stats.chi2.sf(statistic, max(int(used.sum()) - 1, 1)))
+
+
+def z_p(difference: np.ndarray, standard_error: np.ndarray) -> np.ndarray:
+    """Return two-sided p-values of differences, given their standard errors; exact equality has p = 1."""
+    z = np.divide(
+        np.abs(difference),
+        standard_error,
+        out=np.where(difference == 0.0, 0.0, np.inf),
+        where=standard_error > 0,
+    )
+    return 2.0 * stats.norm.sf(z)
+
+
+def welch_p(mean_a, variance_a, count_a, mean_b, variance_b, count_b) -> np.ndarray:
+    """Return p-values of Welch's t-test for equal means; variances are those of single samples."""
+    error_a, error_b = variance_a / count_a, variance_b / count_b
+    error = error_a + error_b
+    freedom = np.divide(
+        error**2,
+        error_a**2 / (count_a - 1) + error_b**2 / (count_b - 1),
+        out=np.full_like(error, np.inf),
+        where=error > 0,
+    )
+    difference = np.abs(mean_a - mean_b)
+    t = np.divide(difference, np.sqrt(error), out=np.where(difference == 0.0, 0.0, np.inf), where=error > 0)
+    return 2.0 * stats.t.sf(t, freedom)
+
+
+def assert_all_plausible(p_values: np.ndarray, significance: float = SIGNIFICANCE) -> None:
+    """Fail when the least of the p-values is below Sidak's level for their number; NaN fails."""
+    p_values = np.atleast_1d(p_values)
+    level = sidak(significance, p_values.size)
+    worst = np.min(p_values)
+    assert worst >= level, f"least p-value {worst:.3g} of {p_values.size} is below {level:.3g}"

@@ -95,6 +95,19 @@ def smape(image: Floats, reference: Floats) -> float:
     return float(np.mean(np.abs(x - r) / (np.abs(x) + np.abs(r) + SMAPE_EPSILON)))
 
 
+def largest_error(image: Floats, reference: Floats) -> float:
+    """Largest absolute difference of two images (...): what an error bound speaks of."""
+    x, r = _pair(image, reference)
+    return float(np.max(np.abs(x - r)))
+
+
+def error_map(image: Floats, reference: Floats) -> Float64:
+    """Absolute difference (H, W) of two images (H, W, C) at each pixel, the mean of its channels."""
+    x, r = _pair(image, reference)
+    means: Float64 = np.mean(np.abs(x - r), axis=-1)
+    return means
+
+
 @dataclass(frozen=True)
 class Metric:
     """A metric, the colour it is meant for ("display" or "linear"), its unit and whether more is better."""

@@ -15,7 +15,7 @@ from skimage import metrics as oracle
 from wamnet.refimpl import metrics
 from wamnet.refimpl.errors import InputError
 
-ALL = [metric.function for metric in metrics.METRICS.values()]
+ALL = [metric.function for metric in metrics.METRICS.values()] + [metrics.largest_error]
 U64 = 2.0**-53
 """Unit roundoff of float64."""
 
@@ -136,6 +136,14 @@ def test_a_larger_error_is_a_worse_score(a: np.ndarray, step: float) -> None:
     for metric in (metrics.mse, metrics.relmse, metrics.smape):
         assert metric(a + 2 * step, a) > metric(a + step, a) > metric(a, a)
     assert metrics.psnr(a + 2 * step, a) < metrics.psnr(a + step, a)
+
+
+def test_largest_error_and_error_map_by_hand() -> None:
+    """One pixel off by 1/4, 1/2 and 0: at most 1/2, on average 1/4."""
+    a, b = np.zeros((1, 2, 3)), np.zeros((1, 2, 3))
+    a[0, 1] = (0.25, -0.5, 0.0)
+    assert metrics.largest_error(a, b) == 0.5
+    assert (metrics.error_map(a, b) == [[0.0, 0.25]]).all()
 
 
 def test_float64_inside() -> None:

@@ -1,1 +1,1 @@
-"""From the reference to kernels: tracing, the IR and its passes, error bounds, and the text for each target."""
+"""From the reference to kernels: tracing, the IR, its passes, error bounds, and each target's text."""

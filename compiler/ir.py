@@ -1,0 +1,186 @@
+"""The intermediate representation: a program of one pixel, as a list of named operations.
+
+1. A value is the result of one node; nodes stand in the order of evaluation and name their operands by
+   index, so each value is assigned once [`Node`, `Program`].
+2. A value has a type: a float, or a short vector of floats [`Type`]. Leading lanes (pixels, paths) are not
+   part of the program; every operation works on each lane alone.
+3. Weights stand beside the nodes under names [`Program.parameters`] and are float32 exactly.
+4. How a kernel fills the input named `window` from images is data of the program, not nodes [`Gather`].
+5. Programs are built by value numbering: asking twice for the same operation gives the same value
+   [`Builder`]. They are printed in one stable text [`text`], whose hash is their identity [`digest`].
+
+What the operations mean is the table in ops.py; what a well-formed program is, the table in verify.py.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..refimpl.dataset import Window
+
+Parameters = Mapping[str, NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class Type:
+    """The type of a value in one lane: a number (shape ()) or a vector (shape (n,))."""
+
+    dtype: str = "float32"
+    shape: tuple[int, ...] = ()
+
+    def __str__(self) -> str:
+        return self.dtype + "".join(f"[{n}]" for n in self.shape)
+
+
+Attribute = str | int | float | Type
+"""What a node may carry beside its operands: a name, an index, a constant, the type of an input."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """One operation: `args` are indices of earlier nodes, `attributes` are sorted by name."""
+
+    op: str
+    args: tuple[int, ...]
+    type: Type
+    attributes: tuple[tuple[str, Attribute], ...] = ()
+
+    def __getitem__(self, name: str) -> Attribute:
+        return dict(self.attributes)[name]
+
+    def get(self, name: str) -> Attribute | None:
+        """Return an attribute, or None when the node does not have it."""
+        return dict(self.attributes).get(name)
+
+
+@dataclass(frozen=True)
+class Image:
+    """A feature image: what an encoded channel can hold lies in [low, high]."""
+
+    name: str
+    channels: int
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Gather:
+    """The program's input `window` holds, for each tap (dy, dx) in C order, the channels of all `images`."""
+
+    window: Window
+    images: tuple[Image, ...]
+
+    @property
+    def channels(self) -> int:
+        """Return the channels of all images together."""
+        return sum(image.channels for image in self.images)
+
+    @property
+    def n_inputs(self) -> int:
+        """Return the length of the window vector."""
+        return self.window.size * self.window.size * self.channels
+
+
+@dataclass(frozen=True)
+class Program:
+    """A function of one lane; `info` says where it came from and how its images are encoded."""
+
+    nodes: tuple[Node, ...]
+    outputs: tuple[tuple[str, int], ...]
+    parameters: Parameters = field(default_factory=dict)
+    gather: Gather | None = None
+    info: tuple[tuple[str, str], ...] = ()
+
+
+class Builder:
+    """Makes nodes; the same operation on the same operands is made once (value numbering)."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = []
+        self.parameters: dict[str, NDArray[np.float32]] = {}
+        self._numbers: dict[tuple[object, ...], int] = {}
+        self._names: dict[tuple[tuple[int, ...], bytes], str] = {}
+
+    def add(self, node: Node) -> int:
+        """Return the index of `node`, which is appended unless it is there already."""
+        # repr tells 0.0 from -0.0, which compare equal but divide differently.
+        key = (node.op, node.args, node.type, repr(node.attributes))
+        if key not in self._numbers:
+            self._numbers[key] = len(self.nodes)
+            self.nodes.append(node)
+        return self._numbers[key]
+
+    def parameter(self, array: NDArray[np.float32]) -> str:
+        """Return the name of an array: W0, W1, ... for matrices, b0, b1, ... for vectors."""
+        key = (array.shape, array.tobytes())
+        if key not in self._names:
+            letter = "W" if array.ndim == 2 else "b"
+            count = sum(name.startswith(letter) for name in self.parameters)
+            self._names[key] = f"{letter}{count}"
+            self.parameters[self._names[key]] = array
+        return self._names[key]
+
+
+def text(program: Program) -> str:
+    """Return the program as text: one line a node, the same bytes for the same program."""
+    lines = ["program"]
+    if program.gather is not None:
+        window = program.gather.window
+        lines.append(f"  window {window.size}x{window.size}, border {window.border}")
+        lines += [f"  image {i.name}: {i.channels} in [{i.low:g}, {i.high:g}]" for i in program.gather.images]
+    lines += [f"  %{index} = {_line(node)}" for index, node in enumerate(program.nodes)]
+    lines += [f"  output {name} = %{index}" for name, index in program.outputs]
+    lines += [f"  parameter {name}: {_array(array)}" for name, array in sorted(program.parameters.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _line(node: Node) -> str:
+    """Return `op %a, %b {name=value} : type`."""
+    words = [node.op]
+    if node.args:
+        words.append(", ".join(f"%{arg}" for arg in node.args))
+    if node.attributes:
+        words.append("{" + ", ".join(f"{name}={value}" for name, value in node.attributes) + "}")
+    return " ".join(words) + f" : {node.type}"
+
+
+def _array(array: NDArray[np.float32]) -> str:
+    """Return type and content hash of a parameter."""
+    return f"float32{list(array.shape)} sha256 {sha256(_bytes(array))[:16]}"
+
+
+def digest(program: Program) -> str:
+    """Return the SHA-256 of the program's text and of every bit of its parameters, in hexadecimal."""
+    return sha256(text(program).encode(), *(_bytes(a) for _, a in sorted(program.parameters.items())))
+
+
+def sha256(*pieces: bytes) -> str:
+    """Return the SHA-256 of the pieces one after another, in hexadecimal."""
+    hashed = hashlib.sha256()
+    for piece in pieces:
+        hashed.update(piece)
+    return hashed.hexdigest()
+
+
+def _bytes(array: NDArray[np.float32]) -> bytes:
+    """Return the array as little-endian float32 in C order, the same on every machine."""
+    return np.ascontiguousarray(array, "<f4").tobytes()
+
+
+def attributes(**given: Attribute | None) -> tuple[tuple[str, Attribute], ...]:
+    """Return attributes in the order that nodes keep them; None means absent."""
+    return tuple(sorted((name, value) for name, value in given.items() if value is not None))
+
+
+def users(program: Program) -> Sequence[tuple[int, ...]]:
+    """Return, for each node, the indices of the nodes that read it."""
+    found: list[list[int]] = [[] for _ in program.nodes]
+    for index, node in enumerate(program.nodes):
+        for arg in set(node.args):
+            found[arg].append(index)
+    return [tuple(indices) for indices in found]

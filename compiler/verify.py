@@ -1,0 +1,138 @@
+"""What a well-formed program is: a table of rules that runs before and after every pass.
+
+Each rule yields a sentence for each place that breaks it; the first sentence is the error [`verify`]. Later
+rules may rely on the earlier ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from ..refimpl.errors import CompileError
+from .ir import Node, Program, Type
+from .ops import OPS, TypeRuleError
+
+Rule = Callable[[Program], Iterator[str]]
+
+
+def known_operations(program: Program) -> Iterator[str]:
+    """Every operation is in the table."""
+    for index, node in enumerate(program.nodes):
+        if node.op not in OPS:
+            yield f"%{index} is {node.op!r}, which is no operation; there are: {', '.join(OPS)}"
+
+
+def operands_before_use(program: Program) -> Iterator[str]:
+    """Operands are indices of earlier nodes, as many as the operation takes."""
+    for index, node in enumerate(program.nodes):
+        arity = OPS[node.op].arity
+        if len(node.args) != arity and not (arity is None and node.args):
+            yield f"%{index} {node.op} has {len(node.args)} operands; it takes {arity or 'one or more'}"
+        for arg in node.args:
+            if not 0 <= arg < index:
+                yield f"%{index} {node.op} reads %{arg}; only %0 to %{index - 1} are computed before it"
+
+
+def attributes_in_order(program: Program) -> Iterator[str]:
+    """Attributes are those of the operation, sorted, each once."""
+    for index, node in enumerate(program.nodes):
+        names = [name for name, _ in node.attributes]
+        op = OPS[node.op]
+        missing = set(op.required) - set(names)
+        unknown = set(names) - set(op.required) - set(op.optional)
+        if missing or unknown or names != sorted(set(names)):
+            wanted = ", ".join((*op.required, *(f"{name} (optional)" for name in op.optional))) or "none"
+            yield f"%{index} {node.op} has attributes {names}; it takes, sorted: {wanted}"
+
+
+def parameters_exist(program: Program) -> Iterator[str]:
+    """Named parameters are there."""
+    for index, node in enumerate(program.nodes):
+        for name in OPS[node.op].parameters:
+            if node.get(name) is not None and node[name] not in program.parameters:
+                yield f"%{index} {node.op} names parameter {node[name]!r}, which the program does not have"
+
+
+def parameters_are_numbers(program: Program) -> Iterator[str]:
+    """Parameters are finite float32 arrays, none of them empty."""
+    for name, array in program.parameters.items():
+        if array.dtype != np.float32 or not array.size or not np.isfinite(array).all():
+            yield f"parameter {name} ({array.dtype}, shape {array.shape}) must be finite float32, not empty"
+
+
+def types_follow(program: Program) -> Iterator[str]:
+    """Every node has the type that its operation's rule gives."""
+    for index, node in enumerate(program.nodes):
+        try:
+            found = node_type(program, node)
+        except TypeRuleError as error:
+            yield f"%{index} {node.op}: {error}"
+        else:
+            if node.type != found:
+                yield f"%{index} {node.op} is marked {node.type}; its operands give {found}"
+
+
+def short_vectors(program: Program) -> Iterator[str]:
+    """A value is a float32 number or a vector of at least one."""
+    for index, node in enumerate(program.nodes):
+        if node.type.dtype != "float32" or len(node.type.shape) > 1 or 0 in node.type.shape:
+            yield f"%{index} {node.op} has type {node.type}; values are float32 numbers or vectors"
+
+
+def inputs_once(program: Program) -> Iterator[str]:
+    """No two inputs have one name."""
+    names = [node["name"] for node in program.nodes if node.op == "input"]
+    for name in sorted({str(name) for name in names if names.count(name) > 1}):
+        yield f"input {name!r} is declared more than once"
+
+
+def outputs_exist(program: Program) -> Iterator[str]:
+    """There is an output; each has its own name and is a value."""
+    names = [name for name, _ in program.outputs]
+    if not names or len(set(names)) < len(names):
+        yield f"outputs are {names}; there must be one or more, with different names"
+    for name, index in program.outputs:
+        if not 0 <= index < len(program.nodes):
+            yield f"output {name!r} is %{index}; the program computes %0 to %{len(program.nodes) - 1}"
+
+
+def window_matches(program: Program) -> Iterator[str]:
+    """A gathered program has one input, `window`, as long as its images and window size say."""
+    if program.gather is None:
+        return
+    wanted = {"window": Type(shape=(program.gather.n_inputs,))}
+    found = {str(node["name"]): node.type for node in program.nodes if node.op == "input"}
+    if found != wanted:
+        shown = [", ".join(f"{name}: {kind}" for name, kind in kinds.items()) for kinds in (found, wanted)]
+        yield f"inputs are ({shown[0]}); the gathered window gives ({shown[1]})"
+
+
+RULES: tuple[Rule, ...] = (
+    known_operations,
+    operands_before_use,
+    attributes_in_order,
+    parameters_exist,
+    parameters_are_numbers,
+    types_follow,
+    short_vectors,
+    inputs_once,
+    outputs_exist,
+    window_matches,
+)
+"""The grammar, in the order in which it is checked."""
+
+
+def verify(program: Program, when: str = "program") -> Program:
+    """Return `program` unchanged, or raise with the first rule that it breaks; `when` names the moment."""
+    for rule in RULES:
+        for sentence in rule(program):
+            raise CompileError(f"{when}: {sentence} (rule {rule.__name__})")
+    return program
+
+
+def node_type(program: Program, node: Node) -> Type:
+    """Return the type that the node's operation gives for its operands."""
+    types = [program.nodes[arg].type for arg in node.args]
+    return OPS[node.op].type_rule(types, dict(node.attributes), program.parameters)

@@ -1,0 +1,31 @@
+"""From a model to the program of one pixel: trace the reference's own function [`lower`]."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+import numpy as np
+
+from ..refimpl.dataset import FEATURES
+from ..refimpl.denoise import Model, as_dtype, check_model, denoise_pixel
+from .ir import Gather, Image, Program, Type
+from .trace import trace
+from .verify import verify
+
+
+def lower(model: Model) -> Program:
+    """Return the program of `denoise_pixel` for this model, with its weights rounded to float32."""
+    check_model(model)
+    features = [FEATURES[name] for name in model.features]
+    images = tuple(Image(f.name, f.channels, f.low, f.high) for f in features)
+    gather = Gather(model.window, images)
+    siren = as_dtype(model.siren, np.float32)
+    info = {**model.info, "normalization": json.dumps(asdict(model.normalization), sort_keys=True)}
+    program = trace(
+        lambda window: denoise_pixel(siren, window),
+        {"window": Type(shape=(gather.n_inputs,))},
+        gather,
+        info=info,
+    )
+    return verify(program, "lowered model")

@@ -1,0 +1,117 @@
+"""The emitted sine: additions, multiplications and floor, with a proven absolute error on a domain.
+
+For |x| <= DOMAIN, u = 2**-24:
+
+1. k = floor(x / pi + 1/2). x * (1/pi) has two relative roundings, of the constant and of the product: at most
+   2 u * 4075 < 4.9e-4; the sum, below 4096, has half an ulp, 2**-13. So |x / pi - k| < 1/2 + 6.1e-4,
+   |k| < 2**12 and |x - k pi| < R_MAX = 1.573.
+2. r = ((x - k P1) - k P2) - k P3, where P1 + P2 + P3 is pi to 1.3e-13 and each part has 12 bits (Cody and
+   Waite, 1980). With 12 bits of k the three products are exact, so a fused multiply-add gives the same
+   result. The first difference is exact too: if k is not 0, x and k P1 are multiples of 2**-23 and the
+   difference is below 2. The others are rounded, |r| <= R_MAX: r is off by at most 2 u |r| + 4096 *
+   1.3e-13, which sin passes on times |cos r|; |r cos r| <= 0.5611 on the range.
+3. sin(x) = (-1)**k sin(r); the sign is 1 - 2 (k - 2 floor(k / 2)), exact.
+4. sin(r) ~ r + r (z q(z)), z = r r: odd, with float32 coefficients; approximation error
+   `approximation_error` (proven by experiments/sine_coefficients.py). Its rounding is bounded by the
+   compiler's own rules (bounds.py), which hold with and without fused multiply-add: the term r z q is below
+   0.573 and carries 4 to 5 roundings, the last addition one.
+5. The result is clamped to [-1, 1], which cannot move it away from sin(x).
+
+The sum is below `error`; tests/compiler/test_sine.py adds it up over small intervals of r and compares.
+Results below 2**-126 may be flushed to zero, which adds at most that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+DOMAIN = 12800.0
+"""Largest |x| for which the proof holds, in radians: k needs 12 bits; beyond it the result means nothing."""
+
+R_MAX = 1.573
+"""Largest |reduced argument|, in radians: pi / 2 and the error of choosing k (step 1)."""
+
+INVERSE_PI = float.fromhex("0x1.45f306p-2")
+"""1 / pi, rounded to float32."""
+
+PI_PARTS = (
+    float.fromhex("0x1.922p+1"),
+    float.fromhex("-0x1.2aep-17"),
+    float.fromhex("-0x1.deap-30"),
+)
+"""pi in three parts of 12 bits (step 2)."""
+
+PI_REST = 1.3e-13
+"""|pi - sum of PI_PARTS|, rounded up."""
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """sin(r) on [-R_MAX, R_MAX]: `coefficients` of r, r^3, ..., all float32, the first one 1.
+
+    `approximation_error` bounds |p - sin| in exact arithmetic, `error` the whole emitted sine (steps 1 to 5).
+    """
+
+    coefficients: tuple[float, ...]
+    approximation_error: float
+    error: float
+
+
+POLYNOMIALS: Mapping[int, Polynomial] = {
+    11: Polynomial(
+        tuple(
+            float.fromhex(text)
+            for text in (
+                "0x1p+0",
+                "-0x1.555556p-3",
+                "0x1.111132p-7",
+                "-0x1.a0221p-13",
+                "0x1.72915ep-19",
+                "-0x1.b0e24p-26",
+            )
+        ),
+        approximation_error=1.16e-9,
+        error=2.5e-7,
+    ),
+}
+"""Polynomials by degree."""
+
+DEGREE = 11
+"""The degree in use: its approximation error is far below one rounding."""
+
+
+def sine(x: Any, degree: int = DEGREE) -> Any:
+    """Return sin(x) for x (...) in [-DOMAIN, DOMAIN], as the kernels compute it; may be traced."""
+    # Reduce to r in [-R_MAX, R_MAX], x = k pi + r.
+    k = np.floor(x * INVERSE_PI + 0.5)
+    r = reduce(x, k)
+    # An odd k turns the sign.
+    sign = 1.0 - 2.0 * (k - 2.0 * np.floor(0.5 * k))
+    return np.maximum(np.minimum(sign * polynomial(r, degree), 1.0), -1.0)
+
+
+def reduce(x: Any, k: Any) -> Any:
+    """Return x - k pi (...)."""
+    for part in PI_PARTS:
+        x = x - k * part
+    return x
+
+
+def polynomial(r: Any, degree: int = DEGREE) -> Any:
+    """Return the polynomial near sin(r), r (...), by Horner's rule in z = r r."""
+    first, *inner, last = POLYNOMIALS[degree].coefficients[1:]
+    z = r * r
+    q = last
+    for coefficient in reversed([first, *inner]):
+        q = z * q + coefficient
+    return r + r * (z * q)
+
+
+def reduction_error(r: Any) -> Any:
+    """Return how far step 2 moves sin(r), |r| (...) <= R_MAX: the error of r times |cos|, and its square."""
+    moved = 2.0 * 2.0**-24 * (1 + 2.0**-20) * np.abs(r) + 2.0**12 * PI_REST
+    return moved * np.abs(np.cos(r)) + moved * moved

@@ -1,0 +1,30 @@
+"""Remove what no output needs; inputs stay, because they are the program's interface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..ir import Node, Program
+from ..ops import OPS
+
+
+def eliminate_dead(program: Program) -> Program:
+    """Return the program with the nodes and parameters alone that its outputs depend on."""
+    live = {index for _, index in program.outputs}
+    for index in reversed(range(len(program.nodes))):
+        if index in live:
+            live.update(program.nodes[index].args)
+    kept = [i for i, node in enumerate(program.nodes) if i in live or node.op == "input"]
+    moved = {old: new for new, old in enumerate(kept)}
+    nodes = tuple(
+        replace(program.nodes[i], args=tuple(moved[arg] for arg in program.nodes[i].args)) for i in kept
+    )
+    outputs = tuple((name, moved[index]) for name, index in program.outputs)
+    used = {name for node in nodes for name in _parameter_names(node)}
+    parameters = {name: array for name, array in program.parameters.items() if name in used}
+    return replace(program, nodes=nodes, outputs=outputs, parameters=parameters)
+
+
+def _parameter_names(node: Node) -> list[str]:
+    """Return the names of the parameters that a node reads."""
+    return [str(value) for name, value in node.attributes if name in OPS[node.op].parameters]

@@ -1,0 +1,34 @@
+"""The list of passes, and the way they run: in a named order, with the verifier before and after each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from ...refimpl.errors import CompileError
+from ..ir import Program
+from ..verify import verify
+from .eliminate_dead import eliminate_dead
+from .expand_sine import expand_sine
+from .fold import fold
+from .fuse_bias import fuse_bias
+
+PASSES: Mapping[str, Callable[[Program], Program]] = {
+    "fold": fold,
+    "fuse_bias": fuse_bias,
+    "expand_sine": expand_sine,
+    "eliminate_dead": eliminate_dead,
+}
+"""All passes, by name."""
+
+COMMON = ("fold", "fuse_bias", "eliminate_dead")
+"""What every program goes through; error bounds speak about the result, where a sine is one node."""
+
+
+def run(program: Program, names: Sequence[str]) -> Program:
+    """Return the program after the named passes, verified at every step."""
+    verify(program, "before the passes")
+    for name in names:
+        if name not in PASSES:
+            raise CompileError(f"pass {name!r} does not exist; there are: {', '.join(PASSES)}")
+        program = verify(PASSES[name](program), f"after pass {name}")
+    return program

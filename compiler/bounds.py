@@ -1,0 +1,328 @@
+"""How far a kernel may be from the reference: a bound for every value of a program, one rule an operation.
+
+1. For each value we keep an interval that holds the reference's value (float64, the same float32 weights and
+   inputs) and a bound of |kernel's value - reference's value| [`Enclosure`].
+2. Each operation has a rule: from the enclosures of its operands to its own [`RULES`]. A rule adds the
+   error that it passes on and the error that it makes itself, in the arithmetic of profiles.py: any order
+   of summation, with or without fused multiply-add, results below 2**-126 flushed or not.
+3. Over a box of inputs that gives an a-priori bound [`over_box`]; at given inputs, with intervals of one
+   point and all pixels at once, a sharper a-posteriori one [`at_inputs`].
+4. The rules themselves are computed in float64; what that rounding and the reference's own could change is
+   below 2**-28 of each term, and every result is widened by more [`_outward`].
+
+n rounded operations in any order: gamma(n) = n u / (1 - n u), Higham, "Accuracy and Stability of Numerical
+Algorithms", 2002, section 3.1. The programs analysed are those before `expand_sine`: a sine is one node,
+with the contract that its profile gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .ir import Gather, Node, Program
+from .ops import OPS
+from .profiles import FLUSH, RELATIVE_ERROR, UNIT_ROUNDOFF, SineContract
+
+Array = NDArray[np.float64]
+
+OUTWARD = 2.0**-20
+"""Relative widening of every error bound: covers float64's rounding in rules and reference (step 4)."""
+
+RANGE_OUTWARD = 2.0**-40
+"""Relative widening of every range: float64's rounding of sums of up to 2**12 terms, of sin and of cos."""
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """The reference's value lies in [low, high] (..., n), the kernel's at most `error` (..., n) from it."""
+
+    low: Array
+    high: Array
+    error: Array
+
+    @property
+    def largest(self) -> Array:
+        """Return the largest magnitude of the reference's value."""
+        return np.maximum(np.abs(self.low), np.abs(self.high))
+
+    @property
+    def seen(self) -> Array:
+        """Return the largest magnitude of the kernel's value."""
+        return self.largest + self.error
+
+    @property
+    def read(self) -> Array:
+        """Return the error of the kernel's value when it is read, and perhaps flushed to zero."""
+        return self.error + FLUSH
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a rule may look at beside its operands: the node, the parameters in float64, the sine."""
+
+    node: Node
+    parameters: Mapping[str, Array]
+    sine: SineContract
+
+
+Rule = Callable[[Context, list[Enclosure]], Enclosure]
+
+
+def gamma(n: int) -> float:
+    """Return the largest relative error of n rounded operations."""
+    return n * UNIT_ROUNDOFF / (1.0 - n * UNIT_ROUNDOFF)
+
+
+# ---- rules ------------------------------------------------------------------------------------------
+
+
+def _rounded(context: Context, low: Array, high: Array, passed_on: Array) -> Enclosure:
+    """Add to the error that is passed on the error of rounding the result."""
+    magnitude = np.maximum(np.abs(low), np.abs(high)) + passed_on
+    relative = RELATIVE_ERROR[OPS[context.node.op].rounding]
+    return Enclosure(low, high, passed_on + relative * magnitude + FLUSH)
+
+
+def _constant(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """A constant is rounded to float32 when it is emitted."""
+    value = np.asarray(context.node["value"], np.float64)
+    return Enclosure(value, value, np.abs(value.astype(np.float32) - value))
+
+
+def _parameter(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """Parameters are float32 already."""
+    vector = context.parameters[str(context.node["name"])]
+    return Enclosure(vector, vector, np.zeros_like(vector))
+
+
+def _affine(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """|W| times x's error, and gamma(D_in + 1) of the magnitudes of the D_in + 1 terms of W x + b."""
+    (x,) = operands
+    weight = context.parameters[str(context.node["weight"])]
+    bias = np.zeros(weight.shape[0])
+    if context.node.get("bias") is not None:
+        bias = context.parameters[str(context.node["bias"])]
+    n = weight.shape[1] + 1
+    size = np.abs(weight).T
+    # Range: the centre's image, and what the radius of each input adds; float64 rounds sums of n terms.
+    middle = (x.low + x.high) / 2 @ weight.T + bias
+    reach = ((x.high - x.low) / 2 + RANGE_OUTWARD * x.largest) @ size + RANGE_OUTWARD * np.abs(bias)
+    # Error: x's own, rounding, and underflow of a weight, of a product and of a sum.
+    error = (x.read + gamma(n) * (x.seen + FLUSH)) @ size + gamma(n) * np.abs(bias)
+    underflow = FLUSH * (np.sum(x.seen, axis=-1, keepdims=True) + 4 * n)
+    return Enclosure(middle - reach, middle + reach, error + underflow)
+
+
+def _add(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """Errors add up."""
+    a, b = operands
+    return _rounded(context, a.low + b.low, a.high + b.high, a.read + b.read)
+
+
+def _subtract(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """a - b is a + (-b)."""
+    a, b = operands
+    return _rounded(context, a.low - b.high, a.high - b.low, a.read + b.read)
+
+
+def _multiply(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """(a + da)(b + db) - a b = a db + b da + da db; a square is not negative."""
+    a, b = operands
+    corners = [a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high]
+    low, high = (
+        np.minimum.reduce(np.broadcast_arrays(*corners)),
+        np.maximum.reduce(np.broadcast_arrays(*corners)),
+    )
+    if context.node.args[0] == context.node.args[1]:
+        low = np.where((a.low <= 0) & (a.high >= 0), 0.0, low)
+    return _rounded(context, low, high, a.largest * b.read + b.largest * a.read + a.read * b.read)
+
+
+def _divide(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """(a + da) / (b + db) - a / b = (da - (a / b) db) / (b + db); no bound when the kernel's b may be 0."""
+    a, b = operands
+    nearest = np.where((b.low > 0) | (b.high < 0), np.minimum(np.abs(b.low), np.abs(b.high)), 0.0)
+    safe = nearest > b.read
+    with np.errstate(divide="ignore", invalid="ignore"):
+        corners = np.broadcast_arrays(a.low / b.low, a.low / b.high, a.high / b.low, a.high / b.high)
+        low = np.where(safe, np.minimum.reduce(corners), -np.inf)
+        high = np.where(safe, np.maximum.reduce(corners), np.inf)
+        quotient = np.where(safe, np.maximum(np.abs(low), np.abs(high)), np.inf)
+        passed_on = np.where(safe, (a.read + quotient * b.read) / (nearest - b.read), np.inf)
+    return _rounded(context, low, high, passed_on)
+
+
+def _negative(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """Exact."""
+    (a,) = operands
+    return Enclosure(-a.high, -a.low, a.error)
+
+
+def _absolute(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """Exact; ||a'| - |a|| <= |a' - a|."""
+    (a,) = operands
+    low = np.where((a.low <= 0) & (a.high >= 0), 0.0, np.minimum(np.abs(a.low), np.abs(a.high)))
+    return Enclosure(low, a.largest, a.error)
+
+
+def _minimum(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """Exact; the error of the operand that is chosen, and of both where either may be."""
+    a, b = operands
+    # One that lies above the other by more than both errors is chosen nowhere.
+    a_error = np.where(a.low - a.read > b.high + b.read, 0.0, a.error)
+    b_error = np.where(b.low - b.read > a.high + a.read, 0.0, b.error)
+    return Enclosure(np.minimum(a.low, b.low), np.minimum(a.high, b.high), np.maximum(a_error, b_error))
+
+
+def _maximum(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """max(a, b) = -min(-a, -b)."""
+    negated = [_negative(context, [operand]) for operand in operands]
+    return _negative(context, [_minimum(context, negated)])
+
+
+def _floor(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """Exact on what it sees: off by the whole numbers between the reference's value and the kernel's."""
+    (a,) = operands
+    steps = np.floor(a.high + a.read) - np.floor(a.low - a.read)
+    return Enclosure(np.floor(a.low), np.floor(a.high), np.minimum(steps, np.ceil(a.read)))
+
+
+def _sqrt(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """|sqrt(a') - sqrt(a)| = |a' - a| / (sqrt(a') + sqrt(a)); no bound when the kernel's a may be below 0."""
+    (a,) = operands
+    safe = a.low >= a.error
+    low, high = np.sqrt(np.maximum(a.low, 0.0)), np.sqrt(np.maximum(a.high, 0.0))
+    least = low + np.sqrt(np.maximum(a.low - a.error, 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        moved = np.where(a.error > 0, a.error / least, 0.0)
+    # A number that is flushed before the root loses at most sqrt(FLUSH).
+    return _rounded(context, low, high, np.where(safe, moved + np.sqrt(FLUSH), np.inf))
+
+
+def _sin(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """The mean value theorem, |cos| between the two arguments, and the contract's error on its domain."""
+    (a,) = operands
+    low, high = sine_range(a.low, a.high)
+    slopes = sine_range(a.low - a.read + np.pi / 2, a.high + a.read + np.pi / 2)
+    own = np.inf if context.sine.error is None else context.sine.error
+    moved = np.maximum(np.abs(slopes[0]), np.abs(slopes[1])) * a.read
+    # Both values lie in [-1, 1], up to the contract's error, whatever the arguments.
+    error = np.minimum(moved, 2.0) + own + FLUSH
+    return Enclosure(low, high, np.where(argument_reach(a) <= context.sine.domain, error, np.inf))
+
+
+def argument_reach(a: Enclosure) -> Array:
+    """Return the largest |argument| that the kernel's sine may be given."""
+    return a.largest + a.read
+
+
+def sine_range(low: Array, high: Array) -> tuple[Array, Array]:
+    """Return the least and largest sine on [low, high] (...): at the ends, or 1 and -1 at crests between."""
+    turn = 2 * np.pi
+    at_low, at_high = np.sin(low), np.sin(high)
+    # A crest that rounding hides here is so near an end that the sine there is 1 up to RANGE_OUTWARD.
+    crest = np.floor((high - np.pi / 2) / turn) >= np.ceil((low - np.pi / 2) / turn)
+    trough = np.floor((high + np.pi / 2) / turn) >= np.ceil((low + np.pi / 2) / turn)
+    least = np.where(trough, -1.0, np.minimum(at_low, at_high))
+    most = np.where(crest, 1.0, np.maximum(at_low, at_high))
+    return np.maximum(least - RANGE_OUTWARD, -1.0), np.minimum(most + RANGE_OUTWARD, 1.0)
+
+
+def _stack(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """Each number with its own bound."""
+    parts = [np.broadcast_arrays(*(getattr(o, name) for o in operands)) for name in ("low", "high", "error")]
+    return Enclosure(*(np.stack(part, axis=-1) for part in parts))
+
+
+def _component(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """The component's own bound."""
+    (a,), i = operands, int(context.node["index"])  # type: ignore[arg-type]
+    return Enclosure(a.low[..., i], a.high[..., i], a.error[..., i])
+
+
+RULES: Mapping[str, Rule] = {
+    "constant": _constant,
+    "parameter": _parameter,
+    "affine": _affine,
+    "add": _add,
+    "subtract": _subtract,
+    "multiply": _multiply,
+    "divide": _divide,
+    "negative": _negative,
+    "absolute": _absolute,
+    "minimum": _minimum,
+    "maximum": _maximum,
+    "floor": _floor,
+    "sqrt": _sqrt,
+    "sin": _sin,
+    "stack": _stack,
+    "component": _component,
+}
+"""One rule an operation; inputs are given."""
+
+
+# ---- programs ---------------------------------------------------------------------------------------
+
+
+def enclose(program: Program, inputs: Mapping[str, tuple[Any, Any]], sine: SineContract) -> list[Enclosure]:
+    """Return the enclosure of every node for inputs in the given boxes (low, high), each (..., n)."""
+    parameters = {name: array.astype(np.float64) for name, array in program.parameters.items()}
+    found: list[Enclosure] = []
+    for node in program.nodes:
+        if node.op == "input":
+            low, high = (np.asarray(end, np.float64) for end in inputs[str(node["name"])])
+            found.append(Enclosure(low, high, np.zeros_like(low)))
+            continue
+        operands = [_spread(found[arg], program.nodes[arg], node) for arg in node.args]
+        # An infinite bound may meet a weight of 0: _outward reads the NaN as no bound.
+        with np.errstate(invalid="ignore"):
+            found.append(_outward(RULES[node.op](Context(node, parameters, sine), operands)))
+    return found
+
+
+def _spread(found: Enclosure, operand: Node, node: Node) -> Enclosure:
+    """Let a number (...) meet the vectors (..., n) of an elementwise operation."""
+    if not OPS[node.op].elementwise or not node.type.shape or operand.type.shape or not np.ndim(found.low):
+        return found
+    return Enclosure(found.low[..., None], found.high[..., None], found.error[..., None])
+
+
+def _outward(e: Enclosure) -> Enclosure:
+    """Widen an enclosure by more than float64 can have rounded it; what is no number becomes no bound."""
+    low = e.low - RANGE_OUTWARD * np.abs(e.low)
+    high = e.high + RANGE_OUTWARD * np.abs(e.high)
+    error = e.error * (1 + OUTWARD)
+    return Enclosure(
+        np.where(np.isnan(low), -np.inf, low),
+        np.where(np.isnan(high), np.inf, high),
+        np.where(np.isnan(error), np.inf, error),
+    )
+
+
+def window_box(gather: Gather) -> tuple[Array, Array]:
+    """Return the smallest and largest window vectors (n,); a zero border adds 0 to each range."""
+    outside = [0.0] if gather.window.border == "zero" else []
+    taps = gather.window.size**2
+    low = [min([image.low, *outside]) for image in gather.images for _ in range(image.channels)]
+    high = [max([image.high, *outside]) for image in gather.images for _ in range(image.channels)]
+    return np.tile(np.array(low), taps), np.tile(np.array(high), taps)
+
+
+def output_errors(program: Program, found: list[Enclosure]) -> dict[str, Array]:
+    """Return the bound (..., n) of each output, which may be flushed when it is written."""
+    return {name: np.atleast_1d(found[index].read) for name, index in program.outputs}
+
+
+def over_box(program: Program, inputs: Mapping[str, tuple[Any, Any]], sine: SineContract) -> dict[str, Array]:
+    """Return the bound (n,) of each output for all inputs in the boxes (low, high): a-priori."""
+    return output_errors(program, enclose(program, inputs, sine))
+
+
+def at_inputs(program: Program, inputs: Mapping[str, Any], sine: SineContract) -> dict[str, Array]:
+    """Return the bound (..., n) of each output at the given inputs (..., n): a-posteriori."""
+    return output_errors(program, enclose(program, {name: (x, x) for name, x in inputs.items()}, sine))

@@ -1,0 +1,83 @@
+"""Profiles: what a kernel's arithmetic promises, and so which bound on its error can be computed.
+
+1. Rounding: the relative error of each class of operations that targets may make [`RELATIVE_ERROR`].
+2. Sine: an absolute error on a domain, or no promise [`SineContract`]. Profile `ieee` emits its own sine;
+   `native` calls the target's, whose promise stands in the target's dialect [`sine_contract`].
+3. The passes that turn the common program into the one that is emitted [`Profile`].
+
+Sources: OpenCL C 1.2 specification, section 7.4 (divide 2.5 ulp, sqrt 3 ulp, sin 4 ulp, full profile); GLSL
+4.60 specification, section 4.7.1 (+ - * correctly rounded, a / b 2.5 ulp, sqrt as 1.0 / inversesqrt(): 2
+ulp and 2.5 ulp). GLSL 3.30 states nothing; the later text describes the same hardware and is assumed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ..refimpl.errors import CompileError
+from . import sine
+from .ops import Rounding
+
+UNIT_ROUNDOFF = 2.0**-24
+"""u: the largest relative error of rounding to nearest in float32."""
+
+FLUSH = 2.0**-126
+"""The smallest normal float32: a target may read or write anything smaller as zero."""
+
+RELATIVE_ERROR: Mapping[Rounding, float] = {
+    "exact": 0.0,
+    "nearest": UNIT_ROUNDOFF,
+    "divide": 2.5 * 2 * UNIT_ROUNDOFF,
+    "sqrt": 5.0 * 2 * UNIT_ROUNDOFF,
+}
+"""Largest relative error by class, over all targets; an ulp is at most 2 u |result|."""
+
+
+@dataclass(frozen=True)
+class SineContract:
+    """|computed - sin(x)| <= error for |x| <= domain; `error` None: no promise. `text` names the source."""
+
+    text: str
+    error: float | None
+    domain: float = math.inf
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A promise: `sine` None means the target's own, `passes` run after the common ones."""
+
+    name: str
+    text: str
+    sine: SineContract | None
+    passes: tuple[str, ...]
+
+
+EMITTED_SINE = SineContract(
+    f"emitted, odd polynomial of degree {sine.DEGREE}", sine.POLYNOMIALS[sine.DEGREE].error, sine.DOMAIN
+)
+"""The sine of compiler/sine.py."""
+
+PROFILES: Mapping[str, Profile] = {
+    profile.name: profile
+    for profile in (
+        Profile(
+            "ieee",
+            "any order of summation, fused multiply-add allowed, emitted sine",
+            EMITTED_SINE,
+            ("expand_sine", "fold", "eliminate_dead"),
+        ),
+        Profile(
+            "native", "any order of summation, fused multiply-add allowed, the target's own sine", None, ()
+        ),
+    )
+}
+"""All profiles, by name."""
+
+
+def profile_named(name: str) -> Profile:
+    """Return the profile, or say which ones there are."""
+    if name not in PROFILES:
+        raise CompileError(f"profile {name!r} does not exist; there are: {', '.join(PROFILES)}")
+    return PROFILES[name]

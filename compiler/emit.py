@@ -1,0 +1,274 @@
+"""From a program to the text of a kernel, for any dialect, with the plain schedule.
+
+1. Nodes are grouped in their order [`schedule`]: neighbouring elementwise nodes of one shape share a loop, an
+   affine node is a loop nest of its own.
+2. An affine node that reads the window accumulates straight from the images, tap by tap; the window vector
+   exists only if something else reads it [`_over_window`].
+3. A value that another group reads is an array `v<number>`; a number, or a value that only its own loop
+   reads, is a variable `t<number>`; numbers are those of the printed program.
+
+The language's own words come from the dialect's templates; nothing here asks which language it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from ..refimpl.errors import CompileError
+from .dialect import Dialect
+from .ir import Gather, Node, Program, users
+from .ops import OPS
+from .weights import layout
+
+ENTRY = "wamnet_denoise"
+"""Name of the kernel function, where the language lets one choose."""
+
+INSIDE = {"clamp": "", "zero": "(row == y + dy - WINDOW_CENTRE && column == x + dx - WINDOW_CENTRE) ? "}
+"""What stands before a pixel's value, by border rule; coordinates are clamped anyway: no read strays."""
+
+OUTSIDE = {"clamp": "", "zero": " : 0.0f"}
+"""What stands after it."""
+
+
+def emit(program: Program, dialect: Dialect, header: Sequence[str]) -> str:
+    """Return the kernel's source; `header` are the lines of the comment at its top."""
+    gather = kernel_gather(program)
+    _check_channels(program, dialect)
+    images = [dialect.image_declaration.format(image=i.name, channels=i.channels) for i in gather.images]
+    defines = (
+        f"#define WINDOW_SIZE {gather.window.size}\n"
+        f"#define WINDOW_CENTRE {gather.window.size // 2} /* the tap that lies on the pixel itself */"
+    )
+    begin = dialect.begin.format(
+        defines=defines,
+        entry=ENTRY,
+        images=dialect.image_separator.join(images),
+        image=gather.images[0].name,
+    )
+    comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
+    body = _Body(program, dialect, gather).text()
+    return "\n".join([*comment, begin, *body, dialect.end.format()]) + "\n"
+
+
+def kernel_gather(program: Program) -> Gather:
+    """Return how the window is filled, or refuse a program that this skeleton cannot hold."""
+    if program.gather is None or len(program.outputs) != 1:
+        raise CompileError(
+            f"the program has {len(program.outputs)} outputs and {'a' if program.gather else 'no'} gathered "
+            "window: a kernel needs one output and a window; lower a model, or trace with a Gather"
+        )
+    return program.gather
+
+
+def _check_channels(program: Program, dialect: Dialect) -> None:
+    """Refuse an output that the language cannot write at once."""
+    channels = output_channels(program)
+    if channels > dialect.max_output_channels:
+        raise CompileError(
+            f"the output has {channels} channels: {dialect.language} writes at most "
+            f"{dialect.max_output_channels}; compile for another target"
+        )
+
+
+def output_channels(program: Program) -> int:
+    """Return the number of channels of the only output."""
+    shape = program.nodes[program.outputs[0][1]].type.shape
+    return shape[0] if shape else 1
+
+
+def schedule(program: Program) -> list[tuple[int, ...]]:
+    """Return groups of node indices in order: nodes that share a loop, or one other node."""
+    groups: list[list[int]] = []
+    for index, node in enumerate(program.nodes):
+        if node.op in ("constant", "parameter"):
+            continue
+        last = program.nodes[groups[-1][-1]] if groups else node
+        if groups and _loops(node) and _loops(last) and node.type == last.type:
+            groups[-1].append(index)
+        else:
+            groups.append([index])
+    return [tuple(group) for group in groups]
+
+
+def _loops(node: Node) -> bool:
+    """Return whether the node is one statement, in a loop over components or in straight code."""
+    return OPS[node.op].elementwise or node.op == "component"
+
+
+@dataclass
+class _Body:
+    """The statements of one kernel."""
+
+    program: Program
+    dialect: Dialect
+    gather: Gather
+    lines: list[str] = field(default_factory=list)
+    depth: int = 1
+
+    def text(self) -> list[str]:
+        """Return the lines between the kernel's braces."""
+        groups = schedule(self.program)
+        self.slots = layout(self.program)
+        self.readers = users(self.program)
+        self.group_of = {index: number for number, group in enumerate(groups) for index in group}
+        for group in groups:
+            self._group(group)
+        self._outputs()
+        return self.lines
+
+    # ---- groups ------------------------------------------------------------------------------------------
+
+    def _group(self, group: tuple[int, ...]) -> None:
+        """Write one group: a window, an affine map, a stack, or elementwise operations."""
+        node = self.program.nodes[group[0]]
+        if node.op == "input":
+            if self._is_array(group[0]):
+                self._materialised(group[0])
+        elif node.op == "affine":
+            self._affine(group[0], node)
+        elif node.op == "stack":
+            self._declare(group[0], f"%{group[0]}: {len(node.args)} numbers side by side")
+            for i, arg in enumerate(node.args):
+                self._line(f"v{group[0]}[{i}] = {self._read(arg, '')};")
+        else:
+            self._elementwise(group)
+
+    def _materialised(self, index: int) -> None:
+        """Write the window into an array."""
+        self._declare(index, f"%{index}: the window")
+        self._over_window(lambda tap: [f"v{index}[{tap}] = value;"])
+
+    def _affine(self, index: int, node: Node) -> None:
+        """Write v = W x + b, x being the images around the pixel or an array."""
+        weight, n_out = self.slots[str(node["weight"])], node.type.shape[0]
+        n_in, source = weight.shape[0], self.program.nodes[node.args[0]]
+        self._declare(index, f"%{index}: affine map {node['weight']} from {n_in} to {n_out}")
+        bias = node.get("bias")
+        start = self._weight(f"{self.slots[str(bias)].offset} + j") if bias else "0.0f"
+        neurons = f"for (int j = 0; j < {n_out}; ++j) {{"
+        self._nest([neurons], [f"v{index}[j] = {start};"])
+        if source.op == "input":
+            self._over_window(
+                lambda tap: self._accumulate(index, neurons, f"{weight.offset} + ({tap}) * {n_out} + j")
+            )
+        else:
+            inner = self._accumulate(index, neurons, f"{weight.offset} + i * {n_out} + j")
+            value = f"float value = {self._read(node.args[0], 'i')};"
+            self._nest([f"for (int i = 0; i < {n_in}; ++i) {{"], [value, *inner])
+
+    def _accumulate(self, index: int, neurons: str, weight: str) -> list[str]:
+        """Return the loop that adds `value` times one row of weights to all neurons."""
+        return [neurons, f"    v{index}[j] += {self._weight(weight)} * value;", "}"]
+
+    def _elementwise(self, group: tuple[int, ...]) -> None:
+        """Write the operations of a group, in a loop when they work on vectors."""
+        shape = self.program.nodes[group[0]].type.shape
+        lane = "i" if shape else ""
+        span = f"%{group[0]}" if len(group) == 1 else f"%{group[0]} to %{group[-1]}"
+        if shape:
+            self._comment(f"{span}: elementwise on {shape[0]} numbers")
+            for index in filter(self._is_array, group):
+                self._line(f"float v{index}[{shape[0]}];")
+        statements = []
+        for index in group:
+            statements.append(f"{self.dialect.temporary} t{index} = {self._expression(index, lane)};")
+            if shape and self._is_array(index):
+                statements.append(f"v{index}[i] = t{index};")
+        self._nest([f"for (int i = 0; i < {shape[0]}; ++i) {{"] if shape else [], statements)
+
+    def _expression(self, index: int, lane: str) -> str:
+        """Return the right side of an elementwise node or a component."""
+        node = self.program.nodes[index]
+        if node.op == "component":
+            return self._read(node.args[0], str(node["index"]))
+        operands = [self._read(arg, lane, self.group_of[index]) for arg in node.args]
+        return self.dialect.operations[node.op].format(*operands)
+
+    def _outputs(self) -> None:
+        """Write the only output to the result."""
+        index = self.program.outputs[0][1]
+        channels = output_channels(self.program)
+        self._comment(f"output {self.program.outputs[0][0]}")
+        store = self.dialect.store
+        if self.program.nodes[index].type.shape:
+            line = store.format(channels=channels, i="i", value=self._read(index, "i"))
+            self._nest([f"for (int i = 0; i < {channels}; ++i) {{"], [line])
+        else:
+            self._line(store.format(channels=1, i="0", value=self._read(index, "")))
+
+    # ---- the window --------------------------------------------------------------------------------------
+
+    def _over_window(self, body: Callable[[str], list[str]]) -> None:
+        """Write the loops over taps and channels that set `value`; `body` takes the index into the window."""
+        border, first = self.gather.window.border, 0
+        self._open("for (int dy = 0; dy < WINDOW_SIZE; ++dy) {")
+        self._line("int row = clamp(y + dy - WINDOW_CENTRE, 0, height - 1);")
+        self._open("for (int dx = 0; dx < WINDOW_SIZE; ++dx) {")
+        self._line("int column = clamp(x + dx - WINDOW_CENTRE, 0, width - 1);")
+        self._line(f"int tap = (dy * WINDOW_SIZE + dx) * {self.gather.channels};")
+        for image in self.gather.images:
+            pixel = self.dialect.pixel.format(image=image.name, channels=image.channels)
+            value = f"float value = {INSIDE[border]}{pixel}{OUTSIDE[border]};"
+            self._nest(
+                [f"for (int c = 0; c < {image.channels}; ++c) {{"], [value, *body(f"tap + {first} + c")]
+            )
+            first += image.channels
+        self._close()
+        self._close()
+
+    # ---- values ------------------------------------------------------------------------------------------
+
+    def _read(self, index: int, lane: str, group: int | None = None) -> str:
+        """Return the text of component `lane` of a value ('' for a number), read inside `group`."""
+        node = self.program.nodes[index]
+        if node.op == "constant":
+            return self.dialect.literal(float(node["value"]))  # type: ignore[arg-type]
+        if node.op == "parameter":
+            return self._weight(f"{self.slots[str(node['name'])].offset} + {lane}")
+        if not node.type.shape or self.group_of[index] == group:
+            return f"t{index}"
+        return f"v{index}[{lane}]"
+
+    def _is_array(self, index: int) -> bool:
+        """Return whether something outside the node's own loop reads this vector component by component."""
+        node = self.program.nodes[index]
+        readers = [r for r in self.readers[index] if self.group_of[r] != self.group_of[index]]
+        if node.op == "input":
+            readers = [r for r in readers if self.program.nodes[r].op != "affine"]
+        return bool(readers) or any(index == output for _, output in self.program.outputs)
+
+    def _weight(self, index: str) -> str:
+        """Return the text of one weight."""
+        return self.dialect.weight.format(index=index)
+
+    # ---- lines -------------------------------------------------------------------------------------------
+
+    def _declare(self, index: int, comment: str) -> None:
+        """Write a comment and the declaration of an array."""
+        self._comment(comment)
+        self._line(f"float v{index}[{self.program.nodes[index].type.shape[0]}];")
+
+    def _comment(self, text: str) -> None:
+        self.lines.append("")
+        self._line(f"/* {text} */")
+
+    def _nest(self, loops: Sequence[str], body: Sequence[str]) -> None:
+        """Write loops around a body whose lines carry their own further indentation."""
+        for loop in loops:
+            self._open(loop)
+        for line in body:
+            self._line(line)
+        for _ in loops:
+            self._close()
+
+    def _open(self, text: str) -> None:
+        self._line(text)
+        self.depth += 1
+
+    def _close(self) -> None:
+        self.depth -= 1
+        self._line("}")
+
+    def _line(self, text: str) -> None:
+        self.lines.append("    " * self.depth + text)

@@ -1,0 +1,67 @@
+"""GLSL 3.30 fragment shader: one fragment a pixel; images and weights are textures.
+
+`precise` (GL_ARB_gpu_shader5) keeps the compiler from rewriting (x - k P1) - k P2 as x - k (P1 + P2), which
+plain GLSL allows and which would undo the sine's range reduction.
+"""
+
+from __future__ import annotations
+
+from .dialect import Dialect
+from .profiles import SineContract
+
+WEIGHT_TEXTURE_WIDTH = 1024
+"""Texels in a row of the weight texture: every implementation takes 1024 rows of 1024, a million weights."""
+
+
+class GLSL(Dialect):
+    """The dialect's table."""
+
+    target = "opengl"
+    language = "GLSL 3.30, fragment shader"
+    suffix = ".frag"
+    image_declaration = "uniform sampler2D image_{image};"
+    image_separator = "\n"
+    begin = f"""\
+#version 330 core
+#extension GL_ARB_gpu_shader5 : enable
+#ifdef GL_ARB_gpu_shader5
+#define PRECISE precise
+#else
+#define PRECISE
+#endif
+{{defines}}
+{{images}}
+uniform sampler2D weight_texture;
+layout(location = 0) out vec4 result;
+
+float weights(int index)
+{{{{
+    ivec2 texel = ivec2(index % {WEIGHT_TEXTURE_WIDTH}, index / {WEIGHT_TEXTURE_WIDTH});
+    return texelFetch(weight_texture, texel, 0).r;
+}}}}
+
+void main()
+{{{{
+    int width = textureSize(image_{{image}}, 0).x;
+    int height = textureSize(image_{{image}}, 0).y;
+    int x = int(gl_FragCoord.x);
+    int y = int(gl_FragCoord.y);
+    result = vec4(0.0, 0.0, 0.0, 1.0);"""
+    pixel = "texelFetch(image_{image}, ivec2(column, row), 0)[c]"
+    weight = "weights({index})"
+    store = "result[{i}] = {value};"
+    arguments = (
+        "each image: a float texture (R32F to RGBA32F) of width x height, texel row 0 is the top row;\n"
+        f"weight_texture: R32F, {WEIGHT_TEXTURE_WIDTH} texels wide, filled row by row;\n"
+        "result: a float colour buffer of width x height whose row 0 is the top row.\n"
+        "Draw one triangle that covers it"
+    )
+    max_output_channels = 4
+    native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
+    temporary = "PRECISE float"
+    operations = {
+        **Dialect.operations,
+        "absolute": "abs({0})",
+        "minimum": "min({0}, {1})",
+        "maximum": "max({0}, {1})",
+    }

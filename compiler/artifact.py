@@ -1,0 +1,83 @@
+"""What the compiler hands out: source, weights and a manifest that says how to call it and what it promises.
+
+Everything is a function of program, target and profile, to the byte: no time, no path, no machine.
+[`write`] puts an artifact into a folder file by file under temporary names, the manifest last; it carries
+the hashes of the others.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .ir import Program
+
+SCHEMA = "wamnet-artifact-1"
+"""Name and version of the manifest's form; described in spec/kernel_interface.md."""
+
+
+@dataclass(frozen=True)
+class Artifact:
+    """A compiled kernel; `program` is what was emitted, after all passes."""
+
+    target: str
+    profile: str
+    entry_point: str
+    source: str
+    source_name: str
+    program: Program
+    weights: NDArray[np.float32]
+    manifest: Mapping[str, Any]
+
+    @property
+    def digest(self) -> str:
+        """Return the hash that names this artifact: of source and weights."""
+        return str(self.manifest["digest"])
+
+
+WEIGHTS_NAME = "weights.bin"
+"""File of the weights: little-endian float32, nothing else."""
+
+MANIFEST_NAME = "manifest.json"
+"""File of the manifest."""
+
+
+def weight_bytes(artifact: Artifact) -> bytes:
+    """Return the weights as they are written."""
+    return artifact.weights.astype("<f4").tobytes()
+
+
+def manifest_text(artifact: Artifact) -> str:
+    """Return the manifest as it is written."""
+    return json.dumps(artifact.manifest, indent=2, sort_keys=True, allow_nan=False) + "\n"
+
+
+def write(artifact: Artifact, folder: str | os.PathLike[str]) -> tuple[Path, ...]:
+    """Write source, weights and manifest into `folder`; no file is ever seen half written."""
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    contents = {
+        artifact.source_name: artifact.source.encode(),
+        WEIGHTS_NAME: weight_bytes(artifact),
+        MANIFEST_NAME: manifest_text(artifact).encode(),
+    }
+    for name, content in contents.items():
+        _write_whole(target / name, content)
+    return tuple(target / name for name in contents)
+
+
+def _write_whole(path: Path, content: bytes) -> None:
+    """Write beside `path`, then take its name in one step."""
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.write_bytes(content)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

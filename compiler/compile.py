@@ -1,0 +1,218 @@
+"""Compile a program for a target: passes, error bound, source, artifact.
+
+1. Run the common passes [`pipeline.COMMON`].
+2. Bound the output over all inputs that the images can hold, and refuse a program whose sines may leave the
+   domain on which their error is known [`bound_over_images`].
+3. Run the profile's passes and emit the source with the target's dialect.
+4. Put source, weights and manifest together [`compile_program`].
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ..refimpl.errors import CompileError
+from . import artifact, bounds, ir, profiles
+from .artifact import Artifact
+from .dialect import Dialect
+from .emit import ENTRY, emit, kernel_gather, output_channels
+from .glsl import GLSL
+from .ir import Program
+from .opencl import OpenCL
+from .passes import pipeline
+from .profiles import Profile, SineContract
+from .weights import layout, pack
+
+
+@dataclass(frozen=True)
+class Target:
+    """Something that runs kernels: how its source is made, and what its own sine promises."""
+
+    name: str
+    language: str
+    suffix: str
+    arguments: str
+    native_sine: SineContract
+    emit: Callable[[Program, Sequence[str]], str]
+
+
+def _dialect_target(dialect: Dialect) -> Target:
+    """Return the target whose source a dialect makes."""
+    return Target(
+        dialect.target,
+        dialect.language,
+        dialect.suffix,
+        dialect.arguments,
+        dialect.native_sine,
+        lambda program, header: emit(program, dialect, header),
+    )
+
+
+def _printed(program: Program, header: Sequence[str]) -> str:
+    """Return the program as text, which is all that the interpreter needs."""
+    return "".join(f"# {line}".rstrip() + "\n" for line in header) + ir.text(program)
+
+
+TARGETS: Mapping[str, Target] = {
+    target.name: target
+    for target in (
+        Target(
+            "numpy",
+            "wamnet IR",
+            ".ir.txt",
+            "the program's inputs and parameters, by name",
+            SineContract("np.sin, whose documentation promises nothing", None),
+            _printed,
+        ),
+        _dialect_target(OpenCL()),
+        _dialect_target(GLSL()),
+    )
+}
+"""All targets, by the name of the executor that runs them."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A-priori promise: `output` bounds each channel's error, None where an operation promises nothing.
+
+    `sines` holds the range of each sine's argument.
+    """
+
+    output: tuple[float, ...] | None
+    sines: tuple[tuple[float, float], ...]
+
+
+def analysed(program: Program) -> Program:
+    """Return the program that bounds speak about: after the common passes, each sine one node."""
+    return pipeline.run(program, pipeline.COMMON)
+
+
+def sine_contract(profile: str, target: str) -> SineContract:
+    """Return what is promised of a sine under this profile on this target."""
+    return profiles.profile_named(profile).sine or target_named(target).native_sine
+
+
+def bound_over_images(program: Program, profile: str, target: str) -> Bound:
+    """Return the bound of an analysed program over all that its images can hold, or refuse it."""
+    contract = sine_contract(profile, target)
+    found = bounds.enclose(program, {"window": bounds.window_box(kernel_gather(program))}, contract)
+    sines = [index for index, node in enumerate(program.nodes) if node.op == "sin"]
+    ranges = []
+    for number, index in enumerate(sines):
+        argument = found[program.nodes[index].args[0]]
+        ranges.append((float(argument.low.min()), float(argument.high.max())))
+        # What a sine without a contract passes on is unknown: there is no domain to check against.
+        if contract.error is not None and not bounds.argument_reach(argument).max() <= contract.domain:
+            _refuse_domain(number + 1, len(sines), index, ranges[-1], contract)
+    errors = bounds.output_errors(program, found)[program.outputs[0][0]]
+    known = all(math.isfinite(error) for error in errors)
+    return Bound(tuple(float(e) for e in errors) if known else None, tuple(ranges))
+
+
+def _refuse_domain(
+    number: int, count: int, index: int, found: tuple[float, float], contract: SineContract
+) -> None:
+    """Raise: a sine may be given an argument for which nothing is proven."""
+    raise CompileError(
+        f"sine {number} of {count} (layer {number - 1}, %{index}) may be given arguments from {found[0]:.6g} "
+        f"to {found[1]:.6g}: the sine ({contract.text}) is proven for |x| <= {contract.domain:g}; use a smaller "
+        "omega_0, smaller weights or features of a smaller range, or profile native, which promises less"
+    )
+
+
+def target_named(name: str) -> Target:
+    """Return the target, or say which ones there are."""
+    if name not in TARGETS:
+        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(TARGETS)}")
+    return TARGETS[name]
+
+
+def compile_program(program: Program, target: str, profile: str = "ieee") -> Artifact:
+    """Return the kernel of a program that reads a window and writes one output."""
+    chosen, promised = target_named(target), profiles.profile_named(profile)
+    kernel_gather(program)
+    common = analysed(program)
+    bound = bound_over_images(common, profile, target)
+    emitted = pipeline.run(common, promised.passes)
+    source = chosen.emit(emitted, _header(common, chosen, promised, bound))
+    return _assemble(common, emitted, chosen, promised, bound, source)
+
+
+def _header(program: Program, target: Target, profile: Profile, bound: Bound) -> list[str]:
+    """Return the lines of the comment at the top of the source."""
+    gather, channels = kernel_gather(program), output_channels(program)
+    images = [f"{i.name} ({i.channels} channels in [{i.low:g}, {i.high:g}])" for i in gather.images]
+    arguments = target.arguments.format(channels=channels).split("\n")
+    size = gather.window.size
+    return [
+        f"wamnet denoiser, {target.language}. Generated: change the compiler, not this text.",
+        f"program   {ir.digest(program)[:32]}",
+        f"input     {', '.join(images)}",
+        f"window    {size} x {size} pixels, the pixel itself is tap {size // 2}",
+        f"border    {gather.window.border}",
+        f"output    {channels} channels, row 0 is the top row",
+        f"profile   {profile.name}: {profile.text}",
+        f"sine      {sine_contract(profile.name, target.name).text}",
+        f"bound     {_bound_text(bound)}",
+        f"arguments {arguments[0]}",
+        *(f"          {line}" for line in arguments[1:]),
+    ]
+
+
+def _bound_text(bound: Bound) -> str:
+    """Return the bound as a reader wants it, rounded up."""
+    if bound.output is None:
+        return "none: an operation of this program promises nothing on this target"
+    return f"|output - float64 reference| <= {round_up(max(bound.output)):g} for all images in these ranges"
+
+
+def round_up(value: float, digits: int = 3) -> float:
+    """Return the smallest number of so many significant decimal digits that is not below `value`."""
+    if value == 0:
+        return 0.0
+    unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    return float(f"{math.ceil(value / unit) * unit:.{digits}g}")
+
+
+def _assemble(
+    common: Program, emitted: Program, target: Target, profile: Profile, bound: Bound, source: str
+) -> Artifact:
+    """Return the artifact with its manifest."""
+    gather, weights = kernel_gather(emitted), pack(emitted)
+    raw, slots = weights.astype("<f4").tobytes(), layout(emitted).values()
+    source_name = f"denoise{target.suffix}"
+    manifest: dict[str, Any] = {
+        "schema": artifact.SCHEMA,
+        "digest": ir.sha256(source.encode(), raw),
+        "program": ir.digest(common),
+        "target": target.name,
+        "language": target.language,
+        "entry_point": ENTRY,
+        "profile": {"name": profile.name, "text": profile.text},
+        "sine": asdict_finite(sine_contract(profile.name, target.name)),
+        "passes": [*pipeline.COMMON, *profile.passes],
+        "window": {**asdict(gather.window), "centre": gather.window.size // 2},
+        "images": [asdict(image) for image in gather.images],
+        "output": {"name": emitted.outputs[0][0], "channels": output_channels(emitted)},
+        "arguments": target.arguments.format(channels=output_channels(emitted)),
+        "bound": {"output": bound.output, "against": "float64 reference, same float32 weights and images"},
+        "sine_arguments": bound.sines,
+        "info": dict(emitted.info),
+        "files": {
+            source_name: ir.sha256(source.encode()),
+            artifact.WEIGHTS_NAME: ir.sha256(raw),
+        },
+        "weights": {"count": int(weights.size), "layout": [asdict(slot) for slot in slots]},
+    }
+    manifest = json.loads(json.dumps(manifest, allow_nan=False))
+    return Artifact(target.name, profile.name, ENTRY, source, source_name, emitted, weights, manifest)
+
+
+def asdict_finite(contract: SineContract) -> dict[str, Any]:
+    """Return a contract for JSON, which has no infinity: null means everywhere."""
+    found = asdict(contract)
+    return {**found, "domain": found["domain"] if math.isfinite(found["domain"]) else None}

@@ -1,0 +1,46 @@
+"""Denoise a frame on an executor: lower, compile, encode, run, with both times."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiler.compile import compile_program
+from ..compiler.lower import lower
+from ..refimpl.dataset import feature_image
+from ..refimpl.denoise import Model
+from ..refimpl.frame import Frame
+from .executor import Executor, Images
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """The picture (H, W, 3), display-encoded, and where and how fast it was made.
+
+    `seconds_compile`: tracing, passes, bound, emission, the driver's compilation and one run on a few pixels.
+    `seconds_run`: images to the device, the kernel, the result back; not the encoding of the features.
+    """
+
+    image: NDArray[np.float32]
+    seconds_compile: float
+    seconds_run: float
+    device: str
+
+
+def images_of(model: Model, frame: Frame) -> Images:
+    """Return the encoded feature images (H, W, C) that the model's kernel reads, by name."""
+    return {name: feature_image(frame, (name,), model.normalization) for name in model.features}
+
+
+def denoise_on(executor: Executor, model: Model, frame: Frame, profile: str = "ieee") -> RunResult:
+    """Return the denoised frame and the times."""
+    images = images_of(model, frame)
+    start = time.perf_counter()
+    artifact = compile_program(lower(model), executor.name, profile)
+    executor.build(artifact, (frame.height, frame.width))
+    built = time.perf_counter()
+    image = executor.run(artifact, images)
+    return RunResult(image, built - start, time.perf_counter() - built, executor.device)

@@ -1,0 +1,108 @@
+"""What every executor is: something that builds an artifact and runs it on images.
+
+`build` is idempotent and does all that can be done before the pixels are known, the driver's own delayed
+compilation included (it runs the kernel once on a few pixels). `run` copies the images to the device, runs,
+and copies the result back; the times that wamnet reports mean these two [`denoise_on.RunResult`].
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiler.artifact import Artifact
+from ..compiler.ir import Gather
+from ..refimpl.errors import InputError
+
+Images = Mapping[str, NDArray[np.float32]]
+
+
+class Executor(ABC):
+    """A device that is open; a context manager that closes it. `name` is its target, `device` a text."""
+
+    name: str
+    device: str
+
+    @abstractmethod
+    def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
+        """Make the artifact ready to run on images of `size` (height, width); again costs nothing."""
+
+    @abstractmethod
+    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
+        """Run on checked images (H, W, C)."""
+
+    def close(self) -> None:
+        """Give the device back."""
+
+    def run(self, artifact: Artifact, inputs: Images) -> NDArray[np.float32]:
+        """Return the output (H, W, C) for encoded feature images (H, W, C), float32, by name."""
+        images = checked(artifact, inputs)
+        self._check_target(artifact)
+        self.build(artifact, next(iter(images.values())).shape[:2])
+        return self._run(artifact, images)
+
+    def _check_target(self, artifact: Artifact) -> None:
+        """Refuse a kernel in another language."""
+        if artifact.target != self.name:
+            raise InputError(
+                f"artifact for executor {self.name!r}: target",
+                artifact.target,
+                f"must be {self.name}",
+                f"compile the program for {self.name}",
+            )
+
+    def __enter__(self) -> Any:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def gather_of(artifact: Artifact) -> Gather:
+    """Return how the artifact's window is filled."""
+    gather = artifact.program.gather
+    assert gather is not None, "compile_program refuses programs without one"
+    return gather
+
+
+def checked(artifact: Artifact, inputs: Images) -> Images:
+    """Return the images in the kernel's order, contiguous, or say what is wrong with them."""
+    wanted = gather_of(artifact).images
+    if sorted(inputs) != sorted(image.name for image in wanted):
+        raise InputError(
+            "images for the kernel",
+            ", ".join(inputs) or "none",
+            f"must be {', '.join(image.name for image in wanted)}",
+            "give each encoded feature once, by name",
+        )
+    size = inputs[wanted[0].name].shape[:2]
+    for image in wanted:
+        array = inputs[image.name]
+        if array.dtype != np.float32 or array.shape != (*size, image.channels) or 0 in array.shape:
+            raise InputError(
+                f"image {image.name!r}",
+                f"{array.dtype} of shape {array.shape}",
+                f"must be float32 of shape (height, width, {image.channels}), all images of one size",
+                "encode the frame's features (refimpl.dataset.feature_image)",
+            )
+        if not np.isfinite(array).all():
+            y, x, _ = np.argwhere(~np.isfinite(array))[0]
+            raise InputError(
+                f"image {image.name!r} at row {y}, column {x}",
+                array[y, x].tolist(),
+                "all numbers must be finite",
+                "mend or mask the frame first",
+            )
+    return {image.name: np.ascontiguousarray(inputs[image.name]) for image in wanted}
+
+
+def black(artifact: Artifact, size: tuple[int, int]) -> Images:
+    """Return black images of `size` (height, width), for the run that makes drivers finish compiling."""
+    return {i.name: np.zeros((*size, i.channels), np.float32) for i in gather_of(artifact).images}

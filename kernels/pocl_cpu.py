@@ -1,0 +1,82 @@
+"""Let an old PoCL run on a processor that is newer than its LLVM.
+
+PoCL asks LLVM for the processor's name and hands the name to its compiler. LLVM 14, in the wheel of PoCL
+3.0, answers "generic" for processors that it does not know (AMD's since 2022, for example), and its
+compiler then refuses every kernel: "unknown target CPU 'generic'" (PoCL's issue 1049). No option or
+variable of PoCL 3 changes the name.
+
+1. Nothing is done unless the device's record holds exactly one pointer to the text "generic"
+   [`name_the_processor`]: a PoCL that knows the processor, or a later one, is left alone.
+2. That pointer is set to the name of the instruction set level that the processor has [`level`]: the levels
+   of the x86-64 psABI, which LLVM knows since version 12 and which promise no instruction that is missing.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from pathlib import Path
+
+PLATFORM = "Portable Computing Language"
+"""PoCL's name among OpenCL's platforms."""
+
+UNKNOWN = b"generic\0"
+"""What LLVM calls a processor that it does not know."""
+
+RECORD_BYTES = 2048
+"""How far into a device's record the pointer is looked for: PoCL 3.0 has it at 640."""
+
+LEVELS: Mapping[str, frozenset[str]] = {
+    "x86-64-v4": frozenset(
+        {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl", "avx2", "fma", "bmi2"}
+    ),
+    "x86-64-v3": frozenset({"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe"}),
+    "x86-64-v2": frozenset({"cx16", "popcnt", "sse4_1", "sse4_2", "ssse3"}),
+}
+"""Levels of the x86-64 psABI, highest first, and the flags of /proc/cpuinfo that tell them."""
+
+_names: list[ctypes.Array[ctypes.c_char]] = []
+"""Texts that PoCL's records point to: kept for as long as the process lives."""
+
+
+def name_the_processor(record: int) -> bool:
+    """Give the device with its record at address `record` a processor name, if it has none; say whether."""
+    readable = _readable()
+    words = range(record, record + RECORD_BYTES, 8)
+    found = [word for word in words if _inside(word, readable) and _points_to_unknown(word, readable)]
+    if len(found) != 1:
+        return False
+    _names.append(ctypes.create_string_buffer(level(_flags()).encode()))
+    ctypes.c_uint64.from_address(found[0]).value = ctypes.addressof(_names[-1])
+    return True
+
+
+def level(flags: frozenset[str]) -> str:
+    """Return the highest instruction set level whose flags the processor has."""
+    return next((name for name, needed in LEVELS.items() if needed <= flags), "x86-64")
+
+
+def _points_to_unknown(word: int, readable: list[tuple[int, int]]) -> bool:
+    """Return whether the eight bytes at `word` are the address of the text "generic"."""
+    address = ctypes.c_uint64.from_address(word).value
+    return _inside(address, readable) and ctypes.string_at(address, len(UNKNOWN)) == UNKNOWN
+
+
+def _inside(address: int, readable: list[tuple[int, int]]) -> bool:
+    """Return whether the eight bytes at `address` may be read."""
+    return any(start <= address and address + 8 <= end for start, end in readable)
+
+
+def _readable() -> list[tuple[int, int]]:
+    """Return the readable address ranges of this process; none where the system does not list them."""
+    maps = Path("/proc/self/maps")
+    lines = [line.split()[:2] for line in maps.read_text().splitlines()] if maps.exists() else []
+    spans = [span.split("-") for span, access in lines if access.startswith("r")]
+    return [(int(start, 16), int(end, 16)) for start, end in spans]
+
+
+def _flags() -> frozenset[str]:
+    """Return the first processor's feature flags, none where the system does not list them."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.exists() else []
+    return frozenset(next((line for line in lines if line.startswith("flags")), "").split())

@@ -1,0 +1,46 @@
+"""Executors by name. Their packages are imported when one is opened: the base install has none of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ..refimpl.errors import ExecutorUnavailable, InputError
+from .executor import Executor
+
+
+def _numpy(**options: Any) -> Executor:
+    """Open the interpreter."""
+    from .numpy_executor import NumpyExecutor
+
+    return NumpyExecutor(**options)
+
+
+def _opencl(**options: Any) -> Executor:
+    """Open an OpenCL device; option `device`: a part of its name."""
+    from .opencl_executor import OpenCLExecutor
+
+    return OpenCLExecutor(**options)
+
+
+def _opengl(**options: Any) -> Executor:
+    """Open an OpenGL context; option `context`: auto, egl or osmesa."""
+    from .opengl_executor import OpenGLExecutor
+
+    return OpenGLExecutor(**options)
+
+
+EXECUTORS: Mapping[str, Callable[..., Executor]] = {"numpy": _numpy, "opencl": _opencl, "opengl": _opengl}
+"""How to open each executor; the name is also the target that the compiler takes."""
+
+
+def open_executor(name: str, **options: Any) -> Executor:
+    """Return an open executor, or raise ExecutorUnavailable that says what is missing and how to get it."""
+    if name not in EXECUTORS:
+        raise InputError("executor", name, f"must be one of {', '.join(EXECUTORS)}", "choose one of these")
+    try:
+        return EXECUTORS[name](**options)
+    except ImportError as error:
+        raise ExecutorUnavailable(
+            f"{name}: package {error.name or error} cannot be imported; pip install 'wamnet[{name}]'"
+        ) from None

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
-from statistical import SIGNIFICANCE, assert_all_plausible, sidak, welch_p
+from statistical import SIGNIFICANCE, assert_all_plausible, welch_p
 
 from wamnet.refimpl import render as R
 from wamnet.refimpl import scenes, transport
@@ -226,4 +226,10 @@ def test_mis_weights_of_both_techniques_add_up_to_one():
         settings = Settings(heuristic=heuristic)
         total = transport.mis_weight(settings, a, b) + transport.mis_weight(settings, b, a)
         assert np.max(np.abs(total - 1.0)) <= 8 * 2.0**-52  # four roundings in each weight
-    assert sidak(0.01, 1) == pytest.approx(0.01, rel=1e-12)  # log1p and expm1 are inverse to some ulps
+
+
+def test_mis_weights_by_hand():
+    """p = 1, q = 3: balance 1 / (1 + 3) = 1/4, power 1 / (1 + 9) = 1/10."""
+    one, three = np.array([1.0]), np.array([3.0])
+    assert transport.mis_weight(Settings(heuristic="balance"), one, three)[0] == 0.25
+    assert transport.mis_weight(Settings(heuristic="power"), one, three)[0] == 0.1

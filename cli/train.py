@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any
@@ -97,31 +97,21 @@ def read_pairs(inputs: Sequence[Path], targets: Sequence[Path]) -> list[tuple[Fr
     ]
 
 
-@dataclass(frozen=True)
-class LogLine:
-    """Steps done, seconds since the start of this run, and the loss of the last step."""
-
-    step: int
-    seconds: float
-    loss: float
-
-
 def fit(
     recipe: Recipe, pairs: Sequence[tuple[Frame, Frame]], output: Path, state: TrainState | None = None
-) -> tuple[TrainState, list[LogLine]]:
-    """Train with a progress bar and checkpoints beside `output`, and write the model there."""
+) -> tuple[TrainState, float]:
+    """Train with a progress bar and checkpoints beside `output`; write the model there; return seconds too."""
     from ..compiler.model_file import save_checkpoint, save_model
     from ..refimpl.train import model_of, train
 
-    saved, done = checkpoint_path(output), state.step if state is not None else 0
-    log: list[LogLine] = []
+    saved, seen = checkpoint_path(output), state.step if state is not None else 0
     started = kept = monotonic()
-    with progress("training", recipe.steps - done) as advance:
+    with progress("training", recipe.steps - seen) as advance:
 
-        def on_progress(now: TrainState, loss: float) -> None:
-            nonlocal kept
-            advance(now.step - (log[-1].step if log else done))
-            log.append(LogLine(now.step, monotonic() - started, loss))
+        def on_progress(now: TrainState, _loss: float) -> None:
+            nonlocal kept, seen
+            advance(now.step - seen)
+            seen = now.step
             if monotonic() - kept > CHECKPOINT_INTERVAL_S:
                 save_checkpoint(saved, now)
                 kept = monotonic()
@@ -133,8 +123,9 @@ def fit(
             on_progress=on_progress,
             on_checkpoint=lambda now: save_checkpoint(saved, now),
         )
+    seconds = monotonic() - started
     save_model(output, model_of(state, facts(pairs)))
-    return state, log
+    return state, seconds
 
 
 def facts(pairs: Sequence[tuple[Frame, Frame]]) -> dict[str, str]:

@@ -1,0 +1,102 @@
+"""One model and one frame on every executor: picture, times, error against the float64 reference, bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ..refimpl.errors import CompileError, ExecutorUnavailable
+
+if TYPE_CHECKING:
+    from ..compiler.artifact import Artifact
+    from ..refimpl.denoise import Model
+    from ..refimpl.frame import Frame
+
+BLOCK_NUMBERS = 2**21
+"""Numbers in the windows of a block of rows while bounds are computed: 16 MiB in float64."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One executor on one frame; where it cannot run, `missing` says why and the numbers are None.
+
+    `error` is the largest difference from the float64 reference. `bound_frame` bounds it for this very frame,
+    `bound_all` for all frames; they are None where the target's sine promises nothing.
+    """
+
+    executor: str
+    device: str = ""
+    seconds_compile: float | None = None
+    seconds_run: float | None = None
+    error: float | None = None
+    bound_frame: float | None = None
+    bound_all: float | None = None
+    missing: str = ""
+
+
+def run_all(
+    model: Model, frame: Frame, kernels: dict[str, Artifact], on_done: Callable[[float], None]
+) -> tuple[dict[str, Any], tuple[Run, ...]]:
+    """Run each executor that is here; return pictures (H, W, 3) by executor, and what was found about all."""
+    import numpy as np
+
+    from ..refimpl.denoise import denoise
+
+    truth = denoise(model, frame, np.float64)
+    images: dict[str, Any] = {}
+    runs = []
+    for name, kernel in kernels.items():
+        try:
+            images[name], run = run_one(name, kernel, model, frame, truth)
+        except (ExecutorUnavailable, CompileError) as error:
+            run = Run(name, missing=str(error))
+        runs.append(run)
+        on_done(1)
+    return images, tuple(runs)
+
+
+def run_one(name: str, kernel: Artifact, model: Model, frame: Frame, truth: Any) -> tuple[Any, Run]:
+    """Return one executor's picture, and its times, error and bounds.
+
+    The kernel runs twice and the second time counts: drivers put off work until the first run.
+    """
+    from ..kernels import denoise_on, open_executor
+    from ..refimpl.metrics import largest_error
+
+    with open_executor(name) as executor:
+        first = denoise_on(executor, model, frame)
+        second = denoise_on(executor, model, frame)
+    everywhere = kernel.manifest["bound"]["output"]
+    run = Run(
+        name,
+        second.device,
+        first.seconds_compile,
+        second.seconds_run,
+        largest_error(second.image, truth),
+        frame_bound(model, frame, name, kernel.profile),
+        max(everywhere) if everywhere else None,
+    )
+    return second.image, run
+
+
+def frame_bound(model: Model, frame: Frame, target: str, profile: str) -> float | None:
+    """Return the compiler's bound on the largest error in this frame, or None where it has none."""
+    import numpy as np
+
+    from ..compiler import bounds
+    from ..compiler.compile import analysed, sine_contract
+    from ..compiler.lower import lower
+    from ..refimpl import dataset
+
+    program, sine = analysed(lower(model)), sine_contract(profile, target)
+    padded = dataset.pad(dataset.feature_image(frame, model.features, model.normalization), model.window)
+    margin = model.window.size - 1
+    rows = max(1, BLOCK_NUMBERS // (frame.width * model.siren.widths[0]))
+    largest = 0.0
+    for top in range(0, frame.height, rows):
+        strip = padded[top : min(top + rows, frame.height) + margin]
+        windows = dataset.all_windows(strip, model.window).astype(np.float64)
+        (errors,) = bounds.at_inputs(program, {"window": windows}, sine).values()
+        largest = max(largest, float(errors.max()))
+    return largest if np.isfinite(largest) else None

@@ -1,0 +1,89 @@
+"""`.ci/setup` refuses what cannot work in one sentence, and touches nothing; `make` lists its targets."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+
+def setup(house, *arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [house.root / ".ci/setup", *arguments],
+        env=os.environ | {"VENV": "no/such/environment"} | variables,
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        check=False,
+    )
+
+
+def python_that_says(folder, script: str) -> str:
+    """Return the path of a stand-in for Python that answers by a shell script."""
+    path = folder / "python"
+    path.write_text(f"#!/bin/sh\n{script}\n")
+    path.chmod(0o755)
+    return str(path)
+
+
+def test_python_that_is_not_there(house):
+    done = setup(house, "all", PYTHON="no-such-python")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("set-up: no-such-python is not installed: Python 3.10 or newer is needed")
+
+
+def test_python_that_is_too_old(house, tmp_path):
+    old = python_that_says(tmp_path, 'case "$2" in *print*) echo 3.9;; *) exit 1;; esac')
+    done = setup(house, "all", PYTHON=old)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert (
+        done.stderr
+        == f"set-up: {old} is Python 3.9: 3.10 or newer is needed; set PYTHON=python3.11, for example\n"
+    )
+
+
+def test_python_that_makes_no_environments(house, tmp_path):
+    script = f'case "$2" in *ensurepip*) exit 1;; esac; exec {sys.executable} "$@"'
+    nothing_else = python_that_says(tmp_path, script)
+    # Without apt-get on PATH nothing can be installed.
+    for tool in ("bash", "env", "dirname", "cat", "sh", "ls"):
+        (tmp_path / tool).symlink_to(shutil.which(tool))
+    done = setup(house, "all", PYTHON=nothing_else, PATH=str(tmp_path))
+    assert done.returncode == 1
+    assert re.search(
+        r"cannot make virtual environments: install python3\.\d+-venv .* and try again", done.stderr
+    )
+
+
+def test_folder_that_is_no_environment(house, tmp_path):
+    (tmp_path / "precious").write_text("kept")
+    done = setup(house, "all", VENV=str(tmp_path))
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "is a folder that holds something else" in done.stderr
+    assert (tmp_path / "precious").read_text() == "kept"
+
+
+def test_extras_must_be_named(house):
+    done = setup(house)
+    assert done.returncode != 0
+    assert "usage: .ci/setup EXTRAS" in done.stderr
+
+
+@pytest.mark.parametrize("script", ["setup", "lint", "run"])
+def test_scripts_stop_at_the_first_error(house, script):
+    path = house.root / ".ci" / script
+    assert "\nset -euo pipefail\n" in path.read_text()
+    assert os.access(path, os.X_OK)
+
+
+def test_make_lists_every_target(house):
+    makefile = (house.root / "Makefile").read_text()
+    phony = set(re.search(r"^\.PHONY: (.*)$", makefile, re.MULTILINE)[1].split())
+    shown = subprocess.run(
+        ["make", "-C", house.root, "--no-print-directory"], capture_output=True, text=True, check=True
+    ).stdout
+    assert {line.split()[1] for line in shown.splitlines()} == phony

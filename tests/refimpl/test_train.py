@@ -59,7 +59,7 @@ def tensors(state: TrainState) -> list[bytes]:
 
 @pytest.mark.parametrize("n_windows", [0, 2000])
 def test_training_beats_a_mean_filter_on_an_unseen_frame(n_windows: int) -> None:
-    """The margin: on planes the mean over 3x3 pixels is unbiased; its error is sigma^2/9, a ninth of the input's.
+    """On planes the mean over 3x3 pixels is unbiased; its error is sigma^2/9, a ninth of the input's error.
 
     The network sees 5x5 pixels, so sigma^2/25 is possible; one that has learned must at least beat sigma^2/9
     as measured on the same pixels (borders, where the mean is one-sided, are left out for both).
@@ -85,7 +85,7 @@ def test_float64_trains_in_float64() -> None:
 
 
 def test_loss_and_gradients_by_hand() -> None:
-    """y = 2 x, x = 3, target t = 5: loss (6 - 5)^2 = 1, dloss/dw = 2 (y - t) x = 6, dloss/db = 2 (y - t) = 2."""
+    """y = 2 x, x = 3, t = 5: loss (6 - 5)^2 = 1, dloss/dw = 2 (y - t) x = 6, dloss/db = 2 (y - t) = 2."""
     network = train.Siren((np.array([[2.0]]),), (np.array([0.0]),), 1.0, 1.0)
     loss, gradients = train.loss_and_gradients(network, np.array([[3.0]]), np.array([[5.0]]))
     assert (loss, gradients.dweights[0].item(), gradients.dbiases[0].item()) == (1.0, 6.0, 2.0)

@@ -101,12 +101,12 @@ SHORT = Recipe(
     features=("color", "normal", "albedo", "position"),
     window=Window(12, "clamp"),
     widths=(32, 32, 32, 32),
-    omega_0_first=3.0,
-    omega_0_hidden=3.0,
+    omega_0_first=1.0,
+    omega_0_hidden=10.0,
     n_windows=0,
-    batch=1024,
+    batch=512,
     steps=8_000,
-    learning_rate=3e-3,
+    learning_rate=1e-3,
     schedule="cosine",
 )
 """Better than the paper's protocol on unseen frames in about a minute; chosen by `experiments/presets.py`."""

@@ -100,7 +100,7 @@ def read_pairs(inputs: Sequence[Path], targets: Sequence[Path]) -> list[tuple[Fr
 def fit(
     recipe: Recipe, pairs: Sequence[tuple[Frame, Frame]], output: Path, state: TrainState | None = None
 ) -> tuple[TrainState, float]:
-    """Train with a progress bar and checkpoints beside `output`; write the model there; return seconds too."""
+    """Train with a progress bar and checkpoints beside `output`; write the model there. Seconds come too."""
     from ..compiler.model_file import save_checkpoint, save_model
     from ..refimpl.train import model_of, train
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import math
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -19,7 +20,7 @@ from ..refimpl.errors import CompileError
 from . import artifact, bounds, ir, profiles
 from .artifact import Artifact
 from .dialect import Dialect
-from .emit import ENTRY, emit, kernel_gather, output_channels
+from .emit import emit, kernel_gather, output_channels
 from .glsl import GLSL
 from .ir import Program
 from .opencl import OpenCL
@@ -35,6 +36,7 @@ class Target:
     name: str
     language: str
     suffix: str
+    entry: str
     arguments: str
     native_sine: SineContract
     emit: Callable[[Program, Sequence[str]], str]
@@ -46,6 +48,7 @@ def _dialect_target(dialect: Dialect) -> Target:
         dialect.target,
         dialect.language,
         dialect.suffix,
+        dialect.entry,
         dialect.arguments,
         dialect.native_sine,
         lambda program, header: emit(program, dialect, header),
@@ -64,6 +67,7 @@ TARGETS: Mapping[str, Target] = {
             "numpy",
             "wamnet IR",
             ".ir.txt",
+            "program",
             "the program's inputs and parameters, by name",
             SineContract("np.sin, whose documentation promises nothing", None),
             _printed,
@@ -119,8 +123,9 @@ def _refuse_domain(
     """Raise: a sine may be given an argument for which nothing is proven."""
     raise CompileError(
         f"sine {number} of {count} (layer {number - 1}, %{index}) may be given arguments from {found[0]:.6g} "
-        f"to {found[1]:.6g}: the sine ({contract.text}) is proven for |x| <= {contract.domain:g}; use a smaller "
-        "omega_0, smaller weights or features of a smaller range, or profile native, which promises less"
+        f"to {found[1]:.6g}: the sine ({contract.text}) is proven for |x| <= {contract.domain:g}; "
+        "use a smaller omega_0, smaller weights or features of a smaller range, or profile native, which "
+        "promises less"
     )
 
 
@@ -138,7 +143,7 @@ def compile_program(program: Program, target: str, profile: str = "ieee") -> Art
     common = analysed(program)
     bound = bound_over_images(common, profile, target)
     emitted = pipeline.run(common, promised.passes)
-    source = chosen.emit(emitted, _header(common, chosen, promised, bound))
+    source = chosen.emit(emitted, _header(common, chosen, promised, bound) + _weight_lines(emitted))
     return _assemble(common, emitted, chosen, promised, bound, source)
 
 
@@ -163,6 +168,13 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound) ->
     ]
 
 
+def _weight_lines(program: Program) -> list[str]:
+    """Return the lines of the header that say where each parameter lies, wrapped."""
+    slots = [f"{s.name} ({' x '.join(map(str, s.shape))}) at {s.offset}" for s in layout(program).values()]
+    text = f"{', '.join(slots) or 'none'}; matrices input-major: D_in x D_out, in C order"
+    return textwrap.wrap(text, 98, initial_indent="weights   ", subsequent_indent=" " * 10)
+
+
 def _bound_text(bound: Bound) -> str:
     """Return the bound as a reader wants it, rounded up."""
     if bound.output is None:
@@ -172,9 +184,9 @@ def _bound_text(bound: Bound) -> str:
 
 def round_up(value: float, digits: int = 3) -> float:
     """Return the smallest number of so many significant decimal digits that is not below `value`."""
-    if value == 0:
-        return 0.0
-    unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    if value == 0 or not math.isfinite(value):
+        return value
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1)
     return float(f"{math.ceil(value / unit) * unit:.{digits}g}")
 
 
@@ -191,7 +203,7 @@ def _assemble(
         "program": ir.digest(common),
         "target": target.name,
         "language": target.language,
-        "entry_point": ENTRY,
+        "entry_point": target.entry,
         "profile": {"name": profile.name, "text": profile.text},
         "sine": asdict_finite(sine_contract(profile.name, target.name)),
         "passes": [*pipeline.COMMON, *profile.passes],
@@ -199,8 +211,11 @@ def _assemble(
         "images": [asdict(image) for image in gather.images],
         "output": {"name": emitted.outputs[0][0], "channels": output_channels(emitted)},
         "arguments": target.arguments.format(channels=output_channels(emitted)),
-        "bound": {"output": bound.output, "against": "float64 reference, same float32 weights and images"},
-        "sine_arguments": bound.sines,
+        "bound": {
+            "output": bound.output and [round_up(error) for error in bound.output],
+            "against": "float64 reference, same float32 weights and images",
+        },
+        "sine_arguments": [[-round_up(-low), round_up(high)] for low, high in bound.sines],
         "info": dict(emitted.info),
         "files": {
             source_name: ir.sha256(source.encode()),
@@ -209,7 +224,7 @@ def _assemble(
         "weights": {"count": int(weights.size), "layout": [asdict(slot) for slot in slots]},
     }
     manifest = json.loads(json.dumps(manifest, allow_nan=False))
-    return Artifact(target.name, profile.name, ENTRY, source, source_name, emitted, weights, manifest)
+    return Artifact(target.name, profile.name, target.entry, source, source_name, emitted, weights, manifest)
 
 
 def asdict_finite(contract: SineContract) -> dict[str, Any]:

@@ -20,6 +20,7 @@ class Dialect:
     target: str
     language: str
     suffix: str
+    entry: str
     image_declaration: str
     image_separator: str
     begin: str

@@ -12,7 +12,7 @@ The language's own words come from the dialect's templates; nothing here asks wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ..refimpl.errors import CompileError
@@ -21,14 +21,14 @@ from .ir import Gather, Node, Program, users
 from .ops import OPS
 from .weights import layout
 
-ENTRY = "wamnet_denoise"
-"""Name of the kernel function, where the language lets one choose."""
-
-INSIDE = {"clamp": "", "zero": "(row == y + dy - WINDOW_CENTRE && column == x + dx - WINDOW_CENTRE) ? "}
-"""What stands before a pixel's value, by border rule; coordinates are clamped anyway: no read strays."""
-
-OUTSIDE = {"clamp": "", "zero": " : 0.0f"}
-"""What stands after it."""
+BORDERS: Mapping[str, tuple[str, str]] = {
+    "clamp": ("", "{pixel}"),
+    "zero": (
+        "bool inside = row == y + dy - WINDOW_CENTRE && column == x + dx - WINDOW_CENTRE;",
+        "inside ? {pixel} : 0.0f",
+    ),
+}
+"""By border rule: a statement before the channels are read, and one's value; no read leaves the image."""
 
 
 def emit(program: Program, dialect: Dialect, header: Sequence[str]) -> str:
@@ -42,7 +42,7 @@ def emit(program: Program, dialect: Dialect, header: Sequence[str]) -> str:
     )
     begin = dialect.begin.format(
         defines=defines,
-        entry=ENTRY,
+        entry=dialect.entry,
         images=dialect.image_separator.join(images),
         image=gather.images[0].name,
     )
@@ -96,6 +96,11 @@ def _loops(node: Node) -> bool:
     return OPS[node.op].elementwise or node.op == "component"
 
 
+def _plus(*terms: str | int) -> str:
+    """Return the text of a sum, without terms that are 0."""
+    return " + ".join(str(term) for term in terms if term != 0)
+
+
 @dataclass
 class _Body:
     """The statements of one kernel."""
@@ -145,15 +150,15 @@ class _Body:
         n_in, source = weight.shape[0], self.program.nodes[node.args[0]]
         self._declare(index, f"%{index}: affine map {node['weight']} from {n_in} to {n_out}")
         bias = node.get("bias")
-        start = self._weight(f"{self.slots[str(bias)].offset} + j") if bias else "0.0f"
+        start = self._weight(_plus(self.slots[str(bias)].offset, "j")) if bias else "0.0f"
         neurons = f"for (int j = 0; j < {n_out}; ++j) {{"
         self._nest([neurons], [f"v{index}[j] = {start};"])
         if source.op == "input":
             self._over_window(
-                lambda tap: self._accumulate(index, neurons, f"{weight.offset} + ({tap}) * {n_out} + j")
+                lambda tap: self._accumulate(index, neurons, _plus(weight.offset, f"({tap}) * {n_out}", "j"))
             )
         else:
-            inner = self._accumulate(index, neurons, f"{weight.offset} + i * {n_out} + j")
+            inner = self._accumulate(index, neurons, _plus(weight.offset, f"i * {n_out}", "j"))
             value = f"float value = {self._read(node.args[0], 'i')};"
             self._nest([f"for (int i = 0; i < {n_in}; ++i) {{"], [value, *inner])
 
@@ -201,18 +206,19 @@ class _Body:
 
     def _over_window(self, body: Callable[[str], list[str]]) -> None:
         """Write the loops over taps and channels that set `value`; `body` takes the index into the window."""
-        border, first = self.gather.window.border, 0
+        before, value = BORDERS[self.gather.window.border]
         self._open("for (int dy = 0; dy < WINDOW_SIZE; ++dy) {")
         self._line("int row = clamp(y + dy - WINDOW_CENTRE, 0, height - 1);")
         self._open("for (int dx = 0; dx < WINDOW_SIZE; ++dx) {")
         self._line("int column = clamp(x + dx - WINDOW_CENTRE, 0, width - 1);")
+        if before:
+            self._line(before)
         self._line(f"int tap = (dy * WINDOW_SIZE + dx) * {self.gather.channels};")
+        first = 0
         for image in self.gather.images:
             pixel = self.dialect.pixel.format(image=image.name, channels=image.channels)
-            value = f"float value = {INSIDE[border]}{pixel}{OUTSIDE[border]};"
-            self._nest(
-                [f"for (int c = 0; c < {image.channels}; ++c) {{"], [value, *body(f"tap + {first} + c")]
-            )
+            lines = [f"float value = {value.format(pixel=pixel)};", *body(_plus("tap", first, "c"))]
+            self._nest([f"for (int c = 0; c < {image.channels}; ++c) {{"], lines)
             first += image.channels
         self._close()
         self._close()
@@ -225,7 +231,7 @@ class _Body:
         if node.op == "constant":
             return self.dialect.literal(float(node["value"]))  # type: ignore[arg-type]
         if node.op == "parameter":
-            return self._weight(f"{self.slots[str(node['name'])].offset} + {lane}")
+            return self._weight(_plus(self.slots[str(node["name"])].offset, lane))
         if not node.type.shape or self.group_of[index] == group:
             return f"t{index}"
         return f"v{index}[{lane}]"

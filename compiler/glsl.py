@@ -19,6 +19,7 @@ class GLSL(Dialect):
     target = "opengl"
     language = "GLSL 3.30, fragment shader"
     suffix = ".frag"
+    entry = "main"
     image_declaration = "uniform sampler2D image_{image};"
     image_separator = "\n"
     begin = f"""\

@@ -12,6 +12,7 @@ class OpenCL(Dialect):
     target = "opencl"
     language = "OpenCL C 1.2"
     suffix = ".cl"
+    entry = "wamnet_denoise"
     image_declaration = "    __global const float *restrict image_{image}"
     image_separator = ",\n"
     begin = """\

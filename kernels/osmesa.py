@@ -1,6 +1,6 @@
 """An OpenGL context that renders into main memory: Mesa's OSMesa library through ctypes.
 
-moderngl takes any object with these methods as a context; the names of attributes are those of GL/osmesa.h.
+moderngl takes any object with these methods as a context.
 """
 
 from __future__ import annotations
@@ -9,19 +9,17 @@ import ctypes
 import ctypes.util
 from typing import Any
 
-OSMESA_FORMAT, OSMESA_RGBA = 0x22, 0x1908
-OSMESA_PROFILE, OSMESA_CORE_PROFILE = 0x33, 0x34
-OSMESA_CONTEXT_MAJOR_VERSION, OSMESA_CONTEXT_MINOR_VERSION = 0x36, 0x37
-GL_UNSIGNED_BYTE = 0x1401
-
 ATTRIBUTES = (
-    *(OSMESA_FORMAT, OSMESA_RGBA),
-    *(OSMESA_PROFILE, OSMESA_CORE_PROFILE),
-    *(OSMESA_CONTEXT_MAJOR_VERSION, 3),
-    *(OSMESA_CONTEXT_MINOR_VERSION, 3),
+    *(0x22, 0x1908),  # OSMESA_FORMAT: OSMESA_RGBA
+    *(0x33, 0x34),  # OSMESA_PROFILE: OSMESA_CORE_PROFILE
+    *(0x36, 3),  # OSMESA_CONTEXT_MAJOR_VERSION
+    *(0x37, 3),  # OSMESA_CONTEXT_MINOR_VERSION
     0,
 )
-"""An OpenGL 3.3 core context; the list ends with 0."""
+"""An OpenGL 3.3 core context, in the numbers of GL/osmesa.h; the list ends with 0."""
+
+GL_UNSIGNED_BYTE = 0x1401
+"""Type of the default buffer's numbers, in the numbers of GL/gl.h."""
 
 LIBRARIES = ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")
 """Names under which the library is looked for."""

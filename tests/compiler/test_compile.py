@@ -1,0 +1,165 @@
+"""From a program to an artifact: generated text, manifest, bound, refusals, files."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.compiler import artifact as artifacts
+from wamnet.compiler import ir
+from wamnet.compiler.compile import TARGETS, analysed, compile_program, round_up
+from wamnet.compiler.interpret import interpret
+from wamnet.compiler.ir import Gather, Image, Type
+from wamnet.compiler.lower import lower
+from wamnet.compiler.trace import trace
+from wamnet.compiler.weights import layout, pack
+from wamnet.refimpl import dataset, siren
+from wamnet.refimpl.dataset import Window
+from wamnet.refimpl.denoise import Model, denoise_pixel
+from wamnet.refimpl.errors import CompileError
+
+
+def model(widths=(24, 4, 3), window=None, omega_0=3.0):
+    """Return a small model; its weights are multiples of 1/64, which no platform rounds differently."""
+    drawn = siren.init(widths, omega_0, 2.0, seed=1, dtype=np.float64)
+    weights = tuple((np.round(w * 64) / 64).astype(np.float32) for w in drawn.weights)
+    biases = tuple((np.round(b * 64) / 64).astype(np.float32) for b in drawn.biases)
+    network = siren.Siren(weights, biases, omega_0, 2.0)
+    return Model(network, ("color", "normal"), window or Window(2, "zero"), dataset.Normalization())
+
+
+def gathered(function, channels=3, low=-1.0, high=1.0):
+    gather = Gather(Window(1, "clamp"), (Image("a", channels, low, high),))
+    return trace(function, {"window": Type(shape=(channels,))}, gather)
+
+
+def test_golden_program(golden):
+    golden("denoise.lowered.ir.txt", ir.text(lower(model())))
+    golden("denoise.analysed.ir.txt", ir.text(analysed(lower(model()))))
+
+
+@pytest.mark.parametrize("profile", ["ieee", "native"])
+@pytest.mark.parametrize("target", TARGETS)
+def test_golden_source(golden, target, profile):
+    artifact = compile_program(lower(model()), target, profile)
+    golden(f"{profile}.{artifact.source_name}", artifact.source)
+
+
+def test_golden_manifest(golden):
+    golden("ieee.opencl.manifest.json", artifacts.manifest_text(compile_program(lower(model()), "opencl")))
+
+
+def test_lowered_model_is_the_reference():
+    small = model()
+    x = np.random.default_rng(0).random((7, 24), dtype=np.float32)
+    assert np.array_equal(interpret(lower(small), {"window": x})["color"], denoise_pixel(small.siren, x))
+
+
+def test_compiling_again_gives_the_same_bytes():
+    one, two = (compile_program(lower(model()), "opengl") for _ in range(2))
+    assert (one.source, artifacts.manifest_text(one), one.weights.tobytes()) == (
+        two.source,
+        artifacts.manifest_text(two),
+        two.weights.tobytes(),
+    )
+
+
+def test_other_weights_give_another_digest():
+    other = model(omega_0=3.5)
+    assert compile_program(lower(model()), "opencl").digest != compile_program(lower(other), "opencl").digest
+
+
+def test_weights_are_packed_input_major():
+    program = lower(model())
+    slots, packed = layout(program), pack(program)
+    for name, array in program.parameters.items():
+        slot = slots[name]
+        assert np.array_equal(packed[slot.offset : slot.offset + array.size].reshape(slot.shape), array.T)
+    assert packed.size == sum(array.size for array in program.parameters.values())
+
+
+def test_written_artifact_carries_its_hashes(tmp_path):
+    artifact = compile_program(lower(model()), "opencl")
+    written = artifacts.write(artifact, tmp_path / "new")
+    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == sorted(path.name for path in written)
+    manifest = json.loads((tmp_path / "new" / "manifest.json").read_text())
+    for name, digest in manifest["files"].items():
+        assert ir.sha256((tmp_path / "new" / name).read_bytes()) == digest
+    raw = np.fromfile(tmp_path / "new" / "weights.bin", "<f4")
+    assert raw.size == manifest["weights"]["count"]
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
+    artifact = compile_program(lower(model()), "opencl")
+    artifacts.write(artifact, tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def breaks(self, target):
+        raise OSError("disk full")
+
+    monkeypatch.setattr(artifacts.Path, "replace", breaks)
+    with pytest.raises(OSError, match="disk full"):
+        artifacts.write(compile_program(lower(model(omega_0=2.0)), "opencl"), tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+# ---- refusals ------------------------------------------------------------------------------------------
+
+
+def test_unknown_target_and_profile():
+    with pytest.raises(CompileError, match="target 'metal' does not exist; there are: numpy, opencl, opengl"):
+        compile_program(lower(model()), "metal")
+    with pytest.raises(CompileError, match="profile 'fast' does not exist; there are: ieee, native"):
+        compile_program(lower(model()), "opencl", "fast")
+
+
+def test_sine_that_may_leave_its_domain_is_refused():
+    with pytest.raises(
+        CompileError,
+        match=r"sine 2 of 2 \(layer 1, %\d+\) may be given arguments from -20000 to 20000: the sine \(.*\) "
+        r"is proven for \|x\| <= 12800; use a smaller omega_0",
+    ):
+        compile_program(gathered(lambda x: np.sin(2e4 * np.sin(x * 100.0))), "opencl")
+
+
+def test_the_target_s_own_sine_has_no_domain():
+    artifact = compile_program(gathered(lambda x: np.sin(2e4 * x)), "opencl", "native")
+    assert artifact.manifest["sine_arguments"] == [[-20100.0, 20100.0]]  # widened a little, rounded up
+    assert max(artifact.manifest["bound"]["output"]) < 1
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_program_without_a_window_or_with_two_outputs_is_refused(target):
+    with pytest.raises(CompileError, match="has 1 outputs and no gathered window: a kernel needs one output"):
+        compile_program(trace(lambda x: x, {"window": Type()}), target)
+    with pytest.raises(CompileError, match="has 2 outputs and a gathered window"):
+        compile_program(gathered(lambda x: {"a": x, "b": x}), target)
+
+
+def test_too_many_output_channels_for_a_fragment():
+    with pytest.raises(
+        CompileError, match=r"output has 5 channels: GLSL .* writes at most 4; compile for another"
+    ):
+        compile_program(gathered(lambda x: x, channels=5), "opengl")
+
+
+def test_division_by_what_may_be_zero_has_no_bound():
+    artifact = compile_program(gathered(lambda x: 1.0 / x), "opencl")
+    assert artifact.manifest["bound"]["output"] is None
+    assert "bound     none" in artifact.source
+
+
+@given(value=st.floats(1e-30, 1e30))
+def test_round_up(value):
+    """Three digits: a step is at most 1/100 of the value."""
+    assert value <= round_up(value) <= value + 0.0101 * value
+    assert -value <= round_up(-value) <= -value + 0.0101 * value
+
+
+@pytest.mark.parametrize("value", [0.0, np.inf, 3.0])
+def test_round_up_of_what_is_round_already(value):
+    assert round_up(value) == value

@@ -1,0 +1,32 @@
+"""Dialects: every operation has its words, every constant names one float32."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.compiler.dialect import Dialect
+from wamnet.compiler.glsl import GLSL
+from wamnet.compiler.opencl import OpenCL
+from wamnet.compiler.ops import ELEMENTWISE
+
+
+@pytest.mark.parametrize("dialect", [OpenCL, GLSL])
+def test_every_elementwise_operation_has_a_template(dialect):
+    assert set(dialect.operations) == {op.name for op in ELEMENTWISE}
+
+
+@given(value=st.floats(allow_nan=False, allow_infinity=False, width=32))
+def test_constant_reads_back_as_the_same_float32(value):
+    text = Dialect.literal(value).strip("()")
+    assert text.endswith("f")
+    assert "." in text or "e" in text
+    assert np.float32(text[:-1]).tobytes() == np.float32(value).tobytes()
+    assert np.float32(float(text[:-1])).tobytes() == np.float32(value).tobytes()
+
+
+def test_negative_constants_stand_in_brackets():
+    assert Dialect.literal(-2.0) == "(-2.0f)"
+    assert Dialect.literal(3.0) == "3.0f"

@@ -1,0 +1,120 @@
+/*
+ * wamnet denoiser, OpenCL C 1.2. Generated: change the compiler, not this text.
+ * program   5decc1ca2b74879dc87b2f345f814f53
+ * input     color (3 channels in [0, 1]), normal (3 channels in [-1, 1])
+ * window    2 x 2 pixels, the pixel itself is tap 1
+ * border    zero
+ * output    3 channels, row 0 is the top row
+ * profile   ieee: any order of summation, fused multiply-add allowed, emitted sine
+ * sine      emitted, odd polynomial of degree 11
+ * bound     |output - float64 reference| <= 6.78e-06 for all images in these ranges
+ * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
+ *           weights; result: width * height * 3 floats in the same order; width; height.
+ *           Global size: at least (width, height)
+ * weights   W0 (24 x 4) at 0, b0 (4) at 96, W1 (4 x 3) at 100, b1 (3) at 112; matrices input-major:
+ *           D_in x D_out, in C order
+ */
+#define WINDOW_SIZE 2
+#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
+__kernel void wamnet_denoise(
+    __global const float *restrict image_color,
+    __global const float *restrict image_normal,
+    __global const float *restrict weights,
+    __global float *restrict result,
+    int width,
+    int height)
+{
+    int x = (int)get_global_id(0);
+    int y = (int)get_global_id(1);
+    if (x >= width || y >= height) {
+        return;
+    }
+
+    /* %1: affine map W0 from 24 to 4 */
+    float v1[4];
+    for (int j = 0; j < 4; ++j) {
+        v1[j] = weights[96 + j];
+    }
+    for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
+        int row = clamp(y + dy - WINDOW_CENTRE, 0, height - 1);
+        for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
+            int column = clamp(x + dx - WINDOW_CENTRE, 0, width - 1);
+            bool inside = row == y + dy - WINDOW_CENTRE && column == x + dx - WINDOW_CENTRE;
+            int tap = (dy * WINDOW_SIZE + dx) * 6;
+            for (int c = 0; c < 3; ++c) {
+                float value = inside ? image_color[(row * width + column) * 3 + c] : 0.0f;
+                for (int j = 0; j < 4; ++j) {
+                    v1[j] += weights[(tap + c) * 4 + j] * value;
+                }
+            }
+            for (int c = 0; c < 3; ++c) {
+                float value = inside ? image_normal[(row * width + column) * 3 + c] : 0.0f;
+                for (int j = 0; j < 4; ++j) {
+                    v1[j] += weights[(tap + 3 + c) * 4 + j] * value;
+                }
+            }
+        }
+    }
+
+    /* %3 to %46: elementwise on 4 numbers */
+    float v46[4];
+    for (int i = 0; i < 4; ++i) {
+        float t3 = 3.0f * v1[i];
+        float t5 = t3 * 0.318309873f;
+        float t7 = t5 + 0.5f;
+        float t8 = floor(t7);
+        float t10 = t8 * 3.14160156f;
+        float t11 = t3 - t10;
+        float t13 = t8 * (-8.9071691e-06f);
+        float t14 = t11 - t13;
+        float t16 = t8 * (-1.74122761e-09f);
+        float t17 = t14 - t16;
+        float t18 = 0.5f * t8;
+        float t19 = floor(t18);
+        float t21 = 2.0f * t19;
+        float t22 = t8 - t21;
+        float t23 = 2.0f * t22;
+        float t25 = 1.0f - t23;
+        float t26 = t17 * t17;
+        float t28 = t26 * (-2.51971528e-08f);
+        float t30 = t28 + 2.76094556e-06f;
+        float t31 = t26 * t30;
+        float t33 = t31 + (-0.000198427704f);
+        float t34 = t26 * t33;
+        float t36 = t34 + 0.00833334867f;
+        float t37 = t26 * t36;
+        float t39 = t37 + (-0.166666672f);
+        float t40 = t26 * t39;
+        float t41 = t17 * t40;
+        float t42 = t17 + t41;
+        float t43 = t25 * t42;
+        float t44 = fmin(t43, 1.0f);
+        float t46 = fmax(t44, (-1.0f));
+        v46[i] = t46;
+    }
+
+    /* %47: affine map W1 from 4 to 3 */
+    float v47[3];
+    for (int j = 0; j < 3; ++j) {
+        v47[j] = weights[112 + j];
+    }
+    for (int i = 0; i < 4; ++i) {
+        float value = v46[i];
+        for (int j = 0; j < 3; ++j) {
+            v47[j] += weights[100 + i * 3 + j] * value;
+        }
+    }
+
+    /* %49 to %50: elementwise on 3 numbers */
+    float v50[3];
+    for (int i = 0; i < 3; ++i) {
+        float t49 = fmax(v47[i], 0.0f);
+        float t50 = fmin(t49, 1.0f);
+        v50[i] = t50;
+    }
+
+    /* output color */
+    for (int i = 0; i < 3; ++i) {
+        result[(y * width + x) * 3 + i] = v50[i];
+    }
+}

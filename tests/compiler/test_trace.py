@@ -1,0 +1,111 @@
+"""Tracing: which program a function gives, and what is said of a function that cannot be traced."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wamnet.compiler.interpret import interpret
+from wamnet.compiler.ir import Type, text
+from wamnet.compiler.trace import TRACEABLE, trace
+from wamnet.refimpl.errors import CompileError
+
+W = np.arange(6, dtype=np.float32).reshape(2, 3)
+B = np.array([1, 2], np.float32)
+
+
+def traced(function, shape=(3,)):
+    return trace(function, {"x": Type(shape=shape)})
+
+
+def ops(program):
+    return [node.op for node in program.nodes]
+
+
+def test_a_layer():
+    program = traced(lambda x: np.sin(3.0 * (x @ W.T + B)))
+    lines = text(program).splitlines()
+    assert lines[:9] == [
+        "program",
+        "  %0 = input {name=x, type=float32[3]} : float32[3]",
+        "  %1 = affine %0 {weight=W0} : float32[2]",
+        "  %2 = parameter {name=b0} : float32[2]",
+        "  %3 = add %1, %2 : float32[2]",
+        "  %4 = constant {value=3.0} : float32",
+        "  %5 = multiply %4, %3 : float32[2]",
+        "  %6 = sin %5 : float32[2]",
+        "  output color = %6",
+    ]
+    assert [line.split()[1] for line in lines[9:]] == ["W0:", "b0:"]
+    assert np.array_equal(program.parameters["W0"], W)
+
+
+def test_the_same_operation_is_made_once():
+    program = traced(lambda x: np.sin(x) * np.sin(x) + np.matmul(np.sin(x), W.T)[..., 0][..., None])
+    assert ops(program).count("sin") == 1
+    program = traced(lambda x: np.matmul(x, W.T) + np.matmul(x, W.copy().T))
+    assert list(program.parameters) == ["W0"]
+
+
+def test_zeros_of_both_signs_are_two_constants():
+    assert ops(traced(lambda x: np.maximum(x, 0.0) + -0.0)).count("constant") == 2
+
+
+def test_clip_stack_components_and_operators():
+    def function(x):
+        return np.stack([np.clip(x, -1, 1)[..., 0], -abs(x)[..., -1], x[..., 1] / np.float32(2)], axis=-1)
+
+    program = traced(function)
+    x = np.random.default_rng(0).normal(size=(5, 3)).astype(np.float32)
+    assert np.array_equal(interpret(program, {"x": x})["color"], function(x))
+
+
+def test_several_outputs_and_the_shape_in_one_lane():
+    def function(x):
+        assert (x.shape, x.ndim) == ((3,), 1)
+        return {"a": x + 1.0, "b": x[..., 0]}
+
+    program = traced(function)
+    x = np.zeros((4, 3), np.float32)
+    found = interpret(program, {"x": x})
+    assert np.array_equal(found["a"], x + 1)
+    assert found["b"].shape == (4,)
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (np.exp, r"np\.exp cannot be traced"),
+        (np.sum, r"np\.sum cannot be traced"),
+        (np.add.reduce, r"np\.add\.reduce with .* cannot be traced"),
+        (lambda x: np.add(x, x, where=False), r"np\.add with \['where'\] cannot"),
+        (lambda x: x if x > 0 else -x, r"np\.greater cannot"),
+        (lambda x: x if x else -x, r"a decision \(if, while, and, or\) on a value cannot"),
+        (lambda x: list(x), "iteration over a value cannot"),
+        (lambda x: np.asarray(x), "conversion to an array cannot"),
+        (lambda x: x.sum(), r"the array method \.sum cannot"),
+        (lambda x: x[0], "indexing with 0 cannot"),
+        (lambda x: x[..., None], r"indexing with \(Ellipsis, None\) cannot"),
+        (lambda x: x[..., 3], r"component: component 3 does not exist in an operand of type float32\[3\]"),
+        (lambda x: W @ x, r"np\.matmul of anything but a traced vector and a constant matrix"),
+        (lambda x: x @ W, r"affine: weight of shape \(3, 2\) does not take an operand of type float32\[3\]"),
+        (lambda x: x + B, r"add: operands must be of one shape or numbers, not float32\[3\], float32\[2\]"),
+        (lambda x: x + W, r"a parameter used as a value must be a vector, not of shape \(2, 3\)"),
+        (lambda x: np.stack([x, x], axis=-1), r"stack takes numbers, not float32\[3\], float32\[3\]"),
+        (lambda x: np.stack([x[..., 0]]), r"np\.stack with axis=0"),
+        (lambda x: x * np.inf, "a constant must be a float that is finite in float32, not inf"),
+        (lambda x: x * 1e39, "not 1e"),
+        (lambda x: x + "1", r"operand"),
+        (lambda x: x * np.array([0.1, 1, 1]), r"float64, shape \(3,\), holds numbers that float32 cannot"),
+    ],
+)
+def test_what_cannot_be_traced_is_named_with_its_place(function, message):
+    with pytest.raises(CompileError, match=message) as caught:
+        traced(function)
+    assert "test_trace.py:" in str(caught.value)
+
+
+def test_the_message_lists_what_can_be_traced():
+    with pytest.raises(CompileError, match=r"np\.log cannot be traced; use only") as caught:
+        traced(np.log)
+    assert all(name in str(caught.value) for name in TRACEABLE)

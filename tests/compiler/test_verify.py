@@ -1,0 +1,119 @@
+"""The verifier refuses each malformed program with its own sentence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wamnet.compiler import verify as verifier
+from wamnet.compiler.ir import Gather, Image, Node, Program, Type, attributes
+from wamnet.compiler.verify import verify
+from wamnet.refimpl.dataset import Window
+from wamnet.refimpl.errors import CompileError
+
+V3 = Type(shape=(3,))
+INPUT = Node("input", (), V3, attributes(name="window", type=V3))
+W = np.ones((2, 3), np.float32)
+AFFINE = Node("affine", (0,), Type(shape=(2,)), attributes(weight="W0", bias="b0"))
+GOOD = Program((INPUT, AFFINE), (("color", 1),), {"W0": W, "b0": np.ones(2, np.float32)})
+
+
+def plus(*nodes):
+    return replace(GOOD, nodes=(*GOOD.nodes, *nodes))
+
+
+def constant(value):
+    return Node("constant", (), Type(), attributes(value=value))
+
+
+CASES = [
+    (
+        "known_operations",
+        plus(Node("exp", (1,), V3)),
+        "%2 is 'exp', which is no operation; there are: input,",
+    ),
+    ("operands_before_use", plus(Node("add", (1,), V3)), "%2 add has 1 operands; it takes 2"),
+    ("operands_before_use", plus(Node("stack", (), V3)), "%2 stack has 0 operands; it takes one or more"),
+    (
+        "operands_before_use",
+        plus(Node("sin", (2,), V3)),
+        "%2 sin reads %2; only %0 to %1 are computed before it",
+    ),
+    ("operands_before_use", plus(Node("sin", (-1,), V3)), "%2 sin reads %-1"),
+    ("attributes_in_order", plus(Node("constant", (), Type())), r"attributes \[\]; it takes, sorted: value"),
+    (
+        "attributes_in_order",
+        plus(replace(AFFINE, attributes=(("weight", "W0"), ("bias", "b0")))),
+        r"\['weight', 'bias'\]; it takes, sorted: weight, bias \(optional\)",
+    ),
+    ("attributes_in_order", plus(Node("sin", (1,), V3, attributes(x=1))), "it takes, sorted: none"),
+    (
+        "parameters_exist",
+        replace(GOOD, parameters={"W0": W}),
+        "names parameter 'b0', which the program does not have",
+    ),
+    (
+        "parameters_are_numbers",
+        replace(GOOD, parameters={**GOOD.parameters, "W0": W * np.nan}),
+        "must be finite",
+    ),
+    ("parameters_are_numbers", replace(GOOD, parameters={**GOOD.parameters, "W1": W[:0]}), "not empty"),
+    ("parameters_are_numbers", replace(GOOD, parameters={**GOOD.parameters, "W0": W * 1.0j}), "complex64"),
+    (
+        "types_follow",
+        plus(Node("sin", (1,), V3)),
+        r"%2 sin is marked float32\[3\]; its operands give float32\[2\]",
+    ),
+    (
+        "types_follow",
+        plus(Node("add", (0, 1), V3)),
+        r"operands must be of one shape or numbers, not float32\[3\]",
+    ),
+    ("types_follow", plus(constant(1)), "a constant must be a float that is finite in float32, not 1"),
+    ("types_follow", plus(constant(float("nan"))), "finite in float32, not nan"),
+    (
+        "types_follow",
+        plus(Node("component", (1,), Type(), attributes(index=2))),
+        "component 2 does not exist",
+    ),
+    (
+        "types_follow",
+        plus(Node("input", (), V3, attributes(name="y", type="V3"))),
+        "an input's attribute `type` must be a Type",
+    ),
+    (
+        "types_follow",
+        replace(GOOD, parameters={**GOOD.parameters, "b0": np.ones(3, np.float32)}),
+        r"bias must have shape \(2,\) beside a weight of \(2, 3\)",
+    ),
+    (
+        "short_vectors",
+        plus(Node("input", (), Type("int8"), attributes(name="y", type=Type("int8")))),
+        "%2 input has type int8; values are float32 numbers or vectors",
+    ),
+    ("inputs_once", plus(INPUT), "input 'window' is declared more than once"),
+    ("outputs_exist", replace(GOOD, outputs=()), r"outputs are \[\]; there must be one or more"),
+    ("outputs_exist", replace(GOOD, outputs=(("a", 0), ("a", 1))), "with different names"),
+    ("outputs_exist", replace(GOOD, outputs=(("a", 2),)), "output 'a' is %2; the program computes %0 to %1"),
+    (
+        "window_matches",
+        replace(GOOD, gather=Gather(Window(2, "clamp"), (Image("a", 1, 0, 1),))),
+        r"inputs are \(window: float32\[3\]\); the gathered window gives \(window: float32\[4\]\)",
+    ),
+]
+
+
+@pytest.mark.parametrize(("rule", "program", "message"), CASES)
+def test_malformed_program_is_refused(rule, program, message):
+    with pytest.raises(CompileError, match=rf"after pass x: .*{message}.* \(rule {rule}\)"):
+        verify(program, "after pass x")
+
+
+def test_every_rule_has_a_case():
+    assert {rule for rule, _, _ in CASES} == {rule.__name__ for rule in verifier.RULES}
+
+
+def test_well_formed_program_passes():
+    assert verify(GOOD) is GOOD

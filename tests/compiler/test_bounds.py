@@ -1,0 +1,199 @@
+"""The rules of error bounds, one by one, against exact rational arithmetic; then whole programs."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.compiler import bounds, ops
+from wamnet.compiler.interpret import interpret
+from wamnet.compiler.ir import Gather, Image, Type
+from wamnet.compiler.profiles import EMITTED_SINE, SineContract
+from wamnet.compiler.trace import trace
+from wamnet.refimpl.dataset import Window
+
+floats = st.floats(-100, 100, width=32)
+shifts = st.integers(-(2**20), 2**20).map(lambda n: n / 2**20)
+
+EXACT = {
+    "add": lambda a, b: a + b,
+    "subtract": lambda a, b: a - b,
+    "multiply": lambda a, b: a * b,
+    "divide": lambda a, b: a / b,
+    "negative": lambda a: -a,
+    "absolute": abs,
+    "minimum": min,
+    "maximum": max,
+    "floor": lambda a: Fraction(a.__floor__()),
+}
+"""The operations on rationals."""
+
+
+def enclosed(op, operands, context=EMITTED_SINE):
+    """Return the rule's enclosure for operands that are enclosures of numbers."""
+    inputs = {f"x{i}": Type() for i in range(len(operands))}
+    program = trace(lambda *x: getattr(np, op)(*x), inputs)
+    node = program.nodes[-1]
+    return bounds.RULES[op](bounds.Context(node, {}, context), operands)
+
+
+def around(value, error):
+    return bounds.Enclosure(np.float64(value), np.float64(value), np.float64(error))
+
+
+@pytest.mark.parametrize("op", EXACT)
+@given(data=st.data())
+def test_rule_bounds_the_rounded_operation_on_shifted_operands(op, data):
+    """Reference: the operation on a, b, exactly. Kernel: float32, on operands off by up to their errors."""
+    count = ops.OPS[op].arity
+    kernel = [np.float32(data.draw(floats)) for _ in range(count)]
+    errors = [np.float64(abs(data.draw(shifts))) * 0.01 for _ in range(count)]
+    reference = [float(k) + e * data.draw(shifts) for k, e in zip(kernel, errors, strict=True)]
+    found = enclosed(op, [around(r, e) for r, e in zip(reference, errors, strict=True)])
+    if not np.isfinite(found.error):
+        assert op == "divide"
+        return
+    with np.errstate(under="ignore"):
+        computed = getattr(np, op)(*kernel)
+    wanted = EXACT[op](*map(Fraction, reference))
+    slack = 1 + Fraction(bounds.OUTWARD)
+    assert abs(Fraction(float(computed)) - wanted) <= Fraction(float(found.error)) * slack
+    assert Fraction(float(found.low)) - Fraction(2**-40) * abs(wanted) <= wanted
+    assert wanted <= Fraction(float(found.high)) + Fraction(2**-40) * abs(wanted)
+
+
+@given(x=st.floats(2.0**-10, 100, width=32), shift=shifts)
+def test_sqrt(x, shift):
+    """Reference sqrt(a), a within 2^-20 of x, in float64: its 2^-53 is far below the bound's 2^-24."""
+    kernel, error = np.float32(x), 2.0**-20
+    found = enclosed("sqrt", [around(float(kernel) + shift * error, error)])
+    assert abs(float(np.sqrt(kernel)) - np.sqrt(float(kernel) + shift * error)) <= found.error
+
+
+def test_sqrt_of_what_may_be_negative_has_no_bound():
+    assert enclosed("sqrt", [around(1e-9, 1e-8)]).error == np.inf
+    assert np.isfinite(enclosed("sqrt", [around(0.0, 0.0)]).error)
+
+
+def test_divide_by_what_may_be_zero_has_no_bound():
+    assert enclosed("divide", [around(1.0, 0.0), around(1e-9, 1e-8)]).error == np.inf
+
+
+@given(
+    data=st.data(),
+    n=st.integers(1, 40),
+    m=st.integers(1, 5),
+    seed=st.integers(0, 2**32 - 1),
+    fused=st.booleans(),
+)
+def test_affine_in_any_order_with_and_without_fma(data, n, m, seed, fused):
+    """Sum the D_in + 1 terms in a random order, rounding each product or not, against rationals."""
+    random = np.random.default_rng(seed)
+    weight = random.normal(size=(m, n)).astype(np.float32)
+    x = random.normal(size=n).astype(np.float32) * np.float32(10.0 ** data.draw(st.integers(-3, 3)))
+    program = trace(lambda v: np.matmul(v, weight.T), {"x": Type(shape=(n,))})
+    named = bounds.at_inputs(program, {"x": x}, EMITTED_SINE)["color"]
+    order = random.permutation(n)
+    for row in range(m):
+        total = np.float32(0)
+        for i in order:
+            product = Fraction(float(weight[row, i])) * Fraction(float(x[i]))
+            if not fused:
+                product = Fraction(float(weight[row, i] * x[i]))
+            total = np.float32(float(product + Fraction(float(total))))
+        exact = sum(Fraction(float(a)) * Fraction(float(b)) for a, b in zip(weight[row], x, strict=True))
+        assert abs(Fraction(float(total)) - exact) <= Fraction(float(named[row]))
+
+
+@given(low=st.floats(-20, 20), width=st.floats(0, 8), at=st.floats(0, 1))
+def test_sine_range_holds_the_sine(low, width, at):
+    least, most = bounds.sine_range(np.float64(low), np.float64(low + width))
+    assert least <= np.sin(low + at * width) <= most
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "wanted"),
+    [
+        (1.0, 2.0, (np.sin(1), 1)),
+        (4.0, 5.0, (-1, np.sin(4))),
+        (0.0, 7.0, (-1, 1)),
+        (0.1, 0.2, np.sin([0.1, 0.2])),
+    ],
+)
+def test_sine_range_is_tight(low, high, wanted):
+    """The range is widened by 2^-40, no more."""
+    found = bounds.sine_range(np.float64(low), np.float64(high))
+    assert np.max(np.abs(np.array(found) - wanted)) <= 2.0**-39
+
+
+@given(x=st.floats(-1000, 1000), error=st.floats(0, 0.5), shift=shifts)
+def test_sine_rule(x, error, shift):
+    found = enclosed("sin", [around(x, error)])
+    computed = np.sin(x + error * shift)
+    assert abs(computed - np.sin(x)) + EMITTED_SINE.error <= found.error * (1 + bounds.OUTWARD)
+
+
+def test_sine_outside_its_domain_or_without_promise_has_no_bound():
+    assert enclosed("sin", [around(20000.0, 0.0)]).error == np.inf
+    assert enclosed("sin", [around(1.0, 0.0)], SineContract("none", None)).error == np.inf
+
+
+def test_no_bound_stays_no_bound_beside_a_weight_of_zero():
+    program = trace(lambda x: np.matmul(np.sin(x), np.zeros((1, 2), np.float32).T), {"x": Type(shape=(2,))})
+    assert bounds.at_inputs(program, {"x": np.zeros(2)}, SineContract("none", None))["color"] == np.inf
+
+
+def test_constant_that_float32_does_not_hold():
+    program = trace(lambda x: x * 0.1, {"x": Type()})
+    found = bounds.enclose(program, {"x": (1.0, 1.0)}, EMITTED_SINE)
+    index = next(i for i, node in enumerate(program.nodes) if node.op == "constant")
+    assert abs(float(np.float32(0.1)) - 0.1) <= found[index].error
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_box_holds_what_happens_inside(seed):
+    """Ranges and errors over a box are at least those at any point of it."""
+    random = np.random.default_rng(seed)
+    weight = random.normal(size=(3, 4)).astype(np.float32)
+
+    def function(x):
+        y = np.sin(np.matmul(x, weight.T) * 2.5)
+        z = np.minimum(np.absolute(y), 0.5) - y * y[..., 1][..., None]
+        return np.stack([z[..., 0], np.maximum(z[..., 2], y[..., 0]) / 3.0], axis=-1)
+
+    program = trace(function, {"x": Type(shape=(4,))})
+    low = random.uniform(-2, 0, 4)
+    high = low + random.uniform(0, 2, 4)
+    x = (low + (high - low) * random.uniform(0, 1, (20, 4))).astype(np.float32).clip(low, high)
+    box = bounds.enclose(program, {"x": (low, high)}, EMITTED_SINE)
+    points = bounds.enclose(program, {"x": (x, x)}, EMITTED_SINE)
+    for over, at in zip(box, points, strict=True):
+        assert np.all(over.low <= at.low)
+        assert np.all(at.high <= over.high)
+        assert np.all(at.error <= over.error)
+    (value,) = interpret(program, {"x": x}, np.float64).values()
+    assert np.all(box[-1].low <= value)
+    assert np.all(value <= box[-1].high)
+
+
+def test_minimum_forgets_an_operand_that_is_never_chosen():
+    found = enclosed("minimum", [around(0.0, 1e-3), around(1.0, 0.5)])
+    assert found.error == 1e-3
+
+
+def test_window_box_has_a_range_for_each_channel_and_zero_outside():
+    images = (Image("a", 2, 1.0, 2.0), Image("b", 1, -3.0, -1.0))
+    low, high = bounds.window_box(Gather(Window(2, "clamp"), images))
+    assert low.tolist() == [1, 1, -3] * 4
+    assert high.tolist() == [2, 2, -1] * 4
+    low, high = bounds.window_box(Gather(Window(2, "zero"), images))
+    assert low.tolist() == [0, 0, -3] * 4
+    assert high.tolist() == [2, 2, 0] * 4
+
+
+def test_every_operation_but_inputs_has_a_rule():
+    assert set(bounds.RULES) == set(ops.OPS) - {"input"}

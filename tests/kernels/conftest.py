@@ -1,0 +1,87 @@
+"""Small programs, images, and the one comparison that all tests of executors use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wamnet.compiler import bounds
+from wamnet.compiler.artifact import Artifact
+from wamnet.compiler.compile import analysed, compile_program, sine_contract
+from wamnet.compiler.interpret import interpret
+from wamnet.compiler.ir import Gather, Image, Program, Type, sha256
+from wamnet.compiler.trace import trace
+from wamnet.refimpl import dataset, siren
+from wamnet.refimpl.denoise import denoise_pixel
+
+
+class Kit:
+    """What the tests of this folder share."""
+
+    def network(
+        self, widths: list[int], omegas: tuple[float, float], seed: int = 1, scale: float = 1.0
+    ) -> siren.Siren:
+        """Return a network with weights and biases that are `scale` times the initial ones, float32."""
+        drawn = siren.init(widths, *omegas, seed=seed, dtype=np.float32)
+        factor = np.float32(scale)
+        return replace(
+            drawn,
+            weights=tuple(w * factor for w in drawn.weights),
+            biases=tuple(b * factor for b in drawn.biases),
+        )
+
+    def program(
+        self, function: Callable[..., Any], channels: Mapping[str, int], size: int = 1, border: str = "clamp"
+    ) -> Program:
+        """Trace a function of the window vector over images with values in [-2, 2]."""
+        images = tuple(Image(name, n, -2.0, 2.0) for name, n in channels.items())
+        gather = Gather(dataset.Window(size, border), images)
+        return trace(function, {"window": Type(shape=(gather.n_inputs,))}, gather)
+
+    def denoiser(self, network: siren.Siren, channels: Mapping[str, int], size: int, border: str) -> Program:
+        """Trace the reference's pixel function."""
+        return self.program(lambda window: denoise_pixel(network, window), channels, size, border)
+
+    def windows(self, program: Program, images: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return the windows (H, W, n) of the images."""
+        joined = np.concatenate([images[image.name] for image in program.gather.images], axis=-1)
+        return dataset.all_windows(dataset.pad(joined, program.gather.window), program.gather.window)
+
+    def excess(
+        self,
+        executor: Any,
+        program: Program,
+        images: Mapping[str, np.ndarray],
+        artifact: Artifact | None = None,
+    ) -> float:
+        """Return the largest error / bound against the float64 reference: at most 1 for a right kernel."""
+        artifact = artifact or compile_program(program, executor.name)
+        windows = self.windows(program, images)
+        (expected,) = interpret(program, {"window": windows}, np.float64).values()
+        contract = sine_contract(artifact.profile, artifact.target)
+        (bound,) = bounds.at_inputs(analysed(program), {"window": windows}, contract).values()
+        found = executor.run(artifact, images).astype(np.float64)
+        expected, bound = (_per_pixel(array, found.shape[:2]) for array in (expected, bound))
+        return float(np.max(np.abs(found - expected) / bound))
+
+    def with_source(self, artifact: Artifact, old: str, new: str) -> Artifact:
+        """Return the artifact with a piece of its source replaced, under a digest of its own."""
+        assert old in artifact.source
+        source = artifact.source.replace(old, new)
+        return replace(
+            artifact, source=source, manifest={**artifact.manifest, "digest": sha256(source.encode())}
+        )
+
+
+def _per_pixel(array: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Return (H, W, C) of an array that may lack the last axis, or all but it (constants)."""
+    return array.reshape(*size, -1) if np.ndim(array) >= 2 else np.atleast_1d(array)
+
+
+@pytest.fixture(scope="session")
+def kit() -> Kit:
+    return Kit()

@@ -1,0 +1,195 @@
+"""Every executor against the float64 reference, with the bound that the compiler computes for each pixel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.lower import lower
+from wamnet.kernels import denoise_on
+from wamnet.refimpl import dataset, denoise, frame
+from wamnet.refimpl.errors import CompileError, InputError
+
+EXAMPLES = settings.default.max_examples // 10
+"""Each example compiles a kernel, up to a second on Mesa: a tenth of what other tests draw."""
+
+
+@st.composite
+def cases(draw):
+    """Draw (widths, omegas, seed, scale, channels, size, border, images)."""
+    channels = draw(st.sampled_from([{"a": 3}, {"a": 3, "b": 1}, {"a": 1, "b": 4, "c": 2}]))
+    size = draw(st.integers(1, 12))
+    hidden = draw(st.lists(st.integers(1, 9), min_size=0, max_size=4))
+    outputs = draw(st.integers(1, 4))
+    shape = draw(st.tuples(st.integers(1, 14), st.integers(1, 14)))
+    kind = draw(st.sampled_from(["random", "constant", "extreme"]))
+    seed = draw(st.integers(0, 2**32 - 1))
+    random = np.random.default_rng(seed)
+    images = {}
+    for name, n in channels.items():
+        values = random.uniform(-2, 2, (*shape, n))
+        values = {
+            "random": values,
+            "constant": np.full_like(values, values.flat[0]),
+            "extreme": 2 * np.sign(values),
+        }
+        images[name] = values[kind].astype(np.float32)
+    return {
+        "widths": [size * size * sum(channels.values()), *hidden, outputs],
+        "omegas": draw(st.tuples(st.floats(1, 30), st.floats(1, 30))),
+        "seed": seed,
+        "scale": draw(st.sampled_from([0.25, 1.0, 3.0])),
+        "channels": channels,
+        "size": size,
+        "border": draw(st.sampled_from(["clamp", "zero"])),
+        "images": images,
+    }
+
+
+@settings(max_examples=EXAMPLES)
+@given(case=cases())
+def test_error_is_within_the_bound(executor, kit, case):
+    network = kit.network(case["widths"], case["omegas"], case["seed"], case["scale"])
+    program = kit.denoiser(network, case["channels"], case["size"], case["border"])
+    assert kit.excess(executor, program, case["images"]) <= 1
+
+
+def test_the_paper_s_network(executor, kit):
+    network = kit.network([864, 32, 32, 32, 32, 3], (3.0, 3.0))
+    program = kit.denoiser(network, {"color": 3, "normal": 3}, 12, "clamp")
+    random = np.random.default_rng(5)
+    images = {name: random.uniform(-1, 1, (13, 17, 3)).astype(np.float32) for name in ("color", "normal")}
+    assert kit.excess(executor, program, images) <= 1
+
+
+def test_target_s_own_sine_on_opencl(executor_named, kit):
+    executor = executor_named("opencl")
+    program = kit.denoiser(kit.network([27, 8, 8, 3], (9.0, 9.0)), {"a": 3}, 3, "clamp")
+    images = {"a": np.random.default_rng(6).uniform(-2, 2, (9, 9, 3)).astype(np.float32)}
+    assert kit.excess(executor, program, images, compile_program(program, "opencl", "native")) <= 1
+
+
+@pytest.mark.parametrize("target", ["numpy", "opengl"])
+def test_target_s_own_sine_without_promise_has_no_bound(kit, target):
+    program = kit.denoiser(kit.network([27, 8, 3], (9.0, 9.0)), {"a": 3}, 3, "clamp")
+    artifact = compile_program(program, target, "native")
+    assert artifact.manifest["bound"]["output"] is None
+    assert "promises nothing" in artifact.source
+
+
+def test_row_0_is_the_top_row_and_columns_are_not_mirrored(executor, kit):
+    image = np.arange(5 * 7, dtype=np.float32).reshape(5, 7, 1) / 64
+    artifact = compile_program(kit.program(lambda x: x * 1.0, {"a": 1}), executor.name)
+    assert np.array_equal(executor.run(artifact, {"a": image}), image)
+
+
+def test_denoise_on_equals_the_definition(executor, kit):
+    """Whole frames: the float64 `denoise` is the reference, the bound the a-priori one, over all images."""
+    random = np.random.default_rng(7)
+    network = kit.network([54, 8, 3], (3.0, 3.0))
+    model = denoise.Model(network, ("color", "normal"), dataset.Window(3, "zero"), dataset.Normalization())
+    noisy = frame.Frame(
+        {
+            "color": random.uniform(0, 4, (6, 11, 3)).astype(np.float32),
+            "normal": random.uniform(-1, 1, (6, 11, 3)).astype(np.float32),
+        }
+    )
+    result = denoise_on(executor, model, noisy)
+    bound = compile_program(lower(model), executor.name).manifest["bound"]["output"]
+    assert result.image.shape == (6, 11, 3)
+    assert result.device == executor.device
+    assert (np.abs(result.image - denoise.denoise(model, noisy, np.float64)) <= bound).all()
+
+
+# ---- wrong kernels are caught ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("#define WINDOW_CENTRE 2", "#define WINDOW_CENTRE 1"),
+        ("clamp(x + dx - WINDOW_CENTRE, 0, width - 1)", "clamp(x + dx - WINDOW_CENTRE, 1, width - 1)"),
+        (" = 3.0f * v1[i]", " = 1.0f * v1[i]"),
+        ("(tap + c) * 8 + j", "(tap + 2 - c) * 8 + j"),
+    ],
+    ids=["centre", "border", "omega", "channels"],
+)
+@pytest.mark.parametrize("name", ["opencl", "opengl-egl"])
+def test_a_wrong_kernel_is_caught(executor_named, kit, name, old, new):
+    executor = executor_named(name)
+    program = kit.denoiser(kit.network([48, 8, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
+    images = {"a": np.random.default_rng(8).uniform(-2, 2, (6, 7, 3)).astype(np.float32)}
+    artifact = compile_program(program, executor.name)
+    assert kit.excess(executor, program, images, artifact) <= 1
+    assert kit.excess(executor, program, images, kit.with_source(artifact, old, new)) > 1
+
+
+def test_transposed_weights_are_caught(executor_named, kit):
+    program = kit.denoiser(kit.network([3, 8, 8, 3], (3.0, 3.0)), {"a": 3}, 1, "clamp")
+    images = {"a": np.random.default_rng(9).uniform(-2, 2, (6, 7, 3)).astype(np.float32)}
+    parameters = {**program.parameters, "W1": np.ascontiguousarray(program.parameters["W1"].T)}
+    wrong = compile_program(replace(program, parameters=parameters), "opencl")
+    assert kit.excess(executor_named("opencl"), program, images, wrong) > 1
+
+
+# ---- refusals ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def small(executor, kit):
+    return executor, compile_program(kit.program(lambda x: x * 2.0, {"a": 3}), executor.name)
+
+
+@pytest.mark.parametrize(
+    ("images", "message"),
+    [
+        ({}, "images for the kernel is none: must be a"),
+        ({"b": np.zeros((2, 2, 3), np.float32)}, "images for the kernel is b: must be a"),
+        (
+            {"a": np.zeros((2, 2, 1), np.float32)},
+            r"image 'a' is float32 of shape \(2, 2, 1\): must be float32 of",
+        ),
+        ({"a": np.zeros((2, 2, 3))}, "image 'a' is float64 of shape"),
+        ({"a": np.zeros((0, 2, 3), np.float32)}, "image 'a' is float32 of shape"),
+        (
+            {"a": np.full((2, 2, 3), np.nan, np.float32)},
+            "image 'a' at row 0, column 0 is .*: all numbers must be",
+        ),
+    ],
+)
+def test_wrong_images_are_refused(small, images, message):
+    executor, artifact = small
+    with pytest.raises(InputError, match=message):
+        executor.run(artifact, images)
+
+
+def test_kernel_in_another_language_is_refused(small, kit):
+    executor, _ = small
+    other = {"numpy": "opencl", "opencl": "opengl", "opengl": "numpy"}[executor.name]
+    artifact = compile_program(kit.program(lambda x: x * 2.0, {"a": 3}), other)
+    with pytest.raises(InputError, match=f"artifact for executor '{executor.name}': target is {other}"):
+        executor.run(artifact, {"a": np.zeros((2, 2, 3), np.float32)})
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", ["opencl", "opengl-egl"])
+def test_source_that_does_not_compile_is_told_with_the_log(executor_named, kit, name):
+    executor = executor_named(name)
+    artifact = compile_program(kit.program(lambda x: x * 2.0, {"a": 3}), executor.name)
+    broken = kit.with_source(artifact, "int y = ", "int y = nonsense + ")
+    with pytest.raises(CompileError, match=r"(?s)does not build the kernel: .*nonsense"):
+        executor.run(broken, {"a": np.zeros((2, 2, 3), np.float32)})
+
+
+def test_too_large_a_texture_is_refused(executor_named, kit):
+    executor = executor_named("opengl-egl")
+    artifact = compile_program(kit.program(lambda x: x * 2.0, {"a": 1}), "opengl")
+    with pytest.raises(
+        InputError, match="texture for 'a' is 100000 x 1 with 1 channels: this OpenGL takes at most"
+    ):
+        executor.run(artifact, {"a": np.zeros((1, 100000, 1), np.float32)})

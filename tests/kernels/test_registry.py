@@ -1,0 +1,111 @@
+"""Opening executors: names, options, and what is said when something is missing."""
+
+from __future__ import annotations
+
+import builtins
+import sys
+
+import pytest
+
+from wamnet import kernels
+from wamnet.kernels import registry
+from wamnet.refimpl.errors import ExecutorUnavailable, InputError
+
+
+def test_unknown_executor():
+    with pytest.raises(InputError, match="executor is metal: must be one of numpy, opencl, opengl"):
+        kernels.open_executor("metal")
+
+
+@pytest.mark.parametrize(("name", "package"), [("opencl", "pyopencl"), ("opengl", "moderngl")])
+def test_missing_package_is_named_with_the_way_to_get_it(monkeypatch, name, package):
+    real = builtins.__import__
+
+    def without(module, *args, **options):
+        if module == package:
+            raise ModuleNotFoundError(f"No module named {package!r}", name=package)
+        return real(module, *args, **options)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    monkeypatch.delitem(sys.modules, f"{registry.__package__}.{name}_executor", raising=False)
+    with pytest.raises(
+        ExecutorUnavailable, match=rf"{name}: package {package} .* pip install 'wamnet\[{name}\]'"
+    ):
+        kernels.open_executor(name)
+
+
+def test_opencl_device_that_does_not_exist(executor_named):
+    executor_named("opencl")
+    with pytest.raises(ExecutorUnavailable, match="no device matches 'abacus'; choose a part of one of: "):
+        kernels.open_executor("opencl", device="abacus")
+
+
+def test_opencl_device_is_chosen_by_a_part_of_its_name(executor_named, monkeypatch):
+    device = executor_named("opencl").device
+    monkeypatch.setenv("WAMNET_OPENCL_DEVICE", device[-5:].upper())
+    with kernels.open_executor("opencl") as executor:
+        assert executor.device == device
+
+
+def test_no_opencl_platform(executor_named, monkeypatch):
+    executor_named("opencl")
+    from wamnet.kernels import opencl_executor
+
+    monkeypatch.setattr(opencl_executor.cl, "get_platforms", list)
+    with pytest.raises(
+        ExecutorUnavailable, match=r"no platform is installed; pip install 'wamnet\[opencl\]'"
+    ):
+        kernels.open_executor("opencl")
+
+
+def test_unknown_opengl_context(executor_named):
+    executor_named("opengl-egl")
+    with pytest.raises(InputError, match="OpenGL context is glx: must be auto, egl, osmesa"):
+        kernels.open_executor("opengl", context="glx")
+
+
+def test_no_opengl_context_names_what_was_tried(executor_named, monkeypatch):
+    executor_named("opengl-egl")
+    from wamnet.kernels import opengl_executor
+
+    def fails():
+        raise OSError("no library")
+
+    monkeypatch.setattr(opengl_executor, "CONTEXTS", {"egl": fails, "osmesa": fails})
+    with pytest.raises(
+        ExecutorUnavailable, match=r"egl: no library; install libegl1.*osmesa: no library; install"
+    ):
+        kernels.open_executor("opengl")
+
+
+def test_osmesa_library_that_is_missing(monkeypatch):
+    from wamnet.kernels import osmesa
+
+    monkeypatch.setattr(osmesa, "LIBRARIES", ("libnowhere.so",))
+    monkeypatch.setattr(osmesa.ctypes.util, "find_library", lambda name: None)
+    with pytest.raises(OSError, match=r"no library libnowhere\.so"):
+        osmesa.OSMesaContext()
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        ("OSMesaCreateContextAttribs", "gives no OpenGL 3.3 core"),
+        ("OSMesaMakeCurrent", "does not make its context"),
+    ],
+)
+def test_osmesa_that_refuses(executor_named, monkeypatch, function, message):
+    executor_named("opengl-osmesa")
+    from wamnet.kernels import osmesa
+
+    library = osmesa._load()
+    setattr(library, function, lambda *_: 0)
+    monkeypatch.setattr(osmesa, "_load", lambda: library)
+    with pytest.raises(OSError, match=message):
+        osmesa.OSMesaContext()
+
+
+def test_automatic_context_opens_one(executor_named):
+    executor_named("opengl-egl")
+    with kernels.open_executor("opengl") as executor:
+        assert "through" in executor.device

@@ -1,9 +1,8 @@
 """The operations of the IR, one row each: what the rest of the compiler knows about them in general.
 
 A row says how many operands an operation takes, which attributes, what type comes out, what it computes (a
-NumPy function: the definition, used by the interpreter), and how the target may round it. A new operation
-is a row here, a rule in bounds.py and an entry in each dialect's table; tests/compiler/test_ops.py demands
-all three.
+NumPy function: the definition, used by the interpreter), and how the target may round it. A new operation is
+a row here, a rule in bounds.py and an entry in each dialect's table; tests demand all three.
 """
 
 from __future__ import annotations

@@ -68,7 +68,10 @@ class Traced(NDArrayOperatorsMixin):
     def __array_function__(self, function: Any, types: Any, args: Any, options: Any) -> Traced:
         if function not in _FUNCTIONS:
             _refuse(f"np.{function.__name__}")
-        return _FUNCTIONS[function](self.builder, *args, **options)
+        try:
+            return _FUNCTIONS[function](self.builder, *args, **options)
+        except TypeError:
+            return _refuse(f"np.{function.__name__} with these arguments")
 
     def __getitem__(self, key: Any) -> Traced:
         if key == (Ellipsis, None) and not self.shape:

@@ -75,6 +75,7 @@ def test_several_outputs_and_the_shape_in_one_lane():
 @pytest.mark.parametrize(
     ("function", "message"),
     [
+        (lambda x: np.clip(x, min=0, max=1), r"np\.clip with these arguments cannot"),
         (np.exp, r"np\.exp cannot be traced"),
         (np.sum, r"np\.sum cannot be traced"),
         (np.add.reduce, r"np\.add\.reduce with .* cannot be traced"),

@@ -35,9 +35,6 @@ LEVELS: Mapping[str, frozenset[str]] = {
 }
 """Levels of the x86-64 psABI, highest first, and the flags of /proc/cpuinfo that tell them."""
 
-_names: list[ctypes.Array[ctypes.c_char]] = []
-"""Texts that PoCL's records point to: kept for as long as the process lives."""
-
 
 def name_the_processor(record: int) -> bool:
     """Give the device with its record at address `record` a processor name, if it has none; say whether."""
@@ -46,8 +43,10 @@ def name_the_processor(record: int) -> bool:
     found = [word for word in words if _inside(word, readable) and _points_to_unknown(word, readable)]
     if len(found) != 1:
         return False
-    _names.append(ctypes.create_string_buffer(level(_flags()).encode()))
-    ctypes.c_uint64.from_address(found[0]).value = ctypes.addressof(_names[-1])
+    # The C library's own copy of the text: PoCL may free it when the process ends.
+    copy = ctypes.CDLL(None).strdup
+    copy.restype, copy.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
+    ctypes.c_uint64.from_address(found[0]).value = copy(level(_flags()).encode())
     return True
 
 

@@ -199,6 +199,21 @@ def test_room_is_there_from_inside_alone():
     assert hit(scene, (3.0, 3.0, 0.0), (-1.0, 0.0, 0.0))[0] == I.MISS
 
 
+@pytest.mark.parametrize("dtype", TYPES)
+def test_ray_from_inside_a_box_meets_the_face_that_it_leaves_by(dtype):
+    """From inside, the normal is that of the exit: the axis with the least (half extent -+ origin) /
+    |direction|."""
+    scene = scene_of(boxes=(Box((0.0, 0.0, 0.0), (1.0, 2.0, 3.0), GREY),))
+    origin = (0.5, -0.25, 1.0)
+    # Along (-1, 1, 1): exits x at 1.5, y at 2.25, z at 2; along (1, -4, 1): 0.5, 0.4375, 2; along (0.1, 0.1,
+    # -1): 5, 22.5, 4.
+    for direction, axis in (((-1.0, 1.0, 1.0), 0), ((1.0, -4.0, 1.0), 1), ((0.1, 0.1, -1.0), 2)):
+        _, _, surface = hit(scene, origin, direction, dtype)
+        expected = np.zeros(3)
+        expected[axis] = -np.sign(direction[axis])
+        assert np.array_equal(surface.normal[0], expected)
+
+
 def test_light_is_black_behind():
     scene = scene_of(
         lights=(Light((-1.0, 0.0, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), (1.0, 0.5, 0.25), 4.0),)

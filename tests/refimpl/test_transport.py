@@ -15,7 +15,7 @@ from statistical import SIGNIFICANCE, assert_all_plausible, welch_p
 from wamnet.refimpl import render as R
 from wamnet.refimpl import scenes, transport
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.scene import Box, Camera, Light, Room, Scene
+from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene
 from wamnet.refimpl.transport import Settings
 
 
@@ -64,6 +64,18 @@ def test_strategy_test_finds_a_bias(monkeypatch):
     wrong = render(scene, spp=256, seed=2, max_depth=2, strategy="light")
     with pytest.raises(AssertionError):
         assert_same_image(right, wrong, 256, 256)
+
+
+@pytest.mark.parametrize("strategy", transport.STRATEGIES)
+def test_nothing_is_lit_from_behind_a_light(strategy):
+    """A wall behind a light, which faces away from it, stays black: no strategy finds light there."""
+    # shines along +z
+    light = Light((-0.5, -0.5, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 1.0), 5.0)
+    wall = Quad((-4.0, -4.0, -1.0), (8.0, 0.0, 0.0), (0.0, 8.0, 0.0), (0.9, 0.9, 0.9))
+    scene = Scene("behind", Camera((0.0, 0.0, -0.5), (0.0, 0.0, -1.0)), quads=(wall,), lights=(light,))
+    result = render(scene, spp=8, strategy=strategy, max_depth=1)
+    assert np.all(result.frame["albedo"] > 0.0)
+    assert np.all(result.frame["color"] == 0.0)
 
 
 @pytest.mark.parametrize("name", ["minicubes", "cornell"])

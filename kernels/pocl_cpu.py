@@ -14,7 +14,9 @@ variable of PoCL 3 changes the name.
 from __future__ import annotations
 
 import ctypes
+import platform
 from collections.abc import Mapping
+from itertools import takewhile
 from pathlib import Path
 
 PLATFORM = "Portable Computing Language"
@@ -27,17 +29,18 @@ RECORD_BYTES = 2048
 """How far into a device's record the pointer is looked for: PoCL 3.0 has it at 640."""
 
 LEVELS: Mapping[str, frozenset[str]] = {
-    "x86-64-v4": frozenset(
-        {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl", "avx2", "fma", "bmi2"}
-    ),
-    "x86-64-v3": frozenset({"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe"}),
-    "x86-64-v2": frozenset({"cx16", "popcnt", "sse4_1", "sse4_2", "ssse3"}),
+    "x86-64": frozenset(),
+    "x86-64-v2": frozenset({"cx16", "lahf_lm", "popcnt", "sse4_1", "sse4_2", "ssse3"}),
+    "x86-64-v3": frozenset({"abm", "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe", "xsave"}),
+    "x86-64-v4": frozenset({"avx512bw", "avx512cd", "avx512dq", "avx512f", "avx512vl"}),
 }
-"""Levels of the x86-64 psABI, highest first, and the flags of /proc/cpuinfo that tell them."""
+"""Levels of the x86-64 psABI, lowest first, and the flags of /proc/cpuinfo that each adds to those before."""
 
 
 def name_the_processor(record: int) -> bool:
     """Give the device with its record at address `record` a processor name, if it has none; say whether."""
+    if platform.machine().lower() not in ("x86_64", "amd64"):
+        return False  # elsewhere "generic" is a name that the compiler takes
     readable = _readable()
     words = range(record, record + RECORD_BYTES, 8)
     found = [word for word in words if _inside(word, readable) and _points_to_unknown(word, readable)]
@@ -51,8 +54,9 @@ def name_the_processor(record: int) -> bool:
 
 
 def level(flags: frozenset[str]) -> str:
-    """Return the highest instruction set level whose flags the processor has."""
-    return next((name for name, needed in LEVELS.items() if needed <= flags), "x86-64")
+    """Return the highest instruction set level of a processor with these flags."""
+    reached = takewhile(lambda name: LEVELS[name] <= flags, LEVELS)
+    return list(reached)[-1]
 
 
 def _points_to_unknown(word: int, readable: list[tuple[int, int]]) -> bool:

@@ -17,7 +17,10 @@ def record(*texts):
 
 
 def test_an_unknown_processor_gets_the_name_of_its_level(monkeypatch):
-    monkeypatch.setattr(pocl_cpu, "_flags", lambda: pocl_cpu.LEVELS["x86-64-v3"])
+    monkeypatch.setattr(pocl_cpu.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(
+        pocl_cpu, "_flags", lambda: pocl_cpu.LEVELS["x86-64-v2"] | pocl_cpu.LEVELS["x86-64-v3"]
+    )
     words, _ = record(b"pthread-name", b"generic", b"x86_64-unknown")
     assert pocl_cpu.name_the_processor(ctypes.addressof(words))
     assert ctypes.string_at(words[4]) == b"x86-64-v3"
@@ -31,16 +34,26 @@ def test_anything_else_is_left_alone(texts):
     assert list(words) == before
 
 
+def test_other_architectures_are_left_alone(monkeypatch):
+    monkeypatch.setattr(pocl_cpu.platform, "machine", lambda: "aarch64")
+    words, _ = record(b"generic")
+    assert not pocl_cpu.name_the_processor(ctypes.addressof(words))
+
+
 def test_system_without_lists_is_left_alone(monkeypatch):
     monkeypatch.setattr(pocl_cpu, "_readable", list)
     words, _ = record(b"generic")
     assert not pocl_cpu.name_the_processor(ctypes.addressof(words))
 
 
-@pytest.mark.parametrize(("flags", "name"), [((), "x86-64"), (("avx512f",), "x86-64")])
+@pytest.mark.parametrize(
+    ("flags", "name"), [((), "x86-64"), (("avx512f",), "x86-64"), (("abm", "avx"), "x86-64")]
+)
 def test_a_level_needs_all_its_flags(flags, name):
     assert pocl_cpu.level(frozenset(flags)) == name
 
 
-def test_the_highest_level_wins():
-    assert pocl_cpu.level(frozenset().union(*pocl_cpu.LEVELS.values())) == "x86-64-v4"
+def test_a_level_needs_those_below_it():
+    everything = frozenset().union(*pocl_cpu.LEVELS.values())
+    assert pocl_cpu.level(everything) == "x86-64-v4"
+    assert pocl_cpu.level(everything - {"fma"}) == "x86-64-v2"

@@ -72,11 +72,8 @@ def write_denoised(path: Path, encoded: Any, model: Model, noisy: Frame) -> None
 
 def executors() -> None:
     """List what can run a kernel here, or what is missing for it."""
-    table(
-        "Executors",
-        ("name", "state", "device or what is missing"),
-        [probe(name.value) for name in ExecutorName],
-    )
+    found = [probe(name.value) for name in ExecutorName]
+    table("Executors", ("name", "state", "device, or what is missing"), found, texts=3)
 
 
 def probe(name: str) -> tuple[str, str, str]:

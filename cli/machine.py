@@ -17,7 +17,7 @@ def describe() -> dict[str, str]:
     return {
         "processor": _first_value("/proc/cpuinfo", "model name") or platform.processor() or "unknown",
         "cores": str(cores),
-        "memory": _first_value("/proc/meminfo", "MemTotal") or "unknown",
+        "memory": _memory(),
         "system": f"{platform.system()} {platform.machine()}",
         "Python": platform.python_version(),
     }
@@ -32,6 +32,12 @@ def versions() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             continue
     return found
+
+
+def _memory() -> str:
+    """Return the memory in whole GiB as text; Linux counts it in KiB."""
+    kibibytes = _first_value("/proc/meminfo", "MemTotal").split()
+    return f"{int(kibibytes[0]) >> 20} GiB" if kibibytes else "unknown"
 
 
 def _first_value(path: str, key: str) -> str:

@@ -43,11 +43,11 @@ def progress(title: str, total: float) -> Iterator[Advance]:
         yield lambda done: bar.update(task, advance=done)
 
 
-def table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table: first column to the left, the others to the right."""
+def table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]], *, texts: int = 1) -> None:
+    """Print a table: the first `texts` columns to the left, the others, numbers, to the right."""
     grid = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
     for index, name in enumerate(header):
-        grid.add_column(name, justify="right" if index else "left")
+        grid.add_column(name, justify="left" if index < texts else "right")
     for row in rows:
         grid.add_row(*row)
     Console(highlight=False).print(grid)

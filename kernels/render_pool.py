@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
 from typing import Any
@@ -49,11 +50,17 @@ def render_parallel(
         return render(scene, job, on_progress=on_progress)
     context = multiprocessing.get_context("spawn")
     counter = context.Value("Q", 0)
+    others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(count, context, _start_worker, (counter,))
     try:
         futures = [pool.submit(_render_band, scene, job, rows) for rows in parts]
         _watch(futures, counter, on_progress)
         return join_rows([future.result() for future in futures])
+    except BaseException:
+        # A band may take minutes: do not wait for it.
+        for worker in set(multiprocessing.active_children()) - others:
+            worker.terminate()
+        raise
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
@@ -80,7 +87,8 @@ def _watch(futures: list[Future[Render]], counter: Any, on_progress: Callable[[i
 
 
 def _start_worker(counter: Any) -> None:
-    """Keep the shared counter in this worker."""
+    """Keep the shared counter in this worker, which Ctrl-C ends at once and without a traceback."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     global _finished  # noqa: PLW0603 - the pool's initializer has no other way to reach the tasks
     _finished = counter
 

@@ -1,0 +1,128 @@
+"""Tests of `wamnet compile`, `wamnet denoise` and `wamnet executors`."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from wamnet.cli import denoise, exr
+from wamnet.cli.images import read_png
+from wamnet.compiler.model_file import load_model
+from wamnet.kernels import denoise_on, open_executor
+from wamnet.refimpl import encoding
+from wamnet.refimpl.errors import ExecutorUnavailable
+from wamnet.refimpl.frame import Frame
+
+
+@pytest.fixture
+def here(samples, tmp_path):
+    """Put model.safetensors and noisy.exr into the working folder."""
+    for name in ("model.safetensors", "noisy.exr"):
+        shutil.copy(samples / name, tmp_path / name)
+    return tmp_path
+
+
+@pytest.fixture
+def picture(here):
+    """Return the denoised picture of the NumPy executor."""
+    with open_executor("numpy") as executor:
+        return denoise_on(
+            executor, load_model(here / "model.safetensors"), exr.read_frame(here / "noisy.exr")
+        ).image
+
+
+def test_the_picture_is_the_executors(wamnet, here, picture) -> None:
+    """PNG holds it as it is, EXR as linear radiance; both lines name executor, device and time."""
+    outcome = wamnet("denoise", "model.safetensors", "noisy.exr", "--executor", "numpy")
+    assert outcome.status == 0
+    assert outcome.out.startswith("denoised.png: 13x12 pixels on numpy (NumPy ")
+    assert " s, after " in outcome.out
+    assert (encoding.to_8bit(read_png(here / "denoised.png")) == encoding.to_8bit(picture)).all()
+    assert wamnet("denoise", "model.safetensors", "noisy.exr", "-o", "d.exr").status == 0
+    frame = exr.read_frame(here / "d.exr")
+    assert (frame["color"] == encoding.from_display(picture)).all()
+    assert frame.info["denoised"] == "true"
+    assert frame.info["scene"] == "minicubes"
+
+
+@pytest.mark.parametrize(("target", "source"), [("opencl", "denoise.cl"), ("glsl", "denoise.frag")])
+def test_compile_writes_a_kernel(wamnet, here, target, source) -> None:
+    """Source, weights, manifest; by default into a folder that is named after the language."""
+    outcome = wamnet("compile", "model.safetensors", "--target", target)
+    assert outcome.status == 0
+    assert outcome.out.split() == [f"{target}/{name}" for name in (source, "weights.bin", "manifest.json")]
+    assert json.loads((here / target / "manifest.json").read_text())["profile"]["name"] == "ieee"
+    first = (here / target / source).read_text()
+    assert (
+        wamnet("compile", "model.safetensors", "--target", target, "--profile", "native", "-o", "n").status
+        == 0
+    )
+    assert (here / "n" / source).read_text() != first
+
+
+def test_refusals_of_compile(refused, here) -> None:
+    """No model; another kind of file; no such profile or target; a file in the folder's place."""
+    target = ["--target", "glsl"]
+    assert "wamnet-model file is none: cannot be read" in refused("compile", "none", *target)
+    assert "noisy.exr: not a safetensors file" in refused("compile", "noisy.exr", *target)
+    assert "profile 'best' does not exist; there are: ieee" in refused(
+        "compile", "model.safetensors", *target, "--profile", "best"
+    )
+    assert "output folder is noisy.exr: it is a file" in refused(
+        "compile", "model.safetensors", *target, "-o", "noisy.exr"
+    )
+    assert "Invalid value for '--target'" in refused("compile", "model.safetensors", "--target", "basic")
+    assert "Missing option '--target'" in refused("compile", "model.safetensors")
+
+
+def test_refusals_of_denoise(refused, here) -> None:
+    """Before anything is computed, and without a file."""
+    exr.write_frame(here / "flat.exr", Frame({"color": np.zeros((3, 2, 3))}))
+    both = ["model.safetensors", "noisy.exr"]
+    assert "normal" in refused("denoise", "model.safetensors", "flat.exr")
+    assert "input file is model.safetensors: it is not an OpenEXR image" in refused(
+        "denoise", both[0], both[0]
+    )
+    assert "noisy.exr: not a safetensors file" in refused("denoise", both[1], both[1])
+    assert "output file is noisy.exr: it is an input of this command" in refused(
+        "denoise", *both, "-o", "noisy.exr"
+    )
+    assert "output file is a.tif: its name must end in .exr or .png" in refused(
+        "denoise", *both, "-o", "a.tif"
+    )
+    assert "output file is dir.exr: it is a folder" in _with_folder(refused, here, both)
+
+
+def _with_folder(refused, here, both) -> str:
+    """Refuse to replace a folder."""
+    (here / "dir.exr").mkdir()
+    return refused("denoise", *both, "-o", "dir.exr")
+
+
+def missing(name: str, **_: object) -> None:
+    """Stand for an executor that is not there."""
+    raise ExecutorUnavailable(f"{name}: no device was found; install one")
+
+
+def test_a_missing_executor(refused, here, monkeypatch) -> None:
+    """One line with the way to get it."""
+    monkeypatch.setattr("wamnet.kernels.open_executor", missing)
+    line = refused("denoise", "model.safetensors", "noisy.exr", "--executor", "opencl")
+    assert line == "wamnet: error: opencl: no device was found; install one\n"
+
+
+def test_the_list_of_executors(wamnet, monkeypatch) -> None:
+    """NumPy is always ready; what is missing says why."""
+    assert denoise.probe("numpy")[:2] == ("numpy", "ready")
+    monkeypatch.setattr(
+        "wamnet.kernels.open_executor", lambda name: open_executor(name) if name == "numpy" else missing(name)
+    )
+    outcome = wamnet("executors")
+    assert outcome.status == 0
+    assert re.search(r"numpy +ready", outcome.out)
+    assert re.search(r"opengl +missing", outcome.out)
+    assert "opengl: no device was found; install one" in outcome.out

@@ -1,0 +1,163 @@
+"""Tests of the command line as a whole: help, version, wrong options, errors, interrupts, processes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from wamnet.cli import main as module
+from wamnet.cli import options
+from wamnet.compiler.compile import TARGETS
+from wamnet.kernels import EXECUTORS
+from wamnet.refimpl.errors import TrainingError
+from wamnet.refimpl.train import PRESETS
+
+COMMANDS = ("render", "scene", "train", "compile", "denoise", "compare", "executors", "demo")
+
+
+def run_process(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Run the installed command in a process of its own."""
+    command = [sys.executable, "-m", "wamnet.cli", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False, timeout=120)
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["-h"]])
+def test_help_lists_the_commands(wamnet, arguments) -> None:
+    """Without a command, help is what is wanted."""
+    outcome = wamnet(*arguments)
+    assert outcome.status == 0
+    assert all(command in outcome.out for command in COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_each_help_has_examples(wamnet, command) -> None:
+    """And defaults, where there are options."""
+    outcome = wamnet(command, "--help")
+    assert outcome.status == 0
+    assert f"wamnet {command}" in outcome.out.split("Example")[1]
+    assert "default:" in outcome.out or command == "executors"
+
+
+def test_version(wamnet) -> None:
+    """Name and number."""
+    assert wamnet("--version").out.startswith("wamnet 0.")
+
+
+def test_choices_equal_the_registries() -> None:
+    """Help texts list choices without importing what is chosen from."""
+    assert [name.value for name in options.ExecutorName] == list(EXECUTORS)
+    assert {name.value for name in options.Preset} == set(PRESETS)
+    assert {module.compile_model.__globals__["EXECUTOR_OF"][target] for target in options.Target} <= set(
+        TARGETS
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["rendr"], "No such command 'rendr'"),
+        (["render"], "Missing argument 'SCENE'; see wamnet render --help"),
+        (["render", "minicubes", "--hight", "3"], "No such option: --hight"),
+        (["render", "minicubes", "--width", "many"], "Invalid value for '--width'"),
+        (["denoise", "m", "f", "--executor", "abacus"], "Invalid value for '--executor'"),
+    ],
+)
+def test_wrong_options_are_one_line(refused, arguments, text) -> None:
+    """Like all other errors."""
+    assert text in refused(*arguments)
+
+
+def test_errors_of_the_system_are_one_line(refused, monkeypatch) -> None:
+    """A full disk is no bug."""
+
+    def fail(*_args: object, **_options: object) -> None:
+        raise OSError(28, "No space left on device", "a.exr")
+
+    monkeypatch.setattr(module, "app", fail)
+    assert refused("render") == "wamnet: error: No space left on device: a.exr\n"
+
+
+def test_errors_without_four_parts_are_one_line(refused, monkeypatch) -> None:
+    """Training's errors are plain sentences, perhaps over several lines."""
+
+    def fail(*_args: object, **_options: object) -> None:
+        raise TrainingError("the loss\nis nan")
+
+    monkeypatch.setattr(module, "app", fail)
+    assert refused("train") == "wamnet: error: the loss is nan\n"
+
+
+def test_bugs_keep_their_traceback(wamnet, monkeypatch) -> None:
+    """What no user can cause is not hidden."""
+
+    def fail(*_args: object, **_options: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(module, "app", fail)
+    with pytest.raises(ZeroDivisionError):
+        wamnet("render")
+
+
+def test_ctrl_c(wamnet, monkeypatch) -> None:
+    """Status 130 and no traceback."""
+
+    def interrupt(*_args: object, **_options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, "app", interrupt)
+    assert wamnet("render") == (130, "", "wamnet: interrupted\n")
+    monkeypatch.undo()
+    monkeypatch.setattr("wamnet.cli.render.load_scene", interrupt)
+    assert wamnet("render", "minicubes").status == 130
+
+
+def test_as_a_process(tmp_path) -> None:
+    """The exit status reaches the shell; standard output stays empty when something is wrong."""
+    done = run_process("render", "nowhere", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith(
+        "wamnet: error: scene is nowhere: no canonical scene has this name; known are"
+    )
+    assert run_process("--version", cwd=tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize("whole_group", [True, False])
+def test_ctrl_c_in_a_process_leaves_nothing(tmp_path, whole_group) -> None:
+    """A long render with two workers is interrupted, by a terminal or by a program that knows one process.
+
+    No file is left, whole or half, and no traceback.
+    """
+    arguments = ("render", "minicubes", "--spp", "100000", "--workers", "2", "-o", "a.exr")
+    command = [sys.executable, "-m", "wamnet.cli", *arguments]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, start_new_session=True) as process:
+        try:
+            time.sleep(3)
+            assert process.poll() is None
+            (os.killpg if whole_group else os.kill)(process.pid, signal.SIGINT)
+            _, errors = process.communicate(timeout=30)
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+    assert process.returncode == 130
+    assert errors == b"wamnet: interrupted\n"
+    assert not list(tmp_path.iterdir())
+
+
+def test_help_imports_nothing_heavy(tmp_path) -> None:
+    """A help text appears at once: no NumPy, no plots, no device."""
+    code = (
+        "import sys; from wamnet.cli.main import main; main(['--help']); "
+        "sys.exit(bool({'numpy', 'matplotlib', 'pyopencl', 'OpenEXR', 'PIL'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, check=False, timeout=60
+    )
+    assert done.returncode == 0

@@ -1,0 +1,131 @@
+"""Tests of `wamnet render` and `wamnet scene`: the same frame as the reference's, and every refusal."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wamnet.cli import exr
+from wamnet.cli.images import read_png
+from wamnet.refimpl import encoding
+from wamnet.refimpl.render import Job, render
+from wamnet.refimpl.scene import scene_digest
+from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.transport import Settings
+
+
+def test_the_frame_is_the_references(wamnet, tmp_path) -> None:
+    """Size, samples, seed, time and depth are passed on; the file has the reference's bits and origin."""
+    arguments = ["--width", 7, "--height", 5, "--spp", 2, "--seed", 9, "--time", 1.5, "--max-depth", 2]
+    outcome = wamnet("render", "minicubes", *arguments, "--workers", 1)
+    assert outcome.status == 0
+    assert outcome.out.startswith("minicubes.exr: 7x5 pixels, 2 spp, ")
+    scene = canonical("minicubes", time=1.5)
+    want = render(scene, Job(7, 5, 2, 9, Settings(max_depth=2))).frame
+    got = exr.read_frame(tmp_path / "minicubes.exr")
+    assert all((got[name] == values).all() for name, values in want.layers.items())
+    assert got.info["scene_digest"] == scene_digest(scene)
+    assert got.info["spp"] == "2"
+
+
+def test_double_precision_and_parameters(wamnet, tmp_path) -> None:
+    """A furnace is uniform: float64 in the file is float64 rounded to float32."""
+    arguments = [
+        "--set",
+        "albedo=0.25",
+        "--dtype",
+        "float64",
+        "--width",
+        3,
+        "--height",
+        2,
+        "--executor",
+        "numpy",
+    ]
+    assert wamnet("render", "furnace", *arguments, "-o", "f.exr").status == 0
+    want = render(canonical("furnace", albedo=0.25), Job(3, 2, dtype="float64")).frame
+    assert (exr.read_frame(tmp_path / "f.exr")["color"] == want["color"].astype(np.float32)).all()
+
+
+def test_three_numbers(wamnet, tmp_path) -> None:
+    """A colour is three numbers."""
+    assert (
+        wamnet(
+            "render", "minicubes", "--set", "warm=1,0,0", "--width", 4, "--height", 3, "-o", "a.exr"
+        ).status
+        == 0
+    )
+    want = scene_digest(canonical("minicubes", warm=(1.0, 0.0, 0.0)))
+    assert exr.read_frame(tmp_path / "a.exr").info["scene_digest"] == want
+
+
+def test_a_picture(wamnet, tmp_path) -> None:
+    """PNG holds the display-encoded colour, one stop brighter here."""
+    arguments = ["--set", "background=0.25", "--width", 3, "--height", 2]
+    assert wamnet("render", "empty", *arguments, "--exposure", 1, "-o", "e.png").status == 0
+    want = encoding.from_8bit(encoding.to_8bit(encoding.to_display(np.full((2, 3, 3), 0.25), 1.0)))
+    assert (read_png(tmp_path / "e.png") == want).all()
+
+
+def test_a_scene_file_renders_the_same(wamnet, tmp_path) -> None:
+    """Written by `wamnet scene`, read by `wamnet render`."""
+    assert wamnet("scene", "minicubes", "--time", 2, "-o", "mine.json").out == "mine.json\n"
+    assert wamnet("render", "mine.json", "--width", 4, "--height", 3).status == 0
+    want = render(canonical("minicubes", time=2.0), Job(4, 3)).frame
+    assert (exr.read_frame(tmp_path / "mine.exr")["color"] == want["color"]).all()
+    assert wamnet("scene", "minicubes", "--time", 2).out == (tmp_path / "mine.json").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["nowhere"], "scene is nowhere: no canonical scene has this name; known are minicubes,"),
+        (
+            ["none.json"],
+            "scene file is none.json: it cannot be read (No such file or directory); check the name",
+        ),
+        (
+            ["minicubes", "--set", "orbit"],
+            "--set is orbit: it must be NAME=NUMBER or NAME=NUMBER,NUMBER,NUMBER",
+        ),
+        (["minicubes", "--set", "orbit_deg=x"], "--set is orbit_deg=x: it must be"),
+        (["minicubes", "--set", "warm=1,2"], "--set is warm=1,2: it must be"),
+        (
+            ["minicubes", "--set", "albedo=1"],
+            "parameter albedo is 1.0: minicubes has none such; known are time, ",
+        ),
+        (
+            ["minicubes", "--set", "warm=1"],
+            "parameter warm is 1.0: minicubes wants three numbers with commas",
+        ),
+        (
+            ["furnace", "--set", "albedo=1,2,3"],
+            "parameter albedo is (1.0, 2.0, 3.0): furnace wants one number",
+        ),
+        (["minicubes", "--width", "0"], "width is 0: it must be an integer from 1 to"),
+        (["minicubes", "--spp", "-1"], "spp is -1: it must be an integer from 1 to"),
+        (["minicubes", "--seed", "-1"], "seed is -1: it must be an integer from 0 to"),
+        (["minicubes", "--max-depth", "-1"], "max_depth is -1: it counts scatterings"),
+        (["minicubes", "--workers", "0"], "workers is 0: at least one process must work; use 1 or more"),
+        (["minicubes", "-o", "a.jpg"], "output file is a.jpg: its name must end in .exr or .png"),
+        (["minicubes", "-o", "no/a.exr"], "output folder is no: it does not exist; create it: mkdir -p 'no'"),
+    ],
+)
+def test_refusals(refused, arguments, text) -> None:
+    """Each before any work, and without a file."""
+    assert text in refused("render", *arguments)
+
+
+def test_refusals_of_scene_files(refused, wamnet, tmp_path) -> None:
+    """Not JSON; not text; parameters that a file does not have; a target that is the source."""
+    (tmp_path / "a.json").write_text("{")
+    assert "a.json: scene text is no JSON" in refused("render", "a.json")
+    (tmp_path / "a.json").write_bytes(b"\xff\xfe\xfd")
+    assert "scene file is a.json: it cannot be read (it is no text)" in refused("render", "a.json")
+    wamnet("scene", "empty", "-o", "b.json")
+    text = "option for the scene is time: a scene file has no parameters; change the file"
+    assert text in refused("render", "b.json", "--time", 1)
+    assert "output file is b.json: it is an input of this command" in refused(
+        "scene", "b.json", "-o", "b.json"
+    )
+    assert "its name must end in .json" in refused("scene", "empty", "-o", "c.txt")

@@ -1,0 +1,121 @@
+"""Tests of `wamnet train`: the reference's model, checkpoints, resuming to the same bits, refusals."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+
+from wamnet.cli import exr, train
+from wamnet.compiler.model_file import load_checkpoint, load_model
+from wamnet.refimpl import train as reference
+from wamnet.refimpl.frame import Frame
+
+
+@pytest.fixture
+def pair(samples, tmp_path) -> list[str]:
+    """Put the sample pair into the working folder and return the options that name it."""
+    for name in ("noisy.exr", "reference.exr"):
+        shutil.copy(samples / name, tmp_path / name)
+    return ["-i", "noisy.exr", "-t", "reference.exr", "--features", "color,normal"]
+
+
+def test_the_model_is_the_references(wamnet, pair, tmp_path) -> None:
+    """Preset and choices are passed on; the model says what it was trained on."""
+    outcome = wamnet("train", *pair, "--steps", 2, "--seed", 3, "-o", "m.safetensors")
+    assert outcome.status == 0
+    assert outcome.out == "m.safetensors: 2 steps; checkpoint in m.checkpoint.safetensors\n"
+    model = load_model(tmp_path / "m.safetensors")
+    assert model.features == ("color", "normal")
+    assert model.info["trained_on_time"] == "1.0"
+    recipe = train.choose_recipe("short", None, {"features": ("color", "normal"), "steps": 2, "seed": 3})
+    frames = exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr")
+    want = reference.train(recipe, [frames]).siren
+    assert all((a == b).all() for a, b in zip(model.siren.weights, want.weights, strict=True))
+
+
+def test_resuming_gives_the_same_bits(wamnet, pair, tmp_path) -> None:
+    """An interrupt after 2 of 4 steps keeps a checkpoint; --resume needs no other option to be repeated."""
+    assert wamnet("train", *pair, "--steps", 4, "-o", "whole.safetensors").status == 0
+    step = reference.train_step
+    calls = []
+
+    def interrupted(*arguments):
+        calls.append(1)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return step(*arguments)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reference, "train_step", interrupted)
+        outcome = wamnet("train", *pair, "--steps", 4, "-o", "parts.safetensors")
+    assert outcome.status == 130
+    assert not (tmp_path / "parts.safetensors").exists()
+    assert load_checkpoint(tmp_path / "parts.checkpoint.safetensors").step == 2
+    assert wamnet("train", *pair[:4], "--resume", "-o", "parts.safetensors").status == 0
+    assert (tmp_path / "parts.safetensors").read_bytes() == (tmp_path / "whole.safetensors").read_bytes()
+
+
+def test_checkpoints_by_time(wamnet, pair, tmp_path, monkeypatch) -> None:
+    """When the interval is over, the next log line keeps a checkpoint, before the last step."""
+    kept = []
+    monkeypatch.setattr(train, "CHECKPOINT_INTERVAL_S", -1.0)
+    monkeypatch.setattr(
+        "wamnet.compiler.model_file.save_checkpoint", lambda _path, state: kept.append(state.step)
+    )
+    frames = [(exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr"))]
+    recipe = train.choose_recipe("short", None, {"features": ("color",), "steps": 4})
+    train.fit(train.replace(recipe, log_every=2), frames, tmp_path / "m.safetensors")
+    assert kept == [2, 4, 4]
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (["--steps", "0"], "recipe: steps is 0"),
+        (["--seed", "-1"], "recipe: seed is -1"),
+        (["--features", "colour"], "colour"),
+        (
+            ["-i", "noisy.exr"],
+            "number of targets is 1: each --input needs its --target, and there are 2 inputs",
+        ),
+        (["-o", "m.pt"], "output file is m.pt: its name must end in .safetensors"),
+        (["-o", "no/m.safetensors"], "output folder is no: it does not exist"),
+        (["--resume"], "wamnet-checkpoint file is model.checkpoint.safetensors: cannot be read"),
+        (["-i", "none.exr", "-t", "noisy.exr"], "input file is none.exr: it does not exist"),
+        (["--preset", "long"], "Invalid value for '--preset'"),
+    ],
+)
+def test_refusals(refused, pair, options, text) -> None:
+    """Nothing is written, no checkpoint either."""
+    assert text in refused("train", *pair, *options)
+
+
+def test_refusals_of_frames(refused, pair, tmp_path) -> None:
+    """Sizes that differ, a layer that the features need, a pixel that is not finite."""
+    color = np.zeros((3, 2, 3), np.float32)
+    exr.write_frame(tmp_path / "small.exr", Frame({"color": color}))
+    assert "sizes of noisy and reference frame is 13x12 and 2x3" in refused(
+        "train", "-i", "noisy.exr", "-t", "small.exr", "--features", "color"
+    )
+    assert "normal" in refused("train", "-i", "small.exr", "-t", "small.exr", "--features", "color,normal")
+    # The writer refuses such a frame, so the package writes it.
+    import OpenEXR
+
+    color[1, 0, 2] = np.nan
+    channels = {name: np.ascontiguousarray(color[:, :, i]) for i, name in enumerate("RGB")}
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(tmp_path / "nan.exr"))
+    text = "nan.exr: layer 'color' at x=0, y=1 (first of 1 such pixel) is nan: every pixel must be finite"
+    assert text in refused("train", "-i", "nan.exr", "-t", "small.exr")
+
+
+def test_resuming_with_another_recipe_or_other_frames(wamnet, refused, pair) -> None:
+    """What was begun with one network and one set of frames is not finished with others."""
+    assert wamnet("train", *pair, "--steps", 2).status == 0
+    assert "changed parts of the recipe is features" in refused(
+        "train", *pair[:4], "--resume", "--features", "color"
+    )
+    swapped = ["-i", "reference.exr", "-t", "noisy.exr"]
+    assert "digest of the training frames is" in refused("train", *swapped, "--resume", "--steps", 3)
+    assert "steps is 1: the run has done 2 steps" in refused("train", *pair[:4], "--resume", "--steps", 1)

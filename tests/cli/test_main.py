@@ -98,10 +98,10 @@ def test_bugs_keep_their_traceback(wamnet, monkeypatch) -> None:
     """What no user can cause is not hidden."""
 
     def fail(*_args: object, **_options: object) -> None:
-        raise ZeroDivisionError
+        raise ZeroDivisionError("a bug")
 
     monkeypatch.setattr(module, "app", fail)
-    with pytest.raises(ZeroDivisionError):
+    with pytest.raises(ZeroDivisionError, match="a bug"):
         wamnet("render")
 
 

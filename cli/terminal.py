@@ -35,8 +35,9 @@ def progress(title: str, total: float) -> Iterator[Advance]:
         BarColumn(),
         TaskProgressColumn(),
         TimeElapsedColumn(),
-        TextColumn("of about"),
-        TimeRemainingColumn(elapsed_when_finished=True),
+        TextColumn("passed,"),
+        TimeRemainingColumn(),
+        TextColumn("left"),
     )
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(title, total=total)

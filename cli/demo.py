@@ -61,7 +61,7 @@ class Plan:
     test_time_s: float = 2.0
     noisy_spp: int = 1
     train_reference_spp: int = 24
-    test_reference_spp: int = 192
+    test_reference_spp: int = 256
     preset: str = "short"
     steps: int | None = None
     seed: int = 1

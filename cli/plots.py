@@ -30,11 +30,17 @@ DOTS_PER_INCH = 150
 
 
 def error_maps(maps: Sequence[tuple[str, Any]], theme: Theme) -> bytes:
-    """Draw error maps (H, W) with their titles side by side, in one colour scale, with its bar."""
+    """Draw error maps (H, W) with their titles side by side, in one colour scale, with its bar.
+
+    The scale follows the square root of the error: else a few bright samples would hide everything else.
+    """
+    from matplotlib.colors import PowerNorm
+
     figure, axes = _figure(theme, (7.2, 3.4), len(maps))
     largest = max(float(values.max()) for _, values in maps)
+    scale = PowerNorm(0.5, 0.0, largest or 1.0)
     for axis, (title, values) in zip(axes, maps, strict=True):
-        picture = axis.imshow(values, cmap="magma", vmin=0.0, vmax=largest or 1.0)
+        picture = axis.imshow(values, cmap="magma", norm=scale)
         axis.set_title(title, color=theme.text, fontsize=10)
         axis.set_axis_off()
     bar = figure.colorbar(picture, ax=axes, shrink=0.85, label="absolute error, display-encoded")

@@ -98,7 +98,9 @@ def page(data: dict[str, Any], pictures: dict[str, str], drawn: dict[str, dict[s
 
 def _number(value: float | None, digits: int = 3) -> str:
     """Return a number with so many significant digits, or a dash where there is none."""
-    return "–" if value is None else f"{value:.{digits}g}"
+    if value is None:
+        return "–"
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.{digits}g}"
 
 
 def _embedded(png: bytes) -> str:

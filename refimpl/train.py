@@ -105,7 +105,7 @@ SHORT = Recipe(
     omega_0_hidden=10.0,
     n_windows=0,
     batch=512,
-    steps=8_000,
+    steps=12_000,
     learning_rate=1e-3,
     schedule="cosine",
 )

@@ -1,7 +1,7 @@
 """The driver: from a scene to a frame, in tiles of pixels, one sample of every pixel at a time.
 
 1. [`render`] walks over the image in tiles, and over the samples of a tile.
-2. [`trace`] sends one path through each pixel of a tile and bounces until none is alive; paths that have
+2. [`trace`] sends one path through each pixel of a tile and follows them until none is alive; paths that have
    ended leave the arrays, which is the only thing that this driver does for speed.
 3. Means and variances are taken over the samples in their order, in float64. A pixel's random numbers depend
    on (seed, pixel, sample) alone, so neither tile size nor row range changes a bit of the result.
@@ -22,7 +22,7 @@ from .errors import InputError
 from .frame import LAYERS, Frame
 from .intersection import Hit, Surface
 from .scene import Scene, scene_digest
-from .transport import Path, Settings, World
+from .transport import Counters, Path, Settings, World
 
 MAX_IMAGE_SIDE_PX = 1 << 16
 """Largest width or height, in pixels: x and y share one 32-bit counter of the random generator."""
@@ -133,27 +133,30 @@ def _render_tile(
 def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: int) -> dict[str, Any]:
     """Trace one path through each pixel x, y (P,) and return its layers (P, C)."""
     dtype = world.geometry.dtype
-    seed, number = rng.counter(job.seed), rng.counter(sample)
-    pixel = pixel_counter(x, y)
-    u, v, _, _ = rng.uniforms(seed, pixel, number, np.uint32(0), dtype)
+    counters = Counters(rng.counter(job.seed), pixel_counter(x, y), rng.counter(sample))
+    u, v, _, _ = rng.uniforms(*counters, np.uint32(0), dtype)
     origin, direction = camera_ray(basis, x.astype(dtype), y.astype(dtype), u, v, job.width, job.height)
     path = transport.camera_path(origin, direction)
     color = np.zeros((len(x), 3), dtype)
     lanes = np.arange(len(x))
     layers: dict[str, Any] = {}
     for depth in range(job.settings.max_depth + 1):
-        path, surface, hit, alive = transport.bounce(world, path, depth, seed, pixel, number)
+        path, surface, hit = transport.arrive(world, path)
         if depth == 0:
             layers = first_hit_layers(world, surface, hit, direction)
+        if depth == job.settings.max_depth:
+            break
+        path, alive = transport.scatter(world, path, surface, hit, rng.counter(depth), counters)
         # Put down what paths that end have gathered, and go on with the others.
         ended = np.flatnonzero(~alive)
         color[lanes[ended]] = path.radiance[ended]
-        if len(ended) == len(lanes):
-            break
         if len(ended) > 0:
             going = np.flatnonzero(alive)
-            lanes, pixel = lanes[going], pixel[going]
+            lanes, counters = lanes[going], counters._replace(pixel=counters.pixel[going])
             path = Path(*(_select(part, going) for part in path))
+        if len(lanes) == 0:
+            break
+    color[lanes] = path.radiance
     return {"color": color, **layers}
 
 

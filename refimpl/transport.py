@@ -1,14 +1,15 @@
 """Unidirectional path tracing of one path, over lanes: pure functions from state to state.
 
-A path starts at the camera. At each vertex [`bounce`]
+A path starts at the camera [`camera_path`]. At each vertex
 
-1. finds the next surface [`closest_hit`] and adds what it emits, weighted against the light sample that could
-   have found the same light [`emission_weight`];
-2. samples a point on a light, and adds its light when nothing is in between [`direct_light`] (next-event
-   estimation);
-3. samples a cosine-weighted direction and multiplies the throughput beta by the reflectance (f cos / pdf of a
-   Lambertian surface is just that);
-4. ends the path where nothing was hit, by Russian roulette if asked for, and after `max_depth` scatterings.
+1. [`arrive`] finds the next surface [`closest_hit`] and adds what it emits, weighted against the light sample
+   that could have found the same light [`emission_weight`];
+2. [`scatter`] samples a point on a light, and adds its light when nothing is in between [`direct_light`]
+   (next-event estimation);
+3. it then samples a cosine-weighted direction and multiplies the throughput beta by the reflectance (f cos /
+   pdf of a Lambertian surface is just that);
+4. a path ends where nothing was hit, and by Russian roulette if asked for. Drivers end it after `max_depth`
+   scatterings, with the emission that the last direction meets.
 
 Both ways to find a light are combined by multiple importance sampling (Veach, "Robust Monte Carlo Methods for
 Light Transport Simulation", 1997, chapter 9) with the balance or the power heuristic; each way alone is an
@@ -39,13 +40,17 @@ STRATEGIES = ("mis", "light", "bsdf")
 """Ways to find a light: both combined, light samples alone, directions of the BSDF alone."""
 
 BLOCKS_PER_BOUNCE = 2
-"""Blocks of four random numbers that a bounce uses; block 0 belongs to the camera."""
+"""Blocks of four random numbers that a scattering uses; block 0 belongs to the camera."""
 
 ROULETTE_LIMIT = 0.95
 """Greatest probability to go on after Russian roulette, so that paths between white walls end too."""
 
 LEAST_DENSITY = 1e-15
 """Floor of cosines and densities that divide: its inverse squared is still finite in float32."""
+
+CAMERA_PDF = 1e30
+"""Density of a camera ray's direction, in 1/sr: it is no sample, light sampling is no alternative to it, and
+the weight of what it meets is 1."""
 
 LEAST_SQUARE = 1e-30
 """Floor of squared distances that divide, in scene units squared; it acts on coincident points alone."""
@@ -107,6 +112,14 @@ class World:
     settings: Settings
 
 
+class Counters(NamedTuple):
+    """The counters (...) that name a path's random numbers, as uint32."""
+
+    seed: Any
+    pixel: Any
+    sample: Any
+
+
 class Path(NamedTuple):
     """State of paths between bounces: the ray, what is gathered so far, and what the next hit needs to know.
 
@@ -154,61 +167,69 @@ def _build_lights(scene: Scene, dtype: DTypeLike) -> Lights:
 
 
 def camera_path(origin: Any, direction: Any) -> Path:
-    """Return the state of paths that leave the camera; pdf 0 says that light sampling was no alternative."""
+    """Return the state of paths that leave the camera."""
     one, zero = np.ones_like(direction), np.zeros_like(direction)
-    return Path(origin, direction, one, zero, np.zeros_like(direction[..., 0]))
+    return Path(origin, direction, one, zero, np.full_like(direction[..., 0], CAMERA_PDF))
 
 
-def bounce(
-    world: World, path: Path, depth: int, seed: Any, pixel: Any, sample: Any
-) -> tuple[Path, Surface, Hit, Any]:
-    """Advance paths by one vertex; return state, the surface met, the hit and where (...) paths go on.
-
-    depth counts the scatterings so far; seed, pixel, sample are the counters (...) of the random numbers.
-    """
-    # Find the next surface and add its emission.
+def arrive(world: World, path: Path) -> tuple[Path, Surface, Hit]:
+    """Find the next surface of paths and add what it emits; return state, surface and hit."""
     hit = intersection.closest_hit(world.geometry, path.origin, path.direction)
     surface = intersection.surface_at(world.geometry, hit, path.origin, path.direction)
-    weight = emission_weight(world, path, hit, surface, depth)
+    weight = emission_weight(world, path, hit, surface)
     radiance = path.radiance + path.beta * vectors.scale(surface.emission, weight)
+    return path._replace(radiance=radiance), surface, hit
+
+
+def scatter(
+    world: World, path: Path, surface: Surface, hit: Hit, depth: Any, counters: Counters
+) -> tuple[Path, Any]:
+    """Gather light at the surface and leave it in a sampled direction; return state and who (...) goes on.
+
+    depth (...) counts the scatterings so far, as uint32.
+    """
     alive = hit.surface < world.geometry.nothing
-    if depth == world.settings.max_depth:
-        return path._replace(radiance=radiance), surface, hit, alive & False
+    block = np.uint32(1) + np.uint32(BLOCKS_PER_BOUNCE) * depth
+    u_pick, u0, u1, u_roulette = _uniforms(world, counters, block)
     # Add light that a sampled point of a light sends here.
-    first_block = 1 + BLOCKS_PER_BOUNCE * depth
-    u_pick, u0, u1, u_roulette = _uniforms(world, seed, pixel, sample, first_block)
     origin = intersection.spawn_origin(surface.point, surface.normal, np.where(alive, hit.t, 0.0))
-    beta = path.beta * surface.reflectance
+    beta, radiance = path.beta * surface.reflectance, path.radiance
     if world.lights is not None and world.settings.strategy != "bsdf":
         light = direct_light(world, origin, surface.normal, u_pick, u0, u1)
         radiance = radiance + beta * vectors.choose(alive, light, 0.0)
     # Sample the next direction.
-    u0, u1, _, _ = _uniforms(world, seed, pixel, sample, first_block + 1)
+    u0, u1, _, _ = _uniforms(world, counters, block + np.uint32(1))
     local = sampling.sample_cosine_hemisphere(u0, u1)
     direction = sampling.to_world(local, surface.normal)
     pdf = sampling.cosine_hemisphere_pdf(local[..., 2])
     # End paths that carry nothing, and some others by Russian roulette.
     alive = alive & (vectors.largest(beta) > 0.0)
-    if world.settings.roulette_depth is not None and depth >= world.settings.roulette_depth:
-        survival = np.minimum(vectors.largest(beta), ROULETTE_LIMIT)
-        alive = alive & (u_roulette < survival)
-        beta = beta / np.maximum(survival, LEAST_DENSITY)[..., np.newaxis]
-    return Path(origin, direction, beta, radiance, pdf), surface, hit, alive
+    if world.settings.roulette_depth is not None:
+        beta, alive = _roulette(world.settings.roulette_depth, beta, alive, u_roulette, depth)
+    return Path(origin, direction, beta, radiance, pdf), alive
 
 
-def _uniforms(world: World, seed: Any, pixel: Any, sample: Any, block: int) -> rng.Block:
+def _roulette(first: int, beta: Any, alive: Any, u: Any, depth: Any) -> tuple[Any, Any]:
+    """End paths at random from depth `first` on, in proportion to what they carry; scale up the others."""
+    survival = np.minimum(vectors.largest(beta), ROULETTE_LIMIT)
+    survival = np.where(depth < np.uint32(first), np.ones_like(survival), survival)
+    return beta / np.maximum(survival, LEAST_DENSITY)[..., np.newaxis], alive & (u < survival)
+
+
+def _uniforms(world: World, counters: Counters, block: Any) -> rng.Block:
     """Return four uniform numbers (...) of the given block in the world's float type."""
-    return rng.uniforms(seed, pixel, sample, np.uint32(block), world.geometry.dtype)
+    return rng.uniforms(counters.seed, counters.pixel, counters.sample, block, world.geometry.dtype)
 
 
-def emission_weight(world: World, path: Path, hit: Hit, surface: Surface, depth: int) -> Any:
+def emission_weight(world: World, path: Path, hit: Hit, surface: Surface) -> Any:
     """Return the weight (...) of emission that a BSDF sample (or the camera) has found."""
-    if depth == 0 or world.lights is None or world.settings.strategy == "bsdf":
+    if world.lights is None or world.settings.strategy == "bsdf":
         return np.ones_like(hit.t)
     # Only lights can be found by light sampling.
     is_light = surface.light >= 0
     if world.settings.strategy == "light":
-        return np.where(is_light, np.zeros_like(hit.t), np.ones_like(hit.t))
+        found_twice = is_light & (path.pdf < CAMERA_PDF)
+        return np.where(found_twice, np.zeros_like(hit.t), np.ones_like(hit.t))
     index = np.maximum(surface.light, 0)
     cos_light = np.abs(vectors.dot(surface.normal, path.direction))
     pdf_light = light_pdf(world.lights, index, hit.t * hit.t, cos_light)

@@ -13,7 +13,8 @@ from scipy import stats
 from statistical import SIGNIFICANCE, assert_all_plausible, welch_p
 
 from wamnet.refimpl import render as R
-from wamnet.refimpl import scenes, transport
+from wamnet.refimpl import rng, scenes, transport
+from wamnet.refimpl.camera import camera_basis, camera_ray
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene
 from wamnet.refimpl.transport import Settings
@@ -183,18 +184,16 @@ def test_throughput_never_grows(wall, block, angle, seed):
 
 
 def paths(scene: Scene, seed: int, size: int = 8, depth: int = 4):
-    """Yield the states of one path per pixel after each bounce."""
-    from wamnet.refimpl import rng
-    from wamnet.refimpl.camera import camera_basis, camera_ray
-
+    """Yield the states of one path per pixel after each scattering."""
     world = transport.build(scene, Settings(max_depth=depth), np.float32)
     y, x = np.divmod(np.arange(size * size), size)
-    counters = rng.counter(seed), R.pixel_counter(x, y), rng.counter(0)
+    counters = transport.Counters(rng.counter(seed), R.pixel_counter(x, y), rng.counter(0))
     u, v, _, _ = rng.uniforms(*counters, np.uint32(0), np.float32)
     basis = camera_basis(scene.camera, np.float32)
     path = transport.camera_path(*camera_ray(basis, x.astype("f4"), y.astype("f4"), u, v, size, size))
     for k in range(depth):
-        path, _, _, _ = transport.bounce(world, path, k, *counters)
+        path, surface, hit = transport.arrive(world, path)
+        path, _ = transport.scatter(world, path, surface, hit, rng.counter(k), counters)
         yield path
 
 

@@ -17,14 +17,18 @@ from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wai
 from typing import Any
 
 from ..refimpl.errors import InputError
-from ..refimpl.render import TILE_PIXELS, Job, Render, join_rows, render
+from ..refimpl.render import Job, Render, join_rows, render
 from ..refimpl.scene import Scene
+from .memory import keep_freed_memory
 
 PROGRESS_INTERVAL_S = 0.2
 """Seconds between two looks at the workers' counter: smooth for a progress bar, free for the workers."""
 
-BANDS_PER_WORKER = 4
-"""Bands dealt to each worker when the image is large enough: the last ones even out unequal work."""
+BANDS_PER_WORKER = 2
+"""Bands dealt to each worker: the second evens out unequal work, more would make the tiles small."""
+
+LEAST_SAMPLES = 1 << 17
+"""Samples below which one process is sooner done than others have started (about half a second)."""
 
 _finished: Any = None
 """In a worker: the shared counter of finished samples."""
@@ -46,7 +50,8 @@ def render_parallel(
     if count < 1:
         raise InputError("workers", count, "at least one process must work", "use 1 or more")
     parts = bands(job, count)
-    if count == 1 or len(parts) == 1:
+    keep_freed_memory()
+    if count == 1 or len(parts) == 1 or job.width * job.height * job.spp < LEAST_SAMPLES:
         return render(scene, job, on_progress=on_progress)
     context = multiprocessing.get_context("spawn")
     counter = context.Value("Q", 0)
@@ -66,9 +71,8 @@ def render_parallel(
 
 
 def bands(job: Job, workers: int) -> list[tuple[int, int]]:
-    """Return row ranges [first, last) that cover the image, several a worker where there are enough rows."""
-    least = -(-TILE_PIXELS // (4 * job.width))
-    rows = max(1, least, -(-job.height // (workers * BANDS_PER_WORKER)))
+    """Return row ranges [first, last) of nearly equal height that cover the image."""
+    rows = -(-job.height // (workers * BANDS_PER_WORKER))
     return [(first, min(first + rows, job.height)) for first in range(0, job.height, rows)]
 
 
@@ -89,6 +93,7 @@ def _watch(futures: list[Future[Render]], counter: Any, on_progress: Callable[[i
 def _start_worker(counter: Any) -> None:
     """Keep the shared counter in this worker, which Ctrl-C ends at once and without a traceback."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    keep_freed_memory()
     global _finished  # noqa: PLW0603 - the pool's initializer has no other way to reach the tasks
     _finished = counter
 

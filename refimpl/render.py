@@ -31,7 +31,7 @@ MAX_SAMPLES = 1 << 32
 """Largest number of the last sample plus one: samples are counted in 32 bits."""
 
 TILE_PIXELS = 8192
-"""Pixels in a tile: arrays of this length stay in a core's cache. The image does not depend on it."""
+"""Pixels in a tile at most: arrays of this length stay in a core's cache. The image does not depend on it."""
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,8 @@ def render(
     basis = camera_basis(scene.camera, job.dtype)
     pixels = np.arange(first * job.width, last * job.width)
     tiles = [
-        _render_tile(world, basis, job, pixels[start : start + tile_pixels], on_progress)
-        for start in range(0, len(pixels), tile_pixels)
+        _render_tile(world, basis, job, tile, on_progress)
+        for tile in np.array_split(pixels, -(-len(pixels) // tile_pixels))
     ]
     shape = (last - first, job.width)
     means = {name: np.concatenate([means[name] for means, _ in tiles]).reshape(*shape, -1) for name in LAYERS}

@@ -42,11 +42,11 @@ def test_row_ranges_join_to_the_whole(height, data):
 
 
 def test_workers_change_nothing_and_all_samples_are_counted():
-    job = R.Job(96, 97, 2)
+    job = R.Job(96, 97, 16)  # enough samples for processes to be worth while
     counted: list[int] = []
     parallel = render_parallel(scenes.canonical("minicubes"), job, workers=2, on_progress=counted.append)
     assert equal(parallel, R.render(scenes.canonical("minicubes"), job))
-    assert sum(counted) == 96 * 97 * 2
+    assert sum(counted) == 96 * 97 * 16
 
 
 @given(st.integers(1, 3000), st.integers(1, 3000), st.integers(1, 64))

@@ -58,10 +58,10 @@ class Plan:
     scene: str = "minicubes"
     size_px: int = 192
     train_times_s: tuple[float, ...] = (0.0, 1.3, 2.7, 4.0, 5.3, 6.7)
-    test_time_s: float = 2.0
+    test_time_s: float = 3.4
     noisy_spp: int = 1
     train_reference_spp: int = 24
-    test_reference_spp: int = 256
+    test_reference_spp: int = 512
     preset: str = "short"
     steps: int | None = None
     seed: int = 1

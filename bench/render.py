@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             render_parallel(canonical(scene), job, workers=workers)
             seconds[scene, workers].append(time.perf_counter() - start)
     facts = [
-        *machine.describe().values(),
+        *(f"{name} {value}" for name, value in machine.describe().items()),
         f"NumPy {np.__version__}",
         f"{given.size}x{given.size}, {given.spp} spp",
     ]

@@ -123,37 +123,3 @@ def test_refuses_infinite_numbers_in_json(number):
     text = S.to_json(EVERYTHING).replace("0.25", number)
     with pytest.raises(InputError, match=r"scene.spheres\[0\].radius is .*: it must be a finite number"):
         S.from_json(text)
-
-
-def test_unknown_canonical_scene_lists_the_known_ones():
-    with pytest.raises(
-        InputError, match=r"scene is teapot: .* known are minicubes, cornell, furnace, lone_light, empty"
-    ):
-        scenes.canonical("teapot")
-    with pytest.raises(
-        InputError, match="parameter size is 3: minicubes has none such; known are time, warm, cool"
-    ):
-        scenes.canonical("minicubes", size=3)
-
-
-@pytest.mark.parametrize("time", [0.0, 0.3, 1.7, 5.0, 7.99])
-def test_minicubes_turn_inside_their_room(time):
-    """27 cubes, rigid: every corner stays in the room, distances between centres do not depend on time."""
-    scene = scenes.minicubes(time=time)
-    assert len(scene.boxes) == 27
-    assert len({box.reflectance for box in scene.boxes}) == 27
-    reach = (
-        max(sum(c * c for c in box.center) ** 0.5 for box in scene.boxes) + 3**0.5 * scenes.CUBE_HALF_EXTENT
-    )
-    assert reach < 2.0
-    first, last = scene.boxes[0].center, scene.boxes[-1].center
-    distance = sum((a - b) ** 2 for a, b in zip(first, last, strict=True)) ** 0.5
-    assert distance == pytest.approx(
-        2 * scenes.CUBE_SPACING * 3**0.5, rel=1e-12
-    )  # a rotation in float64: some ulps
-
-
-def test_minicubes_come_back_after_a_turn_and_differ_in_between():
-    start, half, turn = (scenes.minicubes(time=t).boxes[0].center for t in (0.0, 4.0, scenes.TURN_SECONDS))
-    assert start == pytest.approx(turn, abs=1e-14)  # cos and sin of 2 pi: some ulps of 1
-    assert max(abs(a - b) for a, b in zip(start, half, strict=True)) > 0.5

@@ -7,8 +7,13 @@
    of summation, with or without fused multiply-add, results below 2**-126 flushed or not.
 3. Over a box of inputs that gives an a-priori bound [`over_box`]; at given inputs, with intervals of one
    point and all pixels at once, a sharper a-posteriori one [`at_inputs`].
-4. The rules themselves are computed in float64; what that rounding and the reference's own could change is
+4. A number on the way that may be too large for float32 leaves no bound: the kernel may hold an infinity
+   there, and NaN after it [`_held`].
+5. The rules themselves are computed in float64; what that rounding and the reference's own could change is
    below 2**-28 of each term, and every result is widened by more [`_outward`].
+
+A target may fuse a product with the sum that reads it, also across nodes. That leaves out the product's
+rounding for this one reader: an error of 0 in place of one that the product's rule allows.
 
 n rounded operations in any order: gamma(n) = n u / (1 - n u), Higham, "Accuracy and Stability of Numerical
 Algorithms", 2002, section 3.1. The programs analysed are those before `expand_sine`: a sine is one node,
@@ -26,24 +31,39 @@ from numpy.typing import NDArray
 
 from .ir import Gather, Node, Program
 from .ops import OPS
-from .profiles import FLUSH, RELATIVE_ERROR, UNIT_ROUNDOFF, SineContract
+from .profiles import FLUSH, LARGEST_DIVISOR, RELATIVE_ERROR, UNIT_ROUNDOFF, SineContract
 
 Array = NDArray[np.float64]
 
 OUTWARD = 2.0**-20
-"""Relative widening of every error bound: covers float64's rounding in rules and reference (step 4)."""
+"""Relative widening of every error bound: covers float64's rounding in rules and reference (step 5)."""
 
 RANGE_OUTWARD = 2.0**-40
-"""Relative widening of every range: float64's rounding of sums of up to 2**12 terms, of sin and of cos."""
+"""Relative widening of every range: float64's rounding of one operation, sin and cos too; of sums: `_affine`."""
+
+OVERFLOW = float(np.finfo(np.float32).max) * (1 - OUTWARD)
+"""What a number on the way must stay below: the largest float32, less float64's rounding in the rules."""
+
+SURE_TURNS = 2.0**30
+"""Largest argument, in radians, for which float64 finds a sine's crests: they are off by less than 2**-20."""
 
 
 @dataclass(frozen=True)
 class Enclosure:
-    """The reference's value lies in [low, high] (..., n), the kernel's at most `error` (..., n) from it."""
+    """The reference's value lies in [low, high] (..., n), the kernel's at most `error` (..., n) from it.
+
+    `size` (..., n): no number that the operation rounds is larger; 0 for operations that round nothing.
+    """
 
     low: Array
     high: Array
     error: Array
+    size: Any = 0.0
+
+    @property
+    def overflows(self) -> bool:
+        """Return whether float32 may be too small for what the operation rounds from bounded operands."""
+        return bool(np.any((self.size >= OVERFLOW) & np.isfinite(self.size)))
 
     @property
     def largest(self) -> Array:
@@ -85,7 +105,12 @@ def _rounded(context: Context, low: Array, high: Array, passed_on: Array) -> Enc
     """Add to the error that is passed on the error of rounding the result."""
     magnitude = np.maximum(np.abs(low), np.abs(high)) + passed_on
     relative = RELATIVE_ERROR[OPS[context.node.op].rounding]
-    return Enclosure(low, high, passed_on + relative * magnitude + FLUSH)
+    return _held(low, high, passed_on + relative * magnitude + FLUSH, (1 + relative) * magnitude + FLUSH)
+
+
+def _held(low: Array, high: Array, error: Array, size: Array) -> Enclosure:
+    """Give no bound where numbers of this size may overflow, or where their size is not known (NaN)."""
+    return Enclosure(low, high, np.where(size < OVERFLOW, error, np.inf), size)
 
 
 def _constant(context: Context, operands: list[Enclosure]) -> Enclosure:
@@ -110,12 +135,15 @@ def _affine(context: Context, operands: list[Enclosure]) -> Enclosure:
     n = weight.shape[1] + 1
     size = np.abs(weight).T
     # Range: the centre's image, and what the radius of each input adds; float64 rounds sums of n terms.
+    outward = max(RANGE_OUTWARD, n * 2.0**-52)
     middle = (x.low + x.high) / 2 @ weight.T + bias
-    reach = ((x.high - x.low) / 2 + RANGE_OUTWARD * x.largest) @ size + RANGE_OUTWARD * np.abs(bias)
+    reach = ((x.high - x.low) / 2 + outward * x.largest) @ size + outward * np.abs(bias)
     # Error: x's own, rounding, and underflow of a weight, of a product and of a sum.
     error = (x.read + gamma(n) * (x.seen + FLUSH)) @ size + gamma(n) * np.abs(bias)
     underflow = FLUSH * (np.sum(x.seen, axis=-1, keepdims=True) + 4 * n)
-    return Enclosure(middle - reach, middle + reach, error + underflow)
+    # In any order of summation no partial sum is larger than the sum of all magnitudes.
+    whole = ((x.seen + FLUSH) @ size + np.abs(bias)) * (1 + gamma(n)) + n * FLUSH
+    return _held(middle - reach, middle + reach, error + underflow, whole)
 
 
 def _add(context: Context, operands: list[Enclosure]) -> Enclosure:
@@ -144,10 +172,10 @@ def _multiply(context: Context, operands: list[Enclosure]) -> Enclosure:
 
 
 def _divide(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """(a + da) / (b + db) - a / b = (da - (a / b) db) / (b + db); no bound when the kernel's b may be 0."""
+    """(a + da) / (b + db) - a / b = (da - (a / b) db) / (b + db); no bound for b near 0, or huge."""
     a, b = operands
     nearest = np.where((b.low > 0) | (b.high < 0), np.minimum(np.abs(b.low), np.abs(b.high)), 0.0)
-    safe = nearest > b.read
+    safe = (nearest > b.read) & (b.seen <= LARGEST_DIVISOR)
     with np.errstate(divide="ignore", invalid="ignore"):
         corners = np.broadcast_arrays(a.low / b.low, a.low / b.high, a.high / b.low, a.high / b.high)
         low = np.where(safe, np.minimum.reduce(corners), -np.inf)
@@ -211,9 +239,11 @@ def _sin(context: Context, operands: list[Enclosure]) -> Enclosure:
     slopes = sine_range(a.low - a.read + np.pi / 2, a.high + a.read + np.pi / 2)
     own = np.inf if context.sine.error is None else context.sine.error
     moved = np.maximum(np.abs(slopes[0]), np.abs(slopes[1])) * a.read
-    # Both values lie in [-1, 1], up to the contract's error, whatever the arguments.
+    # Both values lie in [-1, 1], up to the contract's error, for all finite arguments in its domain.
     error = np.minimum(moved, 2.0) + own + FLUSH
-    return Enclosure(low, high, np.where(argument_reach(a) <= context.sine.domain, error, np.inf))
+    reach = argument_reach(a)
+    safe = np.isfinite(reach) & (reach <= context.sine.domain)
+    return Enclosure(low, high, np.where(safe, error, np.inf))
 
 
 def argument_reach(a: Enclosure) -> Array:
@@ -223,6 +253,8 @@ def argument_reach(a: Enclosure) -> Array:
 
 def sine_range(low: Array, high: Array) -> tuple[Array, Array]:
     """Return the least and largest sine on [low, high] (...): at the ends, or 1 and -1 at crests between."""
+    sure = np.maximum(np.abs(low), np.abs(high)) <= SURE_TURNS
+    low, high = np.where(sure, low, -np.pi), np.where(sure, high, np.pi)
     turn = 2 * np.pi
     at_low, at_high = np.sin(low), np.sin(high)
     # A crest that rounding hides here is so near an end that the sine there is 1 up to RANGE_OUTWARD.
@@ -301,6 +333,7 @@ def _outward(e: Enclosure) -> Enclosure:
         np.where(np.isnan(low), -np.inf, low),
         np.where(np.isnan(high), np.inf, high),
         np.where(np.isnan(error), np.inf, error),
+        e.size,
     )
 
 

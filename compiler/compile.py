@@ -2,7 +2,7 @@
 
 1. Run the common passes [`pipeline.COMMON`].
 2. Bound the output over all inputs that the images can hold, and refuse a program whose sines may leave the
-   domain on which their error is known [`bound_over_images`].
+   domain on which their error is known, or whose numbers may leave float32 [`bound_over_images`].
 3. Run the profile's passes and emit the source with the target's dialect.
 4. Put source, weights and manifest together [`compile_program`].
 """
@@ -15,6 +15,8 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
+
+import numpy as np
 
 from ..refimpl.errors import CompileError
 from . import artifact, bounds, ir, profiles
@@ -104,6 +106,8 @@ def bound_over_images(program: Program, profile: str, target: str) -> Bound:
     """Return the bound of an analysed program over all that its images can hold, or refuse it."""
     contract = sine_contract(profile, target)
     found = bounds.enclose(program, {"window": bounds.window_box(kernel_gather(program))}, contract)
+    if profiles.profile_named(profile).sine is not None:
+        _check_sizes(program, found)
     sines = [index for index, node in enumerate(program.nodes) if node.op == "sin"]
     ranges = []
     for number, index in enumerate(sines):
@@ -115,6 +119,20 @@ def bound_over_images(program: Program, profile: str, target: str) -> Bound:
     errors = bounds.output_errors(program, found)[program.outputs[0][0]]
     known = all(math.isfinite(error) for error in errors)
     return Bound(tuple(float(e) for e in errors) if known else None, tuple(ranges))
+
+
+def _check_sizes(program: Program, found: Sequence[bounds.Enclosure]) -> None:
+    """Refuse a program whose numbers may overflow, which would leave it without a bound."""
+    layer = -1
+    for index, (node, enclosure) in enumerate(zip(program.nodes, found, strict=True)):
+        layer += node.op == "affine"
+        if enclosure.overflows:
+            place = f"layer {layer}, %{index}" if layer >= 0 else f"%{index}"
+            raise CompileError(
+                f"{node.op} ({place}) may hold numbers up to {np.nanmax(enclosure.size):.3g}: float32 ends "
+                f"at {np.finfo(np.float32).max:.3g}; use smaller weights, a smaller omega_0 or features of a "
+                "smaller range, or profile native, which then promises nothing"
+            )
 
 
 def _refuse_domain(

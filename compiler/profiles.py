@@ -6,8 +6,10 @@
 3. The passes that turn the common program into the one that is emitted [`Profile`].
 
 Sources: OpenCL C 1.2 specification, section 7.4 (divide 2.5 ulp, sqrt 3 ulp, sin 4 ulp, full profile); GLSL
-4.60 specification, section 4.7.1 (+ - * correctly rounded, a / b 2.5 ulp, sqrt as 1.0 / inversesqrt(): 2
-ulp and 2.5 ulp). GLSL 3.30 states nothing; the later text describes the same hardware and is assumed.
+4.60 specification, section 4.7.1 (+ - * correctly rounded, a / b 2.5 ulp for 2**-126 <= |b| <= 2**126, sqrt as
+1.0 / inversesqrt(): 2 ulp and 2.5 ulp). GLSL 3.30 states nothing; the later text describes the same hardware
+and is assumed. GLSL leaves the rounding mode open: rounding to nearest is assumed too. OpenCL says it of each
+device, and the executor asks.
 """
 
 from __future__ import annotations
@@ -33,6 +35,9 @@ RELATIVE_ERROR: Mapping[Rounding, float] = {
     "sqrt": 5.0 * 2 * UNIT_ROUNDOFF,
 }
 """Largest relative error by class, over all targets; an ulp is at most 2 u |result|."""
+
+LARGEST_DIVISOR = 2.0**126
+"""Largest |b| for which GLSL bounds the error of a / b."""
 
 
 @dataclass(frozen=True)

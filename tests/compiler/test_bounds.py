@@ -147,6 +147,67 @@ def test_no_bound_stays_no_bound_beside_a_weight_of_zero():
     assert bounds.at_inputs(program, {"x": np.zeros(2)}, SineContract("none", None))["color"] == np.inf
 
 
+# ---- overflow: the programs on which a kernel gave NaN or an infinity beside a finite bound ---------------
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda x: ((x * 1e30) * 1e30) * 1e-30 * 1e-30,
+        lambda x: np.sin((x * 1e30) * 1e30),
+        lambda x: np.minimum((x * 1e30) * 1e30 * 1e-38, 5.0),
+        lambda x: x * 3e38 + 3e38,
+        lambda x: x * 2.0 / 1e-38,
+    ],
+)
+def test_what_may_overflow_on_the_way_has_no_bound(function):
+    program = trace(function, {"x": Type()})
+    native = SineContract("any argument", 1e-6)
+    assert bounds.over_box(program, {"x": (-1.0, 1.0)}, native)["color"] == np.inf
+    assert bounds.at_inputs(program, {"x": 1.0}, native)["color"] == np.inf
+
+
+def test_a_sum_that_may_overflow_in_some_order_has_no_bound():
+    """The whole sum is 2 x 3e38, too much for a partial sum, although its value is -3e38."""
+    weight = np.array([[3e38, 3e38, -3e38, -3e38, -3e38]], np.float32)
+    program = trace(lambda x: np.matmul(x, weight.T), {"x": Type(shape=(5,))})
+    assert bounds.at_inputs(program, {"x": np.ones(5)}, EMITTED_SINE)["color"] == np.inf
+    assert np.isfinite(bounds.at_inputs(program, {"x": np.full(5, 0.1)}, EMITTED_SINE)["color"])
+
+
+def test_the_largest_numbers_that_fit_have_a_bound():
+    largest = float(np.finfo(np.float32).max)
+    for value, finite in ((largest * (1 - 2.0**-10), True), (largest, False)):
+        found = enclosed("add", [around(value, 0.0), around(0.0, 0.0)])
+        assert np.isfinite(found.error) == finite
+        assert found.overflows != finite
+
+
+def test_divisor_beyond_the_range_of_the_promise_has_no_bound():
+    for b, finite in ((2.0**125, True), (2.0**126, True), (2.0**126 * (1 + 2.0**-20), False)):
+        assert np.isfinite(enclosed("divide", [around(1.0, 0.0), around(b, 0.0)]).error) == finite
+
+
+def test_sine_of_what_has_no_bound_has_none():
+    native = SineContract("any argument", 1e-6)
+    assert enclosed("sin", [around(1.0, np.inf)], native).error == np.inf
+    assert np.isfinite(enclosed("sin", [around(1e30, 0.0)], native).error)
+
+
+@pytest.mark.parametrize("low", [1e17, 2.0**60, -1e300])
+def test_sine_range_does_not_trust_float64_with_many_turns(low):
+    assert bounds.sine_range(np.float64(low), np.float64(low + abs(low) * 2.0**-50)) == (-1, 1)
+
+
+def test_range_of_a_long_sum_is_wide_enough():
+    """2^16 equal terms lose up to n 2^-53 in float64: the exact sum still lies in the range."""
+    n = 2**16
+    weight = np.full((1, n), 0.1, np.float32)
+    program = trace(lambda x: np.matmul(x, weight.T), {"x": Type(shape=(n,))})
+    found = bounds.enclose(program, {"x": (np.full(n, 0.1), np.full(n, 0.1))}, EMITTED_SINE)[-1]
+    assert found.high[0] - found.low[0] >= 2 * n * 2.0**-52 * 0.01 * n * 0.9
+
+
 def test_constant_that_float32_does_not_hold():
     program = trace(lambda x: x * 0.1, {"x": Type()})
     found = bounds.enclose(program, {"x": (1.0, 1.0)}, EMITTED_SINE)

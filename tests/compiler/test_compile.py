@@ -126,6 +126,36 @@ def test_sine_that_may_leave_its_domain_is_refused():
         compile_program(gathered(lambda x: np.sin(2e4 * np.sin(x * 100.0))), "opencl")
 
 
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (lambda x: x * 1e30 * 1e30 * 1e-38, r"multiply \(%\d\) may hold numbers up to 1e\+60"),
+        (
+            lambda x: np.sin(np.matmul(x, np.full((2, 3), 3e38, np.float32).T) * 1e-38),
+            r"affine \(layer 0, %1\) may hold numbers up to 9e\+38: float32 ends at 3.4e\+38; use",
+        ),
+        (lambda x: np.maximum(x * 3e38 + 3e38, 0.0), r"add \(%3\) may hold numbers up to 6e\+38"),
+    ],
+)
+@pytest.mark.parametrize("target", TARGETS)
+def test_numbers_that_may_overflow_are_refused(target, function, message):
+    with pytest.raises(CompileError, match=message):
+        compile_program(gathered(function), target)
+    assert compile_program(gathered(function), target, "native").manifest["bound"]["output"] is None
+
+
+def test_overflow_before_the_sine_leaves_no_bound_on_any_target():
+    """A model whose hidden layer overflows, so that sin(inf) is NaN, and whose last layer is small."""
+    shapes = (((4, 3), 1.0), ((4, 4), 3e38), ((3, 4), 0.01))
+    weights = tuple(np.full(shape, value, np.float32) for shape, value in shapes)
+    biases = tuple(np.full(n, value, np.float32) for n, value in ((4, 0.0), (4, 0.0), (3, 0.5)))
+    network = siren.Siren(weights, biases, 1.0, 2e-38)
+    program = lower(Model(network, ("color",), Window(1, "clamp"), dataset.Normalization()))
+    assert compile_program(program, "opencl", "native").manifest["bound"]["output"] is None
+    with pytest.raises(CompileError, match=r"affine \(layer 1, %\d+\) may hold numbers up to 1.2e\+39"):
+        compile_program(program, "opencl")
+
+
 def test_the_target_s_own_sine_has_no_domain():
     artifact = compile_program(gathered(lambda x: np.sin(2e4 * x)), "opencl", "native")
     assert artifact.manifest["sine_arguments"] == [[-20100.0, 20100.0]]  # widened a little, rounded up

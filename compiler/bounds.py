@@ -39,7 +39,7 @@ OUTWARD = 2.0**-20
 """Relative widening of every error bound: covers float64's rounding in rules and reference (step 5)."""
 
 RANGE_OUTWARD = 2.0**-40
-"""Relative widening of every range: float64's rounding of one operation, sin and cos too; of sums: `_affine`."""
+"""Relative widening of every range: float64's rounding of one operation, or sin; of a sum: `_affine`."""
 
 OVERFLOW = float(np.finfo(np.float32).max) * (1 - OUTWARD)
 """What a number on the way must stay below: the largest float32, less float64's rounding in the rules."""

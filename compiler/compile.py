@@ -14,6 +14,7 @@ import math
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 import numpy as np
@@ -79,6 +80,10 @@ TARGETS: Mapping[str, Target] = {
     )
 }
 """All targets, by the name of the executor that runs them."""
+
+
+KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
+"""What of a model's info a manifest repeats: how to encode images, and where the weights come from."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +173,7 @@ def compile_program(program: Program, target: str, profile: str = "ieee") -> Art
 def _header(program: Program, target: Target, profile: Profile, bound: Bound) -> list[str]:
     """Return the lines of the comment at the top of the source."""
     gather, channels = kernel_gather(program), output_channels(program)
-    images = [f"{i.name} ({i.channels} channels in [{i.low:g}, {i.high:g}])" for i in gather.images]
+    images = [f"{i.name} ({i.channels} channels in {i.range_text})" for i in gather.images]
     arguments = target.arguments.format(channels=channels).split("\n")
     size = gather.window.size
     return [
@@ -196,7 +201,7 @@ def _weight_lines(program: Program) -> list[str]:
 def _bound_text(bound: Bound) -> str:
     """Return the bound as a reader wants it, rounded up."""
     if bound.output is None:
-        return "none: an operation of this program promises nothing on this target"
+        return "none: for some images an operation of this program promises nothing on this target"
     return f"|output - float64 reference| <= {round_up(max(bound.output)):g} for all images in these ranges"
 
 
@@ -204,8 +209,10 @@ def round_up(value: float, digits: int = 3) -> float:
     """Return the smallest number of so many significant decimal digits that is not below `value`."""
     if value == 0 or not math.isfinite(value):
         return value
-    unit = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1)
-    return float(f"{math.ceil(value / unit) * unit:.{digits}g}")
+    # Decimals hold every float64 exactly, and the float64 nearest to one above `value` is not below it.
+    exact = Decimal(value)
+    unit = Decimal(1).scaleb(exact.adjusted() - digits + 1)
+    return float(exact.quantize(unit, ROUND_CEILING))
 
 
 def _assemble(
@@ -233,8 +240,8 @@ def _assemble(
             "output": bound.output and [round_up(error) for error in bound.output],
             "against": "float64 reference, same float32 weights and images",
         },
-        "sine_arguments": [[-round_up(-low), round_up(high)] for low, high in bound.sines],
-        "info": dict(emitted.info),
+        "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],
+        "info": {name: text for name, text in emitted.info if name in KEPT_INFO},
         "files": {
             source_name: ir.sha256(source.encode()),
             artifact.WEIGHTS_NAME: ir.sha256(raw),
@@ -248,4 +255,9 @@ def _assemble(
 def asdict_finite(contract: SineContract) -> dict[str, Any]:
     """Return a contract for JSON, which has no infinity: null means everywhere."""
     found = asdict(contract)
-    return {**found, "domain": found["domain"] if math.isfinite(found["domain"]) else None}
+    return {**found, "domain": _finite(found["domain"])}
+
+
+def _finite(value: float) -> float | None:
+    """Return the value for JSON, None for an infinity."""
+    return value if math.isfinite(value) else None

@@ -67,6 +67,11 @@ class Image:
     low: float
     high: float
 
+    @property
+    def range_text(self) -> str:
+        """Return "[low, high]" with all digits: other ranges give another text, and so another digest."""
+        return f"[{float(self.low)!r}, {float(self.high)!r}]"
+
 
 @dataclass(frozen=True)
 class Gather:
@@ -132,7 +137,7 @@ def text(program: Program) -> str:
     if program.gather is not None:
         window = program.gather.window
         lines.append(f"  window {window.size}x{window.size}, border {window.border}")
-        lines += [f"  image {i.name}: {i.channels} in [{i.low:g}, {i.high:g}]" for i in program.gather.images]
+        lines += [f"  image {i.name}: {i.channels} in {i.range_text}" for i in program.gather.images]
     lines += [f"  %{index} = {_line(node)}" for index, node in enumerate(program.nodes)]
     lines += [f"  output {name} = %{index}" for name, index in program.outputs]
     lines += [f"  parameter {name}: {_array(array)}" for name, array in sorted(program.parameters.items())]

@@ -4,12 +4,13 @@ For |x| <= DOMAIN, u = 2**-24:
 
 1. k = floor(x / pi + 1/2). x * (1/pi) has two relative roundings, of the constant and of the product: at most
    2 u * 4075 < 4.9e-4; the sum, below 4096, has half an ulp, 2**-13. So |x / pi - k| < 1/2 + 6.1e-4,
-   |k| < 2**12 and |x - k pi| < R_MAX = 1.573.
+   |k| < 2**12 and |x - k pi| < R_MAX = 1.5735.
 2. r = ((x - k P1) - k P2) - k P3, where P1 + P2 + P3 is pi to 1.3e-13 and each part has 12 bits (Cody and
    Waite, 1980). With 12 bits of k the three products are exact, so a fused multiply-add gives the same
    result. The first difference is exact too: if k is not 0, x and k P1 are multiples of 2**-23 and the
-   difference is below 2. The others are rounded, |r| <= R_MAX: r is off by at most 2 u |r| + 4096 *
-   1.3e-13, which sin passes on times |cos r|; |r cos r| <= 0.5611 on the range.
+   difference is below 2. The others are rounded, the second being r + k P3, the third r: r is off by at
+   most u (2 |r| + 4096 |P3|) + 4096 * 1.3e-13, which sin passes on times |cos r|; |r cos r| <= 0.5611 on
+   the range.
 3. sin(x) = (-1)**k sin(r); the sign is 1 - 2 (k - 2 floor(k / 2)), exact.
 4. sin(r) ~ r + r (z q(z)), z = r r: odd, with float32 coefficients; approximation error
    `approximation_error` (proven by experiments/sine_coefficients.py). Its rounding is bounded by the
@@ -32,7 +33,7 @@ import numpy as np
 DOMAIN = 12800.0
 """Largest |x| for which the proof holds, in radians: k needs 12 bits; beyond it the result means nothing."""
 
-R_MAX = 1.573
+R_MAX = 1.5735
 """Largest |reduced argument|, in radians: pi / 2 and the error of choosing k (step 1)."""
 
 INVERSE_PI = float.fromhex("0x1.45f306p-2")
@@ -70,8 +71,8 @@ POLYNOMIALS: Mapping[int, Polynomial] = {
                 "-0x1.555556p-3",
                 "0x1.111132p-7",
                 "-0x1.a0221p-13",
-                "0x1.72915ep-19",
-                "-0x1.b0e24p-26",
+                "0x1.72915ap-19",
+                "-0x1.b0e152p-26",
             )
         ),
         approximation_error=1.16e-9,
@@ -113,5 +114,6 @@ def polynomial(r: Any, degree: int = DEGREE) -> Any:
 
 def reduction_error(r: Any) -> Any:
     """Return how far step 2 moves sin(r), |r| (...) <= R_MAX: the error of r times |cos|, and its square."""
-    moved = 2.0 * 2.0**-24 * (1 + 2.0**-20) * np.abs(r) + 2.0**12 * PI_REST
+    rounded = 2.0 * np.abs(r) + 2.0**12 * abs(PI_PARTS[2])
+    moved = 2.0**-24 * (1 + 2.0**-20) * rounded + 2.0**12 * PI_REST
     return moved * np.abs(np.cos(r)) + moved * moved

@@ -23,7 +23,7 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 
-R_MAX = 1.573
+R_MAX = 1.5735
 """Largest reduced argument, in radians: pi / 2 and the error of choosing k (compiler/sine.py)."""
 
 PART_BITS = 12

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from wamnet.compiler import artifact as artifacts
@@ -183,7 +184,29 @@ def test_division_by_what_may_be_zero_has_no_bound():
     assert "bound     none" in artifact.source
 
 
+def test_sine_of_anything_is_null_in_the_manifest():
+    artifact = compile_program(gathered(lambda x: np.sin(1.0 / x)), "opencl", "native")
+    assert artifact.manifest["sine_arguments"] == [[None, None]]
+    assert artifact.manifest["bound"]["output"] is None
+
+
+def test_ranges_that_differ_in_the_last_digit_give_other_digests():
+    programs = [gathered(lambda x: x * 2, high=high) for high in (1.0, 1.0000004)]
+    assert ir.digest(programs[0]) != ir.digest(programs[1])
+    kernels = [compile_program(program, "opencl") for program in programs]
+    assert kernels[0].digest != kernels[1].digest
+    assert "[-1.0, 1.0000004]" in kernels[1].source
+
+
+def test_the_manifest_repeats_what_an_integrator_needs():
+    info = {"recipe": "{}", "trained_on_scene": "minicubes", "trained_on_seed": "1, 3, 5", "note": "x"}
+    manifest = compile_program(lower(replace(model(), info=info)), "opencl").manifest
+    assert sorted(manifest["info"]) == ["normalization", "recipe", "trained_on_scene"]
+
+
 @given(value=st.floats(1e-30, 1e30))
+@example(value=0.0026200000000000004)
+@example(value=float(np.nextafter(1.0, 2.0)))
 def test_round_up(value):
     """Three digits: a step is at most 1/100 of the value."""
     assert value <= round_up(value) <= value + 0.0101 * value

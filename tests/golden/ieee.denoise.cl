@@ -1,7 +1,7 @@
 /*
  * wamnet denoiser, OpenCL C 1.2. Generated: change the compiler, not this text.
- * program   5decc1ca2b74879dc87b2f345f814f53
- * input     color (3 channels in [0, 1]), normal (3 channels in [-1, 1])
+ * program   f3364223f05e9cc704eb6c074d489b14
+ * input     color (3 channels in [0.0, 1.0]), normal (3 channels in [-1.0, 1.0])
  * window    2 x 2 pixels, the pixel itself is tap 1
  * border    zero
  * output    3 channels, row 0 is the top row
@@ -76,8 +76,8 @@ __kernel void wamnet_denoise(
         float t23 = 2.0f * t22;
         float t25 = 1.0f - t23;
         float t26 = t17 * t17;
-        float t28 = t26 * (-2.51971528e-08f);
-        float t30 = t28 + 2.76094556e-06f;
+        float t28 = t26 * (-2.51969414e-08f);
+        float t30 = t28 + 2.76094511e-06f;
         float t31 = t26 * t30;
         float t33 = t31 + (-0.000198427704f);
         float t34 = t26 * t33;

@@ -1,7 +1,7 @@
 /*
  * wamnet denoiser, OpenCL C 1.2. Generated: change the compiler, not this text.
- * program   5decc1ca2b74879dc87b2f345f814f53
- * input     color (3 channels in [0, 1]), normal (3 channels in [-1, 1])
+ * program   f3364223f05e9cc704eb6c074d489b14
+ * input     color (3 channels in [0.0, 1.0]), normal (3 channels in [-1.0, 1.0])
  * window    2 x 2 pixels, the pixel itself is tap 1
  * border    zero
  * output    3 channels, row 0 is the top row

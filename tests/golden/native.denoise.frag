@@ -1,13 +1,13 @@
 /*
  * wamnet denoiser, GLSL 3.30, fragment shader. Generated: change the compiler, not this text.
- * program   5decc1ca2b74879dc87b2f345f814f53
- * input     color (3 channels in [0, 1]), normal (3 channels in [-1, 1])
+ * program   f3364223f05e9cc704eb6c074d489b14
+ * input     color (3 channels in [0.0, 1.0]), normal (3 channels in [-1.0, 1.0])
  * window    2 x 2 pixels, the pixel itself is tap 1
  * border    zero
  * output    3 channels, row 0 is the top row
  * profile   native: any order of summation, fused multiply-add allowed, the target's own sine
  * sine      sin() of GLSL 3.30, which promises nothing
- * bound     none: an operation of this program promises nothing on this target
+ * bound     none: for some images an operation of this program promises nothing on this target
  * arguments each image: a float texture (R32F to RGBA32F) of width x height, texel row 0 is the top row;
  *           weight_texture: R32F, 1024 texels wide, filled row by row;
  *           result: a float colour buffer of width x height whose row 0 is the top row.

@@ -109,6 +109,17 @@ def window_matches(program: Program) -> Iterator[str]:
         yield f"inputs are ({shown[0]}); the gathered window gives ({shown[1]})"
 
 
+def images_have_ranges(program: Program) -> Iterator[str]:
+    """What an image can hold is a range of float32 numbers."""
+    for image in program.gather.images if program.gather else ():
+        largest = float(np.finfo(np.float32).max)
+        if not -largest <= image.low <= image.high <= largest:
+            yield (
+                f"image {image.name} holds numbers in {image.range_text}; the ends must be finite in "
+                "float32, the first not above the second"
+            )
+
+
 RULES: tuple[Rule, ...] = (
     known_operations,
     operands_before_use,
@@ -120,6 +131,7 @@ RULES: tuple[Rule, ...] = (
     inputs_once,
     outputs_exist,
     window_matches,
+    images_have_ranges,
 )
 """The grammar, in the order in which it is checked."""
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
-from ..compiler.ir import Gather
+from ..compiler.ir import Gather, Image
 from ..refimpl.errors import InputError
 
 Images = Mapping[str, NDArray[np.float32]]
@@ -100,7 +100,23 @@ def checked(artifact: Artifact, inputs: Images) -> Images:
                 "all numbers must be finite",
                 "mend or mask the frame first",
             )
+        _check_range(image, array)
     return {image.name: np.ascontiguousarray(inputs[image.name]) for image in wanted}
+
+
+def _check_range(image: Image, array: NDArray[np.float32]) -> None:
+    """Refuse numbers outside the range on which the kernel's bound rests."""
+    if image.low <= float(array.min()) and float(array.max()) <= image.high:
+        return
+    # In float64: a Python number would be rounded to the array's float32 first.
+    outside = (array < np.float64(image.low)) | (array > np.float64(image.high))
+    y, x, _ = np.argwhere(outside)[0]
+    raise InputError(
+        f"image {image.name!r} at row {y}, column {x}",
+        array[y, x].tolist(),
+        f"the kernel's bound holds for numbers in {image.range_text}",
+        "encode the frame's features (refimpl.dataset.feature_image)",
+    )
 
 
 def black(artifact: Artifact, size: tuple[int, int]) -> Images:

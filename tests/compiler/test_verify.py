@@ -102,6 +102,14 @@ CASES = [
         replace(GOOD, gather=Gather(Window(2, "clamp"), (Image("a", 1, 0, 1),))),
         r"inputs are \(window: float32\[3\]\); the gathered window gives \(window: float32\[4\]\)",
     ),
+    *(
+        (
+            "images_have_ranges",
+            replace(GOOD, gather=Gather(Window(1, "clamp"), (Image("a", 3, low, high),))),
+            r"image a holds numbers in \[.*\]; the ends must be finite in float32",
+        )
+        for low, high in ((1.0, -1.0), (-np.inf, 1.0), (0.0, 1e39), (np.nan, 1.0))
+    ),
 ]
 
 

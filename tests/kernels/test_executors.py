@@ -163,6 +163,11 @@ def small(executor, kit):
             {"a": np.full((2, 2, 3), np.nan, np.float32)},
             "image 'a' at row 0, column 0 is .*: all numbers must be",
         ),
+        (
+            {"a": np.float32([[[0, 0, 0], [2, -2, 0]], [[0, -2.0000002, 0], [9, 9, 9]]])},
+            r"image 'a' at row 1, column 0 is \[0.0, -2.000000.*\]: the kernel's bound holds for numbers in "
+            r"\[-2.0, 2.0\]; encode the frame's",
+        ),
     ],
 )
 def test_wrong_images_are_refused(small, images, message):

@@ -102,6 +102,28 @@ def test_digest_names_the_data() -> None:
 # ---- features --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("scale", [1e-30, 1.0, 1e30])
+def test_no_frame_leaves_the_ranges(scale: float) -> None:
+    """Executors refuse what lies outside: the largest float32 numbers, the smallest, and those around 1."""
+    one = np.float32(1.0)
+    values = [
+        np.finfo(np.float32).max,
+        1e-45,
+        0.0,
+        1.0,
+        np.nextafter(one, 2 * one),
+        np.nextafter(one, 0 * one),
+    ]
+    signed = np.array([*values, *np.negative(values)], np.float32).reshape(2, -1, 1)
+    layers = {name: np.repeat(signed, layer.channels, axis=-1) for name, layer in LAYERS.items()}
+    layers["color"], layers["depth"] = np.abs(layers["color"]), np.abs(layers["depth"])
+    normalization = Normalization(20.0, scale, (scale, -scale, 0.0), scale)
+    for name, feature in FEATURES.items():
+        image = dataset.feature_image(Frame(layers), (name,), normalization)
+        assert feature.low <= image.min()
+        assert image.max() <= feature.high
+
+
 def test_feature_ranges_channels_and_order() -> None:
     frame = frame_of(5, 4)
     scales = Normalization(depth_scale=1.5, position_scale=1.5)

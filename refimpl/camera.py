@@ -41,7 +41,7 @@ def camera_basis(camera: Camera, dtype: DTypeLike = np.float64) -> CameraBasis:
 
 
 def camera_ray(
-    basis: CameraBasis, x: Any, y: Any, u: Any, v: Any, width: int, height: int
+    basis: CameraBasis, x: Any, y: Any, u: Any, v: Any, width: Any, height: Any
 ) -> tuple[Any, Any]:
     """Return origin, unit direction (..., 3) of rays through pixels x, y (...) at u, v (...) in [0, 1)."""
     # Map the image to [-1, 1] in height, with y up, and keep the pixels square in width.

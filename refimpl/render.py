@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from . import intersection, rng, transport, vectors
 from .camera import CameraBasis, camera_basis, camera_ray
@@ -134,9 +134,8 @@ def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: in
     """Trace one path through each pixel x, y (P,) and return its layers (P, C)."""
     dtype = world.geometry.dtype
     counters = Counters(rng.counter(job.seed), pixel_counter(x, y), rng.counter(sample))
-    u, v, _, _ = rng.uniforms(*counters, np.uint32(0), dtype)
-    origin, direction = camera_ray(basis, x.astype(dtype), y.astype(dtype), u, v, job.width, job.height)
-    path = transport.camera_path(origin, direction)
+    path = start(basis, x.astype(dtype), y.astype(dtype), job.width, job.height, counters, dtype)
+    direction = path.direction
     color = np.zeros((len(x), 3), dtype)
     lanes = np.arange(len(x))
     layers: dict[str, Any] = {}
@@ -158,6 +157,14 @@ def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: in
             break
     color[lanes] = path.radiance
     return {"color": color, **layers}
+
+
+def start(
+    basis: CameraBasis, x: Any, y: Any, width: Any, height: Any, counters: Counters, dtype: DTypeLike
+) -> Path:
+    """Return paths that leave the camera through a random point of pixels x, y (...), in floats."""
+    u, v, _, _ = rng.uniforms(*counters, np.uint32(0), dtype)
+    return transport.camera_path(*camera_ray(basis, x, y, u, v, width, height))
 
 
 def pixel_counter(x: Any, y: Any) -> Any:

@@ -106,12 +106,12 @@ def sample_discrete(u: Any, cumulative: Any) -> Any:
 
 def discrete_pdf(index: Any, cumulative: Any) -> Any:
     """Return the probability (...) of each index (...) under the running sums cumulative (K,)."""
-    return np.take(np.diff(cumulative, prepend=cumulative.dtype.type(0)), index)
+    return vectors.look_up(np.diff(cumulative, prepend=cumulative.dtype.type(0)), index)
 
 
 def invert_discrete_sample(index: Any, cumulative: Any) -> Any:
     """Return the middle (...) of the uniform numbers that [`sample_discrete`] maps to index (...)."""
-    upper = np.take(cumulative, index)
+    upper = vectors.look_up(cumulative, index)
     return upper - 0.5 * discrete_pdf(index, cumulative)
 
 

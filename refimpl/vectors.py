@@ -51,6 +51,20 @@ def choose(condition: Any, a: Any, b: Any) -> Any:
     return np.where(condition[..., np.newaxis], a, b)
 
 
+def look_up(table: Any, index: Any) -> Any:
+    """Return the entries (...) of a constant table (K,) at index (...).
+
+    NumPy asks the table, not the index, who takes from it; `like` makes it a table of the index's kind, so
+    that an index that is traced makes a look-up that is traced.
+    """
+    return np.take(np.asarray(table, like=index), index)
+
+
+def look_up_rows(table: Any, index: Any) -> Any:
+    """Return the rows (..., 3) of a constant table (K, 3) at index (...)."""
+    return vector(*(look_up(table[:, i], index) for i in range(3)))
+
+
 def largest(a: Any) -> Any:
     """Return the largest component (...) of a (..., 3)."""
     return np.maximum(np.maximum(a[..., 0], a[..., 1]), a[..., 2])

@@ -241,7 +241,8 @@ def quad_distance(quad: tuple[Any, Any, Any, Any], origin: Any, direction: Any) 
 
 def _away_from_zero(x: Any) -> Any:
     """Return x (...) with its magnitude raised to [`LEAST_COMPONENT`] where it is smaller."""
-    return np.where(np.abs(x) < LEAST_COMPONENT, np.where(x < 0.0, -LEAST_COMPONENT, LEAST_COMPONENT), x)
+    least = np.full_like(x, LEAST_COMPONENT)  # np.where of two Python numbers would be float64
+    return np.where(np.abs(x) < LEAST_COMPONENT, np.where(x < 0.0, -least, least), x)
 
 
 def _inverse(direction: Any) -> Any:
@@ -342,24 +343,19 @@ def surface_at(geometry: Geometry, hit: Hit, origin: Any, direction: Any) -> Sur
     t = np.where(found, hit.t, 0.0)
     point = choose_or_zero(found, origin + vectors.scale(direction, t))
     normal = choose_or_zero(found, _normal(geometry, hit, point, origin, direction))
-    emission = _look_up(geometry.emission, hit.surface)
+    emission = vectors.look_up_rows(geometry.emission, hit.surface)
     # Lights are black behind.
-    light = np.take(geometry.light, hit.surface)
+    light = vectors.look_up(geometry.light, hit.surface)
     if geometry.quads:
-        front = _look_up(_quad_normals(geometry), hit.surface)
-        behind = np.take(geometry.one_sided, hit.surface) & (vectors.dot(front, direction) > 0.0)
+        front = vectors.look_up_rows(_quad_normals(geometry), hit.surface)
+        behind = vectors.look_up(geometry.one_sided, hit.surface) & (vectors.dot(front, direction) > 0.0)
         emission = vectors.choose(behind, 0.0, emission)
-    return Surface(point, normal, _look_up(geometry.reflectance, hit.surface), emission, light)
+    return Surface(point, normal, vectors.look_up_rows(geometry.reflectance, hit.surface), emission, light)
 
 
 def choose_or_zero(condition: Any, a: Any) -> Any:
     """Return vectors a (..., 3) where condition (...) holds, else zero."""
     return vectors.choose(condition, a, 0.0)
-
-
-def _look_up(table: Any, index: Any) -> Any:
-    """Return the rows (..., 3) of a constant table (K, 3) at index (...)."""
-    return vectors.vector(*(np.take(table[:, i], index) for i in range(3)))
 
 
 def _quad_normals(geometry: Geometry) -> Any:
@@ -384,7 +380,7 @@ def _normal(geometry: Geometry, hit: Hit, point: Any, origin: Any, direction: An
         normal = vectors.choose(inside, _sphere_normal(geometry, hit, point, direction), normal)
     if geometry.quads:
         inside = (hit.surface >= geometry.quad_id) & (hit.surface < geometry.nothing)
-        front = _look_up(_quad_normals(geometry), hit.surface)
+        front = vectors.look_up_rows(_quad_normals(geometry), hit.surface)
         normal = vectors.choose(inside, _facing(front, direction), normal)
     return normal
 
@@ -414,8 +410,8 @@ def _box_normal(group: BoxGroup, hit: Hit, origin: Any, direction: Any) -> Any:
     """
     local_origin, local_direction = _into_group(group, origin, direction)
     index = np.minimum(np.maximum(hit.surface - np.int32(group.first_id), 0), len(group.centers) - 1)
-    center = _look_up(np.stack(group.centers), index)
-    half_extent = _look_up(np.stack(group.half_extents), index)
+    center = vectors.look_up_rows(np.stack(group.centers), index)
+    half_extent = vectors.look_up_rows(np.stack(group.half_extents), index)
     enter, leave = slabs(center, half_extent, local_origin, _inverse(local_direction))
     # From outside the last slab entered decides, from inside the first one left.
     face = vectors.choose(vectors.largest(enter) > 0.0, -enter, leave)
@@ -426,6 +422,6 @@ def _box_normal(group: BoxGroup, hit: Hit, origin: Any, direction: Any) -> Any:
 def _sphere_normal(geometry: Geometry, hit: Hit, point: Any, direction: Any) -> Any:
     """Return the normals (..., 3) of hits on spheres, for points (..., 3) on them."""
     index = np.minimum(np.maximum(hit.surface - np.int32(geometry.sphere_id), 0), len(geometry.spheres) - 1)
-    center = _look_up(np.stack([center for center, _ in geometry.spheres]), index)
-    radius = np.take(np.array([radius for _, radius in geometry.spheres], geometry.dtype), index)
+    center = vectors.look_up_rows(np.stack([center for center, _ in geometry.spheres]), index)
+    radius = vectors.look_up(np.array([radius for _, radius in geometry.spheres], geometry.dtype), index)
     return _facing((point - center) / radius[..., np.newaxis], direction)

@@ -232,7 +232,8 @@ def emission_weight(world: World, path: Path, hit: Hit, surface: Surface) -> Any
         return np.where(found_twice, np.zeros_like(hit.t), np.ones_like(hit.t))
     index = np.maximum(surface.light, 0)
     cos_light = np.abs(vectors.dot(surface.normal, path.direction))
-    pdf_light = light_pdf(world.lights, index, hit.t * hit.t, cos_light)
+    distance = np.where(is_light, hit.t, 0.0)  # the square of a miss would overflow
+    pdf_light = light_pdf(world.lights, index, distance * distance, cos_light)
     return np.where(is_light, mis_weight(world.settings, path.pdf, pdf_light), np.ones_like(hit.t))
 
 
@@ -243,7 +244,7 @@ def direct_light(world: World, origin: Any, normal: Any, u_pick: Any, u0: Any, u
     # Pick a light and a point on it, a little off its surface.
     index = sampling.sample_discrete(u_pick, lights.cumulative)
     corner, edge_u, edge_v, light_normal, radiance = (
-        _look_up(table, index)
+        vectors.look_up_rows(table, index)
         for table in (lights.corner, lights.edge_u, lights.edge_v, lights.normal, lights.radiance)
     )
     point = sampling.sample_quad(u0, u1, corner, edge_u, edge_v)
@@ -270,7 +271,7 @@ def light_pdf(lights: Lights, index: Any, square: Any, cos_light: Any) -> Any:
 
     square is the squared distance (...), cos_light (...) the cosine at the light.
     """
-    area, probability = np.take(lights.area, index), np.take(lights.probability, index)
+    area, probability = vectors.look_up(lights.area, index), vectors.look_up(lights.probability, index)
     return probability * square / (area * np.maximum(cos_light, LEAST_DENSITY))
 
 
@@ -282,8 +283,3 @@ def mis_weight(settings: Settings, pdf: Any, other_pdf: Any) -> Any:
     """
     ratio = np.minimum(other_pdf / np.maximum(pdf, LEAST_DENSITY), 1.0 / LEAST_DENSITY)
     return 1.0 / (1.0 + ratio ** HEURISTICS[settings.heuristic])
-
-
-def _look_up(table: Any, index: Any) -> Any:
-    """Return the rows (..., 3) of a constant table (K, 3) at index (...)."""
-    return vectors.vector(*(np.take(table[:, i], index) for i in range(3)))

@@ -147,7 +147,7 @@ def test_rays_parallel_to_an_axis(dtype, scale, axis, sign):
     )  # a difference, a product, a sum
     assert surface.normal[0, axis] == -sign
     origin[(axis + 1) % 3] = 1.001 * scale
-    assert hit(scene, origin, direction, dtype)[0] == I.MISS
+    assert hit(scene, origin, direction, dtype)[0] == np.dtype(dtype).type(I.MISS)
 
 
 @pytest.mark.parametrize("dtype", TYPES)

@@ -118,6 +118,19 @@ def test_layers_of_a_known_scene():
     )  # a product and a sum of numbers < 8
 
 
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("name", ["cornell", "lone_light", "empty"])
+def test_layers_are_zero_where_nothing_is_hit(name, dtype):
+    """Each of these scenes has rays that miss; single samples, so that a miss is a pixel of zeros."""
+    result = R.render(scenes.canonical(name), R.Job(33, 33, dtype=dtype)).frame
+    missed = result["depth"][..., 0] == 0.0
+    assert missed.any()
+    assert result["depth"].max() < 200.0
+    for layer in ("albedo", "normal", "position"):
+        assert not result[layer][missed].any()
+        assert result[layer][~missed].any() or name == "empty"
+
+
 def test_row_zero_is_the_top_and_column_zero_the_left():
     up_right = Sphere((0.5, 0.5, 0.0), 0.3, (1.0, 1.0, 1.0))
     scene = Scene(

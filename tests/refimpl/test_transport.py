@@ -56,6 +56,25 @@ def test_strategies_agree(name, strategy, heuristic):
     assert_same_image(combined, other, 256, 1024)
 
 
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("name", scenes.CANONICAL)
+def test_every_number_has_the_world_s_type(name, dtype):
+    scene, job = scenes.canonical(name), R.Job(9, 7, dtype=dtype)
+    world, basis = (
+        transport.build(scene, Settings(roulette_depth=0), dtype),
+        camera_basis(scene.camera, dtype),
+    )
+    y, x = np.divmod(np.arange(63), 9)
+    counters = transport.Counters(rng.counter(1), R.pixel_counter(x, y), rng.counter(0))
+    path = R.start(basis, x.astype(dtype), y.astype(dtype), job.width, job.height, counters, dtype)
+    path, surface, hit = transport.arrive(world, path)
+    went_on, _ = transport.scatter(world, path, surface, hit, rng.counter(0), counters)
+    layers = R.first_hit_layers(world, surface, hit, path.direction)
+    floats = [*path, *went_on, *surface[:4], hit.t, *layers.values()]
+    assert {str(values.dtype) for values in floats} == {dtype}
+    assert {str(surface.light.dtype), str(hit.surface.dtype)} == {"int32"}
+
+
 def test_strategy_test_finds_a_bias(monkeypatch):
     """The test above can fail: a light density that is wrong by a tenth is found."""
     scene = scenes.canonical("cornell")

@@ -23,7 +23,7 @@ from ..refimpl.errors import CompileError
 from . import artifact, bounds, ir, profiles
 from .artifact import Artifact
 from .dialect import Dialect
-from .emit import emit, kernel_gather, output_channels
+from .emit import emit, kernel_gather, output_channels, private_bytes
 from .glsl import GLSL
 from .ir import Program
 from .opencl import OpenCL
@@ -42,7 +42,7 @@ class Target:
     entry: str
     arguments: str
     native_sine: SineContract
-    emit: Callable[[Program, Sequence[str]], str]
+    emit: Callable[[Program, Sequence[str], bool], str]
 
 
 def _dialect_target(dialect: Dialect) -> Target:
@@ -54,11 +54,11 @@ def _dialect_target(dialect: Dialect) -> Target:
         dialect.entry,
         dialect.arguments,
         dialect.native_sine,
-        lambda program, header: emit(program, dialect, header),
+        lambda program, header, bounded: emit(program, dialect, header, bounded),
     )
 
 
-def _printed(program: Program, header: Sequence[str]) -> str:
+def _printed(program: Program, header: Sequence[str], bounded: bool) -> str:
     """Return the program as text, which is all that the interpreter needs."""
     return "".join(f"# {line}".rstrip() + "\n" for line in header) + ir.text(program)
 
@@ -166,7 +166,8 @@ def compile_program(program: Program, target: str, profile: str = "ieee") -> Art
     common = analysed(program)
     bound = bound_over_images(common, profile, target)
     emitted = pipeline.run(common, promised.passes)
-    source = chosen.emit(emitted, _header(common, chosen, promised, bound) + _weight_lines(emitted))
+    header = _header(common, chosen, promised, bound) + _weight_lines(emitted)
+    source = chosen.emit(emitted, header, bound.output is not None)
     return _assemble(common, emitted, chosen, promised, bound, source)
 
 
@@ -246,6 +247,7 @@ def _assemble(
             source_name: ir.sha256(source.encode()),
             artifact.WEIGHTS_NAME: ir.sha256(raw),
         },
+        "private_bytes": private_bytes(emitted),
         "weights": {"count": int(weights.size), "layout": [asdict(slot) for slot in slots]},
     }
     manifest = json.loads(json.dumps(manifest, allow_nan=False))

@@ -1,7 +1,8 @@
 """What a target's language looks like: templates and a table of operations, no logic.
 
 emit.py fills the templates in. Names in braces: `image` and `channels` of a feature image, `entry`,
-`images` and `defines` of the whole kernel, `index` into the weights, `i` and `value` of an output channel,
+`images` and `defines` of the whole kernel, `unordered` (what stands where the language cannot keep operations
+in order: without an error bound, with one), `index` into the weights, `i` and `value` of an output channel,
 `0` and `1` the operands of an operation. The text between is the language's own, its braces doubled.
 """
 
@@ -32,6 +33,7 @@ class Dialect:
     max_output_channels: int
     native_sine: SineContract
     temporary = "float"
+    unordered: tuple[str, str] = ("", "")
     operations: Mapping[str, str] = {
         "add": "{0} + {1}",
         "subtract": "{0} - {1}",

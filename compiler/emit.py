@@ -31,8 +31,11 @@ BORDERS: Mapping[str, tuple[str, str]] = {
 """By border rule: a statement before the channels are read, and one's value; no read leaves the image."""
 
 
-def emit(program: Program, dialect: Dialect, header: Sequence[str]) -> str:
-    """Return the kernel's source; `header` are the lines of the comment at its top."""
+def emit(program: Program, dialect: Dialect, header: Sequence[str], bounded: bool) -> str:
+    """Return the kernel's source; `header` are the lines of the comment at its top.
+
+    `bounded`: an error bound is stated, and the language must keep the order of operations that it rests on.
+    """
     gather = kernel_gather(program)
     _check_channels(program, dialect)
     images = [dialect.image_declaration.format(image=i.name, channels=i.channels) for i in gather.images]
@@ -45,10 +48,18 @@ def emit(program: Program, dialect: Dialect, header: Sequence[str]) -> str:
         entry=dialect.entry,
         images=dialect.image_separator.join(images),
         image=gather.images[0].name,
+        unordered=dialect.unordered[bounded],
     )
     comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
     body = _Body(program, dialect, gather).text()
     return "\n".join([*comment, begin, *body, dialect.end.format()]) + "\n"
+
+
+def private_bytes(program: Program) -> int:
+    """Return the bytes of the arrays that a kernel declares for each pixel."""
+    body = _Body(program, Dialect(), kernel_gather(program))
+    shapes = [program.nodes[index].type.shape for index in body.group_of if body.declares(index)]
+    return sum(4 * shape[0] for shape in shapes)
 
 
 def kernel_gather(program: Program) -> Gather:
@@ -111,13 +122,15 @@ class _Body:
     lines: list[str] = field(default_factory=list)
     depth: int = 1
 
-    def text(self) -> list[str]:
-        """Return the lines between the kernel's braces."""
-        groups = schedule(self.program)
+    def __post_init__(self) -> None:
+        self.groups = schedule(self.program)
         self.slots = layout(self.program)
         self.readers = users(self.program)
-        self.group_of = {index: number for number, group in enumerate(groups) for index in group}
-        for group in groups:
+        self.group_of = {index: number for number, group in enumerate(self.groups) for index in group}
+
+    def text(self) -> list[str]:
+        """Return the lines between the kernel's braces."""
+        for group in self.groups:
             self._group(group)
         self._outputs()
         return self.lines
@@ -235,6 +248,11 @@ class _Body:
         if not node.type.shape or self.group_of[index] == group:
             return f"t{index}"
         return f"v{index}[{lane}]"
+
+    def declares(self, index: int) -> bool:
+        """Return whether the kernel has an array for this value."""
+        node = self.program.nodes[index]
+        return bool(node.type.shape) and (node.op in ("affine", "stack") or self._is_array(index))
 
     def _is_array(self, index: int) -> bool:
         """Return whether something outside the node's own loop reads this vector component by component."""

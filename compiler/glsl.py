@@ -1,7 +1,8 @@
 """GLSL 3.30 fragment shader: one fragment a pixel; images and weights are textures.
 
 `precise` (GL_ARB_gpu_shader5) keeps the compiler from rewriting (x - k P1) - k P2 as x - k (P1 + P2), which
-plain GLSL allows and which would undo the sine's range reduction.
+plain GLSL allows and which would undo the sine's range reduction. A kernel with an error bound does not
+compile without it.
 """
 
 from __future__ import annotations
@@ -11,6 +12,10 @@ from .profiles import SineContract
 
 WEIGHT_TEXTURE_WIDTH = 1024
 """Texels in a row of the weight texture: every implementation takes 1024 rows of 1024, a million weights."""
+
+
+ORDER_EXTENSION = "GL_ARB_gpu_shader5"
+"""The extension of OpenGL 3.3 that brings `precise`."""
 
 
 class GLSL(Dialect):
@@ -25,10 +30,10 @@ class GLSL(Dialect):
     begin = f"""\
 #version 330 core
 #extension GL_ARB_gpu_shader5 : enable
-#ifdef GL_ARB_gpu_shader5
+#if defined(GL_ARB_gpu_shader5) || __VERSION__ >= 400
 #define PRECISE precise
 #else
-#define PRECISE
+{{unordered}}
 #endif
 {{defines}}
 {{images}}
@@ -60,6 +65,10 @@ void main()
     max_output_channels = 4
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
     temporary = "PRECISE float"
+    unordered = (
+        "#define PRECISE",
+        f"#error the error bound needs `precise`: {ORDER_EXTENSION}, or #version 400",
+    )
     operations = {
         **Dialect.operations,
         "absolute": "abs({0})",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -169,6 +170,18 @@ def test_program_without_a_window_or_with_two_outputs_is_refused(target):
         compile_program(trace(lambda x: x, {"window": Type()}), target)
     with pytest.raises(CompileError, match="has 2 outputs and a gathered window"):
         compile_program(gathered(lambda x: {"a": x, "b": x}), target)
+
+
+def test_a_bound_needs_precise_and_no_bound_does_not():
+    for profile, wanted in (("ieee", "#error the error bound needs"), ("native", "#define PRECISE\n")):
+        assert wanted in compile_program(lower(model()), "opengl", profile).source
+
+
+def test_private_bytes_are_those_of_the_declared_arrays():
+    for target in ("opencl", "opengl"):
+        artifact = compile_program(lower(model()), target)
+        declared = re.findall(r"float v\d+\[(\d+)\];", artifact.source)
+        assert artifact.manifest["private_bytes"] == 4 * sum(map(int, declared)) == 56
 
 
 def test_too_many_output_channels_for_a_fragment():

@@ -17,10 +17,10 @@
  */
 #version 330 core
 #extension GL_ARB_gpu_shader5 : enable
-#ifdef GL_ARB_gpu_shader5
+#if defined(GL_ARB_gpu_shader5) || __VERSION__ >= 400
 #define PRECISE precise
 #else
-#define PRECISE
+#error the error bound needs `precise`: GL_ARB_gpu_shader5, or #version 400
 #endif
 #define WINDOW_SIZE 2
 #define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */

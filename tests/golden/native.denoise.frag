@@ -17,7 +17,7 @@
  */
 #version 330 core
 #extension GL_ARB_gpu_shader5 : enable
-#ifdef GL_ARB_gpu_shader5
+#if defined(GL_ARB_gpu_shader5) || __VERSION__ >= 400
 #define PRECISE precise
 #else
 #define PRECISE

@@ -5,8 +5,9 @@ PoCL asks LLVM for the processor's name and hands the name to its compiler. LLVM
 compiler then refuses every kernel: "unknown target CPU 'generic'" (PoCL's issue 1049). No option or
 variable of PoCL 3 changes the name.
 
-1. Nothing is done unless the device's record holds exactly one pointer to the text "generic"
-   [`name_the_processor`]: a PoCL that knows the processor, or a later one, is left alone.
+1. Nothing is done unless the device's record, as long as the C library says it is [`_allocated`], holds
+   exactly one pointer to the text "generic" [`name_the_processor`]: a PoCL that knows the processor, or a
+   later one, is left alone.
 2. That pointer is set to the name of the instruction set level that the processor has [`level`]: the levels
    of the x86-64 psABI, which LLVM knows since version 12 and which promise no instruction that is missing.
 """
@@ -25,8 +26,8 @@ PLATFORM = "Portable Computing Language"
 UNKNOWN = b"generic\0"
 """What LLVM calls a processor that it does not know."""
 
-RECORD_BYTES = 2048
-"""How far into a device's record the pointer is looked for: PoCL 3.0 has it at 640."""
+RECORD_BYTES = 1024
+"""How far into a device's record the pointer is looked for: PoCL 3.0 has it at 640 of 1024 bytes."""
 
 LEVELS: Mapping[str, frozenset[str]] = {
     "x86-64": frozenset(),
@@ -42,7 +43,7 @@ def name_the_processor(record: int) -> bool:
     if platform.machine().lower() not in ("x86_64", "amd64"):
         return False  # elsewhere "generic" is a name that the compiler takes
     readable = _readable()
-    words = range(record, record + RECORD_BYTES, 8)
+    words = range(record, record + min(RECORD_BYTES, _allocated(record)) // 8 * 8, 8)
     found = [word for word in words if _inside(word, readable) and _points_to_unknown(word, readable)]
     if len(found) != 1:
         return False
@@ -57,6 +58,15 @@ def level(flags: frozenset[str]) -> str:
     """Return the highest instruction set level of a processor with these flags."""
     reached = takewhile(lambda name: LEVELS[name] <= flags, LEVELS)
     return list(reached)[-1]
+
+
+def _allocated(address: int) -> int:
+    """Return the bytes that the C library has given out at `address`; 0 where it does not tell."""
+    usable = getattr(ctypes.CDLL(None), "malloc_usable_size", None)
+    if usable is None:
+        return 0
+    usable.restype, usable.argtypes = ctypes.c_size_t, [ctypes.c_void_p]
+    return int(usable(address))
 
 
 def _points_to_unknown(word: int, readable: list[tuple[int, int]]) -> bool:

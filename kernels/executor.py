@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,10 @@ from ..compiler.ir import Gather, Image
 from ..refimpl.errors import InputError
 
 Images = Mapping[str, NDArray[np.float32]]
+T = TypeVar("T")
+
+KEPT_KERNELS = 64
+"""Kernels that an executor keeps built: programs use a few; a process that makes thousands stays small."""
 
 
 class Executor(ABC):
@@ -43,8 +47,13 @@ class Executor(ABC):
         """Return the output (H, W, C) for encoded feature images (H, W, C), float32, by name."""
         images = checked(artifact, inputs)
         self._check_target(artifact)
-        self.build(artifact, next(iter(images.values())).shape[:2])
+        height, width = next(iter(images.values())).shape[:2]
+        self.check_size(artifact, (height, width))
+        self.build(artifact, (height, width))
         return self._run(artifact, images)
+
+    def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
+        """Refuse images of a size (height, width) that the device cannot hold."""
 
     def _check_target(self, artifact: Artifact) -> None:
         """Refuse a kernel in another language."""
@@ -63,6 +72,13 @@ class Executor(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def keep(built: dict[str, T], digest: str, thing: T) -> list[T]:
+    """Put a built kernel into `built` as the newest, and return those that fall out: the oldest."""
+    built.pop(digest, None)
+    built[digest] = thing
+    return [built.pop(next(iter(built))) for _ in range(len(built) - KEPT_KERNELS)]
 
 
 def gather_of(artifact: Artifact) -> Gather:

@@ -8,6 +8,7 @@ the standard's.
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -16,15 +17,21 @@ from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
-from ..refimpl.errors import CompileError, ExecutorUnavailable
+from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import Executor, Images, black
+from .executor import Executor, Images, black, gather_of, keep
 
 DEVICE_VARIABLE = "WAMNET_OPENCL_DEVICE"
 """Environment variable that chooses a device where the caller does not."""
 
 LOCAL_SIZE = (16, 4)
 """Work items (x, y) in a group: one size for all images, so that PoCL compiles a kernel once."""
+
+STACK_BYTES = 2**20
+"""Most bytes of a group's arrays on a processor: half the smallest stack that glibc gives a thread."""
+
+INDEX_LIMIT = 2**31
+"""Numbers of an image must be fewer: the kernel's indices are `int`."""
 
 BUILD_OPTIONS = ("-cl-std=CL1.2",)
 """Nothing here may allow what the standard's table of errors does not."""
@@ -38,16 +45,21 @@ class OpenCLExecutor(Executor):
     def __init__(self, device: str | None = None) -> None:
         chosen = _choose(device or os.environ.get(DEVICE_VARIABLE) or "")
         self.device = _describe(chosen)
-        if chosen.platform.name == pocl_cpu.PLATFORM:
+        _check_arithmetic(chosen)
+        self._device = chosen
+        # PoCL keeps the records of all devices in one block: only the first one's address is that of a block.
+        if chosen.platform.name == pocl_cpu.PLATFORM and chosen == chosen.platform.get_devices()[0]:
             pocl_cpu.name_the_processor(chosen.int_ptr)
         self._context = cl.Context([chosen])
         self._queue = cl.CommandQueue(self._context)
-        self._built: dict[str, tuple[Any, Any]] = {}
+        self._built: dict[str, tuple[Any, Any, tuple[int, int]]] = {}
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
         """Compile the source, upload the weights, and run once."""
         if artifact.digest in self._built:
+            keep(self._built, artifact.digest, self._built[artifact.digest])
             return
+        local_size = self._local_size(artifact)
         program = cl.Program(self._context, artifact.source)
         try:
             # Without pyopencl's own cache: what is reported as compile time is compiling.
@@ -57,18 +69,62 @@ class OpenCLExecutor(Executor):
             raise CompileError(f"{self.device} does not build the kernel: {error}") from None
         # An empty buffer is no buffer.
         weights = artifact.weights if artifact.weights.size else np.zeros(1, np.float32)
-        self._built[artifact.digest] = (getattr(program, artifact.entry_point), self._upload(weights))
-        self._run(artifact, black(artifact, (1, 1)))
+        built = (getattr(program, artifact.entry_point), self._upload(weights), local_size)
+        self._launch(artifact, built, black(artifact, (1, 1)))
+        keep(self._built, artifact.digest, built)
+
+    def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
+        """Refuse images that are no single buffer of the device, or whose indices `int` does not hold."""
+        height, width = size
+        most = max(output_channels(artifact.program), *(i.channels for i in gather_of(artifact).images))
+        count, largest = height * width * most, self._device.max_mem_alloc_size
+        if count >= INDEX_LIMIT or 4 * count > largest:
+            raise InputError(
+                f"size of the picture on {self.device}",
+                f"{width} x {height} with {most} channels",
+                f"one image must hold fewer than {INDEX_LIMIT} numbers and at most {largest} bytes",
+                "split the picture, or use executor numpy",
+            )
+
+    def _local_size(self, artifact: Artifact) -> tuple[int, int]:
+        """Return the size of a group: smaller on a processor for kernels with large arrays."""
+        items, used = int(self._device.max_work_group_size), int(artifact.manifest["private_bytes"])
+        if self._device.type & cl.device_type.CPU:
+            items = min(items, STACK_BYTES // max(used, 1))
+        if not items:
+            width = max(node.type.shape[0] for node in artifact.program.nodes if node.type.shape)
+            raise CompileError(
+                f"{self.device}: the kernel's arrays take {used} bytes a pixel (the longest vector has "
+                f"{width} numbers): at most {STACK_BYTES} fit a processor's stack; use narrower layers, or a "
+                "GPU, or executor numpy"
+            )
+        x = min(LOCAL_SIZE[0], items)
+        return x, min(LOCAL_SIZE[1], items // x)
 
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
-        kernel, weights = self._built[artifact.digest]
+        height, width = next(iter(images.values())).shape[:2]
+        try:
+            return self._launch(artifact, self._built[artifact.digest], images)
+        except (cl.Error, MemoryError) as error:
+            raise InputError(
+                f"size of the picture on {self.device}",
+                f"{width} x {height}",
+                f"the device does not run it ({' '.join(str(error).split())})",
+                "split the picture, or use executor numpy",
+            ) from None
+
+    def _launch(
+        self, artifact: Artifact, built: tuple[Any, Any, tuple[int, int]], images: Images
+    ) -> NDArray[np.float32]:
+        """Copy the images, run a built kernel, and copy the result back."""
+        kernel, weights, local_size = built
         height, width = next(iter(images.values())).shape[:2]
         result = np.empty((height, width, output_channels(artifact.program)), np.float32)
         output = cl.Buffer(self._context, cl.mem_flags.WRITE_ONLY, result.nbytes)
         inputs = [self._upload(image) for image in images.values()]
         # Whole groups; the kernel leaves out what lies beyond the image.
-        size = tuple(-(-n // local) * local for n, local in zip((width, height), LOCAL_SIZE, strict=True))
-        kernel(self._queue, size, LOCAL_SIZE, *inputs, weights, output, np.int32(width), np.int32(height))
+        size = tuple(-(-n // local) * local for n, local in zip((width, height), local_size, strict=True))
+        kernel(self._queue, size, local_size, *inputs, weights, output, np.int32(width), np.int32(height))
         cl.enqueue_copy(self._queue, result, output)
         return result
 
@@ -80,10 +136,7 @@ class OpenCLExecutor(Executor):
 
 def _choose(wanted: str) -> Any:
     """Return the first device whose description holds `wanted`, GPUs first."""
-    try:
-        found = [device for platform in cl.get_platforms() for device in platform.get_devices()]
-    except cl.LogicError:
-        found = []
+    found = _devices()
     if not found:
         raise ExecutorUnavailable(
             "OpenCL: no platform is installed; pip install 'wamnet[opencl]' brings PoCL, for any processor"
@@ -94,6 +147,27 @@ def _choose(wanted: str) -> Any:
         names = "; ".join(map(_describe, found))
         raise ExecutorUnavailable(f"OpenCL: no device matches {wanted!r}; choose a part of one of: {names}")
     return matching[0]
+
+
+def _devices() -> list[Any]:
+    """Return the devices of all platforms; a platform that fails has none."""
+    found: list[Any] = []
+    with suppress(cl.Error):
+        for platform in cl.get_platforms():
+            with suppress(cl.Error):
+                found += platform.get_devices()
+    return found
+
+
+def _check_arithmetic(device: Any) -> None:
+    """Refuse a device whose arithmetic is not that of the error bound (full profile, round to nearest)."""
+    nearest = bool(device.single_fp_config & cl.device_fp_config.ROUND_TO_NEAREST)
+    if device.profile != "FULL_PROFILE" or not nearest:
+        lacking = "" if nearest else ", not rounding to nearest"
+        raise ExecutorUnavailable(
+            f"OpenCL: {_describe(device)} has {device.profile}{lacking}: "
+            "error bounds need FULL_PROFILE and rounding to nearest; choose another device"
+        )
 
 
 def _describe(device: Any) -> str:

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 from typing import Any
 
 import moderngl
@@ -18,10 +20,10 @@ from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
-from ..compiler.glsl import WEIGHT_TEXTURE_WIDTH
+from ..compiler.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import osmesa
-from .executor import Executor, Images, black
+from .executor import Executor, Images, black, keep
 
 CONTEXT_VARIABLE = "WAMNET_OPENGL_CONTEXT"
 """Environment variable that chooses the kind of context where the caller does not."""
@@ -58,6 +60,21 @@ HOW_TO_GET = {
 """What to do when a kind of context cannot be had, in Debian's words."""
 
 
+@dataclass(frozen=True)
+class _Built:
+    """A kernel on the device, and the sizes of which it has drawn a few pixels."""
+
+    program: Any
+    triangle: Any
+    weights: Any
+    drawn: set[tuple[int, int]] = field(default_factory=set)
+
+    def release(self) -> None:
+        """Give it back."""
+        for thing in (self.triangle, self.program, self.weights):
+            thing.release()
+
+
 class OpenGLExecutor(Executor):
     """One OpenGL context."""
 
@@ -66,55 +83,72 @@ class OpenGLExecutor(Executor):
     def __init__(self, context: str | None = None) -> None:
         kind, self._context = _open(context or os.environ.get(CONTEXT_VARIABLE) or "auto")
         self.device = f"{self._context.info['GL_RENDERER']} through {kind}"
-        self._built: dict[str, tuple[Any, Any, Any]] = {}
-        self._drawn: set[tuple[str, tuple[int, int]]] = set()
+        self._built: dict[str, _Built] = {}
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
         """Compile the shaders, upload the weights, and draw a few pixels."""
-        if artifact.digest not in self._built:
-            self._compile(artifact)
+        built = self._built.get(artifact.digest) or self._compile(artifact)
+        with self._context:
+            for old in keep(self._built, artifact.digest, built):
+                old.release()
         # llvmpipe compiles again for textures whose width or height is, or is not, a power of two.
         small = (3 if size[0] & (size[0] - 1) else 2, 3 if size[1] & (size[1] - 1) else 2)
-        if (artifact.digest, small) not in self._drawn:
-            self._drawn.add((artifact.digest, small))
+        if small not in built.drawn:
             self._run(artifact, black(artifact, small))
+            built.drawn.add(small)
 
-    def _compile(self, artifact: Artifact) -> None:
+    def _compile(self, artifact: Artifact) -> _Built:
         """Compile the shaders and upload the weights."""
-        with self._context:
+        if artifact.manifest["bound"]["output"] and ORDER_EXTENSION not in self._context.extensions:
+            raise CompileError(
+                f"{self.device} lacks {ORDER_EXTENSION}, whose `precise` the error bound needs: use profile "
+                "native, which then promises nothing, or executor opencl or numpy"
+            )
+        with self._context, ExitStack() as made:
+            weights = self._weights(artifact)
+            made.callback(weights.release)
             try:
                 program = self._context.program(vertex_shader=VERTEX_SHADER, fragment_shader=artifact.source)
             except moderngl.Error as error:
                 raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+            made.callback(program.release)
             triangle = self._context.vertex_array(program, [])
-            self._built[artifact.digest] = (program, triangle, self._weights(artifact))
+            made.pop_all()
+            return _Built(program, triangle, weights)
 
     def _weights(self, artifact: Artifact) -> Any:
         """Return the weights as a texture of whole rows."""
         rows = max(1, -(-artifact.weights.size // WEIGHT_TEXTURE_WIDTH))
+        largest = self._context.info["GL_MAX_TEXTURE_SIZE"]
+        if rows > largest:
+            raise CompileError(
+                f"{artifact.weights.size} weights fill {rows} rows of a texture: this OpenGL takes at most "
+                f"{largest}; use narrower layers, or executor opencl or numpy"
+            )
         padded = np.zeros((rows, WEIGHT_TEXTURE_WIDTH, 1), np.float32)
         padded.reshape(-1)[: artifact.weights.size] = artifact.weights
         return self._texture("weights", padded)
 
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
-        program, triangle, weights = self._built[artifact.digest]
+        built = self._built[artifact.digest]
         height, width = next(iter(images.values())).shape[:2]
-        with self._context:
-            textures = {f"image_{name}": self._texture(name, image) for name, image in images.items()}
+        with self._context, ExitStack() as made:
+            textures = {"weight_texture": built.weights}
+            for name, image in images.items():
+                textures[f"image_{name}"] = self._texture(name, image)
+                made.callback(textures[f"image_{name}"].release)
             target = self._context.texture((width, height), 4, dtype="f4")
+            made.callback(target.release)
             frame = self._context.framebuffer([target])
-            try:
-                for unit, (name, texture) in enumerate({**textures, "weight_texture": weights}.items()):
-                    # A driver removes what the shader does not read, and its name with it.
-                    if name in program:
-                        program[name].value = unit
-                    texture.use(unit)
-                frame.use()
-                triangle.render(mode=moderngl.TRIANGLES, vertices=3)
-                pixels = np.frombuffer(target.read(), np.float32).reshape(height, width, 4)
-            finally:
-                for thing in (frame, target, *textures.values()):
-                    thing.release()
+            made.callback(frame.release)
+            for unit, (name, texture) in enumerate(textures.items()):
+                # A driver removes what the shader does not read, and its name with it.
+                if name in built.program:
+                    built.program[name].value = unit
+                texture.use(unit)
+            frame.use()
+            built.triangle.render(mode=moderngl.TRIANGLES, vertices=3)
+            pixels = np.frombuffer(target.read(), np.float32).reshape(height, width, 4)
         return pixels[..., : output_channels(artifact.program)].copy()
 
     def _texture(self, name: str, array: NDArray[np.float32]) -> Any:
@@ -135,7 +169,6 @@ class OpenGLExecutor(Executor):
     def close(self) -> None:
         """Release the context and all that lives in it."""
         self._built.clear()
-        self._drawn.clear()
         self._context.release()
 
 

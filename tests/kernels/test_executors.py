@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -192,6 +195,148 @@ def test_source_that_does_not_compile_is_told_with_the_log(executor_named, kit, 
     broken = kit.with_source(artifact, "int y = ", "int y = nonsense + ")
     with pytest.raises(CompileError, match=r"(?s)does not build the kernel: .*nonsense"):
         executor.run(broken, {"a": np.zeros((2, 2, 3), np.float32)})
+
+
+# ---- the limits of devices ---------------------------------------------------------------------------
+
+
+def wide(kit, width):
+    """Return a program with one hidden layer of `width` numbers over a window of one number."""
+    first, last = np.full((width, 1), 0.01, np.float32), np.full((1, width), 0.5 / width, np.float32)
+    return kit.program(lambda x: np.matmul(np.sin(np.matmul(x, first.T)), last.T), {"a": 1})
+
+
+@pytest.mark.parametrize("width", [1_000, 30_000, 120_000])
+def test_wide_layers_run_on_opencl(executor_named, kit, width):
+    """Arrays of 8 bytes a neuron: groups of 64 pixels would need up to 60 MB of a thread's 8 MB stack."""
+    program = wide(kit, width)
+    images = {"a": np.random.default_rng(2).uniform(-2, 2, (5, 18, 1)).astype(np.float32)}
+    assert kit.excess(executor_named("opencl"), program, images) <= 1
+
+
+def test_too_wide_a_layer_is_refused_on_a_processor(executor_named, kit):
+    executor = executor_named("opencl")
+    if "pthread" not in executor.device and "cpu" not in executor.device.lower():
+        pytest.skip(f"{executor.device} is no processor: its arrays lie on no stack")
+    with pytest.raises(
+        CompileError,
+        match=r"arrays take 1200004 bytes a pixel \(the longest vector has 150000 numbers\): at most 1048576",
+    ):
+        executor.build(compile_program(wide(kit, 150_000), "opencl"))
+
+
+def test_weights_that_no_texture_holds(executor_named, kit, monkeypatch):
+    executor = executor_named("opengl-egl")
+    monkeypatch.setitem(executor._context.info, "GL_MAX_TEXTURE_SIZE", 4)
+    with pytest.raises(
+        CompileError, match="6002 weights fill 6 rows of a texture: this OpenGL takes at most 4"
+    ):
+        executor.build(compile_program(wide(kit, 3_001), "opengl"))
+
+
+@pytest.mark.parametrize("size", [(65536, 16384), (2**20, 2**20)])
+def test_picture_beyond_a_buffer_is_refused_before_it_is_copied(executor_named, kit, size):
+    executor = executor_named("opencl")
+    artifact = compile_program(kit.program(lambda x: x[..., 0], {"a": 2}), "opencl")
+    with pytest.raises(
+        InputError,
+        match=rf"size of the picture on .* is {size[1]} x {size[0]} with 2 channels: one image must",
+    ):
+        executor.check_size(artifact, size)
+
+
+def test_device_that_runs_out_of_memory_is_told_on_one_line(executor_named, kit, monkeypatch):
+    executor = executor_named("opencl")
+    artifact = compile_program(kit.program(lambda x: x * 1.5, {"a": 1}), "opencl")
+    executor.build(artifact)
+
+    def full(array):
+        raise MemoryError("no\nmemory")
+
+    monkeypatch.setattr(executor, "_upload", full)
+    with pytest.raises(
+        InputError, match=r"is 3 x 2: the device does not run it \(no memory\); split the picture"
+    ):
+        executor.run(artifact, {"a": np.zeros((2, 3, 1), np.float32)})
+
+
+def test_a_kernel_counts_as_built_after_its_first_run(executor_named, kit, monkeypatch):
+    executor = executor_named("opencl")
+    artifact = compile_program(kit.program(lambda x: x * 1.75, {"a": 1}), "opencl")
+    with monkeypatch.context() as patch:
+        patch.setattr(executor, "_launch", lambda *_: 1 / 0)
+        with pytest.raises(ZeroDivisionError, match="division"):
+            executor.build(artifact)
+    assert artifact.digest not in executor._built
+
+
+@pytest.mark.parametrize("name", ["opencl", "opengl-egl"])
+def test_old_kernels_are_given_back(executor_named, kit, monkeypatch, name):
+    executor = executor_named(name)
+    monkeypatch.setattr(sys.modules[type(executor).__mro__[1].__module__], "KEPT_KERNELS", 2)
+    artifacts = [
+        compile_program(kit.program(lambda x, f=f: x * f, {"a": 1}), executor.name) for f in (1.1, 1.2, 1.3)
+    ]
+    for artifact in (artifacts[0], artifacts[1], artifacts[0], artifacts[2]):
+        executor.build(artifact)
+    assert list(executor._built) == [artifacts[0].digest, artifacts[2].digest]
+    image = np.full((2, 2, 1), 0.5, np.float32)
+    assert kit.excess(executor, kit.program(lambda x: x * 1.2, {"a": 1}), {"a": image}, artifacts[1]) <= 1
+
+
+def test_a_refused_texture_gives_the_others_back(executor_named, kit, monkeypatch):
+    executor = executor_named("opengl-egl")
+    artifact = compile_program(kit.program(lambda x: x * 1.5, {"a": 1, "b": 1}), "opengl")
+    executor.build(artifact, (3, 3))
+    made = []
+    real = executor._texture
+
+    def texture(name, array):
+        if name == "b":
+            raise InputError("texture", name, "refused", "none")
+        made.append(real(name, array))
+        return made[-1]
+
+    monkeypatch.setattr(executor, "_texture", texture)
+    with pytest.raises(InputError, match="texture is b"):
+        executor.run(artifact, {name: np.zeros((3, 3, 1), np.float32) for name in "ab"})
+    assert [type(thing.mglo).__name__ for thing in made] == ["InvalidObject"]
+
+
+WITHOUT_PRECISE = """
+import numpy as np
+from wamnet import kernels
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.ir import Gather, Image, Type
+from wamnet.compiler.trace import trace
+from wamnet.refimpl.dataset import Window
+
+gather = Gather(Window(1, "clamp"), (Image("a", 1, -1.0, 1.0),))
+program = trace(lambda x: np.sin(x), {"window": Type(shape=(1,))}, gather)
+image = {"a": np.ones((1, 1, 1), np.float32)}
+with kernels.open_executor("opengl", context="egl") as executor:
+    print(executor.run(compile_program(program, "opengl", "native"), image).item())
+    try:
+        executor.run(compile_program(program, "opengl"), image)
+    except Exception as error:
+        print(type(error).__name__, error)
+"""
+
+
+def test_bounded_kernel_is_refused_without_precise(executor_named):
+    """Mesa hides the extension that brings `precise`: the profile without a bound runs, the other not."""
+    executor_named("opengl-egl")
+    outcome = subprocess.run(
+        [sys.executable, "-c", WITHOUT_PRECISE],
+        env={**os.environ, "MESA_EXTENSION_OVERRIDE": "-GL_ARB_gpu_shader5"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    value, refusal = outcome.stdout.splitlines()
+    assert abs(float(value) - np.sin(1.0)) <= 1e-3  # a GPU's own sine is right to 2^-11 at least
+    assert refusal.startswith("CompileError")
+    assert "lacks GL_ARB_gpu_shader5, whose `precise` the error bound needs: use profile native" in refusal
 
 
 def test_too_large_a_texture_is_refused(executor_named, kit):

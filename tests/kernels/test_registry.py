@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -55,6 +56,47 @@ def test_no_opencl_platform(executor_named, monkeypatch):
     with pytest.raises(
         ExecutorUnavailable, match=r"no platform is installed; pip install 'wamnet\[opencl\]'"
     ):
+        kernels.open_executor("opencl")
+
+
+def test_opencl_platform_that_fails_is_passed_over(executor_named, monkeypatch):
+    device = executor_named("opencl").device
+    from wamnet.kernels import opencl_executor
+
+    class Broken:
+        def get_devices(self):
+            raise opencl_executor.cl.LogicError("clGetDeviceIDs failed")
+
+    real = opencl_executor.cl.get_platforms()
+    monkeypatch.setattr(opencl_executor.cl, "get_platforms", lambda: [Broken(), *real])
+    with kernels.open_executor("opencl") as executor:
+        assert executor.device == device
+
+
+@pytest.mark.parametrize(
+    ("profile", "rounding", "message"),
+    [
+        (
+            "EMBEDDED_PROFILE",
+            True,
+            "box has EMBEDDED_PROFILE: error bounds need FULL_PROFILE and rounding to",
+        ),
+        (
+            "FULL_PROFILE",
+            False,
+            "box has FULL_PROFILE, not rounding to nearest: error bounds need FULL_PROFILE",
+        ),
+    ],
+)
+def test_opencl_device_with_other_arithmetic(executor_named, monkeypatch, profile, rounding, message):
+    executor_named("opencl")
+    from wamnet.kernels import opencl_executor
+
+    nearest = opencl_executor.cl.device_fp_config.ROUND_TO_NEAREST if rounding else 0
+    device = SimpleNamespace(profile=profile, single_fp_config=nearest)
+    monkeypatch.setattr(opencl_executor, "_choose", lambda wanted: device)
+    monkeypatch.setattr(opencl_executor, "_describe", lambda device: "box")
+    with pytest.raises(ExecutorUnavailable, match=message):
         kernels.open_executor("opencl")
 
 

@@ -1,14 +1,15 @@
 """What the compiler hands out: source, weights and a manifest that says how to call it and what it promises.
 
 Everything is a function of program, target and profile, to the byte: no time, no path, no machine.
-[`write`] puts an artifact into a folder file by file under temporary names, the manifest last; it carries
-the hashes of the others.
+[`write`] writes all files of an artifact under names that nobody else has, then gives them their own names
+one by one, the manifest last; it carries the hashes of the others: a mixture with another artifact shows.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,7 +61,10 @@ def manifest_text(artifact: Artifact) -> str:
 
 
 def write(artifact: Artifact, folder: str | os.PathLike[str]) -> tuple[Path, ...]:
-    """Write source, weights and manifest into `folder`; no file is ever seen half written."""
+    """Write source, weights and manifest into `folder`; no file is ever seen half written.
+
+    Others may write there at once. What fails before the first file has its name leaves the folder as it was.
+    """
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     contents = {
@@ -68,16 +72,14 @@ def write(artifact: Artifact, folder: str | os.PathLike[str]) -> tuple[Path, ...
         WEIGHTS_NAME: weight_bytes(artifact),
         MANIFEST_NAME: manifest_text(artifact).encode(),
     }
-    for name, content in contents.items():
-        _write_whole(target / name, content)
-    return tuple(target / name for name in contents)
-
-
-def _write_whole(path: Path, content: bytes) -> None:
-    """Write beside `path`, then take its name in one step."""
-    part = path.with_name(f".{path.name}.part")
+    own = secrets.token_hex(8)
+    parts = {target / name: target / f".{name}.{own}.part" for name in contents}
     try:
-        part.write_bytes(content)
-        part.replace(path)
+        for part, content in zip(parts.values(), contents.values(), strict=True):
+            part.write_bytes(content)
+        for path, part in parts.items():
+            part.replace(path)
     finally:
-        part.unlink(missing_ok=True)
+        for part in parts.values():
+            part.unlink(missing_ok=True)
+    return tuple(parts)

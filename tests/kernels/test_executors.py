@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wamnet.compiler.compile import compile_program
+from wamnet.compiler.interpret import interpret
 from wamnet.compiler.lower import lower
 from wamnet.kernels import denoise_on
 from wamnet.refimpl import dataset, denoise, frame
@@ -59,6 +60,8 @@ def cases(draw):
 def test_error_is_within_the_bound(executor, kit, case):
     network = kit.network(case["widths"], case["omegas"], case["seed"], case["scale"])
     program = kit.denoiser(network, case["channels"], case["size"], case["border"])
+    (seen,) = interpret(program, {"window": kit.windows(program, case["images"])}, np.float64).values()
+    assert ((seen > 0) & (seen < 1)).all()
     assert kit.excess(executor, program, case["images"]) <= 1
 
 

@@ -123,7 +123,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
 
 @pytest.fixture
 def golden(pytestconfig: pytest.Config) -> Callable[[str, str], None]:
-    """Give `check(name, text)`: the text must equal tests/golden/NAME to the byte; a missing file fails."""
+    """Give `check(name, text)`: the text must equal tests/golden/<name> to the byte; a missing file fails."""
     folder = Path(__file__).parent / "golden"
 
     def check(name: str, text: str) -> None:

@@ -1,0 +1,55 @@
+"""House rule about paths: what a document or a docstring names is there."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+
+import pytest
+
+NAMED = re.compile(
+    r"(?<![\w/.<>{}*-])((?:refimpl|compiler|kernels|cli|tests|spec|bench|experiments|\.ci)/[\w/.*<>{}-]*[\w>}*/])"
+)
+"""A path from the repository's root: it begins with one of its folders."""
+
+
+def named_paths(text: str) -> list[str]:
+    """Return the paths that a text names; one with a gap to fill in, as in spec/<stem>.md, is none."""
+    found = [match.rstrip("/") for match in NAMED.findall(text)]
+    return [path for path in found if not set("<>{}*") & set(path)]
+
+
+def texts(house) -> Iterator[tuple[str, str]]:
+    """Yield (place, text) of every document and of every string that stands alone in Python code."""
+    for path in house.files():
+        if path.suffix == ".md":
+            yield path.relative_to(house.root).as_posix(), path.read_text()
+    for source in house.python():
+        for node in ast.walk(source.tree):
+            alone = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+            if alone and isinstance(node.value.value, str):
+                yield source.at(node, "docstring"), node.value.value
+
+
+def test_named_paths_exist(house):
+    wrong = [
+        f"{place}: {path}"
+        for place, text in texts(house)
+        for path in named_paths(text)
+        if not (house.root / path).exists()
+    ]
+    house.refuse(wrong, "A path that a document or a docstring names exists: correct it.")
+
+
+@pytest.mark.parametrize(
+    ("text", "paths"),
+    [
+        ("see `compiler/ops.py`, and tests/kernels.", ["compiler/ops.py", "tests/kernels"]),
+        ("spec/<stem>.md and compiler/{target}.py and tests/*.py", []),
+        ("out/cli/x, ./spec/none", []),
+        (".ci/run runs it; the folder tests/meta/", [".ci/run", "tests/meta"]),
+    ],
+)
+def test_the_pattern(text, paths):
+    assert named_paths(text) == paths

@@ -60,7 +60,7 @@ def step(
     m_hat = tuple(m_i / (1.0 - beta_1**t) for m_i in m)
     v_hat = tuple(v_i / (1.0 - beta_2**t) for v_i in v)
     moved = tuple(
-        theta - learning_rate * m_i / (np.sqrt(v_i) + epsilon)
-        for theta, m_i, v_i in zip(parameters, m_hat, v_hat, strict=True)
+        theta - learning_rate * m_hat_i / (np.sqrt(v_hat_i) + epsilon)
+        for theta, m_hat_i, v_hat_i in zip(parameters, m_hat, v_hat, strict=True)
     )
     return moved, AdamState(m, v, t)

@@ -368,7 +368,8 @@ def _quad_normals(geometry: Geometry) -> Any:
 
 def _normal(geometry: Geometry, hit: Hit, point: Any, origin: Any, direction: Any) -> Any:
     """Return the unit normals (..., 3), facing the rays' origins, from the kinds that the scene has."""
-    normal = 0.0 * direction
+    normal = np.zeros_like(direction)
+    # Each kind that the scene has gives normals to all lanes; those of its own ids are kept.
     if geometry.room is not None:
         _, leave = _room_slabs(geometry, origin, direction)
         normal = _axis_normal(*_least_axis(leave), direction)

@@ -42,6 +42,9 @@ VERSION = 1
 ROTATION_TOLERANCE = 1e-6
 """Largest entry of R R^T - I that is still taken for a rotation: JSON written with seven digits passes."""
 
+LARGEST_NUMBER = 1e12
+"""Largest magnitude of any number of a scene: squares of such distances are far from float32's overflow."""
+
 WALLS = ("low_x", "high_x", "low_y", "high_y", "low_z", "high_z")
 """Order of a room's walls: 2 * axis + (1 at the high end). `low_y` is the floor."""
 
@@ -165,19 +168,18 @@ def from_json(text: str) -> Scene:
     """Return the scene in a JSON text; raise InputError, with the value's path, where it breaks a rule."""
     try:
         data = json.loads(text)
-    except json.JSONDecodeError as error:
+    except (json.JSONDecodeError, RecursionError) as error:
         raise InputError(
             "scene text", f"no JSON ({error})", "a scene is a JSON object", "mend the text"
         ) from None
-    if not isinstance(data, dict) or data.pop("format", None) != FORMAT:
-        raise InputError(
-            "scene.format", "something else", f'it must be "{FORMAT}"', "take the key from a scene that works"
-        )
-    version = data.pop("version", None)
-    if version != VERSION:
-        raise InputError(
-            "scene.version", version, f"it must be {VERSION}", "convert the file or update wamnet"
-        )
+    if not isinstance(data, dict):
+        raise InputError("scene text", data, "a scene is a JSON object", "take one from `wamnet scene`")
+    form, version = data.pop("format", None), data.pop("version", None)
+    if form != FORMAT:
+        raise InputError("scene.format", repr(form), f"it must be {FORMAT!r}", "is this a scene?")
+    if version is True or version != VERSION:
+        rule = f"it must be {VERSION}"
+        raise InputError("scene.version", repr(version), rule, "convert the file or update wamnet")
     return validate(_build(Scene, data, "scene"))
 
 
@@ -237,15 +239,27 @@ def _convert(hint: Any, value: Any, path: str) -> Any:
 
 def _number(value: Any, path: str) -> float:
     """Return a JSON number as a finite float."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise InputError(path, value, "it must be a finite number", "write a decimal number")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST_NUMBER:
+        rule = f"it must be a finite number of at most {LARGEST_NUMBER:g} in magnitude"
+        raise InputError(path, _shortened(value), rule, "write a decimal number; choose other units")
     return float(value)
+
+
+def _shortened(value: Any) -> str:
+    """Return a value as text; an integer of thousands of digits would be no line."""
+    return (
+        f"an integer of {value.bit_length()} bits"
+        if type(value) is int and abs(value) > 1e18
+        else repr(value)
+    )
 
 
 def _text(value: Any, path: str) -> str:
     """Return a JSON string."""
     if not isinstance(value, str):
         raise InputError(path, value, "it must be a text", "put it in quotation marks")
+    if any("\ud800" <= character <= "\udfff" for character in value):
+        raise InputError(path, ascii(value), "half a character cannot be written to a file", "mend the text")
     return value
 
 
@@ -296,7 +310,8 @@ def _check_finite(part: Any, path: str) -> None:
     """Refuse NaN and infinities anywhere in a primitive."""
     for f in fields(part):
         value = getattr(part, f.name)
-        _check(value, f"{path}.{f.name}", _is_finite, "all numbers must be finite", "mend the number")
+        rule = f"all numbers must be finite and at most {LARGEST_NUMBER:g} in magnitude"
+        _check(value, f"{path}.{f.name}", _is_finite, rule, "mend the number")
 
 
 def _check_camera(camera: Camera) -> None:
@@ -378,7 +393,7 @@ def _numbers(value: Any) -> Iterable[float]:
 
 
 def _is_finite(value: Any) -> bool:
-    return all(math.isfinite(x) for x in _numbers(value))
+    return all(abs(x) <= LARGEST_NUMBER for x in _numbers(value))
 
 
 def _not_negative(value: Vector) -> bool:

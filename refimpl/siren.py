@@ -1,6 +1,6 @@
 """The network: a multi-layer perceptron with sine activations, forwards and backwards by hand.
 
-1. Draw the parameters [`init`]: uniform, in the ranges of the source, from the counter generator.
+1. Draw the parameters [`init`]: uniform, weights in the ranges of the source (biases: SIR-4), from counters.
 2. Map a vector of `D_in` numbers to `D_out` numbers [`forward`]: all layers but the last are
    ``sin(omega_0 * (W x + b))``, the last is affine. This function is the one that the compiler traces.
 3. For training, do the same and keep what the derivative needs [`forward_cached`], then apply the chain rule
@@ -140,18 +140,19 @@ def backward(siren: Siren, cache: Cache, dy: Array, with_dx: bool = True) -> Gra
     """Turn dy (N, D_out), the loss's derivative by y, into the derivatives by every parameter and by x."""
     last = len(siren.weights) - 1
     dweights, dbiases = [], []
-    dx = dy
+    dx = None
     for layer in range(last, -1, -1):
         # y = sin(a), a = omega_0 z: dz = dy cos(a) omega_0. The last layer has y = z.
-        dz = dx
+        dz = dy
         if layer < last:
-            dz = dx * np.cos(cache.angles[layer]) * _omega_0(siren, layer)
+            dz = dy * np.cos(cache.angles[layer]) * _omega_0(siren, layer)
         # z = x W^T + b, summed over the N rows.
         dweights.append(np.matmul(dz.T, cache.inputs[layer]))
         dbiases.append(np.sum(dz, axis=0))
         # The input of the first layer is data: training has no use for its derivative, which costs a third.
         if layer > 0 or with_dx:
             dx = np.matmul(dz, siren.weights[layer])
+            dy = dx  # this layer's input is the output of the one before it
     return Gradients(tuple(dweights[::-1]), tuple(dbiases[::-1]), dx if with_dx else None)
 
 

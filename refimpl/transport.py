@@ -17,7 +17,8 @@ unbiased estimator as well, which the tests use. Emission of surfaces that are n
 background, is found by the second way alone and has weight 1.
 
 The functions hold no state, write nothing in place, use no mask as an index, and get their random numbers
-from (seed, pixel, sample), so that lanes are independent: this is what the compiler traces. Drivers loop.
+from (seed, pixel, sample), so that lanes are independent: a compiler can trace them as it traces the network.
+Drivers loop.
 """
 
 from __future__ import annotations
@@ -190,16 +191,16 @@ def scatter(
     """
     alive = hit.surface < world.geometry.nothing
     block = np.uint32(1) + np.uint32(BLOCKS_PER_BOUNCE) * depth
-    u_pick, u0, u1, u_roulette = _uniforms(world, counters, block)
+    u_pick, u_light_0, u_light_1, u_roulette = _uniforms(world, counters, block)
     # Add light that a sampled point of a light sends here.
     origin = intersection.spawn_origin(surface.point, surface.normal, np.where(alive, hit.t, 0.0))
     beta, radiance = path.beta * surface.reflectance, path.radiance
     if world.lights is not None and world.settings.strategy != "bsdf":
-        light = direct_light(world, origin, surface.normal, u_pick, u0, u1)
+        light = direct_light(world, origin, surface.normal, u_pick, u_light_0, u_light_1)
         radiance = radiance + beta * vectors.choose(alive, light, 0.0)
     # Sample the next direction.
-    u0, u1, _, _ = _uniforms(world, counters, block + np.uint32(1))
-    local = sampling.sample_cosine_hemisphere(u0, u1)
+    u_direction_0, u_direction_1, _, _ = _uniforms(world, counters, block + np.uint32(1))
+    local = sampling.sample_cosine_hemisphere(u_direction_0, u_direction_1)
     direction = sampling.to_world(local, surface.normal)
     pdf = sampling.cosine_hemisphere_pdf(local[..., 2])
     # End paths that carry nothing, and some others by Russian roulette.

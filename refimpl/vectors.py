@@ -1,8 +1,9 @@
 """Three-vectors over lanes: leading axes are lanes (paths, pixels), the last axis holds the three components.
 
-All functions are written with operations that the compiler can trace; dtype follows the arguments. [`vector`]
-keeps the components in separate planes of memory, which is why elementwise code on `(..., 3)` arrays is as
-quick as on three separate arrays; the values do not depend on it.
+All functions are written without state, in-place writes or masks as indices, so that they can be traced;
+dtype follows the arguments. [`vector`] keeps the components in separate planes of memory, which is why
+elementwise code on `(..., 3)` arrays is as quick as on three separate arrays; the values do not depend on
+it.
 """
 
 from __future__ import annotations

@@ -67,8 +67,20 @@ def changed(path: str, value: object) -> str:
 
 
 REFUSALS = [
-    ("format", "other", r"scene.format .* take the key"),
+    ("format", "other", r"scene.format is 'other': it must be 'wamnet-scene'"),
     ("version", 2, r"scene.version is 2: it must be 1"),
+    ("version", "1", r"scene.version is '1': it must be 1"),
+    ("name", "\ud800", r"scene.name is .*: half a character cannot be written"),
+    (
+        "spheres.0.radius",
+        10**400,
+        r"radius is an integer of 1329 bits: it must be a finite number of at most 1e\+12",
+    ),
+    (
+        "spheres.0.center",
+        [0, 1e39, 0],
+        r"center\[1\] is 1e\+39: it must be a finite number of at most 1e\+12",
+    ),
     ("name", 3, r"scene.name is 3: it must be a text"),
     ("name", ..., r"scene.name is missing: it is required"),
     ("info", [], r"scene.info is \[\]: it must map texts to texts"),
@@ -77,7 +89,7 @@ REFUSALS = [
     ("camera.position", [0, 0], r"scene.camera.position is \[0, 0\]: it must have 3 entries"),
     ("camera.position", "x", r"scene.camera.position is x: it must be a list"),
     ("camera.position.1", True, r"scene.camera.position\[1\] is True: it must be a finite number"),
-    ("camera.position.1", "1", r"scene.camera.position\[1\] is 1: it must be a finite number"),
+    ("camera.position.1", "1", r"scene.camera.position\[1\] is '1': it must be a finite number"),
     ("camera.vertical_fov_deg", 180, r"vertical_fov_deg is 180.0: it must lie between 0 and 180"),
     ("camera.look_at", [0, 0, 5], r"look_at is .*: it must differ from position"),
     ("camera.up", [0, 0, 1], r"up is .*: it must not be parallel to the view"),
@@ -106,7 +118,7 @@ def test_refuses(path, value, message):
         S.from_json(changed(path, value))
 
 
-@pytest.mark.parametrize("text", ["", "{", "[1]", '"x"', "NaN"])
+@pytest.mark.parametrize("text", ["", "{", "[1]", '"x"', "NaN", "[" * 100_000])
 def test_refuses_texts_that_are_no_scene(text):
     with pytest.raises(InputError, match=r"scene text|scene.format"):
         S.from_json(text)

@@ -25,7 +25,7 @@ from .artifact import Artifact
 from .dialect import Dialect
 from .emit import emit, kernel_gather, output_channels, private_bytes
 from .glsl import GLSL
-from .ir import Program
+from .ir import OUTPUT_ENCODING, Program
 from .opencl import OpenCL
 from .passes import pipeline
 from .profiles import Profile, SineContract
@@ -84,6 +84,10 @@ TARGETS: Mapping[str, Target] = {
 
 KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
 """What of a model's info a manifest repeats: how to encode images, and where the weights come from."""
+
+
+JSON_INFO = ("normalization", "recipe")
+"""Which of them are JSON texts."""
 
 
 @dataclass(frozen=True)
@@ -174,16 +178,21 @@ def compile_program(program: Program, target: str, profile: str = "ieee") -> Art
 def _header(program: Program, target: Target, profile: Profile, bound: Bound) -> list[str]:
     """Return the lines of the comment at the top of the source."""
     gather, channels = kernel_gather(program), output_channels(program)
-    images = [f"{i.name} ({i.channels} channels in {i.range_text})" for i in gather.images]
+    images = [
+        f"{i.name}: {i.channels} channels in {i.range_text}" + (f", {i.encoding}" if i.encoding else "")
+        for i in gather.images
+    ]
+    encoding = dict(program.info).get(OUTPUT_ENCODING)
     arguments = target.arguments.format(channels=channels).split("\n")
     size = gather.window.size
     return [
         f"wamnet denoiser, {target.language}. Generated: change the compiler, not this text.",
         f"program   {ir.digest(program)[:32]}",
-        f"input     {', '.join(images)}",
+        f"images    {images[0]}",
+        *(f"          {line}" for line in images[1:]),
         f"window    {size} x {size} pixels, the pixel itself is tap {size // 2}",
         f"border    {gather.window.border}",
-        f"output    {channels} channels, row 0 is the top row",
+        f"output    {channels} channels" + (f", {encoding}" if encoding else ""),
         f"profile   {profile.name}: {profile.text}",
         f"sine      {sine_contract(profile.name, target.name).text}",
         f"bound     {_bound_text(bound)}",
@@ -235,14 +244,18 @@ def _assemble(
         "passes": [*pipeline.COMMON, *profile.passes],
         "window": {**asdict(gather.window), "centre": gather.window.size // 2},
         "images": [asdict(image) for image in gather.images],
-        "output": {"name": emitted.outputs[0][0], "channels": output_channels(emitted)},
+        "output": {
+            "name": emitted.outputs[0][0],
+            "channels": output_channels(emitted),
+            "encoding": dict(emitted.info).get(OUTPUT_ENCODING, ""),
+        },
         "arguments": target.arguments.format(channels=output_channels(emitted)),
         "bound": {
             "output": bound.output and [round_up(error) for error in bound.output],
             "against": "float64 reference, same float32 weights and images",
         },
         "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],
-        "info": {name: text for name, text in emitted.info if name in KEPT_INFO},
+        "info": {name: _info_value(name, text) for name, text in emitted.info if name in KEPT_INFO},
         "files": {
             source_name: ir.sha256(source.encode()),
             artifact.WEIGHTS_NAME: ir.sha256(raw),
@@ -252,6 +265,11 @@ def _assemble(
     }
     manifest = json.loads(json.dumps(manifest, allow_nan=False))
     return Artifact(target.name, profile.name, target.entry, source, source_name, emitted, weights, manifest)
+
+
+def _info_value(name: str, text: str) -> Any:
+    """Return a text of a model's info, or what it holds where it is JSON itself."""
+    return json.loads(text) if name in JSON_INFO else text
 
 
 def asdict_finite(contract: SineContract) -> dict[str, Any]:

@@ -57,10 +57,13 @@ void main()
     weight = "weights({index})"
     store = "result[{i}] = {value};"
     arguments = (
-        "each image: a float texture (R32F to RGBA32F) of width x height, texel row 0 is the top row;\n"
-        f"weight_texture: R32F, {WEIGHT_TEXTURE_WIDTH} texels wide, filled row by row;\n"
-        "result: a float colour buffer of width x height whose row 0 is the top row.\n"
-        "Draw one triangle that covers it"
+        "each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel\n"
+        "row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the\n"
+        "bottom, or the window stands on its head;\n"
+        f"weight_texture: R32F, {WEIGHT_TEXTURE_WIDTH} texels wide, as many rows as weights fill (the last\n"
+        "padded), row by row; it is read with texelFetch alone, so filters do not matter;\n"
+        "result: a float colour buffer of width x height, row 0 again the top row; no sRGB conversion by\n"
+        "the target, the values are encoded already. Draw one triangle that covers it"
     )
     max_output_channels = 4
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)

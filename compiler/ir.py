@@ -37,6 +37,9 @@ class Type:
         return self.dtype + "".join(f"[{n}]" for n in self.shape)
 
 
+OUTPUT_ENCODING = "output_encoding"
+"""Key of [`Program.info`] under which a program says how its output is to be read."""
+
 Attribute = str | int | float | Type
 """What a node may carry beside its operands: a name, an index, a constant, the type of an input."""
 
@@ -60,12 +63,13 @@ class Node:
 
 @dataclass(frozen=True)
 class Image:
-    """A feature image: what an encoded channel can hold lies in [low, high]."""
+    """A feature image: an encoded channel lies in [low, high]; `encoding` says how it is made."""
 
     name: str
     channels: int
     low: float
     high: float
+    encoding: str = ""
 
     @property
     def range_text(self) -> str:

@@ -7,9 +7,9 @@ from dataclasses import asdict
 
 import numpy as np
 
-from ..refimpl.dataset import FEATURES
+from ..refimpl.dataset import DISPLAY_FORMULA, FEATURES
 from ..refimpl.denoise import Model, as_dtype, check_model, denoise_pixel
-from .ir import Gather, Image, Program, Type
+from .ir import OUTPUT_ENCODING, Gather, Image, Program, Type
 from .trace import trace
 from .verify import verify
 
@@ -18,10 +18,15 @@ def lower(model: Model) -> Program:
     """Return the program of `denoise_pixel` for this model, with its weights rounded to float32."""
     check_model(model)
     features = [FEATURES[name] for name in model.features]
-    images = tuple(Image(f.name, f.channels, f.low, f.high) for f in features)
+    scales = model.normalization
+    images = tuple(Image(f.name, f.channels, f.low, f.high, f.encoding(scales)) for f in features)
     gather = Gather(model.window, images)
     siren = as_dtype(model.siren, np.float32)
-    info = {**model.info, "normalization": json.dumps(asdict(model.normalization), sort_keys=True)}
+    info = {
+        **model.info,
+        "normalization": json.dumps(asdict(scales), sort_keys=True),
+        OUTPUT_ENCODING: DISPLAY_FORMULA.format_map(asdict(scales)),
+    }
     program = trace(
         lambda window: denoise_pixel(siren, window),
         {"window": Type(shape=(gather.n_inputs,))},

@@ -34,7 +34,8 @@ __kernel void {entry}(
     store = "result[(y * width + x) * {channels} + {i}] = {value};"
     arguments = (
         "each image: width * height * channels floats, rows from the top, channels interleaved;\n"
-        "weights; result: width * height * {channels} floats in the same order; width; height.\n"
+        "weights; result: width * height * {channels} floats in the same order, encoded as `output` says;\n"
+        "width; height.\n"
         "Global size: at least (width, height)"
     )
     max_output_channels = 2**16

@@ -18,7 +18,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -55,7 +55,10 @@ class Normalization:
 
 @dataclass(frozen=True)
 class Feature:
-    """A network input: `encode` turns `layer` (..., channels) into numbers in [low, high]."""
+    """A network input: `encode` turns `layer` (..., channels) into numbers in [low, high].
+
+    `formula` says the same in words for whoever feeds a kernel, with a [`Normalization`]'s fields in braces.
+    """
 
     name: str
     layer: str
@@ -63,6 +66,11 @@ class Feature:
     low: float
     high: float
     encode: Callable[[Array, Normalization], Array]
+    formula: str
+
+    def encoding(self, normalization: Normalization) -> str:
+        """Return the formula with the model's scales in it."""
+        return self.formula.format_map(asdict(normalization))
 
 
 def encode_color(values: Array, normalization: Normalization) -> Array:
@@ -91,15 +99,58 @@ def encode_position(values: Array, normalization: Normalization) -> Array:
     return np.clip(centred / normalization.position_scale, -1.0, 1.0)
 
 
+DISPLAY_FORMULA = "sRGB of (linear radiance * 2^{exposure_stops!r}) clipped to 0 .. 1 (IEC 61966-2-1)"
+"""How colour is encoded, on the way in and on the way out."""
+
 FEATURES: Mapping[str, Feature] = {
     feature.name: feature
     for feature in (
-        Feature("color", "color", 3, 0.0, 1.0, encode_color),
-        Feature("normal", "normal", 3, -1.0, 1.0, encode_signed),
-        Feature("albedo", "albedo", 3, 0.0, 1.0, encode_albedo),
-        Feature("depth", "depth", 1, 0.0, 1.0, encode_depth),
-        Feature("position", "position", 3, -1.0, 1.0, encode_position),
-        Feature("direction", "direction", 3, -1.0, 1.0, encode_signed),
+        Feature("color", "color", 3, 0.0, 1.0, encode_color, DISPLAY_FORMULA),
+        Feature(
+            "normal",
+            "normal",
+            3,
+            -1.0,
+            1.0,
+            encode_signed,
+            "unit normal in world space towards the ray's origin, mean over samples; 0 where nothing is hit",
+        ),
+        Feature(
+            "albedo",
+            "albedo",
+            3,
+            0.0,
+            1.0,
+            encode_albedo,
+            "linear reflectance clipped to 0 .. 1, mean over samples; 0 where nothing is hit",
+        ),
+        Feature(
+            "depth",
+            "depth",
+            1,
+            0.0,
+            1.0,
+            encode_depth,
+            "distance along the ray / {depth_scale!r}, clipped to 0 .. 1; 0 where nothing is hit",
+        ),
+        Feature(
+            "position",
+            "position",
+            3,
+            -1.0,
+            1.0,
+            encode_position,
+            "(world position - {position_center}) / {position_scale!r}, clipped to -1 .. 1; a miss is at 0",
+        ),
+        Feature(
+            "direction",
+            "direction",
+            3,
+            -1.0,
+            1.0,
+            encode_signed,
+            "unit direction of the camera ray in world space",
+        ),
     )
 }
 """Every feature that a model may use; a new one is one line here and one `encode_*` function."""

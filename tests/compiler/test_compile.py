@@ -277,3 +277,20 @@ def test_round_up(value):
 @pytest.mark.parametrize("value", [0.0, np.inf, 3.0])
 def test_round_up_of_what_is_round_already(value):
     assert round_up(value) == value
+
+
+def test_header_and_manifest_say_how_every_image_and_the_output_are_encoded():
+    """Whoever feeds the kernel needs no other chapter: formulas with the model's scales, as text and JSON."""
+    network = siren.init((4 * 4 * 7, 8, 3), 1.0, 1.0, seed=1)
+    scales = dataset.Normalization(0.5, 7.25, (1.0, -2.0, 0.5), 3.75)
+    given_model = Model(network, ("color", "depth", "position"), Window(4), scales)
+    kernel = compile_program(lower(given_model), "opengl")
+    encodings = [image["encoding"] for image in kernel.manifest["images"]]
+    wanted = ("2^0.5", "/ 7.25", "(1.0, -2.0, 0.5)) / 3.75")
+    for text, formula in zip(wanted, encodings, strict=True):
+        assert text in formula
+        assert formula in kernel.source
+    assert kernel.manifest["output"]["encoding"].startswith("sRGB")
+    assert kernel.manifest["output"]["encoding"] in kernel.source
+    assert kernel.manifest["info"]["normalization"]["position_center"] == [1.0, -2.0, 0.5]
+    assert "flip" in kernel.source

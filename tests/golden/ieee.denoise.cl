@@ -1,15 +1,17 @@
 /*
  * wamnet denoiser, OpenCL C 1.2. Generated: change the compiler, not this text.
  * program   f3364223f05e9cc704eb6c074d489b14
- * input     color (3 channels in [0.0, 1.0]), normal (3 channels in [-1.0, 1.0])
+ * images    color: 3 channels in [0.0, 1.0], sRGB of (linear radiance * 2^0.0) clipped to 0 .. 1 (IEC 61966-2-1)
+ *           normal: 3 channels in [-1.0, 1.0], unit normal in world space towards the ray's origin, mean over samples; 0 where nothing is hit
  * window    2 x 2 pixels, the pixel itself is tap 1
  * border    zero
- * output    3 channels, row 0 is the top row
+ * output    3 channels, sRGB of (linear radiance * 2^0.0) clipped to 0 .. 1 (IEC 61966-2-1)
  * profile   ieee: any order of summation, fused multiply-add allowed, emitted sine
  * sine      emitted, odd polynomial of degree 11
  * bound     |output - float64 reference| <= 6.78e-06 for all images in these ranges
  * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
- *           weights; result: width * height * 3 floats in the same order; width; height.
+ *           weights; result: width * height * 3 floats in the same order, encoded as `output` says;
+ *           width; height.
  *           Global size: at least (width, height)
  * weights   W0 (24 x 4) at 0, b0 (4) at 96, W1 (4 x 3) at 100, b1 (3) at 112; matrices input-major:
  *           D_in x D_out, in C order

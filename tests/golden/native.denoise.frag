@@ -1,17 +1,21 @@
 /*
  * wamnet denoiser, GLSL 3.30, fragment shader. Generated: change the compiler, not this text.
  * program   f3364223f05e9cc704eb6c074d489b14
- * input     color (3 channels in [0.0, 1.0]), normal (3 channels in [-1.0, 1.0])
+ * images    color: 3 channels in [0.0, 1.0], sRGB of (linear radiance * 2^0.0) clipped to 0 .. 1 (IEC 61966-2-1)
+ *           normal: 3 channels in [-1.0, 1.0], unit normal in world space towards the ray's origin, mean over samples; 0 where nothing is hit
  * window    2 x 2 pixels, the pixel itself is tap 1
  * border    zero
- * output    3 channels, row 0 is the top row
+ * output    3 channels, sRGB of (linear radiance * 2^0.0) clipped to 0 .. 1 (IEC 61966-2-1)
  * profile   native: any order of summation, fused multiply-add allowed, the target's own sine
  * sine      sin() of GLSL 3.30, which promises nothing
  * bound     none: for some images an operation of this program promises nothing on this target
- * arguments each image: a float texture (R32F to RGBA32F) of width x height, texel row 0 is the top row;
- *           weight_texture: R32F, 1024 texels wide, filled row by row;
- *           result: a float colour buffer of width x height whose row 0 is the top row.
- *           Draw one triangle that covers it
+ * arguments each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel
+ *           row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the
+ *           bottom, or the window stands on its head;
+ *           weight_texture: R32F, 1024 texels wide, as many rows as weights fill (the last
+ *           padded), row by row; it is read with texelFetch alone, so filters do not matter;
+ *           result: a float colour buffer of width x height, row 0 again the top row; no sRGB conversion by
+ *           the target, the values are encoded already. Draw one triangle that covers it
  * weights   W0 (24 x 4) at 0, b0 (4) at 96, W1 (4 x 3) at 100, b1 (3) at 112; matrices input-major:
  *           D_in x D_out, in C order
  */

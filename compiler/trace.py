@@ -74,9 +74,11 @@ class Traced(NDArrayOperatorsMixin):
             return _refuse(f"np.{function.__name__} with these arguments")
 
     def __getitem__(self, key: Any) -> Traced:
-        if key == (Ellipsis, None) and not self.shape:
+        if not isinstance(key, tuple) or len(key) != 2 or key[0] is not Ellipsis:
+            return _refuse(f"indexing with {key!r}")
+        if key[1] is None and not self.shape:
             return self
-        if isinstance(key, tuple) and len(key) == 2 and key[0] is Ellipsis and isinstance(key[1], int):
+        if type(key[1]) is int:
             from_end = self.shape[0] if self.shape and key[1] < 0 else 0
             return emit(self.builder, "component", self, index=key[1] + from_end)
         return _refuse(f"indexing with {key!r}")
@@ -89,6 +91,15 @@ class Traced(NDArrayOperatorsMixin):
 
     def __bool__(self) -> bool:
         _refuse("a decision (if, while, and, or) on a value")
+
+    def __float__(self) -> float:
+        _refuse("conversion to a Python float (math.sin and the like)")
+
+    def __index__(self) -> int:
+        _refuse("conversion to a Python integer")
+
+    def __len__(self) -> int:
+        _refuse("len()")
 
     def __array__(self, dtype: Any = None, copy: Any = None) -> NoReturn:
         _refuse("conversion to an array")
@@ -139,7 +150,7 @@ def _operand(builder: Builder, value: Any) -> int:
         return value.index
     if isinstance(value, np.ndarray) and value.ndim:
         return _add(builder, "parameter", (), name=builder.parameter(_exact_float32(value)))
-    if not isinstance(value, int | float | np.number | np.ndarray):
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number | np.ndarray):
         _refuse(f"a {type(value).__name__} as an operand")
     return _add(builder, "constant", (), value=float(value))
 
@@ -157,7 +168,7 @@ def _exact_float32(array: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def _matmul(builder: Builder, x: Any, matrix: Any) -> Traced:
-    """Turn x @ W.T with a constant W into an affine node without bias."""
+    """Turn x @ W.T with a constant W into an affine node without bias; the node keeps W (D_out, D_in) itself."""
     if not isinstance(x, Traced) or not isinstance(matrix, np.ndarray) or matrix.ndim != 2:
         _refuse("np.matmul of anything but a traced vector and a constant matrix, x @ W.T")
     return emit(builder, "affine", x, weight=builder.parameter(_exact_float32(matrix.T)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -86,6 +88,12 @@ def test_several_outputs_and_the_shape_in_one_lane():
         (lambda x: np.asarray(x), "conversion to an array cannot"),
         (lambda x: x.sum(), r"the array method \.sum cannot"),
         (lambda x: x[0], "indexing with 0 cannot"),
+        (lambda x: x[np.array([0, 1])], r"indexing with array\(\[0, 1\]\) cannot"),
+        (lambda x: x[..., True], r"indexing with \(Ellipsis, True\) cannot"),
+        (lambda x: math.sin(x), r"conversion to a Python float .* cannot"),
+        (lambda x: [1, 2][x], "conversion to a Python integer cannot"),
+        (lambda x: len(x), r"len\(\) cannot"),
+        (lambda x: x + True, "a bool as an operand cannot"),
         (lambda x: x[..., None], r"indexing with \(Ellipsis, None\) cannot"),
         (lambda x: x[..., 3], r"component: component 3 does not exist in an operand of type float32\[3\]"),
         (lambda x: W @ x, r"np\.matmul of anything but a traced vector and a constant matrix"),

@@ -95,10 +95,10 @@ class Traced(NDArrayOperatorsMixin):
     def __float__(self) -> float:
         _refuse("conversion to a Python float (math.sin and the like)")
 
-    def __index__(self) -> int:
+    def __index__(self) -> int:  # noqa: PLE0305 - it refuses
         _refuse("conversion to a Python integer")
 
-    def __len__(self) -> int:
+    def __len__(self) -> int:  # noqa: PLE0303 - it refuses
         _refuse("len()")
 
     def __array__(self, dtype: Any = None, copy: Any = None) -> NoReturn:
@@ -168,7 +168,7 @@ def _exact_float32(array: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def _matmul(builder: Builder, x: Any, matrix: Any) -> Traced:
-    """Turn x @ W.T with a constant W into an affine node without bias; the node keeps W (D_out, D_in) itself."""
+    """Turn x @ W.T with a constant W into an affine node without bias; it keeps W (D_out, D_in) itself."""
     if not isinstance(x, Traced) or not isinstance(matrix, np.ndarray) or matrix.ndim != 2:
         _refuse("np.matmul of anything but a traced vector and a constant matrix, x @ W.T")
     return emit(builder, "affine", x, weight=builder.parameter(_exact_float32(matrix.T)))

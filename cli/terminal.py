@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
@@ -16,14 +17,25 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.table import Table
+from rich.text import Text
 
 Advance = Callable[[float], None]
 """Called with the work done since the last call, in the unit of the total."""
 
 
 def say(text: str) -> None:
-    """Print one line of result; `text` may use rich's markup."""
-    Console(highlight=False, soft_wrap=True).print(text)
+    """Print one line of result as it is: names of files may look like rich's markup or emoji codes."""
+    Console(highlight=False, soft_wrap=True).print(text, markup=False, emoji=False)
+
+
+@contextmanager
+def hint_on_interrupt(hint: Callable[[], str]) -> Iterator[None]:
+    """Say on standard error how to go on when the block is interrupted; the hint is asked for then."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        sys.stderr.write(f"wamnet: {hint()}\n")
+        raise
 
 
 @contextmanager
@@ -31,7 +43,7 @@ def progress(title: str, total: float) -> Iterator[Advance]:
     """Show a progress bar on a terminal, and nothing where standard error is a file or a pipe."""
     console = Console(stderr=True)
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
         TimeElapsedColumn(),
@@ -45,10 +57,13 @@ def progress(title: str, total: float) -> Iterator[Advance]:
 
 
 def table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]], *, texts: int = 1) -> None:
-    """Print a table: the first `texts` columns to the left, the others, numbers, to the right."""
-    grid = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    """Print a table: the first `texts` columns to the left, the others, numbers, to the right.
+
+    All texts are shown as they are, without markup.
+    """
+    grid = Table(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD)
     for index, name in enumerate(header):
-        grid.add_column(name, justify="left" if index < texts else "right")
+        grid.add_column(Text(name), justify="left" if index < texts else "right")
     for row in rows:
-        grid.add_row(*row)
+        grid.add_row(*map(Text, row))
     Console(highlight=False).print(grid)

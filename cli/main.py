@@ -2,15 +2,18 @@
 
 1. Commands are registered with typer in the order of a first session [`app`].
 2. [`main`] runs one of them. Whatever a user can cause ends in one line on standard error and status 2;
-   Ctrl-C ends in status 130; anything else is a bug and shows its traceback.
+   Ctrl-C ends in status 130 and SIGTERM in 143; anything else is a bug and shows its traceback.
 
 Modules that compute are imported when a command runs, so that a help text appears at once.
 """
 
 from __future__ import annotations
 
+import signal
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Annotated, Any
 
 import typer
@@ -22,6 +25,9 @@ from .compile import compile_model
 
 STATUS_BAD_INPUT = 2
 """Exit status when a file, an option or the machine is not as it must be."""
+
+STATUS_TERMINATED = 143
+"""Exit status after the signal to end: 128 + SIGTERM."""
 
 STATUS_INTERRUPTED = 130
 """Exit status after Ctrl-C: 128 + SIGINT, as shells report it."""
@@ -71,12 +77,44 @@ def root(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line (by default the process's) and return its exit status."""
+    with _ending_on_sigterm() as terminated:
+        status = _run(arguments)
+        return STATUS_TERMINATED if status == STATUS_INTERRUPTED and terminated else status
+
+
+@contextmanager
+def _ending_on_sigterm() -> Iterator[list[int]]:
+    """Make SIGTERM end the commands as Ctrl-C does, workers and half-written files too; yield those seen."""
+    seen: list[int] = []
+
+    def end(number: int, _frame: object) -> None:
+        seen.append(number)
+        raise KeyboardInterrupt
+
+    # Signals belong to the main thread, and who has set another handler keeps it.
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield seen
+        return
+    signal.signal(signal.SIGTERM, end)
+    try:
+        yield seen
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    """Run the command line and return its exit status."""
     try:
         status = app(
             None if arguments is None else list(arguments), prog_name="wamnet", standalone_mode=False
         )
     except WamnetError as error:
         return _fail(str(error))
+    except MemoryError:
+        return _fail(
+            "the memory does not suffice; use smaller frames or fewer --workers, or end other programs"
+        )
     except OSError as error:
         where = f": {error.filename}" if error.filename else ""
         return _fail(f"{error.strerror or error}{where}")

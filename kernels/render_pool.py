@@ -12,8 +12,11 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from typing import Any
 
 from ..refimpl.errors import InputError
@@ -44,7 +47,8 @@ def render_parallel(
     """Render a scene on `workers` processes (None: one per processor that this process may use).
 
     on_progress is called with the number of samples finished since the last call. Raises InputError for fewer
-    workers than one. An interrupt ends the workers and is passed on.
+    workers than one, and when the system has ended one of them. An interrupt ends the workers and is passed
+    on.
     """
     count = workers if workers is not None else len(os.sched_getaffinity(0))
     if count < 1:
@@ -58,9 +62,13 @@ def render_parallel(
     others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(count, context, _start_worker, (counter,))
     try:
-        futures = [pool.submit(_render_band, scene, job, rows) for rows in parts]
+        with _signals_held():
+            futures = [pool.submit(_render_band, scene, job, rows) for rows in parts]
         _watch(futures, counter, on_progress)
         return join_rows([future.result() for future in futures])
+    except BrokenProcessPool:
+        rule = "one of these processes was ended from outside, perhaps for want of memory"
+        raise InputError("workers", count, rule, "use fewer, or render a smaller frame") from None
     except BaseException:
         # A band may take minutes: do not wait for it.
         for worker in set(multiprocessing.active_children()) - others:
@@ -68,6 +76,29 @@ def render_parallel(
         raise
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """Let SIGINT and SIGTERM wait while workers start: they are known by then, and can be ended.
+
+    Workers keep SIGINT blocked, because their parent ends them, with SIGTERM, which must not wait in them:
+    it is not blocked here but noted.
+    """
+    noted: list[int] = []
+    ours = threading.current_thread() is threading.main_thread()
+    handler = signal.getsignal(signal.SIGTERM)
+    if ours:
+        signal.signal(signal.SIGTERM, lambda number, _frame: noted.append(number))
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        if ours:
+            signal.signal(signal.SIGTERM, handler)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if noted:
+            signal.raise_signal(signal.SIGTERM)
 
 
 def bands(job: Job, workers: int) -> list[tuple[int, int]]:
@@ -91,8 +122,7 @@ def _watch(futures: list[Future[Render]], counter: Any, on_progress: Callable[[i
 
 
 def _start_worker(counter: Any) -> None:
-    """Keep the shared counter in this worker, which Ctrl-C ends at once and without a traceback."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    """Keep the shared counter in this worker, in which SIGINT is blocked: its parent ends it."""
     keep_freed_memory()
     global _finished  # noqa: PLW0603 - the pool's initializer has no other way to reach the tasks
     _finished = counter

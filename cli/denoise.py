@@ -9,6 +9,7 @@ import typer
 
 from ..refimpl.errors import ExecutorUnavailable
 from . import options
+from .inputs import load_model, need_layers
 from .options import ExecutorName
 from .outputs import check_output
 from .terminal import say, table
@@ -44,12 +45,14 @@ def denoise(
     executor: options.Executor = ExecutorName.numpy,
 ) -> None:
     """Denoise a frame with a trained model."""
-    from ..compiler.model_file import load_model
     from ..kernels import denoise_on, open_executor
     from . import exr
 
     check_output(output, (".exr", ".png"), [model, frame])
     network, noisy = load_model(model), exr.read_frame(frame)
+    need_layers(
+        frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
+    )
     with open_executor(executor.value) as runner:
         result = denoise_on(runner, network, noisy)
     write_denoised(output, result.image, network, noisy)

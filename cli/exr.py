@@ -23,7 +23,8 @@ import numpy as np
 
 from ..refimpl.errors import InputError
 from ..refimpl.frame import LAYERS, Floats, Frame, validate
-from .outputs import replacing
+from .inputs import check_input
+from .outputs import replacing, unwritable
 from .packages import need
 
 CHANNELS: Mapping[str, tuple[str, ...]] = {
@@ -71,7 +72,13 @@ def write_frame(path: Path, frame: Frame) -> None:
     header = {"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}
     header |= {INFO_PREFIX + name: text for name, text in frame.info.items()}
     with replacing(path) as new:
-        openexr.File(header, channels).write(str(new))
+        try:
+            with _quiet():
+                openexr.File(header, channels).write(str(new))
+        except (RuntimeError, ValueError, TypeError) as error:
+            # The package tells a full disk in this way, with the temporary file's name.
+            reason = " ".join(str(error).replace(str(new), str(path)).split())
+            raise unwritable(path, RuntimeError(reason)) from None
 
 
 def read_frame(path: Path) -> Frame:
@@ -97,8 +104,7 @@ def read_frame(path: Path) -> Frame:
 
 def _read_channels(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return all channels of all parts by name, and the first part's header."""
-    if not path.is_file():
-        raise InputError("input file", str(path), "it does not exist", "check the name")
+    check_input(path)
     openexr = need("OpenEXR", "to read EXR files", "files")
     try:
         with _quiet():
@@ -133,7 +139,11 @@ def _layer(path: Path, name: str, groups: Mapping[str, Mapping[str, Group]]) -> 
     """Return layer `name` (H, W, C) under the best of its aliases, or None if the file has none of them."""
     for alias in ALIASES[name]:
         candidates = groups.get(alias, {})
-        whole = {prefix: found for prefix, group in candidates.items() if (found := _components(name, group))}
+        whole = {
+            prefix: found
+            for prefix, group in candidates.items()
+            if (found := _components(name, alias, group))
+        }
         if len(whole) > 1:
             text = ", ".join(sorted(whole))
             rule = f"each of them could be {name}"
@@ -143,9 +153,13 @@ def _layer(path: Path, name: str, groups: Mapping[str, Mapping[str, Group]]) -> 
     return None
 
 
-def _components(name: str, group: Group) -> list[Any] | None:
-    """Return the pixels of the channels that make up a layer, in order, or None if one is missing."""
-    for components in COMPONENTS[LAYERS[name].channels]:
+def _components(name: str, alias: str, group: Group) -> list[Any] | None:
+    """Return the pixels of the channels that make up a layer, in order, or None if one is missing.
+
+    Without a layer's name, one channel is depth only if it is called Z: a lone Y is luminance.
+    """
+    choices = COMPONENTS[LAYERS[name].channels]
+    for components in choices if alias or len(choices[0]) > 1 else (("z",),):
         if all(component in group for component in components):
             return [group[component] for component in components]
     return None

@@ -16,6 +16,7 @@ from ..refimpl import encoding
 from ..refimpl.errors import InputError
 from ..refimpl.frame import Floats
 from . import exr
+from .inputs import check_input, need_layers
 from .outputs import replacing
 from .packages import need
 
@@ -41,8 +42,7 @@ def write_png(path: Path, encoded: Floats) -> None:
 
 def read_png(path: Path) -> Floats:
     """Read a PNG of 8 bits a channel as display-encoded colour (H, W, 3); transparency is ignored."""
-    if not path.is_file():
-        raise InputError("input file", str(path), "it does not exist", "check the name")
+    check_input(path)
     pillow = need("PIL.Image", "to read PNG files", "files")
     try:
         with pillow.open(path, formats=["PNG"]) as picture:
@@ -64,6 +64,10 @@ def read_image(path: Path, exposure_stops: float = 0.0) -> Image:
         display = read_png(path)
         return Image(display, encoding.from_display(display, exposure_stops))
     if suffix == ".exr":
-        linear = exr.read_frame(path)["color"]
+        frame = exr.read_frame(path)
+        need_layers(path, frame, ("color",), "pictures are compared by their colour", "export it too")
+        linear = frame["color"]
         return Image(encoding.to_display(linear, exposure_stops), linear)
+    if path.is_dir():
+        check_input(path)
     raise InputError("input file", str(path), "its name must end in .exr or .png", "convert it")

@@ -5,6 +5,7 @@ Ranges are not repeated here: what a number may be is said by the function of th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from enum import Enum
 from pathlib import Path
@@ -13,6 +14,24 @@ from typing import Annotated
 import typer
 
 from ..refimpl.errors import InputError
+
+LARGEST_EXPOSURE_STOPS = 64.0
+"""Brightest and darkest exposure: a factor of 2**64; far past it float32 ends."""
+
+
+def _finite(value: float | None) -> float | None:
+    """Refuse a time that is no number."""
+    if value is not None and not math.isfinite(value):
+        raise InputError("--time", value, "it must be finite", "give seconds, for example --time 2.5")
+    return value
+
+
+def _stops(value: float) -> float:
+    """Refuse an exposure that is no number or that leaves no picture."""
+    if not abs(value) <= LARGEST_EXPOSURE_STOPS:
+        rule = f"it must be from {-LARGEST_EXPOSURE_STOPS:g} to {LARGEST_EXPOSURE_STOPS:g} stops"
+        raise InputError("--exposure", value, rule, "for example --exposure 1")
+    return value
 
 
 class ExecutorName(str, Enum):
@@ -57,7 +76,10 @@ Executor = Annotated[
     ),
 ]
 Exposure = Annotated[
-    float, typer.Option("--exposure", help="Stops by which pictures are brightened; +1 doubles the light.")
+    float,
+    typer.Option(
+        "--exposure", callback=_stops, help="Stops by which pictures are brightened; +1 doubles the light."
+    ),
 ]
 ModelFile = Annotated[
     Path, typer.Argument(metavar="MODEL", help="Trained model (.safetensors).", show_default=False)
@@ -72,7 +94,8 @@ Profile = Annotated[
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Any other number gives other random numbers.")]
 Time = Annotated[
-    float | None, typer.Option("--time", help="Time in the animation, in seconds.", show_default="0")
+    float | None,
+    typer.Option("--time", callback=_finite, help="Time in the animation, in seconds.", show_default="0"),
 ]
 Parameters = Annotated[
     list[str] | None,
@@ -105,6 +128,8 @@ def parse_parameters(texts: Sequence[str]) -> dict[str, float | tuple[float, ...
         if not sign or len(numbers) not in (1, 3):
             rule = "it must be NAME=NUMBER or NAME=NUMBER,NUMBER,NUMBER"
             raise InputError("--set", text, rule, "for example --set orbit_deg=20")
+        if not all(map(math.isfinite, numbers)):
+            raise InputError("--set", text, "all numbers must be finite", "for example --set orbit_deg=20")
         parameters[name.strip()] = numbers if len(numbers) > 1 else numbers[0]
     return parameters
 

@@ -24,17 +24,19 @@ def check_output(path: Path, suffixes: Sequence[str] = (), inputs: Sequence[Path
         raise InputError(
             "output file", str(path), f"its name must end in {' or '.join(suffixes)}", "rename it"
         )
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        pass
+    except (OSError, ValueError) as error:
+        raise unwritable(path, error) from None
     if path.is_dir():
         raise InputError("output file", str(path), "it is a folder", "give the name of a file")
     if path.exists() and not path.is_file():
         raise InputError(
             "output file", str(path), "it is a device or the like", "give the name of a plain file"
         )
-    folder = path.parent
-    if not folder.is_dir():
-        raise InputError("output folder", str(folder), "it does not exist", f"create it: mkdir -p '{folder}'")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError("output folder", str(folder), "it cannot be written", "choose another with -o")
+    check_parent(path)
     for source in inputs:
         if path.exists() and source.exists() and path.samefile(source):
             raise InputError(
@@ -42,17 +44,40 @@ def check_output(path: Path, suffixes: Sequence[str] = (), inputs: Sequence[Path
             )
 
 
+def check_parent(path: Path) -> None:
+    """Refuse a path whose folder does not exist or cannot be written."""
+    folder = path.parent
+    if not folder.is_dir():
+        raise InputError("output folder", str(folder), "it does not exist", f"create it: mkdir -p '{folder}'")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError("output folder", str(folder), "it cannot be written", "choose another with -o")
+
+
+def unwritable(path: Path, error: BaseException, what: str = "output file") -> InputError:
+    """Return the error for an output that cannot be written, under its own name and not a temporary one."""
+    reason = getattr(error, "strerror", None) or " ".join(str(error).split()) or type(error).__name__
+    return InputError(
+        what, str(path), f"cannot be written ({reason})", "free space, or choose another with -o"
+    )
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield the name of a new file beside `path`: when the block ends well it replaces it, else it goes."""
     check_output(path)
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    try:
+        # The name is short: one that repeats the output's could be longer than file systems allow.
+        handle, name = tempfile.mkstemp(prefix=".wamnet-", suffix=path.suffix, dir=path.parent)
+    except OSError as error:
+        raise unwritable(path, error) from None
     os.close(handle)
     new = Path(name)
     try:
         yield new
         _give_usual_rights(new)
         new.replace(path)
+    except OSError as error:
+        raise unwritable(path, error) from None
     finally:
         new.unlink(missing_ok=True)
 

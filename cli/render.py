@@ -127,6 +127,9 @@ def load_scene(name: str, time: float | None, assignments: Sequence[str]) -> Sce
     if path.suffix.lower() != ".json":
         if name in CANONICAL:
             _check_kinds(name, parameters)
+        elif path.suffix or path.exists():
+            rule = "neither a canonical scene nor a scene file, whose name ends in .json"
+            raise InputError("scene", name, rule, f"use a .json file or one of {', '.join(CANONICAL)}")
         return canonical(name, **parameters)
     if parameters:
         rule = "a scene file has no parameters"

@@ -56,7 +56,7 @@ def test_identical_and_tiny_pictures(wamnet, tmp_path) -> None:
         (("a.exr", "text.exr"), "input file is text.exr: it is not an OpenEXR image"),
         (("a.exr", "text.png"), "input file is text.png: it is not a readable PNG"),
         (("a.exr", "small.exr"), "size of a.exr is 13x12: small.exr has 2x1; compare pictures of one size"),
-        (("a.exr", "depth.exr"), "the frame's list of layers is depth: layer 'color' is needed"),
+        (("a.exr", "depth.exr"), "depth.exr: list of layers is depth: color must be among them"),
     ],
 )
 def test_refusals(refused, samples, tmp_path, names, text) -> None:

@@ -126,3 +126,20 @@ def test_the_list_of_executors(wamnet, monkeypatch) -> None:
     assert re.search(r"numpy +ready", outcome.out)
     assert re.search(r"opengl +missing", outcome.out)
     assert "opengl: no device was found; install one" in outcome.out
+
+
+def test_a_kernels_folder_has_one_owner(wamnet, refused, here) -> None:
+    """Another program's manifest and another target's kernel stay; missing parents are not made."""
+    glsl = ["compile", "model.safetensors", "--target", "glsl", "-o"]
+    (here / "site").mkdir()
+    for text in ('{"name": "my site"}', "[]", "no JSON"):
+        (here / "site" / "manifest.json").write_text(text)
+        assert "output folder is site: its manifest.json is not one that wamnet wrote" in refused(
+            *glsl, "site"
+        )
+    assert wamnet(*glsl, "kernel").status == 0
+    assert wamnet(*glsl, "kernel").status == 0
+    assert "output folder is kernel: it holds a kernel for opengl, and this one is for opencl" in refused(
+        "compile", "model.safetensors", "--target", "opencl", "-o", "kernel"
+    )
+    assert "output folder is a/b: it does not exist; create it: mkdir -p 'a/b'" in refused(*glsl, "a/b/c")

@@ -257,3 +257,19 @@ def test_ctrl_c_while_writing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     with pytest.raises(KeyboardInterrupt):
         exr.write_frame(out, random_frame(3, 3))
     assert [p.read_bytes() for p in tmp_path.iterdir()] == [before]
+
+
+@pytest.mark.parametrize(
+    ("names", "layers"), [("Y", None), ("RGBY", {"color"}), ("RGBZ", {"color", "depth"})]
+)
+def test_luminance_is_no_depth(tmp_path: Path, names: str, layers: set[str] | None) -> None:
+    """Without a layer's name, only Z is depth."""
+    import OpenEXR
+
+    channels = {name: np.ones((2, 3), np.float32) for name in names}
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(tmp_path / "a.exr"))
+    if layers is None:
+        with pytest.raises(InputError, match="list of channels is Y: no known layer"):
+            exr.read_frame(tmp_path / "a.exr")
+    else:
+        assert set(exr.read_frame(tmp_path / "a.exr").layers) == layers

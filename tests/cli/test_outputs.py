@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -90,3 +92,45 @@ def test_an_input_is_never_overwritten(tmp_path: Path) -> None:
         with pytest.raises(InputError, match="it is an input of this command; choose another name"):
             check_output(name, inputs=(source,))
     check_output(tmp_path / "out.exr", inputs=(source, tmp_path / "missing.exr"))
+
+
+def full(*_args: object, **_options: object) -> None:
+    """Stand for a system call on a full disk."""
+    raise OSError(28, "No space left on device", "/tmp/.secret-name")
+
+
+def test_a_full_disk_names_the_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not the temporary file, which nobody has asked for."""
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(InputError, match=r"output file is .*a\.txt: cannot be written \(No space left"):
+        write_text(tmp_path / "a.txt", "text")
+
+
+def test_a_full_disk_while_exr_is_written(tmp_path: Path) -> None:
+    """OpenEXR tells it by errors of its own; here the largest size of a file is the limit."""
+    code = (
+        "import resource, sys; from pathlib import Path; import numpy as np; import OpenEXR\n"
+        "from wamnet.cli import exr; from wamnet.refimpl.frame import Frame\n"
+        "from wamnet.refimpl.errors import InputError\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
+        "noise = np.random.default_rng(1).random((64, 64, 3)).astype(np.float32)\n"
+        "try: exr.write_frame(Path('a.exr'), Frame({'color': noise}))\n"
+        "except InputError as error: print(error)\n"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+    assert done.stderr == ""
+    assert done.stdout.startswith("output file is a.exr: cannot be written (")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_while_a_kernel_is_written(
+    tmp_path: Path, samples: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder is named."""
+    from wamnet.cli.compile import compile_model
+    from wamnet.cli.options import Target
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(InputError, match=r"output folder is .*kernel: cannot be written \(No space left"):
+        compile_model(samples / "model.safetensors", Target.glsl, tmp_path / "kernel")

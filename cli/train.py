@@ -12,9 +12,10 @@ import typer
 
 from ..refimpl.errors import InputError
 from . import options
+from .inputs import CHECKPOINT_MARK, need_layers
 from .options import Preset
 from .outputs import check_output
-from .terminal import progress, say
+from .terminal import hint_on_interrupt, progress, say
 
 if TYPE_CHECKING:
     from ..refimpl.frame import Frame
@@ -48,8 +49,11 @@ def train(
         Path, typer.Option("-o", "--output", metavar="FILE", help="Model to write (.safetensors).")
     ] = Path("model.safetensors"),
     preset: Annotated[
-        Preset, typer.Option(help="Protocol: the paper's own, or one that is as good in a minute or so.")
-    ] = Preset.short,
+        Preset | None,
+        typer.Option(
+            help="Protocol: the paper's own, or one that is as good in a minute or so.", show_default="short"
+        ),
+    ] = None,
     features: Annotated[
         str | None,
         typer.Option(
@@ -59,22 +63,70 @@ def train(
     ] = None,
     steps: Annotated[int | None, typer.Option(help="Training steps.", show_default="the preset's")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first weights and of the draws.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint beside MODEL.")] = False,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Go on from the checkpoint beside the model, with its own recipe."),
+    ] = False,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="Begin anew, and replace the checkpoint of an earlier run.")
+    ] = False,
 ) -> None:
     """Train a network on noisy frames and their references.
 
-    A checkpoint is kept beside the model. After Ctrl-C, --resume goes on from there, to the same bits; with
-    more --steps it goes on after the end.
+    A checkpoint is kept beside the model. After Ctrl-C, --resume goes on from there, to the same bits. With
+    more --steps it goes on after the end; the learning rate, which falls over the length of the run, then
+    jumps, so the model differs from that of a run which had this length from the start.
     """
     from ..compiler.model_file import load_checkpoint
+    from ..refimpl.train import check_recipe
 
     check_output(output, (".safetensors",), [*inputs, *targets])
     check_output(checkpoint_path(output))
-    state = load_checkpoint(checkpoint_path(output)) if resume else None
-    choices = {"features": options.parse_names(features) if features else None, "steps": steps, "seed": seed}
-    recipe = choose_recipe(preset.value, state, choices)
-    state, _ = fit(recipe, read_pairs(inputs, targets), output, state)
-    say(f"{output}: {state.step} steps; checkpoint in {checkpoint_path(output)}")
+    saved = checkpoint_path(output)
+    check_begin(saved, preset, resume, restart)
+    state = load_checkpoint(saved) if resume else None
+    names = None if features is None else options.parse_names(features)
+    choices = {"features": names, "steps": steps, "seed": seed}
+    recipe = choose_recipe((preset or Preset.short).value, state, choices)
+    check_recipe(recipe)
+    pairs = read_pairs(inputs, targets, recipe.features)
+    state = _fit_to_the_end(recipe, pairs, output, state)
+    say(f"{output}: {state.step} steps; checkpoint in {saved}")
+
+
+def _fit_to_the_end(
+    recipe: Recipe, pairs: Sequence[tuple[Frame, Frame]], output: Path, begin: TrainState | None
+) -> TrainState:
+    """Train, and say how to go on after an interrupt, and that a longer run is another one."""
+    saved = checkpoint_path(output)
+
+    def hint() -> str:
+        return f"go on with --resume, from {saved}" if saved.exists() else "no step was done"
+
+    with hint_on_interrupt(hint):
+        state, _ = fit(recipe, pairs, output, begin)
+    if begin is not None and recipe.steps != begin.recipe.steps:
+        before, now = begin.recipe.steps, recipe.steps
+        say(f"the run of {before} steps became one of {now}: another model than with {now} from the start")
+    return state
+
+
+def check_begin(saved: Path, preset: Preset | None, resume: bool, restart: bool) -> None:
+    """Refuse options that contradict each other, and to replace an earlier run's checkpoint unasked."""
+    if resume and restart:
+        rule = "a run goes on or begins anew"
+        raise InputError("pair of options", "--resume, --restart", rule, "choose one of them")
+    if resume and preset is not None:
+        rule = "with --resume the checkpoint's own recipe counts"
+        raise InputError("--preset", preset.value, rule, "leave it out, or begin anew with --restart")
+    if saved.exists() and not (resume or restart):
+        rule = "it is there from an earlier run, which would be lost"
+        raise InputError(
+            "checkpoint",
+            str(saved),
+            rule,
+            "go on with --resume, replace it with --restart, or choose another -o",
+        )
 
 
 def choose_recipe(preset: str, state: TrainState | None, choices: dict[str, Any]) -> Recipe:
@@ -85,16 +137,23 @@ def choose_recipe(preset: str, state: TrainState | None, choices: dict[str, Any]
     return replace(base, **{name: value for name, value in choices.items() if value is not None})
 
 
-def read_pairs(inputs: Sequence[Path], targets: Sequence[Path]) -> list[tuple[Frame, Frame]]:
-    """Read the noisy frames and their references."""
+def read_pairs(
+    inputs: Sequence[Path], targets: Sequence[Path], features: Sequence[str]
+) -> list[tuple[Frame, Frame]]:
+    """Read the noisy frames, which must have the layers of the features, and their references."""
     from . import exr
 
     if len(inputs) != len(targets):
         rule = f"each --input needs its --target, and there are {len(inputs)} inputs"
         raise InputError("number of targets", len(targets), rule, "repeat -i and -t in the same order")
-    return [
-        (exr.read_frame(noisy), exr.read_frame(target)) for noisy, target in zip(inputs, targets, strict=True)
-    ]
+    pairs = []
+    for noisy, target in zip(inputs, targets, strict=True):
+        pair = exr.read_frame(noisy), exr.read_frame(target)
+        way_out = "render or export it too, or choose other --features"
+        need_layers(noisy, pair[0], features, "the network is to see it", way_out)
+        need_layers(target, pair[1], ("color",), "it is what the network learns", "export it too")
+        pairs.append(pair)
+    return pairs
 
 
 def fit(
@@ -141,4 +200,4 @@ def facts(pairs: Sequence[tuple[Frame, Frame]]) -> dict[str, str]:
 
 def checkpoint_path(output: Path) -> Path:
     """Return the file beside a model that keeps the state of its training: NAME.checkpoint.safetensors."""
-    return output.with_suffix(".checkpoint" + output.suffix)
+    return output.with_suffix(CHECKPOINT_MARK + output.suffix)

@@ -119,3 +119,42 @@ def test_resuming_with_another_recipe_or_other_frames(wamnet, refused, pair) -> 
     swapped = ["-i", "reference.exr", "-t", "noisy.exr"]
     assert "digest of the training frames is" in refused("train", *swapped, "--resume", "--steps", 3)
     assert "steps is 1: the run has done 2 steps" in refused("train", *pair[:4], "--resume", "--steps", 1)
+
+
+def test_an_earlier_run_is_not_lost(wamnet, refused, pair, tmp_path) -> None:
+    """It goes on, or is replaced, when that is asked for."""
+    assert wamnet("train", *pair, "--steps", 2).status == 0
+    line = refused("train", *pair, "--steps", 3)
+    assert "checkpoint is model.checkpoint.safetensors: it is there from an earlier run" in line
+    assert "--resume" in line
+    assert "--restart" in line
+    assert wamnet("train", *pair, "--steps", 3, "--restart").status == 0
+    assert load_checkpoint(tmp_path / "model.checkpoint.safetensors").step == 3
+    assert "choose one of them" in refused("train", *pair, "--resume", "--restart")
+
+
+def test_resuming_has_its_own_recipe(wamnet, refused, pair) -> None:
+    """A preset is refused; another number of steps is told to give another model."""
+    assert wamnet("train", *pair, "--steps", 2).status == 0
+    text = "--preset is paper: with --resume the checkpoint's own recipe counts"
+    assert text in refused("train", *pair[:4], "--resume", "--preset", "paper")
+    outcome = wamnet("train", *pair[:4], "--resume", "--steps", 3)
+    assert "became one of 3: another model than with 3 from the start" in outcome.out
+
+
+def test_no_features_are_refused(refused, pair) -> None:
+    """An empty list is not the preset's."""
+    assert "at least one, each once" in refused("train", *pair[:4], "--features", "")
+
+
+def test_an_interrupt_tells_how_to_go_on(wamnet, pair, monkeypatch) -> None:
+    """With the checkpoint's name, if there is one."""
+
+    def interrupt(*_arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(reference, "train_step", interrupt)
+    outcome = wamnet("train", *pair, "--steps", 2)
+    assert outcome.status == 130
+    assert outcome.err.splitlines()[0].startswith("wamnet: ")
+    assert outcome.err.endswith("wamnet: interrupted\n")

@@ -1,0 +1,102 @@
+"""Tests of what commands say of wrong inputs: folders, checkpoints, missing layers, numbers that are none."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+
+from wamnet.cli import exr
+from wamnet.refimpl.frame import Frame
+
+
+@pytest.fixture
+def here(samples, tmp_path):
+    """Put the sample frames and the model into the working folder."""
+    shutil.copytree(samples, tmp_path, dirs_exist_ok=True)
+    return tmp_path
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf"])
+def test_numbers_must_be_finite(refused, here, value) -> None:
+    """A time, a parameter, an exposure; said before anything is rendered or overwritten."""
+    (here / "minicubes.exr").write_text("precious")
+    small = ["minicubes", "--width", 4, "--height", 3]
+    assert "--time is " in refused("render", *small, f"--time={value}")
+    assert f"--set is orbit_deg={value}: all numbers must be finite" in refused(
+        "render", *small, "--set", f"orbit_deg={value}"
+    )
+    assert "all numbers must be finite" in refused("scene", "minicubes", "--set", f"warm=1,{value},1")
+    for command in (["render", *small, "-o", "a.png"], ["compare", "noisy.exr", "reference.exr"]):
+        line = refused(*command, f"--exposure={value}")
+        assert "it must be from -64 to 64 stops" in line
+
+
+def test_exposures_end_somewhere(wamnet, refused, here) -> None:
+    """At 64 stops either way."""
+    assert "--exposure is 65.0: it must be from -64 to 64 stops" in refused(
+        "compare", "noisy.exr", "reference.exr", "--exposure", 65
+    )
+    assert wamnet("compare", "noisy.exr", "reference.exr", "--exposure", 64).status == 0
+
+
+def test_a_folder_is_no_input(refused, here) -> None:
+    """It is said that it is one, for frames, pictures and scenes."""
+    (here / "dir.exr").mkdir()
+    (here / "dir").mkdir()
+    text = "it is a folder; give the name of a file in it"
+    assert f"input file is dir.exr: {text}" in refused("denoise", "model.safetensors", "dir.exr")
+    assert f"input file is dir: {text}" in refused("compare", "dir", "noisy.exr")
+    assert "Is a directory" in refused("denoise", "dir", "noisy.exr")
+    assert "whose name ends in .json" in refused("render", "dir")
+
+
+def test_a_frame_is_no_scene(refused, here) -> None:
+    """The way out names the suffix of scene files."""
+    line = refused("render", "noisy.exr", "-o", "a.exr")
+    assert "scene is noisy.exr: neither a canonical scene nor a scene file, whose name ends in .json" in line
+
+
+def test_a_checkpoint_is_no_model(wamnet, refused, here) -> None:
+    """The model beside it is named."""
+    pair = ["-i", "noisy.exr", "-t", "reference.exr", "--features", "color", "--steps", 2]
+    assert wamnet("train", *pair, "-o", "m.safetensors").status == 0
+    text = (
+        "m.checkpoint.safetensors: it is a checkpoint of training, not a model; give the model beside it: m."
+    )
+    assert text in refused("denoise", "m.checkpoint.safetensors", "noisy.exr")
+    assert text in refused("compile", "m.checkpoint.safetensors", "--target", "glsl")
+
+
+def test_a_missing_layer_names_the_file(refused, here) -> None:
+    """The way out fits the command: a trained model cannot see something else."""
+    exr.write_frame(here / "flat.exr", Frame({"color": np.zeros((12, 13, 3))}))
+    line = refused("denoise", "model.safetensors", "flat.exr")
+    assert (
+        "flat.exr: list of layers is color: normal must be among them, because the model was trained" in line
+    )
+    assert "features" not in line
+    line = refused("train", "-i", "flat.exr", "-t", "reference.exr", "--features", "color,normal")
+    assert "flat.exr: list of layers is color: normal must be among them" in line
+    assert "--features" in line
+
+
+@pytest.mark.parametrize("command", [["denoise", "model.safetensors", "noisy.exr"], ["render", "minicubes"]])
+def test_a_name_that_no_file_system_takes(refused, here, monkeypatch, command) -> None:
+    """It is found before the work."""
+
+    def never(*_args: object, **_options: object) -> None:
+        raise AssertionError("this is the work")
+
+    monkeypatch.setattr("wamnet.kernels.denoise_on", never)
+    monkeypatch.setattr("wamnet.kernels.render_pool.render_parallel", never)
+    line = refused(*command, "-o", "n" * 300 + ".exr")
+    assert "cannot be written (File name too long)" in line
+
+
+def test_the_longest_name_is_written(wamnet, here) -> None:
+    """255 bytes: the temporary file's name must not be longer."""
+    name = "n" * 251 + ".png"
+    assert wamnet("render", "minicubes", "--width", 2, "--height", 2, "-o", name).status == 0
+    assert (here / name).is_file()

@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
+import shlex
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -25,10 +27,11 @@ import typer
 from ..refimpl.errors import InputError
 from . import machine, train
 from .compare import Score, measure
-from .outputs import write_text
+from .compile import write_kernel
+from .outputs import unwritable, write_text
 from .packages import need
 from .runs import Run, run_all
-from .terminal import Advance, progress, say, table
+from .terminal import Advance, hint_on_interrupt, progress, say, table
 
 if TYPE_CHECKING:
     from ..refimpl.denoise import Model
@@ -43,6 +46,18 @@ wamnet demo
 
 wamnet demo --size 384 -o out/large"""
 """Shown below the help of `wamnet demo`."""
+
+FOLDER = "out/demo"
+"""Folder of the results, unless another is given."""
+
+QUICK_FOLDER = "out/demo-quick"
+"""Folder of the results of `--quick`, which must not mix with the others."""
+
+PLAN_NAME = "plan.json"
+"""File in the folder that says which plan its results are of."""
+
+SHOWN_FIRST = ("opencl", "opengl", "numpy")
+"""Whose picture the report shows: that of a compiled kernel, if one ran here."""
 
 _Result = TypeVar("_Result")
 
@@ -85,7 +100,7 @@ class Results:
     denoised_by: str
     model: Model
     state: TrainState
-    seconds_per_step: float
+    seconds_per_step: float | None
     runs: tuple[Run, ...]
     scores: dict[str, tuple[Score, ...]]
     seconds: dict[str, float]
@@ -93,9 +108,22 @@ class Results:
 
 def demo(
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder for all results.")
-    ] = Path("out/demo"),
-    size: Annotated[int, typer.Option(help="Width and height of the frames, in pixels.")] = Plan.size_px,
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FOLDER",
+            help="Folder for all results.",
+            show_default=f"{FOLDER}, or {QUICK_FOLDER} with --quick",
+        ),
+    ] = None,
+    size: Annotated[
+        int | None,
+        typer.Option(
+            help="Width and height of the frames, in pixels; not with --quick.",
+            show_default=str(Plan.size_px),
+        ),
+    ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Tiny frames: try whether everything works.")
     ] = False,
@@ -108,13 +136,40 @@ def demo(
 
     for module in ("matplotlib", "jinja2"):
         need(module, "to draw the report", "report")
-    if output.exists() and not output.is_dir():
-        raise InputError("output folder", str(output), "it is a file", "choose another with -o")
-    plan = QUICK if quick else Plan(size_px=size)
-    output.mkdir(parents=True, exist_ok=True)
-    results = carry_out(plan, output)
-    report.write(output, plan, results, f"wamnet demo {'--quick' if quick else f'--size {size}'} -o {output}")
-    _tell(results, output)
+    if quick and size is not None:
+        raise InputError("--size", size, "--quick has a size of its own", "leave out one of them")
+    plan = QUICK if quick else Plan(size_px=Plan.size_px if size is None else size)
+    folder = output or Path(QUICK_FOLDER if quick else FOLDER)
+    command = f"wamnet demo {'--quick' if quick else f'--size {plan.size_px}'} -o {shlex.quote(str(folder))}"
+    begin(plan, folder)
+    with hint_on_interrupt(lambda: f"go on with the same command: {command}"):
+        results = carry_out(plan, folder)
+        report.write(folder, plan, results, command)
+    _tell(results, folder)
+
+
+def begin(plan: Plan, folder: Path) -> None:
+    """Make the folder and note the plan in it; refuse a folder that has anything but results of this plan."""
+    from ..refimpl.render import Job
+
+    Job(plan.size_px, plan.size_px)  # Refuses a size that cannot be rendered.
+    if folder.exists() and not folder.is_dir():
+        raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
+    note, text = folder / PLAN_NAME, json.dumps(asdict(plan), indent=2) + "\n"
+    if folder.is_dir() and any(folder.iterdir()):
+        try:
+            found = note.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError):
+            found = ""
+        if found != text:
+            rule = "it holds results of another plan" if found else "it holds files that are not the demo's"
+            raise InputError("output folder", str(folder), rule, "choose another with -o, or remove it")
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(folder, error, "output folder") from None
+    write_text(note, text)
 
 
 def carry_out(plan: Plan, output: Path) -> Results:
@@ -123,9 +178,7 @@ def carry_out(plan: Plan, output: Path) -> Results:
     pairs, (noisy, reference) = _timed(seconds, "rendering", lambda: render_frames(plan, output))
     model, state, per_step = _timed(seconds, "training", lambda: train_network(plan, pairs, output))
     images, runs = _timed(seconds, "kernels", lambda: run_kernels(model, noisy, output))
-    by = min(
-        (run for run in runs if run.seconds_run is not None), key=lambda run: run.seconds_run or 0.0
-    ).executor
+    by = next(name for name in SHOWN_FIRST if name in images)
     scores = score(model, noisy, reference, images[by])
     results = Results(noisy, reference, images[by], by, model, state, per_step, runs, scores, seconds)
     write_pictures(output, results)
@@ -182,8 +235,8 @@ def _frame(path: Path, plan: Plan, time: float, spp: int, seed: int, advance: Ad
     return frame
 
 
-def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Model, TrainState, float]:
-    """Train, or finish what an earlier run began; return the model, the last state and the seconds a step."""
+def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Model, TrainState, float | None]:
+    """Train, or finish what an earlier run began; return model, last state and seconds a step, if known."""
     from ..compiler.model_file import load_checkpoint
     from ..refimpl.train import PRESETS, model_of
 
@@ -201,18 +254,26 @@ def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Mode
         state, seconds = train.fit(recipe, pairs, path)
     if state.step > done:
         write_text(speed, f"{seconds / (state.step - done)}\n")
-    return model_of(state, train.facts(pairs)), state, float(speed.read_text())
+    return model_of(state, train.facts(pairs)), state, _seconds(speed)
+
+
+def _seconds(path: Path) -> float | None:
+    """Return the time in a file, or None where there is none: it is told, and nothing depends on it."""
+    try:
+        value = float(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return value if math.isfinite(value) and value > 0.0 else None
 
 
 def run_kernels(model: Model, noisy: Frame, output: Path) -> tuple[dict[str, Any], tuple[Run, ...]]:
     """Write the kernel of each target, and run each executor on the noisy frame."""
-    from ..compiler import artifact
     from ..compiler.compile import TARGETS, compile_program
     from ..compiler.lower import lower
 
     kernels = {target: compile_program(lower(model), target) for target in TARGETS}
     for target, kernel in kernels.items():
-        artifact.write(kernel, output / "kernels" / target)
+        write_kernel(kernel, output / "kernels" / target)
     with progress("running kernels", len(kernels)) as advance:
         return run_all(model, noisy, kernels, advance)
 

@@ -29,39 +29,46 @@ DOTS_PER_INCH = 150
 """Resolution of the plots: sharp on a phone, small in a file."""
 
 
-def error_maps(maps: Sequence[tuple[str, Any]], theme: Theme) -> bytes:
-    """Draw error maps (H, W) with their titles side by side, in one colour scale, with its bar.
+def error_maps(maps: Sequence[tuple[str, Any]], theme: Theme) -> list[bytes]:
+    """Draw error maps (H, W) with their titles, a picture for each, in one colour scale, with its bar.
 
     The scale follows the square root of the error: else a few bright samples would hide everything else.
     """
     from matplotlib.colors import PowerNorm
 
-    figure, axes = _figure(theme, (7.2, 3.4), len(maps))
     largest = max(float(values.max()) for _, values in maps)
     scale = PowerNorm(0.5, 0.0, largest or 1.0)
-    for axis, (title, values) in zip(axes, maps, strict=True):
+    drawn = []
+    for title, values in maps:
+        figure, axis = _figure(theme, (4.0, 3.4))
         picture = axis.imshow(values, cmap="magma", norm=scale)
         axis.set_title(title, color=theme.text, fontsize=10)
         axis.set_axis_off()
-    bar = figure.colorbar(picture, ax=axes, shrink=0.85, label="absolute error, display-encoded")
-    bar.ax.yaxis.label.set_color(theme.text)
-    bar.ax.tick_params(colors=theme.text)
-    bar.outline.set_edgecolor(theme.text)
-    return _png(figure)
+        bar = figure.colorbar(picture, ax=axis, shrink=0.85, label="absolute error, display-encoded")
+        bar.ax.yaxis.label.set_color(theme.text)
+        bar.ax.tick_params(colors=theme.text)
+        bar.outline.set_edgecolor(theme.text)
+        drawn.append(_png(figure))
+    return drawn
 
 
-def training_curve(history: Sequence[tuple[int, float]], seconds_per_step: float, theme: Theme) -> bytes:
-    """Draw the loss over the steps, with a second axis that counts seconds."""
-    figure, (axis,) = _figure(theme, (7.2, 3.4), 1)
+def training_curve(
+    history: Sequence[tuple[int, float]], seconds_per_step: float | None, theme: Theme
+) -> bytes:
+    """Draw the loss over the steps, with a second axis that counts seconds if their number is known."""
+    figure, axis = _figure(theme, (7.2, 3.4))
     axis.plot([step for step, _ in history], [loss for _, loss in history], color=theme.curve, linewidth=1.4)
     axis.set_yscale("log")
     axis.set_xlabel("step")
     axis.set_ylabel("loss of one minibatch (MSE)")
     axis.grid(visible=True, which="both", color=theme.text, alpha=0.15, linewidth=0.6)
-    scale = seconds_per_step or 1.0
-    above = axis.secondary_xaxis("top", functions=(lambda step: step * scale, lambda second: second / scale))
-    above.set_xlabel("seconds")
-    for part in (axis, above):
+    parts = [axis]
+    if seconds_per_step is not None:
+        scale = seconds_per_step
+        ways = (lambda step: step * scale, lambda second: second / scale)
+        parts.append(axis.secondary_xaxis("top", functions=ways))
+        parts[1].set_xlabel("seconds")
+    for part in parts:
         part.tick_params(which="both", colors=theme.text)
         part.xaxis.label.set_color(theme.text)
         part.yaxis.label.set_color(theme.text)
@@ -70,15 +77,14 @@ def training_curve(history: Sequence[tuple[int, float]], seconds_per_step: float
     return _png(figure)
 
 
-def _figure(theme: Theme, inches: tuple[float, float], columns: int) -> tuple[Any, list[Any]]:
-    """Return a transparent figure with axes in a row."""
+def _figure(theme: Theme, inches: tuple[float, float]) -> tuple[Any, Any]:
+    """Return a transparent figure and its axes."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=inches, dpi=DOTS_PER_INCH, layout="constrained", facecolor="none")
-    axes = [figure.add_subplot(1, columns, column + 1, facecolor="none") for column in range(columns)]
-    for axis in axes:
-        axis.title.set_color(theme.text)
-    return figure, axes
+    axis = figure.add_subplot(facecolor="none")
+    axis.title.set_color(theme.text)
+    return figure, axis
 
 
 def _png(figure: Any) -> bytes:

@@ -78,9 +78,13 @@ def draw(results: Results) -> dict[str, dict[str, str]]:
     stops = results.model.normalization.exposure_stops
     noisy, target = (to_display(frame["color"], stops) for frame in (results.noisy, results.reference))
     maps = [("input", error_map(noisy, target)), ("denoised", error_map(results.denoised, target))]
-    drawn: dict[str, dict[str, str]] = {"errors": {}, "training": {}}
+    drawn: dict[str, dict[str, str]] = {"input_error": {}, "denoised_error": {}, "training": {}}
     for name, theme in (("light", plots.LIGHT), ("dark", plots.DARK)):
-        drawn["errors"][name] = _embedded(plots.error_maps(maps, theme))
+        of_input, of_denoised = plots.error_maps(maps, theme)
+        drawn["input_error"][name], drawn["denoised_error"][name] = (
+            _embedded(of_input),
+            _embedded(of_denoised),
+        )
         curve = plots.training_curve(results.state.history, results.seconds_per_step, theme)
         drawn["training"][name] = _embedded(curve)
     return drawn

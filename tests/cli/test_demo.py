@@ -108,7 +108,7 @@ def test_the_report_stands_alone(finished, report) -> None:
     page.feed(html)
     assert page.addresses
     assert all(address.startswith("data:image/png;base64,") for address in page.addresses)
-    assert len(page.texts) == 6
+    assert len(page.texts) == 7
     assert all(page.texts)
     assert not page.tags & {"script", "link", "iframe"}
     assert not re.search(r"url\(|@import|https?:", re.sub(r"base64,[^\"]*", "", html))
@@ -186,3 +186,55 @@ def test_the_machine_is_described() -> None:
     assert int(facts["cores"]) >= 1
     assert "numpy" in machine.versions()
     assert machine._first_value("/no/such/file", "x") == ""
+
+
+def test_a_folder_holds_one_plan(refused, tmp_path, finished) -> None:
+    """Results of another plan and other files are not mixed with this one's; nor are two sizes."""
+    shutil.copytree(finished, tmp_path / "out")
+    text = "output folder is out: it holds results of another plan; choose another with -o"
+    assert text in refused("demo", "--size", 16, "-o", "out")
+    demo.begin(demo.QUICK, tmp_path / "out")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "noisy.exr").write_text("precious")
+    assert "it holds files that are not the demo's" in refused("demo", "--quick", "-o", "mine")
+    assert "--size is 16: --quick has a size of its own" in refused("demo", "--quick", "--size", 16)
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_an_interrupt_tells_how_to_go_on(wamnet, tmp_path, monkeypatch, quick) -> None:
+    """With the whole command; quick results have a folder of their own."""
+
+    def interrupt(*_arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(demo, "carry_out", interrupt)
+    outcome = wamnet("demo", *(["--quick"] if quick else []))
+    command = "--quick -o out/demo-quick" if quick else "--size 192 -o out/demo"
+    assert outcome.err == f"wamnet: go on with the same command: wamnet demo {command}\nwamnet: interrupted\n"
+    assert outcome.status == 130
+
+
+@pytest.mark.parametrize("content", [None, b"", b"fast", b"\xff", b"nan", b"-1"])
+def test_an_unknown_time_is_no_error(finished, report, tmp_path, content) -> None:
+    """The report has a dash, and the curve no second axis."""
+    from wamnet.cli import plots
+    from wamnet.cli.report import page
+
+    path = tmp_path / "seconds.txt"
+    if content is not None:
+        path.write_bytes(content)
+    assert demo._seconds(path) is None
+    assert plots.training_curve([(1, 0.5), (2, 0.25)], None, plots.LIGHT).startswith(b"\x89PNG")
+    data = {**report, "training": {**report["training"], "seconds_per_step": None}}
+    pictures = dict.fromkeys(("noisy", "denoised", "reference", "normal"), "")
+    drawn = {key: {"light": "", "dark": ""} for key in ("input_error", "denoised_error", "training")}
+    assert "<dd>– <small>60 steps</small>" in page(data, pictures, drawn)
+
+
+def test_the_report_tells_whose_picture_it_is(finished, report) -> None:
+    """That of a compiled kernel, if one ran; what the network sees; that the reference is noisy too."""
+    ran = {run["executor"] for run in report["runs"] if not run["missing"]}
+    assert report["denoised_by"] == next(name for name in ("opencl", "opengl", "numpy") if name in ran)
+    html = (finished / "report.html").read_text()
+    assert "it sees color, normal, albedo, position of its" in html
+    assert "its own noise counts as error" in html

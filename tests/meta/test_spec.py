@@ -33,6 +33,8 @@ def clauses(house) -> Iterator[Clause]:
     for path in sorted((house.root / "spec").glob("*.md")):
         text = path.read_text()
         starts = list(CLAUSE.finditer(text))
+        if not starts:
+            continue  # the glossary has no clauses
         for match, after in zip(starts, [*starts[1:], None], strict=True):
             line = text.count("\n", 0, match.start()) + 1
             body = text[match.end() : after.start() if after else len(text)]

@@ -67,7 +67,8 @@ void main()
     )
     max_output_channels = 4
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
-    temporary = "PRECISE float"
+    qualifiers = {"float32": "PRECISE "}
+    table = "const {type} {name}[{count}] = {type}[{count}]({values});"
     unordered = (
         "#define PRECISE",
         f"#error the error bound needs `precise`: {ORDER_EXTENSION}, or #version 400",
@@ -77,4 +78,5 @@ void main()
         "absolute": "abs({0})",
         "minimum": "min({0}, {1})",
         "maximum": "max({0}, {1})",
+        "convert": "{type}({0})",
     }

@@ -259,7 +259,9 @@ def _moveaxis(builder: Builder, planes: Any, source: int, destination: int) -> T
 
 
 def _where(builder: Builder, condition: Any, a: Any, b: Any) -> Traced:
-    """np.where with a condition is a selection."""
+    """np.where with a condition is a selection; of two Python numbers NumPy would make 64-bit ones."""
+    if all(type(value) in (int, float) for value in (a, b)):
+        _refuse("np.where between two Python numbers (one of them needs a kind: np.float32(0))")
     return emit(builder, "select", condition, a, b)
 
 

@@ -144,6 +144,7 @@ def test_float64_means_floats_alone():
         (lambda x: ~x.astype(np.uint32), r"logical_not: operands must all be bool"),
         (lambda x: np.where(x, x, x), r"select: operands must all be bool, not float32\[3\]"),
         (lambda x: np.where(x > 0.0, x, x > 0.0), r"select: operands must all be .*, not float32\[3\], bool"),
+        (lambda x: np.where(x > 0.0, 1.0, 0.0), r"np\.where between two Python numbers .* cannot"),
         (lambda x: np.where(x > 0.0), r"np\.where with these arguments cannot"),
         (lambda x: x**3, r"a power other than x \*\* 1 and x \*\* 2 cannot"),
         (lambda x: 2**x, r"a power other than"),

@@ -78,7 +78,9 @@ CASES = {
     "right_shift": lambda x: (words(x) >> np.uint32(3)).astype(np.float32),
     "select": lambda x: np.where(x < 0.5, x, np.maximum(words(x).astype(np.int32), 7).astype(np.float32)),
     "convert": lambda x: (x * 100.0).astype(np.int32).astype(np.float32),
-    "take": lambda x: look_up(T, x) + look_up(K, x).astype(np.float32) + floats(look_up(F, x)),
+    "take": lambda x: np.stack(
+        [look_up(T, x), look_up(K, x).astype(np.float32), floats(look_up(F, x)), x[..., 1]], axis=-1
+    ),
 }
 """One function for each operation, named after it."""
 

@@ -131,6 +131,7 @@ class _Kernel:
                 for output in range(-(-len(self.planes) // self.dialect.planes_per_output))
             ),
             max_depth=self.programs.settings.max_depth,
+            unordered=self.dialect.unordered[False],
             counter=self.dialect.types["uint32"],
             **uniforms,
         )
@@ -152,7 +153,7 @@ class _Kernel:
         """Write the loop over the samples."""
         self._open("for (int n = 0; n < samples; ++n) {")
         sample = self._splat(self.dialect.uniforms["sample"], "uint32")
-        self._line(f"{self.dialect.types['uint32']} sample = {sample};")
+        self._line(f"{self.dialect.types['uint32']} sample_number = {sample};")
         self._line(f"{self.dialect.types['uint32']} pixel;")
         self._declare({**PATH, **SURFACE})
         self._line(f"{self.dialect.types['bool']} alive = {self.dialect.number(True, 'bool')};")

@@ -17,6 +17,16 @@ WEIGHT_TEXTURE_WIDTH = 1024
 ORDER_EXTENSION = "GL_ARB_gpu_shader5"
 """The extension of OpenGL 3.3 that brings `precise`."""
 
+PREAMBLE = f"""\
+#version 330 core
+#extension {ORDER_EXTENSION} : enable
+#if defined({ORDER_EXTENSION}) || __VERSION__ >= 400
+#define PRECISE precise
+#else
+{{unordered}}
+#endif"""
+"""First lines of a shader: `PRECISE` stands before temporaries, where the compiler knows it."""
+
 
 class GLSL(Dialect):
     """The dialect's table."""
@@ -28,13 +38,7 @@ class GLSL(Dialect):
     image_declaration = "uniform sampler2D image_{image};"
     image_separator = "\n"
     begin = f"""\
-#version 330 core
-#extension GL_ARB_gpu_shader5 : enable
-#if defined(GL_ARB_gpu_shader5) || __VERSION__ >= 400
-#define PRECISE precise
-#else
-{{unordered}}
-#endif
+{PREAMBLE}
 {{defines}}
 {{images}}
 uniform sampler2D weight_texture;

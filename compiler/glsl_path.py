@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .glsl import GLSL
+from .glsl import GLSL, PREAMBLE
 from .path_dialect import PathDialect
 
 
@@ -12,11 +12,11 @@ class GLSLPath(GLSL, PathDialect):
     entry = "main"
     lanes = 1
     lane_numbers = "0u"
-    path_begin = """\
-#version 330 core
-#define MAX_DEPTH {max_depth}u /* scatterings of a path */
-{tables}
-{outputs}
+    path_begin = f"""\
+{PREAMBLE}
+#define MAX_DEPTH {{max_depth}}u /* scatterings of a path */
+{{tables}}
+{{outputs}}
 uniform int width;
 uniform int height;
 uniform int first_row;
@@ -25,12 +25,11 @@ uniform int samples;
 uniform uint seed_number;
 
 void main()
-{{
-    {counter} x = {column} + {lane_numbers};
-    {counter} y = {row};
-    {counter} seed = {seed};"""
+{{{{
+    {{counter}} x = {{column}} + {{lane_numbers}};
+    {{counter}} y = {{row}};
+    {{counter}} seed = {{seed}};"""
     path_end = "}}"
-    qualifiers = {}
     uniforms = {
         "column": "uint(gl_FragCoord.x)",
         "row": "uint(int(gl_FragCoord.y) + first_row)",

@@ -57,8 +57,8 @@ SURFACE: Values = {
 }
 """What a scattering needs to know of the surface that was hit."""
 
-COUNTERS: Values = dict.fromkeys(("seed", "pixel", "sample"), (NUMBER, COUNTER))
-"""Counters that name a path's random numbers, as refimpl/transport.py: Counters."""
+COUNTERS: Values = dict.fromkeys(("seed", "pixel", "sample_number"), (NUMBER, COUNTER))
+"""Counters that name a path's random numbers, as refimpl/transport.py: Counters (GLSL reserves sample)."""
 
 LAYERS: Values = {
     "albedo": (RGB, FLOAT),
@@ -98,7 +98,7 @@ def lower_scene(scene: Scene, settings: Settings) -> PathPrograms:
     def start(given: Mapping[str, Any]) -> dict[str, Any]:
         # A pixel's counter, as in refimpl/render.py: pixel_counter.
         pixel = given["x"] + np.uint32(render.MAX_IMAGE_SIDE_PX) * given["y"]
-        counters = Counters(given["seed"], pixel, given["sample"])
+        counters = Counters(given["seed"], pixel, given["sample_number"])
         x, y = given["x"].astype(np.float32), given["y"].astype(np.float32)
         path = render.start(basis, x, y, given["width"], given["height"], counters, np.float32)
         return {**_taken(PATH, path), "pixel": pixel}
@@ -120,7 +120,7 @@ def lower_scene(scene: Scene, settings: Settings) -> PathPrograms:
         path, alive = transport.scatter(world, _path(given), surface, hit, given["depth"], counters)
         return {**_taken(PATH, path), "alive": alive}
 
-    numbers = {**dict.fromkeys(("x", "y", "seed", "sample"), (NUMBER, COUNTER))}
+    numbers = {**dict.fromkeys(("x", "y", "seed", "sample_number"), (NUMBER, COUNTER))}
     size = dict.fromkeys(("width", "height"), (NUMBER, FLOAT))
     return PathPrograms(
         scene.name,

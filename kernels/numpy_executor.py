@@ -52,7 +52,7 @@ class NumpyExecutor(Executor):
         # Paths that have ended are computed on, and may leave the range of numbers.
         with np.errstate(all="ignore"):
             for n in range(part.samples):
-                state["sample"] = np.full(shape, (part.first_sample + n) % 2**32, np.uint32)
+                state["sample_number"] = np.full(shape, (part.first_sample + n) % 2**32, np.uint32)
                 first, end = follow(kernel.programs, state)
                 _add(sums, first, end, np.float32(n))
         return np.stack(list(sums.values()))
@@ -76,7 +76,7 @@ class NumpyExecutor(Executor):
 def follow(programs: PathPrograms, given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Follow paths; return the features of their first surfaces and their state in the end.
 
-    given holds the inputs of `start`: x, y, seed, sample (...), width and height.
+    given holds the inputs of `start`: x, y, seed, sample_number (...), width and height.
     """
     state: dict[str, Any] = {**given, **interpret(programs.start, given)}
     state["alive"] = np.ones(state["x"].shape, bool)

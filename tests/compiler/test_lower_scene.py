@@ -66,7 +66,7 @@ def test_programs_give_the_reference_s_bits(name, settings):
     basis = camera_basis(scene.camera, np.float32)
     path = R.start(basis, *(a.astype(np.float32) for a in (x, y)), 16, 12, counters, np.float32)
     given = {"x": x.astype(np.uint32), "y": y.astype(np.uint32), "width": 16, "height": 12}
-    given |= {"seed": counters.seed, "sample": counters.sample}
+    given |= {"seed": counters.seed, "sample_number": counters.sample}
     check(interpret(programs.start, given), {**components(PATH, path), "pixel": counters.pixel})
     given |= {"pixel": counters.pixel}
     # Paths that have ended are computed on, in both.

@@ -54,7 +54,7 @@ __kernel void wamnet_trace(
     float16 sum_direction_y = (float16)(0.0f);
     float16 sum_direction_z = (float16)(0.0f);
     for (int n = 0; n < samples; ++n) {
-        uint16 sample = (uint16)(first_sample + (uint)n);
+        uint16 sample_number = (uint16)(first_sample + (uint)n);
         uint16 pixel;
         float16 origin_x;
         float16 origin_y;
@@ -90,7 +90,7 @@ __kernel void wamnet_trace(
             float16 t10 = convert_float16(y);
             uint16 t12 = t8 * (uint16)(1664525u);
             uint16 t14 = t12 + (uint16)(1013904223u);
-            uint16 t15 = sample * (uint16)(1664525u);
+            uint16 t15 = sample_number * (uint16)(1664525u);
             uint16 t16 = t15 + (uint16)(1013904223u);
             uint16 t17 = seed * (uint16)(1664525u);
             uint16 t18 = t17 + (uint16)(1013904223u);
@@ -317,7 +317,7 @@ __kernel void wamnet_trace(
                 uint16 t33 = (uint16)(1u) + t31;
                 uint16 t35 = pixel * (uint16)(1664525u);
                 uint16 t37 = t35 + (uint16)(1013904223u);
-                uint16 t38 = sample * (uint16)(1664525u);
+                uint16 t38 = sample_number * (uint16)(1664525u);
                 uint16 t39 = t38 + (uint16)(1013904223u);
                 uint16 t40 = seed * (uint16)(1664525u);
                 uint16 t41 = t40 + (uint16)(1013904223u);

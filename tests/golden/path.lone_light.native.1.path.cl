@@ -54,7 +54,7 @@ __kernel void wamnet_trace(
     float sum_direction_y = 0.0f;
     float sum_direction_z = 0.0f;
     for (int n = 0; n < samples; ++n) {
-        uint sample = first_sample + (uint)n;
+        uint sample_number = first_sample + (uint)n;
         uint pixel;
         float origin_x;
         float origin_y;
@@ -90,7 +90,7 @@ __kernel void wamnet_trace(
             float t10 = convert_float(y);
             uint t12 = t8 * 1664525u;
             uint t14 = t12 + 1013904223u;
-            uint t15 = sample * 1664525u;
+            uint t15 = sample_number * 1664525u;
             uint t16 = t15 + 1013904223u;
             uint t17 = seed * 1664525u;
             uint t18 = t17 + 1013904223u;
@@ -385,7 +385,7 @@ __kernel void wamnet_trace(
                 uint t33 = 1u + t31;
                 uint t35 = pixel * 1664525u;
                 uint t37 = t35 + 1013904223u;
-                uint t38 = sample * 1664525u;
+                uint t38 = sample_number * 1664525u;
                 uint t39 = t38 + 1013904223u;
                 uint t40 = t33 * 1664525u;
                 uint t41 = t40 + 1013904223u;

@@ -43,9 +43,11 @@ class ExecutorName(str, Enum):
 
 
 class Renderer(str, Enum):
-    """What traces paths: so far the reference alone."""
+    """What traces paths: the reference, or a kernel."""
 
     numpy = "numpy"
+    opencl = "opencl"
+    opengl = "opengl"
 
 
 class Target(str, Enum):

@@ -16,6 +16,7 @@ from .outputs import check_output, write_text
 from .terminal import progress, say
 
 if TYPE_CHECKING:
+    from ..refimpl.render import Job, Render
     from ..refimpl.scene import Scene
 
 RENDER_EXAMPLES = """Examples:
@@ -23,6 +24,8 @@ RENDER_EXAMPLES = """Examples:
 wamnet render minicubes
 
 wamnet render minicubes --time 2.5 --spp 64 --width 512 --height 512 -o reference.exr
+
+wamnet render minicubes --spp 1024 --executor opencl -o reference.exr
 
 wamnet render furnace --set albedo=0.8 --max-depth 20 -o furnace.png"""
 """Shown below the help of `wamnet render`."""
@@ -59,15 +62,15 @@ def render(
     dtype: Annotated[FloatType, typer.Option(help="Arithmetic; files hold float32.")] = FloatType.float32,
     executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
     workers: Annotated[
-        int | None, typer.Option(help="Processes that share the work.", show_default="one per core")
+        int | None, typer.Option(help="Processes that share NumPy's work.", show_default="one per core")
     ] = None,
     exposure: options.Exposure = 0.0,
 ) -> None:
     """Path-trace a scene: colour, and albedo, normal, depth, position and ray direction with it.
 
-    The same scene, size, samples and seed give the same frame, whatever the number of workers.
+    The same scene, size, samples and seed give the same frame, whatever the number of workers; kernels
+    (OpenCL, OpenGL) give it up to rounding, much sooner.
     """
-    from ..kernels.render_pool import render_parallel
     from ..refimpl.render import Job
     from ..refimpl.transport import Settings
 
@@ -77,10 +80,24 @@ def render(
     job = Job(width, height, spp, seed, Settings(max_depth=max_depth), dtype.value)
     started = clock.perf_counter()
     with progress(f"rendering {scene}", width * height * spp) as advance:
-        frame = render_parallel(loaded, job, workers=workers, on_progress=advance).frame
+        frame = _render_on(executor, loaded, job, workers, advance).frame
     seconds = clock.perf_counter() - started
     write_picture(path, frame, exposure)
     say(f"{path}: {width}x{height} pixels, {spp} spp, {seconds:.1f} s")
+
+
+def _render_on(executor: Renderer, scene: Scene, job: Job, workers: int | None, advance: Any) -> Render:
+    """Render with the reference on several processes, or with a kernel on a device."""
+    from .. import kernels
+    from ..kernels.render_pool import render_parallel
+
+    if executor is Renderer.numpy:
+        return render_parallel(scene, job, workers=workers, on_progress=advance)
+    if workers is not None:
+        rule = f"{executor.value} shares the work by itself"
+        raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
+    with kernels.open_executor(executor.value) as device:
+        return kernels.render_on(device, scene, job, on_progress=advance)
 
 
 def write_picture(path: Path, frame: Any, exposure: float) -> None:

@@ -277,6 +277,25 @@ def _component(context: Context, operands: list[Enclosure]) -> Enclosure:
     return Enclosure(a.low[..., i], a.high[..., i], a.error[..., i])
 
 
+def _reciprocal(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """1 / a."""
+    one = np.ones_like(operands[0].low)
+    return _divide(context, [Enclosure(one, one, np.zeros_like(one)), operands[0]])
+
+
+def _no_rule(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """No bound: a decision may fall differently in the kernel, and nothing is said of what follows."""
+    shape = np.broadcast_shapes(*(np.shape(operand.low) for operand in operands))
+    return Enclosure(np.full(shape, -np.inf), np.full(shape, np.inf), np.full(shape, np.inf))
+
+
+NO_BOUND = (
+    *("cos", "less", "less_equal", "greater", "greater_equal", "equal", "not_equal"),
+    *("logical_and", "logical_or", "logical_not", "bitwise_xor", "right_shift"),
+    *("select", "convert", "take"),
+)
+"""Operations without a rule: a program whose output depends on one has no bound, and says so."""
+
 RULES: Mapping[str, Rule] = {
     "constant": _constant,
     "parameter": _parameter,
@@ -294,6 +313,8 @@ RULES: Mapping[str, Rule] = {
     "sin": _sin,
     "stack": _stack,
     "component": _component,
+    "reciprocal": _reciprocal,
+    **dict.fromkeys(NO_BOUND, _no_rule),
 }
 """One rule an operation; inputs are given."""
 

@@ -1,17 +1,22 @@
-"""What a target's language looks like: templates and a table of operations, no logic.
+"""What a target's language looks like: templates and a table of operations, no decisions.
 
 emit.py fills the templates in. Names in braces: `image` and `channels` of a feature image, `entry`,
 `images` and `defines` of the whole kernel, `unordered` (what stands where the language cannot keep operations
 in order: without an error bound, with one), `index` into the weights, `i` and `value` of an output channel,
-`0` and `1` the operands of an operation. The text between is the language's own, its braces doubled.
+`0`, `1`, `2` the operands of an operation, `type` the type of its result, `table` the name of its table,
+`name`, `count` and `values` of a table's declaration. The text between is the language's own, its braces
+doubled. An operation's template may differ for a kind of operand: `minimum.int32`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from .ir import Node
 from .profiles import SineContract
 
 
@@ -32,8 +37,10 @@ class Dialect:
     arguments: str
     max_output_channels: int
     native_sine: SineContract
-    temporary = "float"
     unordered: tuple[str, str] = ("", "")
+    types: Mapping[str, str] = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "bool"}
+    qualifiers: Mapping[str, str] = {}
+    table: str
     operations: Mapping[str, str] = {
         "add": "{0} + {1}",
         "subtract": "{0} - {1}",
@@ -43,7 +50,50 @@ class Dialect:
         "floor": "floor({0})",
         "sqrt": "sqrt({0})",
         "sin": "sin({0})",
+        "cos": "cos({0})",
+        "reciprocal": "1.0f / {0}",
+        "less": "{0} < {1}",
+        "less_equal": "{0} <= {1}",
+        "greater": "{0} > {1}",
+        "greater_equal": "{0} >= {1}",
+        "equal": "{0} == {1}",
+        "not_equal": "{0} != {1}",
+        "logical_and": "{0} && {1}",
+        "logical_or": "{0} || {1}",
+        "logical_not": "!{0}",
+        "bitwise_xor": "{0} ^ {1}",
+        "right_shift": "{0} >> {1}",
+        "select": "{0} ? {1} : {2}",
+        "take": "{table}[{0}]",
     }
+
+    def variable(self, dtype: str) -> str:
+        """Return the words before the name of a variable of this kind."""
+        return self.qualifiers.get(dtype, "") + self.types[dtype]
+
+    def expression(self, node: Node, kind: str, operands: Sequence[str]) -> str:
+        """Return the text of an operation on operands, the last of which is of the given kind."""
+        template = self.operations.get(f"{node.op}.{kind}") or self.operations[node.op]
+        return template.format(*operands, type=self.types[node.type.dtype], table=node.get("table"))
+
+    def constant(self, node: Node) -> str:
+        """Return the text of a constant."""
+        return self.number(node["value"], node.type.dtype)
+
+    def number(self, value: Any, dtype: str) -> str:
+        """Return the text of a number of the given kind."""
+        if dtype == "float32":
+            return self.literal(float(value))
+        if dtype == "bool":
+            return "true" if value else "false"
+        text = f"{int(value)}{'u' if dtype == 'uint32' else ''}"
+        return f"({text})" if text.startswith("-") else text
+
+    def table_declaration(self, name: str, array: NDArray[Any]) -> str:
+        """Return the declaration of a constant table."""
+        dtype = str(array.dtype)
+        values = ", ".join(self.number(value, dtype) for value in array)
+        return self.table.format(type=self.types[dtype], name=name, count=len(array), values=values)
 
     @staticmethod
     def literal(value: float) -> str:

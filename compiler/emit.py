@@ -19,7 +19,7 @@ from ..refimpl.errors import CompileError
 from .dialect import Dialect
 from .ir import Gather, Node, Program, users
 from .ops import OPS
-from .weights import layout
+from .weights import layout, tables
 
 BORDERS: Mapping[str, tuple[str, str]] = {
     "clamp": ("", "{pixel}"),
@@ -43,8 +43,9 @@ def emit(program: Program, dialect: Dialect, header: Sequence[str], bounded: boo
         f"#define WINDOW_SIZE {gather.window.size}\n"
         f"#define WINDOW_CENTRE {gather.window.size // 2} /* the tap that lies on the pixel itself */"
     )
+    declared = [dialect.table_declaration(name, array) for name, array in tables(program).items()]
     begin = dialect.begin.format(
-        defines=defines,
+        defines="\n".join([defines, *declared]),
         entry=dialect.entry,
         images=dialect.image_separator.join(images),
         image=gather.images[0].name,
@@ -74,6 +75,9 @@ def kernel_gather(program: Program) -> Gather:
 
 def _check_channels(program: Program, dialect: Dialect) -> None:
     """Refuse an output that the language cannot write at once."""
+    kind = program.nodes[program.outputs[0][1]].type
+    if kind.dtype != "float32":
+        raise CompileError(f"the output has type {kind}: a kernel writes float32; convert it with astype")
     channels = output_channels(program)
     if channels > dialect.max_output_channels:
         raise CompileError(
@@ -95,7 +99,7 @@ def schedule(program: Program) -> list[tuple[int, ...]]:
         if node.op in ("constant", "parameter"):
             continue
         last = program.nodes[groups[-1][-1]] if groups else node
-        if groups and _loops(node) and _loops(last) and node.type == last.type:
+        if groups and _loops(node) and _loops(last) and node.type.shape == last.type.shape:
             groups[-1].append(index)
         else:
             groups.append([index])
@@ -104,7 +108,7 @@ def schedule(program: Program) -> list[tuple[int, ...]]:
 
 def _loops(node: Node) -> bool:
     """Return whether the node is one statement, in a loop over components or in straight code."""
-    return OPS[node.op].elementwise or node.op == "component"
+    return OPS[node.op].elementwise or node.op in ("component", "take")
 
 
 def _plus(*terms: str | int) -> str:
@@ -187,10 +191,11 @@ class _Body:
         if shape:
             self._comment(f"{span}: elementwise on {shape[0]} numbers")
             for index in filter(self._is_array, group):
-                self._line(f"float v{index}[{shape[0]}];")
+                self._line(f"{self._type(index)} v{index}[{shape[0]}];")
         statements = []
         for index in group:
-            statements.append(f"{self.dialect.temporary} t{index} = {self._expression(index, lane)};")
+            kind = self.dialect.variable(self.program.nodes[index].type.dtype)
+            statements.append(f"{kind} t{index} = {self._expression(index, lane)};")
             if shape and self._is_array(index):
                 statements.append(f"v{index}[i] = t{index};")
         self._nest([f"for (int i = 0; i < {shape[0]}; ++i) {{"] if shape else [], statements)
@@ -201,7 +206,7 @@ class _Body:
         if node.op == "component":
             return self._read(node.args[0], str(node["index"]))
         operands = [self._read(arg, lane, self.group_of[index]) for arg in node.args]
-        return self.dialect.operations[node.op].format(*operands)
+        return self.dialect.expression(node, self.program.nodes[node.args[-1]].type.dtype, operands)
 
     def _outputs(self) -> None:
         """Write the only output to the result."""
@@ -242,7 +247,7 @@ class _Body:
         """Return the text of component `lane` of a value ('' for a number), read inside `group`."""
         node = self.program.nodes[index]
         if node.op == "constant":
-            return self.dialect.literal(float(node["value"]))  # type: ignore[arg-type]
+            return self.dialect.constant(node)
         if node.op == "parameter":
             return self._weight(_plus(self.slots[str(node["name"])].offset, lane))
         if not node.type.shape or self.group_of[index] == group:
@@ -271,7 +276,11 @@ class _Body:
     def _declare(self, index: int, comment: str) -> None:
         """Write a comment and the declaration of an array."""
         self._comment(comment)
-        self._line(f"float v{index}[{self.program.nodes[index].type.shape[0]}];")
+        self._line(f"{self._type(index)} v{index}[{self.program.nodes[index].type.shape[0]}];")
+
+    def _type(self, index: int) -> str:
+        """Return the type of a value's numbers."""
+        return self.dialect.types[self.program.nodes[index].type.dtype]
 
     def _comment(self, text: str) -> None:
         self.lines.append("")

@@ -17,6 +17,16 @@ WEIGHT_TEXTURE_WIDTH = 1024
 ORDER_EXTENSION = "GL_ARB_gpu_shader5"
 """The extension of OpenGL 3.3 that brings `precise`."""
 
+PREAMBLE = f"""\
+#version 330 core
+#extension {ORDER_EXTENSION} : enable
+#if defined({ORDER_EXTENSION}) || __VERSION__ >= 400
+#define PRECISE precise
+#else
+{{unordered}}
+#endif"""
+"""First lines of a shader: `PRECISE` stands before temporaries, where the compiler knows it."""
+
 
 class GLSL(Dialect):
     """The dialect's table."""
@@ -28,13 +38,7 @@ class GLSL(Dialect):
     image_declaration = "uniform sampler2D image_{image};"
     image_separator = "\n"
     begin = f"""\
-#version 330 core
-#extension GL_ARB_gpu_shader5 : enable
-#if defined(GL_ARB_gpu_shader5) || __VERSION__ >= 400
-#define PRECISE precise
-#else
-{{unordered}}
-#endif
+{PREAMBLE}
 {{defines}}
 {{images}}
 uniform sampler2D weight_texture;
@@ -67,7 +71,8 @@ void main()
     )
     max_output_channels = 4
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
-    temporary = "PRECISE float"
+    qualifiers = {"float32": "PRECISE "}
+    table = "const {type} {name}[{count}] = {type}[{count}]({values});"
     unordered = (
         "#define PRECISE",
         f"#error the error bound needs `precise`: {ORDER_EXTENSION}, or #version 400",
@@ -77,4 +82,5 @@ void main()
         "absolute": "abs({0})",
         "minimum": "min({0}, {1})",
         "maximum": "max({0}, {1})",
+        "convert": "{type}({0})",
     }

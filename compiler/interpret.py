@@ -1,7 +1,8 @@
 """The meaning of a program: each node's NumPy definition, applied in order [`interpret`].
 
 Lanes are leading axes: an input of type float32[n] is an array (..., n), a number an array (...). With
-dtype=float64 this is the reference that error bounds speak about; with float32 it is one more executor.
+dtype=float64, in which floats are then computed, this is the reference that error bounds speak about; with
+float32 it is one more executor. Integers and truth values are the same in both.
 """
 
 from __future__ import annotations
@@ -15,38 +16,56 @@ from numpy.typing import DTypeLike, NDArray
 from .ir import Node, Parameters, Program
 from .ops import OPS
 
-Array = NDArray[np.floating[Any]]
+Array = NDArray[Any]
 
 
 def interpret(
     program: Program, inputs: Mapping[str, Array], dtype: DTypeLike = np.float32
 ) -> dict[str, Array]:
     """Return each output (..., n) of the program for inputs (..., n), computed in `dtype`."""
-    parameters = {name: array.astype(dtype) for name, array in program.parameters.items()}
-    given = {name: np.asarray(array).astype(dtype, copy=False) for name, array in inputs.items()}
+    kind = np.dtype(dtype)
+    parameters = {
+        name: array.astype(element(str(array.dtype), kind), copy=False)
+        for name, array in program.parameters.items()
+    }
     values: list[Any] = []
     for node in program.nodes:
-        values.append(_value(node, program, values, given, parameters, np.dtype(dtype).type))
+        values.append(_value(node, program, values, inputs, parameters, kind))
     return {name: values[index] for name, index in program.outputs}
 
 
 def _value(
-    node: Node, program: Program, values: list[Any], given: Mapping[str, Array], parameters: Any, kind: type
+    node: Node,
+    program: Program,
+    values: list[Any],
+    given: Mapping[str, Array],
+    parameters: Any,
+    kind: np.dtype[Any],
 ) -> Any:
     """Return the value of one node in all lanes."""
     if node.op == "input":
-        return given[str(node["name"])]
+        return np.asarray(given[str(node["name"])]).astype(element(node.type.dtype, kind), copy=False)
     if node.op == "constant":
-        return kind(node["value"])
+        return element(node.type.dtype, kind).type(node["value"])
     if node.op == "parameter":
         return parameters[node["name"]]
-    return apply(node, [_spread(values[arg], program.nodes[arg], node) for arg in node.args], parameters)
+    operands = [_spread(values[arg], program.nodes[arg], node) for arg in node.args]
+    return apply(node, operands, parameters, kind)
 
 
-def apply(node: Node, operands: list[Any], parameters: Parameters) -> Any:
+def element(dtype: str, kind: np.dtype[Any]) -> np.dtype[Any]:
+    """Return the element type in which values of `dtype` are held when floats are computed in `kind`."""
+    return kind if dtype == "float32" else np.dtype(dtype)
+
+
+def apply(node: Node, operands: list[Any], parameters: Parameters, kind: np.dtype[Any]) -> Any:
     """Return the operation's definition, with parameters in place of their names."""
     op = OPS[node.op]
-    named = {name: parameters[str(v)] if name in op.parameters else v for name, v in node.attributes}
+    named: dict[str, Any] = {
+        name: parameters[str(value)] if name in op.parameters else value for name, value in node.attributes
+    }
+    if "dtype" in named:
+        named["dtype"] = element(named["dtype"], kind)
     return op.definition(*operands, **named)
 
 

@@ -2,9 +2,9 @@
 
 1. A value is the result of one node; nodes stand in the order of evaluation and name their operands by
    index, so each value is assigned once [`Node`, `Program`].
-2. A value has a type: a float, or a short vector of floats [`Type`]. Leading lanes (pixels, paths) are not
+2. A value has a type: a number, or a short vector of numbers [`Type`]. Leading lanes (pixels, paths) are not
    part of the program; every operation works on each lane alone.
-3. Weights stand beside the nodes under names [`Program.parameters`] and are float32 exactly.
+3. Weights and tables stand beside the nodes under names [`Program.parameters`]; floats are float32 exactly.
 4. How a kernel fills the input named `window` from images is data of the program, not nodes [`Gather`].
 5. Programs are built by value numbering: asking twice for the same operation gives the same value
    [`Builder`]. They are printed in one stable text [`text`], whose hash is their identity [`digest`].
@@ -17,13 +17,17 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..refimpl.dataset import Window
 
-Parameters = Mapping[str, NDArray[np.float32]]
+Parameters = Mapping[str, NDArray[Any]]
+
+DTYPES = ("float32", "int32", "uint32", "bool")
+"""Kinds of numbers that every target has; arithmetic on uint32 is modulo 2**32."""
 
 
 @dataclass(frozen=True)
@@ -111,9 +115,9 @@ class Builder:
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
-        self.parameters: dict[str, NDArray[np.float32]] = {}
+        self.parameters: dict[str, NDArray[Any]] = {}
         self._numbers: dict[tuple[object, ...], int] = {}
-        self._names: dict[tuple[tuple[int, ...], bytes], str] = {}
+        self._names: dict[tuple[object, ...], str] = {}
 
     def add(self, node: Node) -> int:
         """Return the index of `node`, which is appended unless it is there already."""
@@ -124,11 +128,18 @@ class Builder:
             self.nodes.append(node)
         return self._numbers[key]
 
-    def parameter(self, array: NDArray[np.float32]) -> str:
-        """Return the name of an array: W0, W1, ... for matrices, b0, b1, ... for vectors."""
-        key = (array.shape, array.tobytes())
+    def parameter(self, array: NDArray[Any]) -> str:
+        """Return the name of an array of weights: W0, W1, ... for matrices, b0, b1, ... for vectors."""
+        return self._named("W" if array.ndim == 2 else "b", array)
+
+    def table(self, array: NDArray[Any]) -> str:
+        """Return the name of a table: T0, T1, ..."""
+        return self._named("T", array)
+
+    def _named(self, letter: str, array: NDArray[Any]) -> str:
+        """Return the name of an array, a new one for new content."""
+        key = (letter, str(array.dtype), array.shape, array.tobytes())
         if key not in self._names:
-            letter = "W" if array.ndim == 2 else "b"
             count = sum(name.startswith(letter) for name in self.parameters)
             self._names[key] = f"{letter}{count}"
             self.parameters[self._names[key]] = array
@@ -158,9 +169,9 @@ def _line(node: Node) -> str:
     return " ".join(words) + f" : {node.type}"
 
 
-def _array(array: NDArray[np.float32]) -> str:
+def _array(array: NDArray[Any]) -> str:
     """Return type and content hash of a parameter."""
-    return f"float32{list(array.shape)} sha256 {sha256(_bytes(array))[:16]}"
+    return f"{array.dtype}{list(array.shape)} sha256 {sha256(_bytes(array))[:16]}"
 
 
 def digest(program: Program) -> str:
@@ -176,9 +187,9 @@ def sha256(*pieces: bytes) -> str:
     return hashed.hexdigest()
 
 
-def _bytes(array: NDArray[np.float32]) -> bytes:
-    """Return the array as little-endian float32 in C order, the same on every machine."""
-    return np.ascontiguousarray(array, "<f4").tobytes()
+def _bytes(array: NDArray[Any]) -> bytes:
+    """Return the array's bytes, little-endian and in C order, the same on every machine."""
+    return np.ascontiguousarray(array, array.dtype.newbyteorder("<")).tobytes()
 
 
 def attributes(**given: Attribute | None) -> tuple[tuple[str, Attribute], ...]:

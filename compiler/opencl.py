@@ -42,9 +42,14 @@ __kernel void {entry}(
     native_sine = SineContract(
         "sin() of OpenCL 1.2, 4 ulp on all arguments (full profile)", 4 * 2 * UNIT_ROUNDOFF
     )
+    table = "__constant {type} {name}[{count}] = {{{values}}};"
     operations = {
         **Dialect.operations,
         "absolute": "fabs({0})",
         "minimum": "fmin({0}, {1})",
         "maximum": "fmax({0}, {1})",
+        **{
+            f"{op}imum.{kind}": f"{op}({{0}}, {{1}})" for op in ("min", "max") for kind in ("int32", "uint32")
+        },
+        "convert": "convert_{type}({0})",
     }

@@ -13,9 +13,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from .ir import Attribute, Parameters, Type
+from .ir import DTYPES, Attribute, Parameters, Type
 
-Rounding = Literal["exact", "nearest", "divide", "sqrt", "sine", "dot"]
+Rounding = Literal["exact", "nearest", "divide", "sqrt", "sine", "cosine", "dot"]
 """How a target computes it: exactly, correctly rounded, or with its class's error (profiles.py)."""
 
 TypeRule = Callable[[Sequence[Type], Mapping[str, Attribute], Parameters], Type]
@@ -40,6 +40,12 @@ class Op:
     elementwise: bool = False
 
 
+FLOATS = ("float32",)
+"""Operands that must be floats."""
+
+NUMBERS = ("float32", "int32", "uint32")
+"""Operands that may be any numbers."""
+
 # ---- type rules: (operand types, attributes, parameters) -> type -------------------------------------
 
 
@@ -52,16 +58,25 @@ def _declared(args: Sequence[Type], attributes: Mapping[str, Attribute], paramet
 
 
 def _constant(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
-    """A constant is one finite float."""
-    value = attributes["value"]
-    if not isinstance(value, float) or not abs(value) <= float(np.finfo(np.float32).max):
+    """A constant is one finite float, or by its `dtype` an integer in its range or a truth value."""
+    value, dtype = attributes["value"], str(attributes.get("dtype", "float32"))
+    if dtype in ("int32", "uint32"):
+        info = np.iinfo(dtype)
+        if type(value) is not int or not info.min <= value <= info.max:
+            raise TypeRuleError(f"a constant must be an integer that {dtype} holds, not {value!r}")
+    elif dtype == "bool":
+        if type(value) is not bool:
+            raise TypeRuleError(f"a constant must be True or False, not {value!r}")
+    elif not isinstance(value, float) or not abs(value) <= float(np.finfo(np.float32).max):
         raise TypeRuleError(f"a constant must be a float that is finite in float32, not {value!r}")
-    return Type()
+    return Type(dtype)
 
 
 def _parameter(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
     """A parameter used as a value is a vector."""
     array = parameters[str(attributes["name"])]
+    if array.dtype != np.float32:
+        raise TypeRuleError(f"a parameter used as a value must be float32, not {array.dtype}")
     if array.ndim != 1:
         raise TypeRuleError(f"a parameter used as a value must be a vector, not of shape {array.shape}")
     return Type(shape=array.shape)
@@ -70,26 +85,68 @@ def _parameter(args: Sequence[Type], attributes: Mapping[str, Attribute], parame
 def _affine(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
     """W (D_out, D_in), x (D_in,), b (D_out,) give (D_out,)."""
     weight = parameters[str(attributes["weight"])]
-    if weight.ndim != 2 or args[0].shape != weight.shape[1:]:
+    if weight.ndim != 2 or args[0] != Type(shape=weight.shape[1:]):
         raise TypeRuleError(f"weight of shape {weight.shape} does not take an operand of type {args[0]}")
     if "bias" in attributes and parameters[str(attributes["bias"])].shape != weight.shape[:1]:
         raise TypeRuleError(f"bias must have shape {weight.shape[:1]} beside a weight of {weight.shape}")
     return Type(shape=weight.shape[:1])
 
 
-def _elementwise(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
-    """Equal shapes; a number goes with every component of a vector."""
+def _shape(args: Sequence[Type]) -> tuple[int, ...]:
+    """Return the shape of an elementwise result: a number goes with every component of a vector."""
     shapes = {arg.shape for arg in args} - {()}
     if len(shapes) > 1:
         raise TypeRuleError(f"operands must be of one shape or numbers, not {', '.join(map(str, args))}")
-    return Type(shape=shapes.pop() if shapes else ())
+    return shapes.pop() if shapes else ()
+
+
+def _same(args: Sequence[Type], kinds: Sequence[str]) -> str:
+    """Return the one kind of number that all operands have."""
+    found = {arg.dtype for arg in args}
+    if len(found) > 1 or not found <= set(kinds):
+        raise TypeRuleError(f"operands must all be {' or all '.join(kinds)}, not {', '.join(map(str, args))}")
+    return found.pop()
+
+
+def _elementwise(kinds: Sequence[str]) -> TypeRule:
+    """Return the rule of operations on equal kinds of numbers that keep the kind."""
+    return lambda args, attributes, parameters: Type(_same(args, kinds), _shape(args))
+
+
+def _comparison(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
+    """Equal kinds of numbers give truth values."""
+    _same(args, NUMBERS)
+    return Type("bool", _shape(args))
+
+
+def _select(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
+    """A truth value chooses between two values of one kind."""
+    _same(args[:1], ("bool",))
+    return Type(_same(args[1:], DTYPES), _shape(args))
+
+
+def _convert(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
+    """A number becomes one of another kind; a float is cut off, and must lie in the integers' range."""
+    _same(args, NUMBERS)
+    dtype = str(attributes["dtype"])
+    if dtype not in NUMBERS:
+        raise TypeRuleError(f"numbers are converted to {', '.join(NUMBERS)}, not to {dtype}")
+    return Type(dtype, args[0].shape)
+
+
+def _take(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
+    """An index gives an entry of a table; it must lie inside."""
+    table = parameters[str(attributes["table"])]
+    if args[0] != Type("int32") or table.ndim != 1:
+        raise TypeRuleError(f"a table of shape {table.shape} does not take an index of type {args[0]}")
+    return Type(str(table.dtype))
 
 
 def _stack(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
-    """n numbers give a vector of n."""
+    """n numbers of one kind give a vector of n."""
     if any(arg.shape for arg in args):
         raise TypeRuleError(f"stack takes numbers, not {', '.join(map(str, args))}")
-    return Type(shape=(len(args),))
+    return Type(_same(args, DTYPES), (len(args),))
 
 
 def _component(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
@@ -97,7 +154,7 @@ def _component(args: Sequence[Type], attributes: Mapping[str, Attribute], parame
     index = attributes["index"]
     if not args[0].shape or not isinstance(index, int) or not 0 <= index < args[0].shape[0]:
         raise TypeRuleError(f"component {index!r} does not exist in an operand of type {args[0]}")
-    return Type()
+    return Type(args[0].dtype)
 
 
 # ---- definitions that are no NumPy function by themselves --------------------------------------------
@@ -119,21 +176,42 @@ def _component_value(x: Any, index: int) -> Any:
     return x[..., index]
 
 
+def _convert_value(x: Any, dtype: Any) -> Any:
+    """x (...) in another kind of number."""
+    return np.asarray(x).astype(dtype)
+
+
+def _take_value(index: Any, table: Any) -> Any:
+    """index (...), table (K,) -> (...)."""
+    return np.take(table, index)
+
+
 def _no_definition(*_: Any, **__: Any) -> Any:
     """Inputs, constants and parameters are given to the interpreter, not computed."""
     raise NotImplementedError
 
 
-def _row(name: str, function: Callable[..., Any], arity: int, rounding: Rounding) -> Op:
+def _row(
+    name: str,
+    function: Callable[..., Any],
+    arity: int,
+    rounding: Rounding = "exact",
+    kinds: Sequence[str] = FLOATS,
+) -> Op:
     """Return the row of an elementwise operation whose definition is a NumPy function."""
-    return Op(name, arity, _elementwise, function, rounding, elementwise=True)
+    return Op(name, arity, _elementwise(kinds), function, rounding, elementwise=True)
+
+
+def _compare(name: str, function: Callable[..., Any]) -> Op:
+    """Return the row of a comparison."""
+    return Op(name, 2, _comparison, function, "exact", elementwise=True)
 
 
 OPS: Mapping[str, Op] = {
     op.name: op
     for op in (
         Op("input", 0, _declared, _no_definition, "exact", required=("name", "type")),
-        Op("constant", 0, _constant, _no_definition, "exact", required=("value",)),
+        Op("constant", 0, _constant, _no_definition, "exact", required=("value",), optional=("dtype",)),
         Op("parameter", 0, _parameter, _no_definition, "exact", required=("name",), parameters=("name",)),
         Op(
             "affine",
@@ -145,17 +223,33 @@ OPS: Mapping[str, Op] = {
             optional=("bias",),
             parameters=("weight", "bias"),
         ),
-        _row("add", np.add, 2, "nearest"),
-        _row("subtract", np.subtract, 2, "nearest"),
-        _row("multiply", np.multiply, 2, "nearest"),
+        _row("add", np.add, 2, "nearest", NUMBERS),
+        _row("subtract", np.subtract, 2, "nearest", NUMBERS),
+        _row("multiply", np.multiply, 2, "nearest", NUMBERS),
         _row("divide", np.divide, 2, "divide"),
-        _row("negative", np.negative, 1, "exact"),
-        _row("absolute", np.absolute, 1, "exact"),
-        _row("minimum", np.minimum, 2, "exact"),
-        _row("maximum", np.maximum, 2, "exact"),
-        _row("floor", np.floor, 1, "exact"),
+        _row("reciprocal", np.reciprocal, 1, "divide"),
+        _row("negative", np.negative, 1),
+        _row("absolute", np.absolute, 1),
+        _row("minimum", np.minimum, 2, kinds=NUMBERS),
+        _row("maximum", np.maximum, 2, kinds=NUMBERS),
+        _row("floor", np.floor, 1),
         _row("sqrt", np.sqrt, 1, "sqrt"),
         _row("sin", np.sin, 1, "sine"),
+        _row("cos", np.cos, 1, "cosine"),
+        _compare("less", np.less),
+        _compare("less_equal", np.less_equal),
+        _compare("greater", np.greater),
+        _compare("greater_equal", np.greater_equal),
+        _compare("equal", np.equal),
+        _compare("not_equal", np.not_equal),
+        _row("logical_and", np.logical_and, 2, kinds=("bool",)),
+        _row("logical_or", np.logical_or, 2, kinds=("bool",)),
+        _row("logical_not", np.logical_not, 1, kinds=("bool",)),
+        _row("bitwise_xor", np.bitwise_xor, 2, kinds=("uint32",)),
+        _row("right_shift", np.right_shift, 2, kinds=("uint32",)),
+        Op("select", 3, _select, np.where, "exact", elementwise=True),
+        Op("convert", 1, _convert, _convert_value, "nearest", required=("dtype",), elementwise=True),
+        Op("take", 1, _take, _take_value, "exact", required=("table",), parameters=("table",)),
         Op("stack", None, _stack, _stack_value, "exact"),
         Op("component", 1, _component, _component_value, "exact", required=("index",)),
     )

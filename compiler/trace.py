@@ -3,9 +3,11 @@
 1. Each input becomes a tracing value [`Traced`]; the function is called with them [`trace`].
 2. NumPy hands every ufunc and function on such a value to it (`__array_ufunc__`, `__array_function__`); the
    operation's row in ops.py gives the node. Numbers become constants, arrays become parameters.
-3. `x @ W.T` with a constant matrix becomes one affine node; np.clip becomes maximum and minimum;
+3. `x @ W.T` with a constant matrix becomes one affine node; np.clip becomes maximum and minimum; np.where a
+   selection; np.take from a constant table (made one by `np.asarray(table, like=index)`) a look-up;
    `x[..., i]` a component; `x[..., None]` nothing, since a number goes with every component anyway.
-4. Anything else raises: the closed list of operations is what makes one definition serve every executor.
+4. A Python number takes the kind of the values beside it; other kinds are never mixed.
+5. Anything else raises: the closed list of operations is what makes one definition serve every executor.
 """
 
 from __future__ import annotations
@@ -20,13 +22,22 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 
 from ..refimpl.errors import CompileError
-from .ir import Attribute, Builder, Gather, Node, Program, Type, attributes
+from .ir import DTYPES, Attribute, Builder, Gather, Node, Program, Type, attributes
 from .ops import ELEMENTWISE, OPS, TypeRuleError
 
-_UFUNCS: Mapping[Any, str] = {op.definition: op.name for op in ELEMENTWISE}
-"""NumPy's ufuncs that are operations."""
+_UFUNCS: Mapping[Any, str] = {
+    **{op.definition: op.name for op in ELEMENTWISE if isinstance(op.definition, np.ufunc)},
+    np.bitwise_and: "logical_and",
+    np.bitwise_or: "logical_or",
+    np.invert: "logical_not",
+}
+"""NumPy's ufuncs that are operations; `&`, `|` and `~` are those of truth values."""
 
-TRACEABLE = (*(f"np.{op.name}" for op in ELEMENTWISE), "np.matmul", "np.clip", "np.stack", "x[..., i]")
+TRACEABLE = (
+    *(f"np.{name}" for name in dict.fromkeys(_UFUNCS.values())),
+    *("np.matmul", "np.clip", "np.where", "np.stack", "np.moveaxis(np.stack(...), 0, -1)", "np.take"),
+    *("np.full_like", "np.zeros_like", "np.ones_like", "x ** 1", "x ** 2", "x.astype", "x[..., i]"),
+)
 """The closed list, as error messages and the spec show it."""
 
 
@@ -61,17 +72,19 @@ class Traced(NDArrayOperatorsMixin):
             )
         if ufunc is np.matmul:
             return _matmul(self.builder, *operands)
+        if ufunc is np.power:
+            return _power(self.builder, *operands)
         if ufunc not in _UFUNCS:
             _refuse(name)
         return emit(self.builder, _UFUNCS[ufunc], *operands)
 
-    def __array_function__(self, function: Any, types: Any, args: Any, options: Any) -> Traced:
-        if function not in _FUNCTIONS:
-            _refuse(f"np.{function.__name__}")
-        try:
-            return _FUNCTIONS[function](self.builder, *args, **options)
-        except TypeError:
-            return _refuse(f"np.{function.__name__} with these arguments")
+    def __array_function__(self, function: Any, types: Any, args: Any, options: Any) -> Any:
+        return _call(self.builder, function, args, options)
+
+    def astype(self, dtype: Any) -> Traced:
+        """Return the value in another kind of number."""
+        wanted = np.dtype(dtype).name
+        return self if wanted == self.type.dtype else emit(self.builder, "convert", self, dtype=wanted)
 
     def __getitem__(self, key: Any) -> Traced:
         if not isinstance(key, tuple) or len(key) != 2 or key[0] is not Ellipsis:
@@ -108,6 +121,26 @@ class Traced(NDArrayOperatorsMixin):
         _refuse("iteration over a value")
 
 
+class Table:
+    """A constant table (K,) that np.take looks up at a traced index."""
+
+    def __init__(self, builder: Builder, array: NDArray[Any]) -> None:
+        self.builder, self.array = builder, array
+
+    def __array_function__(self, function: Any, types: Any, args: Any, options: Any) -> Any:
+        return _call(self.builder, function, args, options)
+
+
+class Planes:
+    """Components stacked on the first axis, on their way to the last one by np.moveaxis."""
+
+    def __init__(self, builder: Builder, numbers: Any) -> None:
+        self.builder, self.numbers = builder, numbers
+
+    def __array_function__(self, function: Any, types: Any, args: Any, options: Any) -> Any:
+        return _call(self.builder, function, args, options)
+
+
 def trace(
     function: Callable[..., Any],
     inputs: Mapping[str, Type],
@@ -130,7 +163,9 @@ def trace(
 
 def emit(builder: Builder, op: str, *operands: Any, **named: Attribute | None) -> Traced:
     """Add one operation on traced values, numbers and arrays."""
-    args = tuple(_operand(builder, operand) for operand in operands)
+    chosen = operands[1:] if op == "select" else operands
+    beside = next((value.type.dtype for value in chosen if isinstance(value, Traced)), None)
+    args = tuple(_operand(builder, operand, beside) for operand in operands)
     return Traced(builder, _add(builder, op, args, **named))
 
 
@@ -144,15 +179,43 @@ def _add(builder: Builder, op: str, args: tuple[int, ...], **named: Attribute | 
     return builder.add(Node(op, args, kind, given))
 
 
-def _operand(builder: Builder, value: Any) -> int:
-    """Return the index of a traced value, or of the constant or parameter that a plain one becomes."""
+def _operand(builder: Builder, value: Any, beside: str | None = None) -> int:
+    """Return the index of a traced value, or of the constant or parameter that a plain one becomes.
+
+    `beside` is the kind of number of the values beside it, which a Python number takes.
+    """
     if isinstance(value, Traced):
         return value.index
+    if isinstance(value, Planes):
+        _refuse("np.stack with axis=0 outside of np.moveaxis(np.stack(...), 0, -1)")
     if isinstance(value, np.ndarray) and value.ndim:
         return _add(builder, "parameter", (), name=builder.parameter(_exact_float32(value)))
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number | np.ndarray):
+    if not isinstance(value, int | float | np.number | np.bool_ | np.ndarray):
         _refuse(f"a {type(value).__name__} as an operand")
-    return _add(builder, "constant", (), value=float(value))
+    return _constant(builder, value, _kind(value, beside))
+
+
+def _kind(value: Any, beside: str | None) -> str:
+    """Return the kind of number that a plain value becomes."""
+    if isinstance(value, bool | np.bool_):
+        if beside not in (None, "bool"):
+            _refuse("a bool as an operand of numbers")
+        return "bool"
+    if isinstance(value, np.integer | np.ndarray) and str(value.dtype) in DTYPES:
+        return str(value.dtype)
+    if isinstance(value, int) and beside in ("int32", "uint32"):
+        return beside
+    if isinstance(value, np.integer):
+        _refuse(f"an {value.dtype} as an operand")
+    return "float32"
+
+
+def _constant(builder: Builder, value: Any, dtype: str) -> int:
+    """Return the index of a constant."""
+    if dtype == "float32":
+        return _add(builder, "constant", (), value=float(value))
+    plain = bool(value) if dtype == "bool" else int(value)
+    return _add(builder, "constant", (), value=plain, dtype=dtype)
 
 
 def _exact_float32(array: NDArray[Any]) -> NDArray[np.float32]:
@@ -179,15 +242,93 @@ def _clip(builder: Builder, x: Any, low: Any, high: Any) -> Traced:
     return emit(builder, "minimum", emit(builder, "maximum", x, low), high)
 
 
-def _stack(builder: Builder, numbers: Any, axis: int = 0) -> Traced:
-    """np.stack of numbers on the last axis."""
+def _stack(builder: Builder, numbers: Any, axis: int = 0) -> Traced | Planes:
+    """np.stack of numbers on the last axis, or on the first one before np.moveaxis."""
+    if axis == 0:
+        return Planes(builder, numbers)
     if axis != -1:
         _refuse(f"np.stack with axis={axis} (components are the last axis: axis=-1)")
     return emit(builder, "stack", *numbers)
 
 
-_FUNCTIONS: Mapping[Any, Callable[..., Traced]] = {np.clip: _clip, np.stack: _stack}
+def _moveaxis(builder: Builder, planes: Any, source: int, destination: int) -> Traced:
+    """np.moveaxis(np.stack(numbers), 0, -1): components side by side."""
+    if not isinstance(planes, Planes) or (source, destination) != (0, -1):
+        _refuse("np.moveaxis of anything but np.moveaxis(np.stack(...), 0, -1)")
+    return emit(builder, "stack", *planes.numbers)
+
+
+def _where(builder: Builder, condition: Any, a: Any, b: Any) -> Traced:
+    """np.where with a condition is a selection; of two Python numbers NumPy would make 64-bit ones."""
+    if all(type(value) in (int, float) for value in (a, b)):
+        _refuse("np.where between two Python numbers (one of them needs a kind: np.float32(0))")
+    return emit(builder, "select", condition, a, b)
+
+
+def _power(builder: Builder, x: Any, exponent: Any) -> Traced:
+    """Turn x ** 1 and x ** 2 into what NumPy computes for them."""
+    if not isinstance(x, Traced) or not isinstance(exponent, int) or exponent not in (1, 2):
+        _refuse("a power other than x ** 1 and x ** 2")
+    return x if exponent == 1 else emit(builder, "multiply", x, x)
+
+
+def _full_like(builder: Builder, like: Traced, value: Any, dtype: Any = None) -> Traced:
+    """np.full_like is a constant for each component."""
+    kind = np.dtype(dtype).name if dtype is not None else like.type.dtype
+    if kind not in DTYPES:
+        _refuse(f"np.full_like with dtype {kind}")
+    number = Traced(builder, _constant(builder, value, kind))
+    return emit(builder, "stack", *[number] * like.shape[0]) if like.shape else number
+
+
+def _zeros_like(builder: Builder, like: Traced, dtype: Any = None) -> Traced:
+    """np.zeros_like is np.full_like with 0."""
+    return _full_like(builder, like, 0, dtype)
+
+
+def _ones_like(builder: Builder, like: Traced, dtype: Any = None) -> Traced:
+    """np.ones_like is np.full_like with 1."""
+    return _full_like(builder, like, 1, dtype)
+
+
+def _asarray(builder: Builder, array: Any) -> Table:
+    """np.asarray(table, like=index) is a table that can be looked up."""
+    if not isinstance(array, np.ndarray) or array.ndim != 1:
+        _refuse("np.asarray(..., like=x) of anything but a constant array of one axis")
+    return Table(builder, array)
+
+
+def _take(builder: Builder, table: Any, index: Any) -> Traced:
+    """np.take from a table at a traced index."""
+    if not isinstance(table, Table):
+        _refuse("np.take from anything but np.asarray(table, like=index)")
+    array = table.array
+    known = np.ascontiguousarray(array) if str(array.dtype) in DTYPES else _exact_float32(array)
+    return emit(builder, "take", index, table=builder.table(known))
+
+
+_FUNCTIONS: Mapping[Any, Callable[..., Any]] = {
+    np.clip: _clip,
+    np.stack: _stack,
+    np.moveaxis: _moveaxis,
+    np.where: _where,
+    np.full_like: _full_like,
+    np.zeros_like: _zeros_like,
+    np.ones_like: _ones_like,
+    np.asarray: _asarray,
+    np.take: _take,
+}
 """NumPy's functions that are no ufuncs and can be traced."""
+
+
+def _call(builder: Builder, function: Any, args: Any, options: Any) -> Any:
+    """Do what a NumPy function does, or refuse it."""
+    if function not in _FUNCTIONS:
+        _refuse(f"np.{function.__name__}")
+    try:
+        return _FUNCTIONS[function](builder, *args, **options)
+    except TypeError:
+        return _refuse(f"np.{function.__name__} with these arguments")
 
 
 def _refuse(what: str) -> NoReturn:

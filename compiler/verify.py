@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ..refimpl.errors import CompileError
-from .ir import Node, Program, Type
+from .ir import DTYPES, Node, Program, Type
 from .ops import OPS, TypeRuleError
 
 Rule = Callable[[Program], Iterator[str]]
@@ -56,10 +56,13 @@ def parameters_exist(program: Program) -> Iterator[str]:
 
 
 def parameters_are_numbers(program: Program) -> Iterator[str]:
-    """Parameters are finite float32 arrays, none of them empty."""
+    """Parameters are arrays of a kind that values have, finite, none of them empty."""
     for name, array in program.parameters.items():
-        if array.dtype != np.float32 or not array.size or not np.isfinite(array).all():
-            yield f"parameter {name} ({array.dtype}, shape {array.shape}) must be finite float32, not empty"
+        if str(array.dtype) not in DTYPES or not array.size or not np.isfinite(array).all():
+            yield (
+                f"parameter {name} ({array.dtype}, shape {array.shape}) must be finite, not empty, and of "
+                f"{', '.join(DTYPES)}"
+            )
 
 
 def types_follow(program: Program) -> Iterator[str]:
@@ -75,10 +78,13 @@ def types_follow(program: Program) -> Iterator[str]:
 
 
 def short_vectors(program: Program) -> Iterator[str]:
-    """A value is a float32 number or a vector of at least one."""
+    """A value is a number or a vector of at least one."""
     for index, node in enumerate(program.nodes):
-        if node.type.dtype != "float32" or len(node.type.shape) > 1 or 0 in node.type.shape:
-            yield f"%{index} {node.op} has type {node.type}; values are float32 numbers or vectors"
+        if node.type.dtype not in DTYPES or len(node.type.shape) > 1 or 0 in node.type.shape:
+            yield (
+                f"%{index} {node.op} has type {node.type}; values are numbers or vectors of "
+                f"{', '.join(DTYPES)}"
+            )
 
 
 def inputs_once(program: Program) -> Iterator[str]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
 from ..compiler.ir import Gather, Image
+from ..compiler.path_kernel import PathArtifact
 from ..refimpl.errors import InputError
 
 Images = Mapping[str, NDArray[np.float32]]
@@ -26,11 +28,28 @@ KEPT_KERNELS = 64
 """Kernels that an executor keeps built: programs use a few; a process that makes thousands stays small."""
 
 
+@dataclass(frozen=True)
+class Part:
+    """A part of a render: rows [first_row, first_row + rows) of an image, samples from first_sample on."""
+
+    width: int
+    height: int
+    first_row: int
+    rows: int
+    first_sample: int
+    samples: int
+    seed: int
+
+
 class Executor(ABC):
-    """A device that is open; a context manager that closes it. `name` is its target, `device` a text."""
+    """A device that is open; a context manager that closes it. `name` is its target, `device` a text.
+
+    `lanes` is the number of paths that its path kernels should follow at once.
+    """
 
     name: str
     device: str
+    lanes: int = 1
 
     @abstractmethod
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
@@ -40,8 +59,22 @@ class Executor(ABC):
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
         """Run on checked images (H, W, C)."""
 
+    @abstractmethod
+    def build_path(self, kernel: PathArtifact) -> None:
+        """Make a path kernel ready to run; again costs nothing."""
+
+    @abstractmethod
+    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
+        """Return the sums (planes, rows, width) of a part."""
+
     def close(self) -> None:
         """Give the device back."""
+
+    def trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
+        """Return the sums (planes, rows, width) over the samples of a part of an image."""
+        self._check_target(kernel)
+        self.build_path(kernel)
+        return self._trace(kernel, part)
 
     def run(self, artifact: Artifact, inputs: Images) -> NDArray[np.float32]:
         """Return the output (H, W, C) for encoded feature images (H, W, C), float32, by name."""
@@ -55,7 +88,7 @@ class Executor(ABC):
     def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
         """Refuse images of a size (height, width) that the device cannot hold."""
 
-    def _check_target(self, artifact: Artifact) -> None:
+    def _check_target(self, artifact: Artifact | PathArtifact) -> None:
         """Refuse a kernel in another language."""
         if artifact.target != self.name:
             raise InputError(

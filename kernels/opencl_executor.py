@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
+from ..compiler.path_kernel import PathArtifact
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import Executor, Images, black, gather_of, keep
+from .executor import Executor, Images, Part, black, gather_of, keep
 
 DEVICE_VARIABLE = "WAMNET_OPENCL_DEVICE"
 """Environment variable that chooses a device where the caller does not."""
@@ -32,6 +33,13 @@ STACK_BYTES = 2**20
 
 INDEX_LIMIT = 2**31
 """Numbers of an image must be fewer: the kernel's indices are `int`."""
+
+PATH_LOCAL_SIZE = {1: (8, 8), 2: (1, 1)}
+"""Work items (x, y) in a group of a path kernel: one path each, or (2) vectors of paths, which are groups by
+themselves and need no second loop around them."""
+
+CPU_LANES = 16
+"""Paths in a work item on a CPU: one AVX-512 register, two of AVX2; shorter vectors are slower on both."""
 
 BUILD_OPTIONS = ("-cl-std=CL1.2",)
 """Nothing here may allow what the standard's table of errors does not."""
@@ -53,6 +61,8 @@ class OpenCLExecutor(Executor):
         self._context = cl.Context([chosen])
         self._queue = cl.CommandQueue(self._context)
         self._built: dict[str, tuple[Any, Any, tuple[int, int]]] = {}
+        self._paths: dict[str, Any] = {}
+        self.lanes = CPU_LANES if chosen.type & cl.device_type.CPU else 1
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
         """Compile the source, upload the weights, and run once."""
@@ -60,13 +70,7 @@ class OpenCLExecutor(Executor):
             keep(self._built, artifact.digest, self._built[artifact.digest])
             return
         local_size = self._local_size(artifact)
-        program = cl.Program(self._context, artifact.source)
-        try:
-            # Without pyopencl's own cache: what is reported as compile time is compiling.
-            uncached: Any = False
-            program.build(options=list(BUILD_OPTIONS), cache_dir=uncached)
-        except cl.RuntimeError as error:
-            raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+        program = self._compiled(artifact.source)
         # An empty buffer is no buffer.
         weights = artifact.weights if artifact.weights.size else np.zeros(1, np.float32)
         built = (getattr(program, artifact.entry_point), self._upload(weights), local_size)
@@ -127,6 +131,42 @@ class OpenCLExecutor(Executor):
         kernel(self._queue, size, local_size, *inputs, weights, output, np.int32(width), np.int32(height))
         cl.enqueue_copy(self._queue, result, output)
         return result
+
+    def build_path(self, kernel: PathArtifact) -> None:
+        """Compile the source, and follow one path: PoCL compiles when a kernel is first enqueued."""
+        known = self._paths.get(kernel.digest)
+        function = known or getattr(self._compiled(kernel.source), kernel.entry_point)
+        keep(self._paths, kernel.digest, function)
+        if known is None:
+            self._trace(kernel, Part(1, 1, 0, 1, 0, 1, 0))
+
+    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
+        local = PATH_LOCAL_SIZE[min(kernel.lanes, 2)]
+        # Whole groups of whole vectors; what lies beyond the image is computed too, and left out here.
+        items = (-(-part.width // kernel.lanes), part.rows)
+        columns, rows = (-(-n // size) * size for n, size in zip(items, local, strict=True))
+        sums = np.empty((len(kernel.planes), rows, columns * kernel.lanes), np.float32)
+        output = cl.Buffer(self._context, cl.mem_flags.WRITE_ONLY, sums.nbytes)
+        numbers = (
+            *map(np.int32, (part.width, part.height, part.first_row)),
+            np.uint32(part.first_sample),
+            np.int32(part.samples),
+            np.uint32(part.seed),
+        )
+        self._paths[kernel.digest](self._queue, (columns, rows), local, output, *numbers)
+        cl.enqueue_copy(self._queue, sums, output)
+        return sums[:, : part.rows, : part.width]
+
+    def _compiled(self, source: str) -> Any:
+        """Return the built program, or raise with the driver's log."""
+        program = cl.Program(self._context, source)
+        try:
+            # Without pyopencl's own cache: what is reported as compile time is compiling.
+            uncached: Any = False
+            program.build(options=list(BUILD_OPTIONS), cache_dir=uncached)
+        except cl.RuntimeError as error:
+            raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+        return program
 
     def _upload(self, array: NDArray[np.float32]) -> Any:
         """Return a device buffer with the array's content."""

@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
 from ..compiler.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
+from ..compiler.path_kernel import PathArtifact
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import osmesa
-from .executor import Executor, Images, black, keep
+from .executor import Executor, Images, Part, black, keep
 
 CONTEXT_VARIABLE = "WAMNET_OPENGL_CONTEXT"
 """Environment variable that chooses the kind of context where the caller does not."""
@@ -62,7 +63,7 @@ HOW_TO_GET = {
 
 @dataclass(frozen=True)
 class _Built:
-    """A kernel on the device, and the sizes of which it has drawn a few pixels."""
+    """A kernel on the device, with weights or None, and the sizes of which it has drawn a few pixels."""
 
     program: Any
     triangle: Any
@@ -72,7 +73,8 @@ class _Built:
     def release(self) -> None:
         """Give it back."""
         for thing in (self.triangle, self.program, self.weights):
-            thing.release()
+            if thing is not None:
+                thing.release()
 
 
 class OpenGLExecutor(Executor):
@@ -84,6 +86,7 @@ class OpenGLExecutor(Executor):
         kind, self._context = _open(context or os.environ.get(CONTEXT_VARIABLE) or "auto")
         self.device = f"{self._context.info['GL_RENDERER']} through {kind}"
         self._built: dict[str, _Built] = {}
+        self._paths: dict[str, _Built] = {}
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
         """Compile the shaders, upload the weights, and draw a few pixels."""
@@ -107,14 +110,18 @@ class OpenGLExecutor(Executor):
         with self._context, ExitStack() as made:
             weights = self._weights(artifact)
             made.callback(weights.release)
-            try:
-                program = self._context.program(vertex_shader=VERTEX_SHADER, fragment_shader=artifact.source)
-            except moderngl.Error as error:
-                raise CompileError(f"{self.device} does not build the kernel: {error}") from None
-            made.callback(program.release)
-            triangle = self._context.vertex_array(program, [])
+            program, triangle = self._program(artifact.source, made)
             made.pop_all()
             return _Built(program, triangle, weights)
+
+    def _program(self, source: str, made: ExitStack) -> tuple[Any, Any]:
+        """Return the shaders and the triangle that they draw; `made` gives them back if something fails."""
+        try:
+            program = self._context.program(vertex_shader=VERTEX_SHADER, fragment_shader=source)
+        except moderngl.Error as error:
+            raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+        made.callback(program.release)
+        return program, self._context.vertex_array(program, [])
 
     def _weights(self, artifact: Artifact) -> Any:
         """Return the weights as a texture of whole rows."""
@@ -151,24 +158,67 @@ class OpenGLExecutor(Executor):
             pixels = np.frombuffer(target.read(), np.float32).reshape(height, width, 4)
         return pixels[..., : output_channels(artifact.program)].copy()
 
+    def build_path(self, kernel: PathArtifact) -> None:
+        """Compile the shaders and draw one pixel: drivers finish compiling when they draw."""
+        known = self._paths.get(kernel.digest)
+        with self._context, ExitStack() as made:
+            built = known or _Built(*self._program(kernel.source, made), None)
+            made.pop_all()
+            for old in keep(self._paths, kernel.digest, built):
+                old.release()
+        if known is None:
+            self._trace(kernel, Part(1, 1, 0, 1, 0, 1, 0))
+
+    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
+        built = self._paths[kernel.digest]
+        size, count = (part.width, part.rows), -(-len(kernel.planes) // 4)
+        self._check_texture("the sums", size, 4)
+        values = {
+            "width": part.width,
+            "height": part.height,
+            "first_row": part.first_row,
+            "first_sample": part.first_sample,
+            "samples": part.samples,
+            "seed_number": part.seed,
+        }
+        with self._context, ExitStack() as made:
+            targets = [self._context.texture(size, 4, dtype="f4") for _ in range(count)]
+            frame = self._context.framebuffer(targets)
+            for thing in (*targets, frame):
+                made.callback(thing.release)
+            for name, value in values.items():
+                # A driver removes what the shader does not read, and its name with it.
+                if name in built.program:
+                    built.program[name].value = value
+            frame.use()
+            built.triangle.render(mode=moderngl.TRIANGLES, vertices=3)
+            read = [np.frombuffer(target.read(), np.float32) for target in targets]
+        pixels = np.concatenate([buffer.reshape(part.rows, part.width, 4) for buffer in read], axis=-1)
+        return np.moveaxis(pixels, -1, 0)[: len(kernel.planes)]
+
     def _texture(self, name: str, array: NDArray[np.float32]) -> Any:
         """Return (H, W, C) as a float texture that is read texel by texel."""
         height, width, channels = array.shape
-        largest = self._context.info["GL_MAX_TEXTURE_SIZE"]
-        if max(height, width) > largest or channels > 4:
-            raise InputError(
-                f"texture for {name!r}",
-                f"{width} x {height} with {channels} channels",
-                f"this OpenGL takes at most {largest} x {largest} with 4 channels",
-                "split the picture, or use another executor",
-            )
+        self._check_texture(repr(name), (width, height), channels)
         texture = self._context.texture((width, height), channels, array.tobytes(), dtype="f4")
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         return texture
 
+    def _check_texture(self, name: str, size: tuple[int, int], channels: int) -> None:
+        """Refuse what no texture holds."""
+        largest = self._context.info["GL_MAX_TEXTURE_SIZE"]
+        if max(size) > largest or channels > 4:
+            raise InputError(
+                f"texture for {name}",
+                f"{size[0]} x {size[1]} with {channels} channels",
+                f"this OpenGL takes at most {largest} x {largest} with 4 channels",
+                "split the picture, or use another executor",
+            )
+
     def close(self) -> None:
         """Release the context and all that lives in it."""
         self._built.clear()
+        self._paths.clear()
         self._context.release()
 
 

@@ -102,7 +102,7 @@ def render(
     means = {name: np.concatenate([means[name] for means, _ in tiles]).reshape(*shape, -1) for name in LAYERS}
     variance = np.concatenate([variance for _, variance in tiles]).reshape(*shape, 3)
     layers = {name: mean.astype(job.dtype) for name, mean in means.items()}
-    return Render(Frame(layers, _info(scene, job)), variance)
+    return Render(Frame(layers, render_info(scene, job)), variance)
 
 
 def _render_tile(
@@ -198,7 +198,7 @@ def join_rows(parts: list[Render]) -> Render:
     return Render(replace(parts[0].frame, layers=layers), variance)
 
 
-def _info(scene: Scene, job: Job) -> dict[str, str]:
+def render_info(scene: Scene, job: Job) -> dict[str, str]:
     """Return what the frame's reader may want to know of its making, as text."""
     return {
         **scene.info,

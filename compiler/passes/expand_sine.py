@@ -1,17 +1,18 @@
-"""Put the emitted sine (sine.py) in the place of every sine, by tracing it like any other function."""
+"""Put the emitted sine and cosine (sine.py) in the place of the target's, by tracing them."""
 
 from __future__ import annotations
 
 from ..ir import Builder, Node, Program
-from ..sine import sine
+from ..sine import cosine, sine
 from ..trace import Traced
 from .rewrite import rewrite
 
 
 def expand_sine(program: Program) -> Program:
-    """Return the program without `sin`."""
+    """Return the program without `sin` and `cos`."""
 
     def rule(builder: Builder, node: Node, args: tuple[int, ...]) -> int | None:
-        return int(sine(Traced(builder, args[0])).index) if node.op == "sin" else None
+        emitted = {"sin": sine, "cos": cosine}.get(node.op)
+        return int(emitted(Traced(builder, args[0])).index) if emitted else None
 
     return rewrite(program, rule)

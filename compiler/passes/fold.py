@@ -1,16 +1,22 @@
-"""Compute operations on constants (in float64, rounded when emitted); drop operations that do nothing.
+"""Compute operations on constants; drop operations that do nothing.
 
-x * 1, x / 1, x - 0 and x + (-0) are x for every x; x + 0 is not (it turns -0 into 0) and stays.
+Two ways to compute: `fold` in float64, rounded when emitted (the denoiser, whose reference is float64), and
+`fold_float32` with a rounding after each operation, which gives the bits that the float32 reference has.
+
+x * 1, x / 1, x - 0 and x + (-0) are x for every x; x + 0 is not (it turns -0 into 0) and stays. Integers have
+one zero. A selection with a known condition, or between two equal values, is one of them; a look-up at a
+known index, or in a table of equal entries, is a constant.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
-from ..interpret import apply
+from ..interpret import apply, element
 from ..ir import Builder, Node, Program, Type, attributes
 from ..ops import OPS
 from .rewrite import rewrite
@@ -20,44 +26,135 @@ NEUTRAL: Mapping[str, tuple[float, bool]] = {
     "divide": (1.0, False),
     "subtract": (0.0, False),
     "add": (-0.0, True),
+    "bitwise_xor": (0, True),
+    "right_shift": (0, False),
+    "logical_and": (True, True),
+    "logical_or": (False, True),
 }
 """The right operand that changes nothing, and whether it may stand on the left too."""
 
+DECISIVE: Mapping[str, bool] = {"logical_and": False, "logical_or": True}
+"""The operand that alone decides the result."""
+
 
 def fold(program: Program) -> Program:
-    """Return the program with constant operations computed and neutral ones removed."""
-    return rewrite(program, _rule)
+    """Return the program with constant operations computed in float64 and neutral ones removed."""
+    return _folded(program, np.dtype(np.float64))
 
 
-def _rule(builder: Builder, node: Node, args: tuple[int, ...]) -> int | None:
-    """Return a constant, or the operand that the operation leaves unchanged."""
-    if not OPS[node.op].elementwise:
+def fold_float32(program: Program) -> Program:
+    """Return the program with constant operations computed in float32 and neutral ones removed."""
+    return _folded(program, np.dtype(np.float32))
+
+
+def _folded(program: Program, kind: np.dtype[Any]) -> Program:
+    """Return the program with every node replaced by what is known of it."""
+
+    def rule(builder: Builder, node: Node, args: tuple[int, ...]) -> int | None:
+        if node.op == "constant" and node.type.dtype == "float32":
+            return constant_of(builder, kind.type(node["value"]), "float32")
+        constants = [_constant(builder.nodes[arg]) for arg in args]
+        if args and all(value is not None for value in constants) and _computable(node):
+            return _computed(builder, node, args, kind)
+        for simplify in (_neutral, _decided, _selected, _looked_up, _negated):
+            index = simplify(builder, node, args, constants)
+            if index is not None:
+                return index
         return None
-    constants = [_constant(builder.nodes[arg]) for arg in args]
-    if all(value is not None for value in constants):
-        return _computed(builder, node, constants)
-    if node.op in NEUTRAL:
-        value, commutes = NEUTRAL[node.op]
-        for keep, other in ((0, 1), (1, 0)) if commutes else ((0, 1),):
-            if _same(constants[other], value) and builder.nodes[args[keep]].type == node.type:
-                return args[keep]
+
+    return rewrite(program, rule)
+
+
+Known = list[bool | int | float | None]
+"""The values of a node's operands, None for those that are no constants."""
+
+Simplification = Callable[[Builder, Node, tuple[int, ...], Known], int | None]
+
+
+def _computable(node: Node) -> bool:
+    """Return whether a node of constant operands is a number that can be computed now."""
+    return not node.type.shape and (OPS[node.op].elementwise or node.op == "take")
+
+
+def _computed(builder: Builder, node: Node, args: tuple[int, ...], kind: np.dtype[Any]) -> int | None:
+    """Return the constant that the operation gives, or None when it is not finite in float32."""
+    operands = []
+    for arg in args:
+        constant = builder.nodes[arg]
+        operands.append(element(constant.type.dtype, kind).type(constant["value"]))
+    with np.errstate(all="ignore"):
+        value = apply(node, operands, builder.parameters, kind)
+    if node.type.dtype == "float32" and not abs(float(value)) <= float(np.finfo(np.float32).max):
+        return None
+    return constant_of(builder, value, node.type.dtype)
+
+
+def constant_of(builder: Builder, value: Any, dtype: str) -> int:
+    """Return the index of a constant."""
+    if dtype == "float32":
+        return builder.add(Node("constant", (), Type(), attributes(value=float(value))))
+    plain = bool(value) if dtype == "bool" else int(value)
+    return builder.add(Node("constant", (), Type(dtype), attributes(value=plain, dtype=dtype)))
+
+
+def _neutral(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
+    """Return the operand that the operation leaves unchanged."""
+    if node.op not in NEUTRAL:
+        return None
+    value, commutes = NEUTRAL[node.op]
+    for keep, other in ((0, 1), (1, 0)) if commutes else ((0, 1),):
+        if _same(constants[other], value) and builder.nodes[args[keep]].type == node.type:
+            return args[keep]
     return None
 
 
-def _computed(builder: Builder, node: Node, constants: list[float | None]) -> int | None:
-    """Return the constant that the operation gives, or None when it is not finite in float32."""
-    with np.errstate(all="ignore"):
-        value = float(apply(node, [np.float64(c) for c in constants], {}))
-    if not abs(value) <= float(np.finfo(np.float32).max):
+def _decided(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
+    """Return the constant of `and` with False, and of `or` with True."""
+    if node.op not in DECISIVE or node.type.shape or DECISIVE[node.op] not in constants:
         return None
-    return builder.add(Node("constant", (), Type(), attributes(value=value)))
+    return constant_of(builder, DECISIVE[node.op], "bool")
 
 
-def _constant(node: Node) -> float | None:
+def _selected(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
+    """Return the value that is always chosen; between truth values, what the choice amounts to."""
+    if node.op != "select":
+        return None
+    condition, a, b = args
+    chosen = a if constants[0] or a == b else b if constants[0] is False else None
+    if chosen is not None:
+        return chosen if builder.nodes[chosen].type == node.type else None
+    if node.type != Type("bool") or builder.nodes[condition].type != node.type:
+        return None
+    if constants[1] is True:
+        return builder.add(Node("logical_or", (condition, b), node.type))
+    if constants[2] is False:
+        return builder.add(Node("logical_and", (condition, a), node.type))
+    return None
+
+
+def _looked_up(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
+    """Return the constant of a table whose entries are all the same bits."""
+    if node.op != "take":
+        return None
+    table = builder.parameters[str(node["table"])]
+    same = len({entry.tobytes() for entry in table}) == 1
+    return constant_of(builder, table[0], node.type.dtype) if same else None
+
+
+def _negated(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
+    """Return x of `not not x` and of -(-x)."""
+    if node.op not in ("logical_not", "negative") or builder.nodes[args[0]].op != node.op:
+        return None
+    return builder.nodes[args[0]].args[0]
+
+
+def _constant(node: Node) -> bool | int | float | None:
     """Return the value of a constant, None for anything else."""
-    return float(node["value"]) if node.op == "constant" else None  # type: ignore[arg-type]
+    return node["value"] if node.op == "constant" else None  # type: ignore[return-value]
 
 
-def _same(found: float | None, wanted: float) -> bool:
-    """Return whether two constants are the same number, sign of zero included."""
-    return found == wanted and math.copysign(1.0, found) == math.copysign(1.0, wanted)
+def _same(found: bool | int | float | None, wanted: float) -> bool:
+    """Return whether two constants are the same number; a float's zero must have the same sign."""
+    if found is None or found != wanted:
+        return False
+    return not isinstance(found, float) or math.copysign(1.0, found) == math.copysign(1.0, wanted)

@@ -9,11 +9,16 @@ from ..ir import Program
 from ..verify import verify
 from .eliminate_dead import eliminate_dead
 from .expand_sine import expand_sine
-from .fold import fold
+from .expand_tables import expand_tables
+from .fold import fold, fold_float32
 from .fuse_bias import fuse_bias
+from .scalarize import scalarize
 
 PASSES: Mapping[str, Callable[[Program], Program]] = {
     "fold": fold,
+    "fold_float32": fold_float32,
+    "scalarize": scalarize,
+    "expand_tables": expand_tables,
     "fuse_bias": fuse_bias,
     "expand_sine": expand_sine,
     "eliminate_dead": eliminate_dead,

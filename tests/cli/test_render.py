@@ -129,3 +129,27 @@ def test_refusals_of_scene_files(refused, wamnet, tmp_path) -> None:
         "scene", "b.json", "-o", "b.json"
     )
     assert "its name must end in .json" in refused("scene", "empty", "-o", "c.txt")
+
+
+@pytest.mark.parametrize("name", ["opencl", "opengl"])
+def test_a_kernel_renders_the_frame(wamnet, tmp_path, executor_named, name) -> None:
+    """At least 95 pixels in 100 have the reference's colour to 1e-5; the others' paths may pass an edge."""
+    executor_named({"opencl": "opencl", "opengl": "opengl-egl"}[name])
+    outcome = wamnet("render", "cornell", "--width", 20, "--height", 10, "--executor", name, "-o", "a.exr")
+    assert outcome.status == 0
+    got, want = exr.read_frame(tmp_path / "a.exr"), render(canonical("cornell"), Job(20, 10)).frame
+    near = np.abs(got["color"] - want["color"]) <= 1e-5 * (want["color"] + want["color"].mean())
+    assert near.all(axis=-1).mean() >= 0.95
+
+
+def test_a_kernel_s_work_is_not_shared_by_processes(wamnet) -> None:
+    outcome = wamnet("render", "cornell", "--executor", "opencl", "--workers", 2)
+    assert outcome.status == 2
+    assert "workers is 2: opencl shares the work by itself; leave it out" in outcome.err
+
+
+def test_a_kernel_computes_in_float32(wamnet, executor_named) -> None:
+    executor_named("opencl")
+    outcome = wamnet("render", "cornell", "--executor", "opencl", "--dtype", "float64")
+    assert outcome.status == 2
+    assert "dtype is float64: kernels compute in float32" in outcome.err

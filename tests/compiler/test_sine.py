@@ -97,6 +97,37 @@ def test_random_arguments(largest):
     assert np.max(np.abs(sine.sine(x) - np.sin(x.astype(np.float64)))) + 2.0**-50 <= ERROR
 
 
+def test_the_parts_of_the_cosine_s_error_add_up_to_the_stated_one():
+    """As above; where |r| > 1 the first difference may be rounded too, by 2^-24, passed on times |cos r|."""
+    assert 2 * (sine.COSINE_DOMAIN / np.pi + 1) <= 2**12
+    edges = np.linspace(-sine.R_MAX, sine.R_MAX, 4001)
+    program = trace(sine.polynomial, {"r": Type()})
+    (rounding,) = bounds.over_box(program, {"r": (edges[:-1], edges[1:])}, EMITTED_SINE).values()
+    ends = np.maximum(np.abs(edges[:-1]), np.abs(edges[1:]))
+    reduction = np.maximum(sine.reduction_error(edges[:-1]), sine.reduction_error(edges[1:]))
+    reduction += 4 * 2.0**-24 * np.diff(edges)
+    slope = np.maximum(np.abs(np.cos(edges[:-1])), np.abs(np.cos(edges[1:])))
+    first = np.where(ends > 1.0, 2.0**-24 * (slope + 2.0**-12), 0.0)
+    total = rounding + reduction + first + sine.POLYNOMIALS[sine.DEGREE].approximation_error
+    assert total.max() <= sine.COSINE_ERROR
+
+
+@pytest.mark.parametrize("largest", [1e-3, 4.0, 100.0, sine.COSINE_DOMAIN])
+def test_cosine_of_random_arguments(largest):
+    x = np.random.default_rng(1).uniform(-largest, largest, 2**20).astype(np.float32)
+    found = sine.cosine(x)
+    assert np.max(np.abs(found - np.cos(x.astype(np.float64)))) + 2.0**-50 <= sine.COSINE_ERROR
+    assert np.max(np.abs(found)) <= 1
+
+
+def test_cosine_of_hard_arguments():
+    x = hard_arguments()
+    x = x[np.abs(x) <= sine.COSINE_DOMAIN]
+    with mpmath.workprec(120):
+        exact_cosine = np.array([float(mpmath.cos(mpmath.mpf(float(v)))) for v in x])
+    assert np.max(np.abs(sine.cosine(x) - exact_cosine)) <= sine.COSINE_ERROR
+
+
 def test_numpy_s_float64_sine_is_good_enough():
     x = hard_arguments()[::97]
     assert np.max(np.abs(np.sin(x.astype(np.float64)) - exact(x))) <= 2.0**-50

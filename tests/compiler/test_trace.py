@@ -74,6 +74,33 @@ def test_several_outputs_and_the_shape_in_one_lane():
     assert found["b"].shape == (4,)
 
 
+def test_integers_decisions_and_tables():
+    table = np.array([3, -1, 7, 7], np.int32)
+
+    def function(x):
+        count = np.zeros_like(x[..., 0], dtype=np.int32)
+        for i in range(3):
+            count = count + np.where(x[..., i] >= 0.25, np.int32(1), np.int32(0))
+        looked_up = np.take(np.asarray(table, like=count), np.minimum(count, 3))
+        word = (looked_up.astype(np.uint32) * np.uint32(2654435761) ^ np.uint32(7)) >> np.uint32(9)
+        vector = np.moveaxis(np.stack((word.astype(np.float32), x[..., 1], x[..., 0] ** 2)), 0, -1)
+        inside = (vector > -1.0) & ~(vector == 0.0) | (count < 1)[..., None]
+        return np.where(inside, vector, np.full_like(vector, 0.5) * np.reciprocal(3.0 + np.ones_like(vector)))
+
+    program = traced(function)
+    x = np.random.default_rng(0).normal(size=(50, 3)).astype(np.float32)
+    assert np.array_equal(interpret(program, {"x": x})["color"], function(x))
+    assert {node.type.dtype for node in program.nodes} == {"float32", "int32", "uint32", "bool"}
+    assert "T0: int32[4]" in text(program)
+
+
+def test_float64_means_floats_alone():
+    program = traced(lambda x: np.where(x > 0.0, (x * 3.0).astype(np.int32).astype(np.float32), x / 3.0))
+    found = interpret(program, {"x": np.array([1.0, -1.0, 0.5])}, np.float64)["color"]
+    assert found.dtype == np.float64
+    assert found.tolist() == [3.0, -1.0 / 3.0, 1.0]
+
+
 @pytest.mark.parametrize(
     ("function", "message"),
     [
@@ -82,7 +109,7 @@ def test_several_outputs_and_the_shape_in_one_lane():
         (np.sum, r"np\.sum cannot be traced"),
         (np.add.reduce, r"np\.add\.reduce with .* cannot be traced"),
         (lambda x: np.add(x, x, where=False), r"np\.add with \['where'\] cannot"),
-        (lambda x: x if x > 0 else -x, r"np\.greater cannot"),
+        (lambda x: x if x > 0 else -x, r"a decision \(if, while, and, or\) on a value cannot"),
         (lambda x: x if x else -x, r"a decision \(if, while, and, or\) on a value cannot"),
         (lambda x: list(x), "iteration over a value cannot"),
         (lambda x: np.asarray(x), "conversion to an array cannot"),
@@ -93,7 +120,7 @@ def test_several_outputs_and_the_shape_in_one_lane():
         (lambda x: math.sin(x), r"conversion to a Python float .* cannot"),
         (lambda x: [1, 2][x], "conversion to a Python integer cannot"),
         (lambda x: len(x), r"len\(\) cannot"),
-        (lambda x: x + True, "a bool as an operand cannot"),
+        (lambda x: x + True, "a bool as an operand of numbers cannot"),
         (lambda x: x[..., None], r"indexing with \(Ellipsis, None\) cannot"),
         (lambda x: x[..., 3], r"component: component 3 does not exist in an operand of type float32\[3\]"),
         (lambda x: W @ x, r"np\.matmul of anything but a traced vector and a constant matrix"),
@@ -105,6 +132,35 @@ def test_several_outputs_and_the_shape_in_one_lane():
         (lambda x: x * np.inf, "a constant must be a float that is finite in float32, not inf"),
         (lambda x: x * 1e39, "not 1e"),
         (lambda x: x + "1", r"operand"),
+        (lambda x: x + x.astype(np.int32), r"add: operands must all be float32 or all int32 or all uint32"),
+        (lambda x: x.astype(np.int32) + 0.5, r"not int32\[3\], float32"),
+        (lambda x: x.astype(np.uint32) + np.int32(1), r"not uint32\[3\], int32"),
+        (lambda x: x.astype(np.uint32) - -1, r"a constant must be an integer that uint32 holds, not -1"),
+        (lambda x: x.astype(np.int32) * np.int64(1), r"an int64 as an operand"),
+        (lambda x: x.astype(np.int32) / 2, r"divide: operands must all be float32, not int32"),
+        (lambda x: x.astype(np.float64), r"numbers are converted to float32, int32, uint32, not to float64"),
+        (lambda x: x.astype(np.int32) >> 1, r"right_shift: operands must all be uint32, not int32"),
+        (lambda x: (x > 0.0) + 1.0, r"add: operands must all be .*, not bool\[3\], float32"),
+        (lambda x: ~x.astype(np.uint32), r"logical_not: operands must all be bool"),
+        (lambda x: np.where(x, x, x), r"select: operands must all be bool, not float32\[3\]"),
+        (lambda x: np.where(x > 0.0, x, x > 0.0), r"select: operands must all be .*, not float32\[3\], bool"),
+        (lambda x: np.where(x > 0.0, 1.0, 0.0), r"np\.where between two Python numbers .* cannot"),
+        (lambda x: np.where(x > 0.0), r"np\.where with these arguments cannot"),
+        (lambda x: x**3, r"a power other than x \*\* 1 and x \*\* 2 cannot"),
+        (lambda x: 2**x, r"a power other than"),
+        (lambda x: x + np.stack([x[..., 0]] * 3), r"np\.stack with axis=0 outside of np\.moveaxis"),
+        (lambda x: np.moveaxis(np.stack([x[..., 0]] * 3), 0, 1), r"np\.moveaxis of anything but"),
+        (lambda x: np.moveaxis(x, 0, -1), r"np\.moveaxis of anything but"),
+        (lambda x: np.zeros_like(x, dtype=np.int64), r"np\.full_like with dtype int64 cannot"),
+        (
+            lambda x: np.asarray(W, like=x),
+            r"np\.asarray\(\.\.\., like=x\) of anything but a constant array of one",
+        ),
+        (lambda x: np.take(x, 0), r"np\.take from anything but np\.asarray\(table, like=index\)"),
+        (
+            lambda x: np.take(np.asarray(B, like=x), x),
+            r"take: a table of shape \(2,\) does not take an index of",
+        ),
         (lambda x: x * np.array([0.1, 1, 1]), r"float64, shape \(3,\), holds numbers that float32 cannot"),
     ],
 )

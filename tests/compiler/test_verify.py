@@ -89,9 +89,27 @@ CASES = [
         r"bias must have shape \(2,\) beside a weight of \(2, 3\)",
     ),
     (
+        "types_follow",
+        plus(Node("constant", (), Type("int32"), attributes(value=1.0, dtype="int32"))),
+        "a constant must be an integer that int32 holds, not 1.0",
+    ),
+    (
+        "types_follow",
+        plus(Node("constant", (), Type("bool"), attributes(value=1, dtype="bool"))),
+        "a constant must be True or False, not 1",
+    ),
+    (
+        "types_follow",
+        replace(
+            plus(Node("parameter", (), Type("int32", (2,)), attributes(name="n"))),
+            parameters={**GOOD.parameters, "n": np.ones(2, np.int32)},
+        ),
+        "a parameter used as a value must be float32, not int32",
+    ),
+    (
         "short_vectors",
         plus(Node("input", (), Type("int8"), attributes(name="y", type=Type("int8")))),
-        "%2 input has type int8; values are float32 numbers or vectors",
+        "%2 input has type int8; values are numbers or vectors of float32, int32",
     ),
     ("inputs_once", plus(INPUT), "input 'window' is declared more than once"),
     ("outputs_exist", replace(GOOD, outputs=()), r"outputs are \[\]; there must be one or more"),

@@ -5,11 +5,45 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from wamnet.compiler.bounds import NO_BOUND
 from wamnet.compiler.compile import compile_program
+from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ops import OPS
+from wamnet.compiler.sine import COSINE_ERROR
+from wamnet.refimpl import rng
 
 W = np.array([[1.5, -2.0, 0.25, 3.0], [0.1, 0.2, -0.3, 0.7]], np.float32)
 B = np.array([0.1, -0.2, 0.3, 1e-3], np.float32)
+
+T = np.array([0.25, -3.0, 1e-3, 7.0, 0.5, 2.0, -1.0], np.float32)
+K = np.array([5, -7, 123456789], np.int32)
+F = np.array([True, False, True])
+
+
+def words(x):
+    """Return integers up to 2000."""
+    return (np.absolute(x) * 1000.0).astype(np.uint32)
+
+
+def index(x, limit):
+    """Return an index below `limit`."""
+    return np.minimum(np.floor(np.absolute(x[..., 0]) * 3.0).astype(np.int32), limit)
+
+
+def look_up(table, x):
+    i = index(x, len(table) - 1)
+    return np.take(np.asarray(table, like=i), i)
+
+
+def floats(truth):
+    return np.where(truth, np.float32(1), np.float32(2))
+
+
+def hashed(x):
+    """Return four random numbers from four counters."""
+    w = (np.absolute(x) * 2.0**20).astype(np.uint32) * np.uint32(4093)
+    return np.stack(rng.uniforms(*(w[..., i] for i in range(4))), axis=-1)
+
 
 CASES = {
     "input": lambda x: x,
@@ -29,8 +63,42 @@ CASES = {
     "sin": lambda x: np.sin(1000.0 * x),
     "stack": lambda x: np.stack([x[..., 3], 0.5 * x[..., 0], x[..., -2]], axis=-1),
     "component": lambda x: x[..., 2] * x[..., 1] + 1.0,
+    "reciprocal": lambda x: np.reciprocal(x + 3.0),
+    "cos": lambda x: np.cos(1.5 * x),
+    "less": lambda x: floats(x < x[..., 1][..., None]),
+    "less_equal": lambda x: floats(x <= 2.0),
+    "greater": lambda x: floats(words(x) > np.uint32(700)),
+    "greater_equal": lambda x: floats(words(x).astype(np.int32) >= 2000),
+    "equal": lambda x: floats(x == 0.0),
+    "not_equal": lambda x: floats(words(x) != words(x)[..., 2][..., None]),
+    "logical_and": lambda x: floats((x > 0.0) & (x < 1.0)),
+    "logical_or": lambda x: floats((x < 0.0) | (x > 1.0)[..., 1][..., None]),
+    "logical_not": lambda x: floats(~(x < 0.0)),
+    "bitwise_xor": lambda x: (words(x) ^ words(x)[..., 1][..., None]).astype(np.float32),
+    "right_shift": lambda x: (words(x) >> np.uint32(3)).astype(np.float32),
+    "select": lambda x: np.where(x < 0.5, x, np.maximum(words(x).astype(np.int32), 7).astype(np.float32)),
+    "convert": lambda x: (x * 100.0).astype(np.int32).astype(np.float32),
+    "take": lambda x: np.stack(
+        [look_up(T, x), look_up(K, x).astype(np.float32), floats(look_up(F, x)), x[..., 1]], axis=-1
+    ),
 }
 """One function for each operation, named after it."""
+
+EXACT = (
+    *("less", "less_equal", "greater", "greater_equal", "equal", "not_equal", "logical_and", "logical_or"),
+    *(
+        "logical_not",
+        "bitwise_xor",
+        "right_shift",
+        "select",
+        "convert",
+        "take",
+        "minimum",
+        "negative",
+        "stack",
+    ),
+)
+"""Cases that every executor computes to the bit: integers, decisions, and floats rounded once."""
 
 AWKWARD = [0.0, -0.0, 1.0, -1.0, 2.0, -2.0, 1 / 3, 2 / 3, 1e-20, -1e-40, 0.66666669, 1.9999999]
 """Zeros of both signs, whole numbers after scaling, denormals, neighbours of whole numbers."""
@@ -47,11 +115,41 @@ def test_every_operation_has_a_case():
     assert set(CASES) == set(OPS)
 
 
-@pytest.mark.parametrize("op", CASES)
+def test_operations_without_a_bound_are_tested_without_one():
+    assert set(NO_BOUND) <= {*EXACT, "cos"}
+
+
+@pytest.mark.parametrize("op", [op for op in CASES if op not in NO_BOUND])
 def test_operation_on_executor(executor, kit, image, op):
     program = kit.program(CASES[op], {"a": 4})
     assert op in {node.op for node in program.nodes}
     assert kit.excess(executor, program, {"a": image}) <= 1
+
+
+@pytest.mark.parametrize("op", EXACT)
+def test_operation_is_exact(executor, kit, image, op):
+    image = np.where(np.abs(image) < 1e-30, np.float32(0), image)  # denormals may be flushed
+    program = kit.program(CASES[op], {"a": 4})
+    found = executor.run(compile_program(program, executor.name), {"a": image})
+    (expected,) = interpret(program, {"window": image}).values()
+    assert np.array_equal(found, expected)
+
+
+def test_random_numbers_are_those_of_the_reference(executor, kit, image):
+    program = kit.program(hashed, {"a": 4})
+    found = executor.run(compile_program(program, executor.name), {"a": image})
+    assert np.array_equal(found, hashed(image))
+    assert len(np.unique(found)) > 100
+
+
+def test_cosine_without_a_bound_is_near(executor, kit, image):
+    """Every target's cosine is right to 2^-11 on [-pi, pi], and the emitted one to COSINE_ERROR."""
+    program = kit.program(lambda x: np.cos(1.5 * x), {"a": 4})
+    exact = np.cos((np.float32(1.5) * image).astype(np.float64))
+    for profile, error in (("ieee", COSINE_ERROR), ("native", 2.0**-11)):
+        artifact = compile_program(program, executor.name, profile)
+        assert artifact.manifest["bound"]["output"] is None
+        assert np.max(np.abs(executor.run(artifact, {"a": image}) - exact)) <= error
 
 
 def test_all_operations_compile_without_a_window_of_one(executor, kit):

@@ -1,0 +1,302 @@
+"""From the programs of a path to the text of a kernel, for any dialect.
+
+    for each sample
+        start: the path at the camera
+        for depth = 0, 1, ... MAX_DEPTH
+            arrive: the next surface; radiance of the paths that are alive
+            depth 0: look, add the features of the first surface
+            depth MAX_DEPTH: done
+            scatter: the path goes on; done when no path is alive
+        add the path's radiance
+
+1. Each program is a block of statements, one a node, on variables that have the names of its inputs
+   [`_Kernel.block`]; its outputs are assigned at the block's end.
+2. What is added up over the samples are planes, in groups [`GROUPS`]; a kernel writes the groups that it is
+   asked for.
+3. A path that has ended is computed on with the others of its work item, and changes nothing: radiance is
+   assigned where it is alive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..refimpl.errors import CompileError
+from .ir import Node, Program, Type, attributes
+from .lower_scene import LAYERS, PATH, SURFACE, PathPrograms, Values, kinds, names
+from .path_dialect import PathDialect
+from .weights import tables
+
+FIRST = {layer: names({layer: value}) for layer, value in LAYERS.items()}
+"""Planes of the first surface: outputs of `look`, by group."""
+
+END = {
+    "alive": ["alive"],
+    **{f"last_{name}": names({name: value}) for name, value in {**SURFACE, **PATH}.items()},
+}
+"""Planes of the path's state after its last arrival, by group: for comparing paths."""
+
+COLOR = ["color_r", "color_g", "color_b"]
+"""Planes of the radiance."""
+
+DEVIATION = ["deviation_r", "deviation_g", "deviation_b"]
+"""Planes of the sum of squared differences from the mean radiance."""
+
+GROUPS: Mapping[str, Sequence[str]] = {
+    "color": COLOR,
+    "deviation": DEVIATION,
+    **FIRST,
+    **{group: [f"last_{n}" if n != "alive" else n for n in members] for group, members in END.items()},
+}
+"""What a kernel can add up: groups of planes, by name."""
+
+FRAME_GROUPS = ("color", "deviation", *LAYERS)
+"""What a rendered frame needs."""
+
+
+def planes(groups: Sequence[str]) -> list[str]:
+    """Return the names of all planes of some groups, in the order in which a kernel writes them."""
+    for group in groups:
+        if group not in GROUPS:
+            raise CompileError(f"planes {group!r} do not exist; there are: {', '.join(GROUPS)}")
+    return [plane for group in groups for plane in GROUPS[group]]
+
+
+def emit_path(
+    programs: PathPrograms, dialect: PathDialect, groups: Sequence[str], header: Sequence[str]
+) -> str:
+    """Return the kernel's source; `header` are the lines of the comment at its top."""
+    return _Kernel(programs, dialect, groups).text(header)
+
+
+def renamed_tables(programs: PathPrograms) -> Mapping[tuple[str, str], str]:
+    """Return one name for each table of each program: equal tables share theirs."""
+    known: dict[tuple[str, bytes], str] = {}
+    found = {}
+    for part, program in programs.parts().items():
+        for name, array in tables(program).items():
+            key = (str(array.dtype), array.tobytes())
+            found[part, name] = known.setdefault(key, f"table_{len(known)}")
+    return found
+
+
+@dataclass
+class _Kernel:
+    """The text of one kernel as it is written."""
+
+    programs: PathPrograms
+    dialect: PathDialect
+    groups: Sequence[str]
+    lines: list[str] = field(default_factory=list)
+    depth: int = 1
+
+    def text(self, header: Sequence[str]) -> str:
+        """Return the whole source."""
+        self.tables = renamed_tables(self.programs)
+        self.planes = planes(self.groups)
+        if len(self.planes) > self.dialect.max_planes:
+            raise CompileError(
+                f"the kernel adds up {len(self.planes)} planes: {self.dialect.language} writes at most "
+                f"{self.dialect.max_planes}; ask for fewer groups"
+            )
+        comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
+        self._sums()
+        self._samples()
+        self._stores()
+        end = self.dialect.path_end.format()
+        return "\n".join([*comment, self._begin(), *self.lines, end]) + "\n"
+
+    # ---- the skeleton ------------------------------------------------------------------------------------
+
+    def _begin(self) -> str:
+        """Return the text up to the kernel's first statement."""
+        declared: dict[str, NDArray[np.generic]] = {}
+        for (part, name), table in self.tables.items():
+            declared[table] = self.programs.parts()[part].parameters[name]
+        uniforms = {
+            name: self._splat(value, "float32" if name in ("width", "height") else "uint32")
+            for name, value in self.dialect.uniforms.items()
+        }
+        return self.dialect.path_begin.format(
+            entry=self.dialect.entry,
+            lanes=self.dialect.lanes,
+            lane_numbers=self.dialect.lane_numbers,
+            tables="\n".join(self.dialect.table_declaration(name, array) for name, array in declared.items()),
+            outputs="\n".join(
+                self.dialect.output_declaration.format(output=output)
+                for output in range(-(-len(self.planes) // self.dialect.planes_per_output))
+            ),
+            max_depth=self.programs.settings.max_depth,
+            unordered=self.dialect.unordered[False],
+            counter=self.dialect.types["uint32"],
+            **uniforms,
+        )
+
+    def _splat(self, value: str, dtype: str) -> str:
+        """Return the text of a number that is the same in all lanes."""
+        return self.dialect.splat.format(type=self.dialect.types[dtype], value=value)
+
+    def _sums(self) -> None:
+        """Declare the image's size in lanes, and the sums."""
+        real, zero = self.dialect.types["float32"], self.dialect.number(0.0, "float32")
+        for name in ("width", "height"):
+            size = self._splat(self.dialect.uniforms[name], "float32")
+            self._line(f"{real} image_{name} = {size};")
+        for plane in self.planes:
+            self._line(f"{real} sum_{plane} = {zero};")
+
+    def _samples(self) -> None:
+        """Write the loop over the samples."""
+        self._open("for (int n = 0; n < samples; ++n) {")
+        sample = self._splat(self.dialect.uniforms["sample"], "uint32")
+        self._line(f"{self.dialect.types['uint32']} sample_number = {sample};")
+        self._line(f"{self.dialect.types['uint32']} pixel;")
+        self._declare({**PATH, **SURFACE})
+        self._line(f"{self.dialect.types['bool']} alive = {self.dialect.number(True, 'bool')};")
+        self.block("start", "the path at the camera", {"width": "image_width", "height": "image_height"})
+        self._open("for (uint bounce = 0u; bounce <= MAX_DEPTH; ++bounce) {")
+        self._line(f"{self.dialect.types['uint32']} depth = {self._splat('bounce', 'uint32')};")
+        self.block("arrive", "the next surface", masked=("radiance_r", "radiance_g", "radiance_b"))
+        if set(self.groups) & set(FIRST):
+            self._open("if (bounce == 0u) {")
+            self.block("look", "the features of the first surface", summed=True)
+            self._close()
+        self._open("if (bounce == MAX_DEPTH) {")
+        self._line("break;")
+        self._close()
+        self.block("scatter", "the path goes on", masked=("radiance_r", "radiance_g", "radiance_b"))
+        self._open(f"if (!{self.dialect.any_lane.format(mask='alive')}) {{")
+        self._line("break;")
+        self._close()
+        self._close()
+        self._gather()
+        self._close()
+
+    def _declare(self, values: Values) -> None:
+        """Declare the variables of some values."""
+        for name, kind in kinds(values).items():
+            self._line(f"{self.dialect.types[kind]} {name};")
+
+    def _gather(self) -> None:
+        """Add what a path has gathered."""
+        self.lines.append("")
+        self._line("/* what the path has gathered */")
+        if "deviation" in self.groups:
+            self._line(f"float count = {self.dialect.scalar_float.format('n')};")
+            self._line("float weight = n > 0 ? 1.0f / (count * (count + 1.0f)) : 0.0f;")
+            for c in "rgb":
+                real = self.dialect.types["float32"]
+                self._line(f"{real} difference_{c} = radiance_{c} * count - sum_color_{c};")
+                self._line(f"sum_deviation_{c} += difference_{c} * difference_{c} * weight;")
+        for group in self.groups:
+            for plane in GROUPS[group]:
+                if group == "color":
+                    self._line(f"sum_{plane} += {plane.replace('color', 'radiance')};")
+                elif group in END:
+                    self._line(f"sum_{plane} += {self._as_float(plane.removeprefix('last_'))};")
+
+    def _as_float(self, name: str) -> str:
+        """Return a state variable as a float."""
+        kind = {**kinds({**PATH, **SURFACE}), "alive": "bool"}[name]
+        if kind == "bool":
+            one, zero = (self.dialect.number(value, "float32") for value in (1.0, 0.0))
+            return "(" + self.dialect.operations["select"].format(name, one, zero) + ")"
+        if kind == "float32":
+            return name
+        node = Node("convert", (0,), Type(), attributes(dtype="float32"))
+        return self.dialect.expression(node, kind, [name])
+
+    def _stores(self) -> None:
+        """Write the sums out."""
+        self.lines.append("")
+        for number, plane in enumerate(self.planes):
+            output, component = divmod(number, self.dialect.planes_per_output)
+            store = self.dialect.sum_store
+            self._line(store.format(plane=number, output=output, component=component, value=f"sum_{plane}"))
+
+    # ---- one program -------------------------------------------------------------------------------------
+
+    def block(
+        self,
+        part: str,
+        comment: str,
+        renamed: Mapping[str, str] | None = None,
+        masked: Sequence[str] = (),
+        summed: bool = False,
+    ) -> None:
+        """Write the statements of a program, and assign its outputs or add them up.
+
+        Inputs are variables of their names, or of those that `renamed` gives. Outputs in `masked` are
+        assigned where a path is alive.
+        """
+        program = self.programs.parts()[part]
+        self.lines.append("")
+        self._line(f"/* {part}: {comment} */")
+        self._open("{")
+        texts = self._statements(part, program, renamed or {})
+        for line in self._added(program, texts) if summed else self._assignments(program, texts, masked):
+            self._line(line)
+        self._close()
+
+    def _statements(self, part: str, program: Program, renamed: Mapping[str, str]) -> list[str]:
+        """Write one statement for each operation; return the text of each value."""
+        texts: list[str] = []
+        for index, node in enumerate(program.nodes):
+            if node.op == "input":
+                name = str(node["name"])
+                texts.append(renamed.get(name, name))
+            elif node.op == "constant":
+                texts.append(self.dialect.constant(node))
+            else:
+                texts.append(f"t{index}")
+                expression = self._expression(part, program, node, texts)
+                self._line(f"{self.dialect.variable(node.type.dtype)} t{index} = {expression};")
+        return texts
+
+    def _expression(self, part: str, program: Program, node: Node, texts: Sequence[str]) -> str:
+        """Return the right side of a statement."""
+        if node.op == "take":
+            table = self.tables[part, str(node["table"])]
+            node = Node(node.op, node.args, node.type, attributes(table=table))
+        kind = program.nodes[node.args[-1]].type.dtype
+        return self.dialect.expression(node, kind, [texts[arg] for arg in node.args])
+
+    def _added(self, program: Program, texts: Sequence[str]) -> list[str]:
+        """Return the statements that add a program's outputs up, where they are planes."""
+        return [f"sum_{name} += {texts[i]};" for name, i in program.outputs if name in self.planes]
+
+    def _assignments(self, program: Program, texts: Sequence[str], masked: Sequence[str]) -> list[str]:
+        """Return the assignments of a program's outputs to the variables of their names."""
+        inputs = {str(node["name"]) for node in program.nodes if node.op == "input"}
+        before, after = [], []
+        for name, index in program.outputs:
+            value = texts[index]
+            if value in inputs and value != name:
+                # The variable may be assigned before it is read: keep its value.
+                kind = self.dialect.variable(program.nodes[index].type.dtype)
+                before.append(f"{kind} new_{name} = {value};")
+                value = f"new_{name}"
+            if name == "alive":
+                after.append(f"alive = alive && {value};")
+            elif name in masked and value != name:
+                after.append(f"{name} = {self.dialect.operations['select'].format('alive', value, name)};")
+            elif value != name:
+                after.append(f"{name} = {value};")
+        return before + after
+
+    # ---- lines -------------------------------------------------------------------------------------------
+
+    def _open(self, text: str) -> None:
+        self._line(text)
+        self.depth += 1
+
+    def _close(self) -> None:
+        self.depth -= 1
+        self._line("}")
+
+    def _line(self, text: str) -> None:
+        self.lines.append("    " * self.depth + text)

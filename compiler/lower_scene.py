@@ -1,0 +1,186 @@
+"""From a scene to the programs of one path: trace the reference's own functions [`lower_scene`].
+
+A path is four pure functions of the reference, each a program; a kernel's skeleton calls them:
+
+1. `start`: pixel and counters -> the path at the camera (refimpl/render.py).
+2. `arrive`: path -> its next surface and the radiance gathered so far (refimpl/transport.py).
+3. `look`: the first surface -> the feature layers (refimpl/render.py).
+4. `scatter`: path, surface, depth and counters -> the path that goes on, and whether it does.
+
+Values between them have names [`PATH`, `SURFACE`, `COUNTERS`]: a vector is three numbers, `origin_x` and so
+on. The scene is constants by then: what it lacks (a kind of primitive, a second light, a rotation) is in no
+program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..refimpl import render, transport, vectors
+from ..refimpl.camera import camera_basis
+from ..refimpl.intersection import Hit, Surface
+from ..refimpl.scene import Scene, scene_digest
+from ..refimpl.transport import Counters, Path, Settings
+from .ir import Program, Type
+from .passes import pipeline
+from .trace import Traced, trace
+from .verify import verify
+
+XYZ, RGB, NUMBER = ("_x", "_y", "_z"), ("_r", "_g", "_b"), ("",)
+"""Endings of the names of a vector's, a colour's and a number's components."""
+
+FLOAT, INTEGER, COUNTER, TRUTH = "float32", "int32", "uint32", "bool"
+"""Kinds of numbers of the values between programs."""
+
+Values = Mapping[str, tuple[tuple[str, ...], str]]
+"""Values by name: the endings of their components, and their kind of number."""
+
+PATH: Values = {
+    "origin": (XYZ, FLOAT),
+    "direction": (XYZ, FLOAT),
+    "beta": (RGB, FLOAT),
+    "radiance": (RGB, FLOAT),
+    "pdf": (NUMBER, FLOAT),
+}
+"""State of a path between bounces, as refimpl/transport.py: Path."""
+
+SURFACE: Values = {
+    "point": (XYZ, FLOAT),
+    "normal": (XYZ, FLOAT),
+    "reflectance": (RGB, FLOAT),
+    "t": (NUMBER, FLOAT),
+    "surface": (NUMBER, INTEGER),
+}
+"""What a scattering needs to know of the surface that was hit."""
+
+COUNTERS: Values = dict.fromkeys(("seed", "pixel", "sample_number"), (NUMBER, COUNTER))
+"""Counters that name a path's random numbers, as refimpl/transport.py: Counters (GLSL reserves sample)."""
+
+LAYERS: Values = {
+    "albedo": (RGB, FLOAT),
+    "normal": (XYZ, FLOAT),
+    "depth": (NUMBER, FLOAT),
+    "position": (XYZ, FLOAT),
+    "direction": (XYZ, FLOAT),
+}
+"""The feature layers of the first hit, as refimpl/render.py: first_hit_layers."""
+
+PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "eliminate_dead")
+"""What every program of a path goes through: numbers in place of vectors, the bits that float32 gives."""
+
+
+@dataclass(frozen=True)
+class PathPrograms:
+    """The programs of one path in one scene; `alive`, `scatter`'s truth value, says whether it goes on."""
+
+    scene: str
+    scene_digest: str
+    settings: Settings
+    start: Program
+    arrive: Program
+    look: Program
+    scatter: Program
+
+    def parts(self) -> Mapping[str, Program]:
+        """Return the programs by name."""
+        return {name: getattr(self, name) for name in ("start", "arrive", "look", "scatter")}
+
+
+def lower_scene(scene: Scene, settings: Settings) -> PathPrograms:
+    """Return the programs of a path through a scene, in float32."""
+    world = transport.build(scene, settings, np.float32)
+    basis = camera_basis(scene.camera, np.float32)
+
+    def start(given: Mapping[str, Any]) -> dict[str, Any]:
+        # A pixel's counter, as in refimpl/render.py: pixel_counter.
+        pixel = given["x"] + np.uint32(render.MAX_IMAGE_SIDE_PX) * given["y"]
+        counters = Counters(given["seed"], pixel, given["sample_number"])
+        x, y = given["x"].astype(np.float32), given["y"].astype(np.float32)
+        path = render.start(basis, x, y, given["width"], given["height"], counters, np.float32)
+        return {**_taken(PATH, path), "pixel": pixel}
+
+    def arrive(given: Mapping[str, Any]) -> dict[str, Any]:
+        path, surface, hit = transport.arrive(world, _path(given))
+        return {**_taken({"radiance": PATH["radiance"]}, path), **_taken(SURFACE, surface, hit)}
+
+    def look(given: Mapping[str, Any]) -> dict[str, Any]:
+        surface, hit = _surface(given)
+        layers = render.first_hit_layers(world, surface, hit, _vector(given, "direction", XYZ))
+        return {
+            name: value for layer, (ends, _) in LAYERS.items() for name, value in _split(layer, ends, layers)
+        }
+
+    def scatter(given: Mapping[str, Any]) -> dict[str, Any]:
+        surface, hit = _surface(given)
+        counters = Counters(*(given[name] for name in COUNTERS))
+        path, alive = transport.scatter(world, _path(given), surface, hit, given["depth"], counters)
+        return {**_taken(PATH, path), "alive": alive}
+
+    numbers = {**dict.fromkeys(("x", "y", "seed", "sample_number"), (NUMBER, COUNTER))}
+    size = dict.fromkeys(("width", "height"), (NUMBER, FLOAT))
+    return PathPrograms(
+        scene.name,
+        scene_digest(scene),
+        settings,
+        _lowered("start", start, {**numbers, **size}),
+        _lowered("arrive", arrive, PATH),
+        _lowered("look", look, {**SURFACE, "direction": PATH["direction"]}),
+        _lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, "depth": (NUMBER, COUNTER)}),
+    )
+
+
+def names(values: Values) -> list[str]:
+    """Return the names of all components, in order."""
+    return [name + end for name, (ends, _) in values.items() for end in ends]
+
+
+def kinds(values: Values) -> dict[str, str]:
+    """Return the kind of number of each component."""
+    return {name + end: kind for name, (ends, kind) in values.items() for end in ends}
+
+
+def _lowered(name: str, function: Any, values: Values) -> Program:
+    """Trace a function of named numbers, and run the passes."""
+    inputs = {component: Type(kind) for component, kind in kinds(values).items()}
+    program = trace(lambda *given: function(dict(zip(inputs, given, strict=True))), inputs)
+    return pipeline.run(verify(program, f"traced {name}"), PASSES)
+
+
+def _vector(given: Mapping[str, Any], name: str, ends: tuple[str, ...]) -> Any:
+    """Join a value from its components."""
+    parts = [given[name + end] for end in ends]
+    return vectors.vector(*parts) if len(parts) > 1 else parts[0]
+
+
+def _path(given: Mapping[str, Any]) -> Path:
+    """Return the state of a path from its components."""
+    return Path(**{name: _vector(given, name, ends) for name, (ends, _) in PATH.items()})
+
+
+def _surface(given: Mapping[str, Any]) -> tuple[Surface, Hit]:
+    """Return surface and hit from their components; a scattering asks for neither emission nor light."""
+    point, normal, reflectance = (
+        _vector(given, name, SURFACE[name][0]) for name in ("point", "normal", "reflectance")
+    )
+    return Surface(point, normal, reflectance, None, None), Hit(given["t"], given["surface"])
+
+
+def _taken(values: Values, *tuples: Any) -> dict[str, Traced]:
+    """Return the components of the fields named in `values`, each from the first tuple that has it."""
+    return {
+        component: value
+        for name, (ends, _) in values.items()
+        for component, value in _split(
+            name, ends, next(t._asdict() for t in reversed(tuples) if name in t._fields)
+        )
+    }
+
+
+def _split(name: str, ends: tuple[str, ...], values: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Return the components of one value by name."""
+    whole = values[name]
+    return [(name + end, whole[..., i] if len(ends) > 1 else whole) for i, end in enumerate(ends)]

@@ -1,0 +1,143 @@
+"""Compile a scene's paths for a target: passes, source, artifact.
+
+1. Run the passes of the profile on each program (lower_scene.py has run the common ones).
+2. Emit the source by the target's schedule for a number of paths at once [`SCHEDULES`].
+3. Put both together with a manifest [`compile_path`].
+
+A path kernel has no error bound: its decisions may fall differently from the reference's where a path passes
+an edge by less than the rounding error. Everything is a function of scene, settings, target, profile and
+schedule, to the byte.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from ..refimpl.errors import CompileError
+from . import emit_path, ir, opencl_path, profiles
+from .compile import asdict_finite, sine_contract, target_named
+from .glsl_path import GLSLPath
+from .lower_scene import PASSES, PathPrograms
+from .passes import pipeline
+from .path_dialect import PathDialect
+from .profiles import Profile
+
+SCHEMA = "wamnet-path-kernel-1"
+"""Name and version of the manifest's form; described in spec/path_kernel.md."""
+
+
+@dataclass(frozen=True)
+class PathArtifact:
+    """A compiled path kernel; `programs` are what was emitted, `planes` what it adds up, in order."""
+
+    target: str
+    profile: str
+    lanes: int
+    entry_point: str
+    source: str
+    source_name: str
+    programs: PathPrograms
+    planes: tuple[str, ...]
+    manifest: Mapping[str, Any]
+
+    @property
+    def digest(self) -> str:
+        """Return the hash that names this artifact: of its source."""
+        return str(self.manifest["digest"])
+
+
+def _no_dialect(lanes: int) -> None:
+    """The interpreter needs the programs alone."""
+
+
+SCHEDULES: Mapping[str, tuple[Callable[[int], PathDialect | None], tuple[int, ...]]] = {
+    "numpy": (_no_dialect, (1,)),
+    "opencl": (opencl_path.schedule, (1, *opencl_path.VECTORS)),
+    "opengl": (lambda lanes: GLSLPath(), (1,)),
+}
+"""By target: the dialect for a number of paths at once, and the numbers that there are."""
+
+
+def compile_path(
+    programs: PathPrograms,
+    target: str,
+    profile: str = "ieee",
+    lanes: int = 1,
+    groups: Sequence[str] = emit_path.FRAME_GROUPS,
+) -> PathArtifact:
+    """Return the kernel that follows the paths of a scene, `lanes` at once, and adds up groups of planes."""
+    chosen, promised = target_named(target), profiles.profile_named(profile)
+    make, known = SCHEDULES[target]
+    if lanes not in known:
+        raise CompileError(
+            f"target {target} does not follow {lanes} paths at once; it can do {', '.join(map(str, known))}"
+        )
+    emitted, dialect = _passed(programs, promised.passes), make(lanes)
+    planes = tuple(emit_path.planes(groups))
+    header = _header(programs, dialect.language if dialect else chosen.language, promised, lanes)
+    arguments = dialect.path_arguments if dialect else chosen.arguments
+    arguments = arguments.format(lanes=lanes, planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
+    if dialect is None:
+        text, suffix, entry = _printed(emitted, header), chosen.suffix, chosen.entry
+    else:
+        first, *others = arguments.split("\n")
+        header += [f"arguments {first}", *(f"          {line}" for line in others)]
+        text = emit_path.emit_path(emitted, dialect, groups, header)
+        suffix, entry = dialect.suffix, dialect.entry
+    facts = {
+        "target": target,
+        "language": chosen.language,
+        "entry_point": entry,
+        "lanes": lanes,
+        "profile": {"name": promised.name, "text": promised.text},
+        "sine": asdict_finite(sine_contract(profile, target)),
+        "passes": [*PASSES, *promised.passes],
+        "planes": list(planes),
+        "arguments": arguments,
+    }
+    name = f"path{suffix}"
+    manifest = {**facts, **_identity(emitted, name, text)}
+    return PathArtifact(target, profile, lanes, entry, text, name, emitted, planes, manifest)
+
+
+def _header(programs: PathPrograms, language: str, profile: Profile, lanes: int) -> list[str]:
+    """Return the lines of the comment at the top of the source, up to the arguments."""
+    settings = [f"{key} {value}" for key, value in asdict(programs.settings).items()]
+    return [
+        f"wamnet path tracer, {language}. Generated: change the compiler, not this text.",
+        f"scene     {programs.scene}, digest {programs.scene_digest[:32]}",
+        f"paths     {', '.join(settings)}",
+        f"schedule  {lanes} {'path' if lanes == 1 else 'paths'} at once",
+        f"profile   {profile.name}: {profile.text}",
+        "bound     none: a path's decisions may fall differently near an edge",
+    ]
+
+
+def _identity(programs: PathPrograms, name: str, text: str) -> dict[str, Any]:
+    """Return what the manifest says of the scene, the programs and the source file `name`."""
+    return {
+        "schema": SCHEMA,
+        "digest": ir.sha256(text.encode()),
+        "scene": {"name": programs.scene, "digest": programs.scene_digest},
+        "settings": asdict(programs.settings),
+        "programs": {part: ir.digest(program) for part, program in programs.parts().items()},
+        "bound": None,
+        "files": {name: ir.sha256(text.encode())},
+    }
+
+
+def _passed(programs: PathPrograms, passes: Sequence[str]) -> PathPrograms:
+    """Return the programs after the named passes."""
+    start, arrive, look, scatter = (pipeline.run(part, passes) for part in programs.parts().values())
+    return replace(programs, start=start, arrive=arrive, look=look, scatter=scatter)
+
+
+def _printed(programs: PathPrograms, header: Sequence[str]) -> str:
+    """Return the programs as text, which is all that the interpreter needs."""
+    parts = [f"# {line}".rstrip() for line in header]
+    for name, program in programs.parts().items():
+        parts += [f"# {name}", ir.text(program).rstrip("\n")]
+    return "\n".join(parts) + "\n"

@@ -1,0 +1,169 @@
+"""Paths as programs: the reference's bits, and nothing of what a scene lacks."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wamnet.compiler.interpret import interpret
+from wamnet.compiler.lower_scene import LAYERS, PATH, SURFACE, lower_scene, names
+from wamnet.refimpl import render as R
+from wamnet.refimpl import rng, scenes, transport
+from wamnet.refimpl.camera import camera_basis
+from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.transport import Settings
+
+GREY = (0.5, 0.6, 0.7)
+LIGHT = Light((-1.0, 3.0, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), (1.0, 0.9, 0.8), 30.0)
+TURNED = ((0.8, 0.0, -0.6), (0.0, 1.0, 0.0), (0.6, 0.0, 0.8))
+EVERYTHING = Scene(
+    "everything",
+    Camera((0.2, 0.5, 2.5), (0.0, 0.0, 0.0), vertical_fov_deg=70.0),
+    Room((-3.0, -2.0, -3.0), (3.0, 4.0, 3.0), (GREY,) * 6, (0.1, 0.0, 0.0)),
+    boxes=(
+        Box((-1.0, 0.0, 0.0), (0.3, 0.4, 0.5), (0.2, 0.3, 0.4)),
+        Box((1.0, 0.0, 0.0), (0.3, 0.4, 0.5), (0.9, 0.3, 0.4), TURNED),
+        Box((1.0, 1.0, 0.5), (0.2, 0.2, 0.2), (0.9, 0.3, 0.9), TURNED, (0.5, 0.5, 0.5)),
+    ),
+    spheres=(Sphere((0.0, 0.5, 0.0), 0.4, (0.9, 0.8, 0.1)), Sphere((0.5, -1.0, 1.0), 0.7, (0.3, 0.8, 0.5))),
+    quads=(Quad((-2.0, -1.0, -2.0), (0.5, 0.0, 2.0), (2.0, 0.1, 0.0), (0.7, 0.2, 0.2)),),
+    lights=(LIGHT, replace(LIGHT, corner=(-2.5, 1.0, -1.0), edge_u=(0.0, 0.0, 1.0), edge_v=(0.0, -1.0, 0.0))),
+    background=(0.1, 0.2, 0.3),
+)
+"""One of each kind of primitive and two of most, axis-parallel and turned."""
+
+SCENES = {**{name: scenes.canonical(name) for name in scenes.CANONICAL}, "everything": EVERYTHING}
+SETTINGS = [
+    Settings(max_depth=3),
+    Settings(max_depth=2, roulette_depth=1, heuristic="balance"),
+    Settings(max_depth=2, strategy="light"),
+    Settings(max_depth=2, strategy="bsdf"),
+]
+
+
+def components(values, *tuples):
+    """Return the components (...) of the fields of named tuples, by the names that programs use."""
+    fields = {name: value for t in tuples for name, value in t._asdict().items()}
+    return {
+        name + end: fields[name][..., i] if len(ends) > 1 else fields[name]
+        for name, (ends, _) in values.items()
+        for i, end in enumerate(ends)
+    }
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=lambda s: f"{s.strategy}-{s.roulette_depth}")
+@pytest.mark.parametrize("name", SCENES)
+def test_programs_give_the_reference_s_bits(name, settings):
+    """All programs at each depth, on the reference's own states, in float32, the same sine in both."""
+    scene = SCENES[name]
+    programs = lower_scene(scene, settings)
+    world = transport.build(scene, settings, np.float32)
+    y, x = np.divmod(np.arange(16 * 12), 16)
+    counters = transport.Counters(rng.counter(7), R.pixel_counter(x, y), rng.counter(3))
+    basis = camera_basis(scene.camera, np.float32)
+    path = R.start(basis, *(a.astype(np.float32) for a in (x, y)), 16, 12, counters, np.float32)
+    given = {"x": x.astype(np.uint32), "y": y.astype(np.uint32), "width": 16, "height": 12}
+    given |= {"seed": counters.seed, "sample_number": counters.sample}
+    check(interpret(programs.start, given), {**components(PATH, path), "pixel": counters.pixel})
+    given |= {"pixel": counters.pixel}
+    # Paths that have ended are computed on, in both.
+    with np.errstate(all="ignore"):
+        for depth in range(settings.max_depth):
+            given |= components(PATH, path)
+            path, surface, hit = transport.arrive(world, path)
+            arrived = {**components(PATH, path), **components(SURFACE, surface, hit)}
+            found = interpret(programs.arrive, given)
+            check(found, {name: arrived[name] for name in found})
+            given |= arrived
+            layers = R.first_hit_layers(world, surface, hit, path.direction)
+            looked = interpret(programs.look, given)
+            assert list(looked) == names(LAYERS)
+            check(
+                looked,
+                {n: v for k in LAYERS for n, v in zip(names({k: LAYERS[k]}), layers[k].T, strict=True)},
+            )
+            given["depth"] = rng.counter(depth)
+            path, alive = transport.scatter(world, path, surface, hit, given["depth"], counters)
+            check(interpret(programs.scatter, given), {**components(PATH, path), "alive": alive})
+
+
+def check(found, expected):
+    assert set(found) == set(expected)
+    for name, values in expected.items():
+        assert np.array_equal(np.broadcast_to(found[name], values.shape), values, equal_nan=True), name
+
+
+def ops(program, op):
+    return sum(node.op == op for node in program.nodes)
+
+
+def from_input(program, op, prefix):
+    """Count operations between a constant and an input whose name starts with `prefix`."""
+    kinds = Counter()
+    for node in program.nodes:
+        operands = [program.nodes[arg] for arg in node.args]
+        named = any(o.op == "input" and str(o["name"]).startswith(prefix) for o in operands)
+        kinds[node.op] += named and any(o.op == "constant" for o in operands)
+    return kinds[op]
+
+
+def room_with(**parts):
+    return Scene("room", Camera((0.0, 0.0, 2.0), (0.0, 0.0, 0.0)), SCENES["furnace"].room, **parts)
+
+
+def boxes(count, *rotation):
+    return tuple(
+        Box((0.01 * i, 0.02 * i * i, -0.3), (0.1 + 0.01 * i, 0.1, 0.1), GREY, *rotation) for i in range(count)
+    )
+
+
+@pytest.mark.parametrize("count", [1, 2, 20])
+def test_a_rotation_that_boxes_share_is_applied_once(count):
+    """TURNED times a vector: x and z times 0.8, 0 and +-0.6, y times 0 (twice, made once) and times 1 (y)."""
+    arrive = lower_scene(room_with(boxes=boxes(count, TURNED)), Settings()).arrive
+    assert from_input(arrive, "multiply", "direction") == 7
+    assert from_input(arrive, "multiply", "origin") == 7
+
+
+def test_boxes_that_are_parallel_to_the_axes_are_not_rotated():
+    arrive = lower_scene(room_with(boxes=boxes(5)), Settings()).arrive
+    assert from_input(arrive, "multiply", "direction") == from_input(arrive, "multiply", "origin") == 0
+
+
+def test_what_a_scene_lacks_is_in_no_program():
+    plain = lower_scene(room_with(), Settings()).parts()
+    assert ops(plain["arrive"], "sqrt") == ops(plain["arrive"], "take") == 0
+    with_sphere = lower_scene(room_with(spheres=(Sphere((0.0, 0.0, 0.0), 0.1, GREY),)), Settings())
+    assert ops(with_sphere.arrive, "sqrt") == 1
+    # No light: one direction is sampled; its shadow ray, distance and cosines are not there.
+    assert ops(plain["scatter"], "sqrt") == 1
+    assert ops(plain["scatter"], "reciprocal") == 0
+    assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings(strategy="bsdf")).scatter, "sqrt") == 1
+    assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings()).scatter, "sqrt") == 2
+
+
+@pytest.mark.parametrize(
+    ("lights", "settings", "numbers"),
+    [
+        ((), Settings(), 2),
+        ((LIGHT,), Settings(strategy="bsdf"), 2),
+        ((LIGHT,), Settings(), 4),
+        (EVERYTHING.lights, Settings(), 5),
+        ((LIGHT,), Settings(roulette_depth=3), 5),
+    ],
+)
+def test_only_random_numbers_that_are_used_are_made(lights, settings, numbers):
+    """Two numbers for the direction, two for a point on a light, one to choose it, one for roulette."""
+    scatter = lower_scene(room_with(lights=lights), settings).scatter
+    assert ops(scatter, "convert") == numbers
+
+
+def test_programs_are_numbers_without_vectors_and_without_what_nothing_needs():
+    for program in lower_scene(EVERYTHING, Settings()).parts().values():
+        assert all(not node.type.shape for node in program.nodes)
+        used = {arg for node in program.nodes for arg in node.args} | {i for _, i in program.outputs}
+        assert all(i in used or node.op == "input" for i, node in enumerate(program.nodes))
+        assert not {"stack", "component", "parameter"} & {node.op for node in program.nodes}

@@ -1,0 +1,125 @@
+"""Path kernels: generated text, manifest, refusals."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+from wamnet.compiler import ir
+from wamnet.compiler.emit_path import GROUPS, planes
+from wamnet.compiler.lower_scene import lower_scene
+from wamnet.compiler.path_kernel import SCHEDULES, compile_path
+from wamnet.refimpl import scenes
+from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.transport import Settings
+
+
+def kernel(name="furnace", target="opencl", profile="ieee", lanes=16, settings=None, **options):
+    programs = lower_scene(scenes.canonical(name), settings or Settings(max_depth=3))
+    return compile_path(programs, target, profile, lanes, **options)
+
+
+@pytest.mark.parametrize(
+    ("name", "target", "profile", "lanes"),
+    [
+        ("furnace", "opencl", "ieee", 16),
+        ("lone_light", "opencl", "native", 1),
+        ("furnace", "opengl", "ieee", 1),
+        ("lone_light", "opengl", "native", 1),
+        ("empty", "numpy", "ieee", 1),
+    ],
+)
+def test_golden_source(golden, name, target, profile, lanes):
+    made = kernel(name, target, profile, lanes)
+    golden(f"path.{name}.{profile}.{lanes}.{made.source_name}", made.source)
+
+
+def test_golden_manifest(golden):
+    manifest = json.dumps(kernel().manifest, indent=2, sort_keys=True, allow_nan=False)
+    golden("path.furnace.ieee.16.manifest.json", manifest + "\n")
+
+
+def test_compiling_again_gives_the_same_bytes():
+    one, two = (kernel("minicubes") for _ in range(2))
+    assert (one.source, one.manifest) == (two.source, two.manifest)
+
+
+def test_the_manifest_names_what_was_made():
+    made = kernel("cornell", "opengl", lanes=1)
+    assert made.manifest["files"] == {"path.frag": ir.sha256(made.source.encode())}
+    assert made.digest == ir.sha256(made.source.encode())
+    assert made.manifest["planes"] == planes(
+        ("color", "deviation", "albedo", "normal", "depth", "position", "direction")
+    )
+    assert made.manifest["bound"] is None
+    assert made.manifest["settings"]["max_depth"] == 3
+
+
+@pytest.mark.parametrize(("target", "lanes"), [("opencl", 16), ("opencl", 1), ("opengl", 1)])
+def test_a_scene_s_text_has_nothing_that_it_lacks(target, lanes):
+    """Tables for many materials, cosine and roulette: by the words that they need."""
+    furnace, cubes = (kernel(name, target, "native", lanes).source for name in ("furnace", "minicubes"))
+    assert "table_" not in furnace
+    assert "table_" in cubes
+    arrivals = [text.partition("/* scatter:")[0].partition("/* arrive:")[2] for text in (furnace, cubes)]
+    assert "sqrt" not in arrivals[0]
+    # The room's walls alone are told apart by an equality; each box and light is one more "nearer than".
+    nearer = [len(re.findall(r"= t\d+ < t\d+;", text)) for text in arrivals]
+    assert nearer == [0, 27 + 2]
+
+
+def test_roulette_is_absent_when_off():
+    off, on = (kernel(settings=Settings(max_depth=3, roulette_depth=d)).source for d in (None, 1))
+    assert "0.949999988f" not in off
+    assert "0.949999988f" in on
+
+
+def test_features_are_absent_when_nobody_wants_them():
+    source = kernel(groups=("color",)).source
+    assert "look" not in source
+    assert "deviation" not in source
+    assert "sum_albedo" not in source
+
+
+def test_emitted_sine_replaces_the_target_s():
+    own, emitted = (kernel(profile=profile).source for profile in ("native", "ieee"))
+    assert "sin(" in own
+    assert "cos(" in own
+    assert "sin(" not in emitted
+    assert "cos(" not in emitted
+
+
+def test_interpreter_s_text_holds_all_programs():
+    text = kernel(target="numpy", lanes=1).source
+    assert [line for line in text.splitlines() if re.fullmatch("# [a-z]+", line)] == [
+        "# start",
+        "# arrive",
+        "# look",
+        "# scatter",
+    ]
+
+
+@pytest.mark.parametrize("target", SCHEDULES)
+def test_wrong_number_of_lanes(target):
+    with pytest.raises(CompileError, match=f"target {target} does not follow 3 paths at once; it can do 1"):
+        kernel(target=target, lanes=3)
+
+
+def test_unknown_group_of_planes():
+    with pytest.raises(CompileError, match="planes 'heat' do not exist; there are: color, deviation, albedo"):
+        kernel(groups=("heat",))
+
+
+def test_more_planes_than_a_fragment_writes():
+    with pytest.raises(CompileError, match=r"adds up \d+ planes: GLSL 3.30, .* writes at most 32; ask for"):
+        kernel(target="opengl", lanes=1, groups=tuple(GROUPS))
+    assert len(kernel(lanes=1, groups=tuple(GROUPS)).planes) > 32
+
+
+def test_unknown_target_and_profile():
+    with pytest.raises(CompileError, match="target 'metal' does not exist"):
+        kernel(target="metal")
+    with pytest.raises(CompileError, match="profile 'fast' does not exist"):
+        kernel(profile="fast")

@@ -1,0 +1,541 @@
+/*
+ * wamnet path tracer, OpenCL C 1.2. Generated: change the compiler, not this text.
+ * scene     furnace, digest 5426626d24f949194068d8efe6ece22f
+ * paths     max_depth 3, roulette_depth None, strategy mis, heuristic power
+ * schedule  16 paths at once
+ * profile   ieee: any order of summation, fused multiply-add allowed, emitted sine
+ * bound     none: a path's decisions may fall differently near an edge
+ * arguments sums: float, one plane of global_size(1) rows of global_size(0) * 16 numbers for each of:
+ *           color_r, color_g, color_b, deviation_r, deviation_g, deviation_b, albedo_r, albedo_g, albedo_b,
+ *           normal_x, normal_y, normal_z, depth, position_x, position_y, position_z, direction_x, direction_y,
+ *           direction_z;
+ *           width, height of the image; first_row; first_sample; samples to add up; seed.
+ *           Work item (i, j) follows the pixels from 16 * i of row first_row + j on
+ */
+#define LANES 16
+#define MAX_DEPTH 3u /* scatterings of a path */
+
+__kernel void wamnet_trace(
+    __global float *restrict sums,
+    int width,
+    int height,
+    int first_row,
+    uint first_sample,
+    int samples,
+    uint seed_number)
+{
+    size_t column = get_global_id(0) * LANES;
+    size_t stride = get_global_size(0) * LANES;
+    size_t row = get_global_id(1);
+    size_t plane = get_global_size(1) * stride;
+    size_t at = row * stride + column;
+    uint16 x = (uint16)((uint)column) + (uint16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    uint16 y = (uint16)((uint)((int)row + first_row));
+    uint16 seed = (uint16)(seed_number);
+    float16 image_width = (float16)((float)width);
+    float16 image_height = (float16)((float)height);
+    float16 sum_color_r = (float16)(0.0f);
+    float16 sum_color_g = (float16)(0.0f);
+    float16 sum_color_b = (float16)(0.0f);
+    float16 sum_deviation_r = (float16)(0.0f);
+    float16 sum_deviation_g = (float16)(0.0f);
+    float16 sum_deviation_b = (float16)(0.0f);
+    float16 sum_albedo_r = (float16)(0.0f);
+    float16 sum_albedo_g = (float16)(0.0f);
+    float16 sum_albedo_b = (float16)(0.0f);
+    float16 sum_normal_x = (float16)(0.0f);
+    float16 sum_normal_y = (float16)(0.0f);
+    float16 sum_normal_z = (float16)(0.0f);
+    float16 sum_depth = (float16)(0.0f);
+    float16 sum_position_x = (float16)(0.0f);
+    float16 sum_position_y = (float16)(0.0f);
+    float16 sum_position_z = (float16)(0.0f);
+    float16 sum_direction_x = (float16)(0.0f);
+    float16 sum_direction_y = (float16)(0.0f);
+    float16 sum_direction_z = (float16)(0.0f);
+    for (int n = 0; n < samples; ++n) {
+        uint16 sample_number = (uint16)(first_sample + (uint)n);
+        uint16 pixel;
+        float16 origin_x;
+        float16 origin_y;
+        float16 origin_z;
+        float16 direction_x;
+        float16 direction_y;
+        float16 direction_z;
+        float16 beta_r;
+        float16 beta_g;
+        float16 beta_b;
+        float16 radiance_r;
+        float16 radiance_g;
+        float16 radiance_b;
+        float16 pdf;
+        float16 point_x;
+        float16 point_y;
+        float16 point_z;
+        float16 normal_x;
+        float16 normal_y;
+        float16 normal_z;
+        float16 reflectance_r;
+        float16 reflectance_g;
+        float16 reflectance_b;
+        float16 t;
+        int16 surface;
+        int16 alive = (int16)(-1);
+
+        /* start: the path at the camera */
+        {
+            uint16 t7 = (uint16)(65536u) * y;
+            uint16 t8 = x + t7;
+            float16 t9 = convert_float16(x);
+            float16 t10 = convert_float16(y);
+            uint16 t12 = t8 * (uint16)(1664525u);
+            uint16 t14 = t12 + (uint16)(1013904223u);
+            uint16 t15 = sample_number * (uint16)(1664525u);
+            uint16 t16 = t15 + (uint16)(1013904223u);
+            uint16 t17 = seed * (uint16)(1664525u);
+            uint16 t18 = t17 + (uint16)(1013904223u);
+            uint16 t19 = t16 * t18;
+            uint16 t20 = t14 + t19;
+            uint16 t21 = (uint16)(1013904223u) * t20;
+            uint16 t22 = t16 + t21;
+            uint16 t23 = t20 * t22;
+            uint16 t24 = (uint16)(1013904223u) + t23;
+            uint16 t25 = t22 * t24;
+            uint16 t26 = t18 + t25;
+            uint16 t28 = t20 >> (uint16)(16u);
+            uint16 t29 = t20 ^ t28;
+            uint16 t30 = t22 >> (uint16)(16u);
+            uint16 t31 = t22 ^ t30;
+            uint16 t32 = t24 >> (uint16)(16u);
+            uint16 t33 = t24 ^ t32;
+            uint16 t34 = t26 >> (uint16)(16u);
+            uint16 t35 = t26 ^ t34;
+            uint16 t36 = t31 * t35;
+            uint16 t37 = t29 + t36;
+            uint16 t38 = t33 * t37;
+            uint16 t39 = t31 + t38;
+            uint16 t41 = t37 >> (uint16)(8u);
+            float16 t42 = convert_float16(t41);
+            float16 t44 = t42 * (float16)(5.96046448e-08f);
+            uint16 t45 = t39 >> (uint16)(8u);
+            float16 t46 = convert_float16(t45);
+            float16 t47 = t46 * (float16)(5.96046448e-08f);
+            float16 t48 = t9 + t44;
+            float16 t50 = (float16)(2.0f) * t48;
+            float16 t51 = t50 - image_width;
+            float16 t52 = t51 / image_height;
+            float16 t54 = t52 * (float16)(0.577350259f);
+            float16 t55 = t10 + t47;
+            float16 t56 = (float16)(2.0f) * t55;
+            float16 t57 = image_height - t56;
+            float16 t58 = t57 / image_height;
+            float16 t59 = t58 * (float16)(0.577350259f);
+            float16 t63 = t54 * (float16)(0.998274386f);
+            float16 t64 = t54 * (float16)(0.0f);
+            float16 t65 = t54 * (float16)(-0.0587220229f);
+            float16 t69 = (float16)(-0.0583211854f) + t63;
+            float16 t70 = (float16)(-0.116642371f) + t64;
+            float16 t71 = (float16)(-0.991460145f) + t65;
+            float16 t75 = t59 * (float16)(-0.00684947567f);
+            float16 t76 = t59 * (float16)(0.993173957f);
+            float16 t77 = t59 * (float16)(-0.116441086f);
+            float16 t78 = t69 + t75;
+            float16 t79 = t70 + t76;
+            float16 t80 = t71 + t77;
+            float16 t81 = t78 * t78;
+            float16 t82 = t79 * t79;
+            float16 t83 = t81 + t82;
+            float16 t84 = t80 * t80;
+            float16 t85 = t83 + t84;
+            float16 t86 = sqrt(t85);
+            float16 t87 = t78 / t86;
+            float16 t88 = t79 / t86;
+            float16 t89 = t80 / t86;
+            float16 t90 = (float16)(0.0f) * t87;
+            float16 t91 = (float16)(0.0f) * t88;
+            float16 t92 = (float16)(0.0f) * t89;
+            float16 t96 = (float16)(0.100000001f) + t90;
+            float16 t97 = (float16)(0.200000003f) + t91;
+            float16 t98 = (float16)(0.699999988f) + t92;
+            origin_x = t96;
+            origin_y = t97;
+            origin_z = t98;
+            direction_x = t87;
+            direction_y = t88;
+            direction_z = t89;
+            beta_r = (float16)(1.0f);
+            beta_g = (float16)(1.0f);
+            beta_b = (float16)(1.0f);
+            radiance_r = (float16)(0.0f);
+            radiance_g = (float16)(0.0f);
+            radiance_b = (float16)(0.0f);
+            pdf = (float16)(1.00000002e+30f);
+            pixel = t8;
+        }
+        for (uint bounce = 0u; bounce <= MAX_DEPTH; ++bounce) {
+            uint16 depth = (uint16)(bounce);
+
+            /* arrive: the next surface */
+            {
+                float16 t16 = fabs(direction_x);
+                float16 t17 = fabs(direction_y);
+                float16 t18 = fabs(direction_z);
+                int16 t19 = t16 < (float16)(1e-15f);
+                int16 t20 = t17 < (float16)(1e-15f);
+                int16 t21 = t18 < (float16)(1e-15f);
+                int16 t23 = direction_x < (float16)(0.0f);
+                int16 t24 = direction_y < (float16)(0.0f);
+                int16 t25 = direction_z < (float16)(0.0f);
+                float16 t27 = t23 ? (float16)(-1e-15f) : (float16)(1e-15f);
+                float16 t28 = t24 ? (float16)(-1e-15f) : (float16)(1e-15f);
+                float16 t29 = t25 ? (float16)(-1e-15f) : (float16)(1e-15f);
+                float16 t30 = t19 ? t27 : direction_x;
+                float16 t31 = t20 ? t28 : direction_y;
+                float16 t32 = t21 ? t29 : direction_z;
+                float16 t33 = 1.0f / t30;
+                float16 t34 = 1.0f / t31;
+                float16 t35 = 1.0f / t32;
+                float16 t36 = (float16)(0.0f) - origin_x;
+                float16 t37 = (float16)(0.0f) - origin_y;
+                float16 t38 = (float16)(0.0f) - origin_z;
+                float16 t39 = t36 * t33;
+                float16 t40 = t37 * t34;
+                float16 t41 = t38 * t35;
+                float16 t42 = fabs(t33);
+                float16 t43 = fabs(t34);
+                float16 t44 = fabs(t35);
+                float16 t46 = t39 - t42;
+                float16 t47 = t40 - t43;
+                float16 t48 = t41 - t44;
+                float16 t49 = t39 + t42;
+                float16 t50 = t40 + t43;
+                float16 t51 = t41 + t44;
+                float16 t52 = max(t46, t47);
+                float16 t53 = max(t52, t48);
+                float16 t54 = min(t49, t50);
+                float16 t55 = min(t54, t51);
+                int16 t56 = t53 <= t55;
+                int16 t57 = t55 > (float16)(0.0f);
+                int16 t58 = t56 && t57;
+                float16 t59 = t58 ? t55 : (float16)(1.00000002e+30f);
+                int16 t60 = t59 < (float16)(1.00000002e+30f);
+                int16 t62 = t60 ? (int16)(0) : (int16)(6);
+                float16 t63 = min((float16)(1.00000002e+30f), t59);
+                int16 t64 = t62 == (int16)(0);
+                int16 t65 = direction_x > (float16)(0.0f);
+                int16 t67 = t65 ? (int16)(1) : (int16)(0);
+                int16 t68 = direction_y > (float16)(0.0f);
+                int16 t71 = t68 ? (int16)(3) : (int16)(2);
+                int16 t72 = direction_z > (float16)(0.0f);
+                int16 t75 = t72 ? (int16)(5) : (int16)(4);
+                int16 t76 = t49 <= t50;
+                int16 t77 = t49 <= t51;
+                int16 t78 = t76 && t77;
+                int16 t79 = t50 <= t51;
+                int16 t80 = t79 ? t71 : t75;
+                int16 t81 = t78 ? t67 : t80;
+                int16 t82 = t64 ? t81 : t62;
+                int16 t83 = t82 < (int16)(6);
+                float16 t84 = t83 ? t63 : (float16)(0.0f);
+                float16 t85 = direction_x * t84;
+                float16 t86 = direction_y * t84;
+                float16 t87 = direction_z * t84;
+                float16 t88 = origin_x + t85;
+                float16 t89 = origin_y + t86;
+                float16 t90 = origin_z + t87;
+                float16 t91 = t83 ? t88 : (float16)(0.0f);
+                float16 t92 = t83 ? t89 : (float16)(0.0f);
+                float16 t93 = t83 ? t90 : (float16)(0.0f);
+                float16 t95 = t65 ? (float16)(-1.0f) : (float16)(1.0f);
+                float16 t96 = t68 ? (float16)(-1.0f) : (float16)(1.0f);
+                float16 t97 = t72 ? (float16)(-1.0f) : (float16)(1.0f);
+                float16 t98 = t78 ? t95 : (float16)(0.0f);
+                int16 t99 = !t78;
+                int16 t100 = t99 && t79;
+                float16 t101 = t100 ? t96 : (float16)(0.0f);
+                int16 t102 = !t79;
+                int16 t103 = t99 && t102;
+                float16 t104 = t103 ? t97 : (float16)(0.0f);
+                float16 t105 = t83 ? t98 : (float16)(0.0f);
+                float16 t106 = t83 ? t101 : (float16)(0.0f);
+                float16 t107 = t83 ? t104 : (float16)(0.0f);
+                float16 t108 = t83 ? (float16)(1.0f) : (float16)(0.0f);
+                float16 t110 = t83 ? (float16)(0.5f) : (float16)(0.0f);
+                float16 t111 = beta_r * t108;
+                float16 t112 = beta_g * t108;
+                float16 t113 = beta_b * t108;
+                float16 t114 = radiance_r + t111;
+                float16 t115 = radiance_g + t112;
+                float16 t116 = radiance_b + t113;
+                radiance_r = alive ? t114 : radiance_r;
+                radiance_g = alive ? t115 : radiance_g;
+                radiance_b = alive ? t116 : radiance_b;
+                point_x = t91;
+                point_y = t92;
+                point_z = t93;
+                normal_x = t105;
+                normal_y = t106;
+                normal_z = t107;
+                reflectance_r = t110;
+                reflectance_g = t110;
+                reflectance_b = t110;
+                t = t63;
+                surface = t82;
+            }
+            if (bounce == 0u) {
+
+                /* look: the features of the first surface */
+                {
+                    int16 t15 = surface < (int16)(6);
+                    float16 t17 = t15 ? t : (float16)(0.0f);
+                    float16 t18 = t15 ? point_x : (float16)(0.0f);
+                    float16 t19 = t15 ? point_y : (float16)(0.0f);
+                    float16 t20 = t15 ? point_z : (float16)(0.0f);
+                    sum_albedo_r += reflectance_r;
+                    sum_albedo_g += reflectance_g;
+                    sum_albedo_b += reflectance_b;
+                    sum_normal_x += normal_x;
+                    sum_normal_y += normal_y;
+                    sum_normal_z += normal_z;
+                    sum_depth += t17;
+                    sum_position_x += t18;
+                    sum_position_y += t19;
+                    sum_position_z += t20;
+                    sum_direction_x += direction_x;
+                    sum_direction_y += direction_y;
+                    sum_direction_z += direction_z;
+                }
+            }
+            if (bounce == MAX_DEPTH) {
+                break;
+            }
+
+            /* scatter: the path goes on */
+            {
+                int16 t29 = surface < (int16)(6);
+                uint16 t31 = (uint16)(2u) * depth;
+                uint16 t33 = (uint16)(1u) + t31;
+                uint16 t35 = pixel * (uint16)(1664525u);
+                uint16 t37 = t35 + (uint16)(1013904223u);
+                uint16 t38 = sample_number * (uint16)(1664525u);
+                uint16 t39 = t38 + (uint16)(1013904223u);
+                uint16 t40 = seed * (uint16)(1664525u);
+                uint16 t41 = t40 + (uint16)(1013904223u);
+                uint16 t42 = t39 * t41;
+                uint16 t43 = t37 + t42;
+                uint16 t45 = t43 >> (uint16)(16u);
+                uint16 t46 = t43 ^ t45;
+                float16 t50 = t29 ? t : (float16)(0.0f);
+                float16 t51 = fabs(point_x);
+                float16 t52 = fabs(point_y);
+                float16 t53 = fabs(point_z);
+                float16 t54 = max(t51, t52);
+                float16 t55 = max(t54, t53);
+                float16 t56 = t55 + t50;
+                float16 t58 = (float16)(3.81469727e-06f) * t56;
+                float16 t59 = normal_x * t58;
+                float16 t60 = normal_y * t58;
+                float16 t61 = normal_z * t58;
+                float16 t62 = point_x + t59;
+                float16 t63 = point_y + t60;
+                float16 t64 = point_z + t61;
+                float16 t65 = beta_r * reflectance_r;
+                float16 t66 = beta_g * reflectance_g;
+                float16 t67 = beta_b * reflectance_b;
+                uint16 t68 = t33 + (uint16)(1u);
+                uint16 t69 = t68 * (uint16)(1664525u);
+                uint16 t70 = t69 + (uint16)(1013904223u);
+                uint16 t71 = t70 * t43;
+                uint16 t72 = t39 + t71;
+                uint16 t73 = t43 * t72;
+                uint16 t74 = t70 + t73;
+                uint16 t75 = t72 * t74;
+                uint16 t76 = t41 + t75;
+                uint16 t77 = t72 >> (uint16)(16u);
+                uint16 t78 = t72 ^ t77;
+                uint16 t79 = t74 >> (uint16)(16u);
+                uint16 t80 = t74 ^ t79;
+                uint16 t81 = t76 >> (uint16)(16u);
+                uint16 t82 = t76 ^ t81;
+                uint16 t83 = t78 * t82;
+                uint16 t84 = t46 + t83;
+                uint16 t85 = t80 * t84;
+                uint16 t86 = t78 + t85;
+                uint16 t87 = t84 >> (uint16)(8u);
+                float16 t88 = convert_float16(t87);
+                float16 t89 = t88 * (float16)(5.96046448e-08f);
+                uint16 t90 = t86 >> (uint16)(8u);
+                float16 t91 = convert_float16(t90);
+                float16 t92 = t91 * (float16)(5.96046448e-08f);
+                float16 t94 = (float16)(2.0f) * t89;
+                float16 t96 = t94 - (float16)(1.0f);
+                float16 t97 = (float16)(2.0f) * t92;
+                float16 t98 = t97 - (float16)(1.0f);
+                float16 t99 = fabs(t96);
+                float16 t100 = fabs(t98);
+                int16 t101 = t99 > t100;
+                float16 t102 = t101 ? t96 : t98;
+                float16 t103 = t101 ? t98 : t96;
+                int16 t104 = t102 == (float16)(0.0f);
+                float16 t106 = t104 ? (float16)(1e-30f) : t102;
+                float16 t107 = t103 / t106;
+                float16 t109 = (float16)(0.785398185f) * t107;
+                float16 t111 = (float16)(1.57079637f) - t109;
+                float16 t112 = t101 ? t109 : t111;
+                float16 t114 = t112 * (float16)(0.318309873f);
+                float16 t115 = t114 + (float16)(1.0f);
+                float16 t116 = floor(t115);
+                float16 t118 = t116 - (float16)(0.5f);
+                float16 t120 = t118 * (float16)(3.14160156f);
+                float16 t121 = t112 - t120;
+                float16 t123 = t118 * (float16)(-8.9071691e-06f);
+                float16 t124 = t121 - t123;
+                float16 t126 = t118 * (float16)(-1.74122761e-09f);
+                float16 t127 = t124 - t126;
+                float16 t128 = (float16)(0.5f) * t116;
+                float16 t129 = floor(t128);
+                float16 t130 = (float16)(2.0f) * t129;
+                float16 t131 = t116 - t130;
+                float16 t132 = (float16)(2.0f) * t131;
+                float16 t133 = (float16)(1.0f) - t132;
+                float16 t134 = t127 * t127;
+                float16 t136 = t134 * (float16)(-2.51969414e-08f);
+                float16 t138 = t136 + (float16)(2.76094511e-06f);
+                float16 t139 = t134 * t138;
+                float16 t141 = t139 + (float16)(-0.000198427704f);
+                float16 t142 = t134 * t141;
+                float16 t144 = t142 + (float16)(0.00833334867f);
+                float16 t145 = t134 * t144;
+                float16 t147 = t145 + (float16)(-0.166666672f);
+                float16 t148 = t134 * t147;
+                float16 t149 = t127 * t148;
+                float16 t150 = t127 + t149;
+                float16 t151 = t133 * t150;
+                float16 t152 = min(t151, (float16)(1.0f));
+                float16 t154 = max(t152, (float16)(-1.0f));
+                float16 t155 = t102 * t154;
+                float16 t156 = t114 + (float16)(0.5f);
+                float16 t157 = floor(t156);
+                float16 t158 = t157 * (float16)(3.14160156f);
+                float16 t159 = t112 - t158;
+                float16 t160 = t157 * (float16)(-8.9071691e-06f);
+                float16 t161 = t159 - t160;
+                float16 t162 = t157 * (float16)(-1.74122761e-09f);
+                float16 t163 = t161 - t162;
+                float16 t164 = (float16)(0.5f) * t157;
+                float16 t165 = floor(t164);
+                float16 t166 = (float16)(2.0f) * t165;
+                float16 t167 = t157 - t166;
+                float16 t168 = (float16)(2.0f) * t167;
+                float16 t169 = (float16)(1.0f) - t168;
+                float16 t170 = t163 * t163;
+                float16 t171 = t170 * (float16)(-2.51969414e-08f);
+                float16 t172 = t171 + (float16)(2.76094511e-06f);
+                float16 t173 = t170 * t172;
+                float16 t174 = t173 + (float16)(-0.000198427704f);
+                float16 t175 = t170 * t174;
+                float16 t176 = t175 + (float16)(0.00833334867f);
+                float16 t177 = t170 * t176;
+                float16 t178 = t177 + (float16)(-0.166666672f);
+                float16 t179 = t170 * t178;
+                float16 t180 = t163 * t179;
+                float16 t181 = t163 + t180;
+                float16 t182 = t169 * t181;
+                float16 t183 = min(t182, (float16)(1.0f));
+                float16 t184 = max(t183, (float16)(-1.0f));
+                float16 t185 = t102 * t184;
+                float16 t186 = t155 * t155;
+                float16 t187 = (float16)(1.0f) - t186;
+                float16 t188 = t185 * t185;
+                float16 t189 = t187 - t188;
+                float16 t190 = max((float16)(0.0f), t189);
+                float16 t191 = sqrt(t190);
+                int16 t192 = normal_z < (float16)(0.0f);
+                float16 t193 = t192 ? (float16)(-1.0f) : (float16)(1.0f);
+                float16 t194 = t193 + normal_z;
+                float16 t195 = (float16)(-1.0f) / t194;
+                float16 t196 = normal_x * normal_y;
+                float16 t197 = t196 * t195;
+                float16 t198 = t193 * normal_x;
+                float16 t199 = t198 * normal_x;
+                float16 t200 = t199 * t195;
+                float16 t201 = (float16)(1.0f) + t200;
+                float16 t202 = t193 * t197;
+                float16 t203 = -t193;
+                float16 t204 = t203 * normal_x;
+                float16 t205 = normal_y * normal_y;
+                float16 t206 = t205 * t195;
+                float16 t207 = t193 + t206;
+                float16 t208 = -normal_y;
+                float16 t209 = t201 * t155;
+                float16 t210 = t202 * t155;
+                float16 t211 = t204 * t155;
+                float16 t212 = t197 * t185;
+                float16 t213 = t207 * t185;
+                float16 t214 = t208 * t185;
+                float16 t215 = t209 + t212;
+                float16 t216 = t210 + t213;
+                float16 t217 = t211 + t214;
+                float16 t218 = normal_x * t191;
+                float16 t219 = normal_y * t191;
+                float16 t220 = normal_z * t191;
+                float16 t221 = t215 + t218;
+                float16 t222 = t216 + t219;
+                float16 t223 = t217 + t220;
+                float16 t224 = max(t191, (float16)(0.0f));
+                float16 t225 = t224 * (float16)(0.318309873f);
+                float16 t226 = max(t65, t66);
+                float16 t227 = max(t226, t67);
+                int16 t228 = t227 > (float16)(0.0f);
+                int16 t229 = t29 && t228;
+                origin_x = t62;
+                origin_y = t63;
+                origin_z = t64;
+                direction_x = t221;
+                direction_y = t222;
+                direction_z = t223;
+                beta_r = t65;
+                beta_g = t66;
+                beta_b = t67;
+                pdf = t225;
+                alive = alive && t229;
+            }
+            if (!any(alive)) {
+                break;
+            }
+        }
+
+        /* what the path has gathered */
+        float count = (float)n;
+        float weight = n > 0 ? 1.0f / (count * (count + 1.0f)) : 0.0f;
+        float16 difference_r = radiance_r * count - sum_color_r;
+        sum_deviation_r += difference_r * difference_r * weight;
+        float16 difference_g = radiance_g * count - sum_color_g;
+        sum_deviation_g += difference_g * difference_g * weight;
+        float16 difference_b = radiance_b * count - sum_color_b;
+        sum_deviation_b += difference_b * difference_b * weight;
+        sum_color_r += radiance_r;
+        sum_color_g += radiance_g;
+        sum_color_b += radiance_b;
+    }
+
+    vstore16(sum_color_r, 0, sums + 0 * plane + at);
+    vstore16(sum_color_g, 0, sums + 1 * plane + at);
+    vstore16(sum_color_b, 0, sums + 2 * plane + at);
+    vstore16(sum_deviation_r, 0, sums + 3 * plane + at);
+    vstore16(sum_deviation_g, 0, sums + 4 * plane + at);
+    vstore16(sum_deviation_b, 0, sums + 5 * plane + at);
+    vstore16(sum_albedo_r, 0, sums + 6 * plane + at);
+    vstore16(sum_albedo_g, 0, sums + 7 * plane + at);
+    vstore16(sum_albedo_b, 0, sums + 8 * plane + at);
+    vstore16(sum_normal_x, 0, sums + 9 * plane + at);
+    vstore16(sum_normal_y, 0, sums + 10 * plane + at);
+    vstore16(sum_normal_z, 0, sums + 11 * plane + at);
+    vstore16(sum_depth, 0, sums + 12 * plane + at);
+    vstore16(sum_position_x, 0, sums + 13 * plane + at);
+    vstore16(sum_position_y, 0, sums + 14 * plane + at);
+    vstore16(sum_position_z, 0, sums + 15 * plane + at);
+    vstore16(sum_direction_x, 0, sums + 16 * plane + at);
+    vstore16(sum_direction_y, 0, sums + 17 * plane + at);
+    vstore16(sum_direction_z, 0, sums + 18 * plane + at);
+}

@@ -1,0 +1,281 @@
+"""Path kernels against the reference: path by path, pixel by pixel, and as estimators."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+from statistical import SIGNIFICANCE, assert_all_plausible, welch_p
+
+from wamnet.compiler import ir
+from wamnet.compiler.emit_path import END, FRAME_GROUPS
+from wamnet.compiler.lower_scene import lower_scene
+from wamnet.compiler.path_kernel import SCHEDULES, compile_path
+from wamnet.kernels.executor import Part
+from wamnet.kernels.render_on import compile_scene, render_on
+from wamnet.refimpl import frame, rng, scenes, transport
+from wamnet.refimpl import render as R
+from wamnet.refimpl.camera import camera_basis
+from wamnet.refimpl.errors import CompileError, InputError
+from wamnet.refimpl.transport import Settings
+
+WIDTH, HEIGHT, SEED = 48, 32, 5
+U = 2.0**-24
+"""Unit roundoff of float32."""
+
+DEVICES = ("opencl", "opengl-egl")
+
+
+def scene(name):
+    """Return a canonical scene; the mini cubes are turned, so that no axes are parallel."""
+    return scenes.canonical(name, **({"time": 1.3} if name == "minicubes" else {}))
+
+
+# ---- path by path --------------------------------------------------------------------------------------
+
+
+def reference_paths(name, depths):
+    """Yield, for each depth, alive, hit, surface and state of all paths (P,) of the reference, in float32."""
+    world = transport.build(scene(name), Settings(max_depth=depths), np.float32)
+    y, x = np.divmod(np.arange(WIDTH * HEIGHT), WIDTH)
+    counters = transport.Counters(rng.counter(SEED), R.pixel_counter(x, y), rng.counter(0))
+    basis = camera_basis(scene(name).camera, np.float32)
+    path = R.start(basis, *(a.astype(np.float32) for a in (x, y)), WIDTH, HEIGHT, counters, np.float32)
+    alive = np.ones(len(x), bool)
+    # Paths that have ended are computed on.
+    with np.errstate(all="ignore"):
+        for depth in range(depths):
+            path, surface, hit = transport.arrive(world, path)
+            yield alive, hit, surface, path
+            path, going = transport.scatter(world, path, surface, hit, rng.counter(depth), counters)
+            alive = alive & going
+
+
+def kernel_paths(executor, name, depth):
+    """Return the state of all paths (P,) after `depth` scatterings and one more arrival, by plane."""
+    programs = lower_scene(scene(name), Settings(max_depth=depth))
+    kernel = compile_path(programs, executor.name, "ieee", executor.lanes, tuple(END))
+    sums = executor.trace(kernel, Part(WIDTH, HEIGHT, 0, HEIGHT, 0, 1, SEED))
+    return dict(zip(kernel.planes, sums.reshape(len(kernel.planes), -1), strict=True))
+
+
+def last(found, name, ends="xyz"):
+    return np.stack([found[f"last_{name}_{end}"] for end in ends], axis=-1)
+
+
+def farthest(a, b):
+    return np.abs(a - b).max(axis=-1)
+
+
+@pytest.mark.parametrize("name", scenes.CANONICAL)
+def test_paths_are_those_of_the_reference(executor, name):
+    """Vertices, directions and throughputs agree within a bound until a decision falls differently.
+
+    Where a ray of length t and coordinates up to s meets a plane at an angle of cosine c, an error e of its
+    origin, d of its direction and 64 u s of the arithmetic (spec/intersection.md) move the hit by at most
+    (e + d t + 64 u s) / c. Lifting the origin adds 64 u s. A sampled direction has z = sqrt(1 - x^2 - y^2)
+    from x, y with errors of 8 u, sine included: 32 u / z with the rotation. A throughput is a product.
+    """
+    same = np.ones(WIDTH * HEIGHT, bool)
+    e_origin, e_direction = 0.0, 16 * U
+    flips = 0
+    for depth, (alive, hit, surface, path) in enumerate(reference_paths(name, 4)):
+        found = kernel_paths(executor, name, depth)
+        # A path whose decision differs is another path from there on.
+        decided = (found["alive"] > 0) == alive
+        decided &= ~alive | (found["last_surface"] == hit.surface)
+        flips += np.sum(same & ~decided)
+        same &= decided
+        followed = same & alive
+        met = followed & (surface.light < 0) & (np.abs(surface.normal).max(axis=-1) > 0)
+        assert np.all((farthest(last(found, "direction"), path.direction) <= e_direction)[followed])
+        error = farthest(last(found, "beta", "rgb"), path.beta)
+        assert np.all(error[followed] <= 4 * U * depth)  # products of reflectances below 1
+        with np.errstate(all="ignore"):
+            cosine = np.abs(np.sum(surface.normal * path.direction, axis=-1))
+            size = np.abs(path.origin).max(axis=-1) + hit.t
+            e_point = (e_origin + e_direction * hit.t + 64 * U * size) / cosine
+        assert np.all((farthest(last(found, "point"), surface.point) <= e_point)[met])
+        e_origin = e_point + 64 * U * size
+        e_direction = next_direction_error(name, depth, surface)
+    assert flips <= 0.01 * WIDTH * HEIGHT  # a path in a hundred passes an edge by less than rounding
+    assert same.mean() >= 0.99
+
+
+def next_direction_error(name, depth, surface):
+    """Return the bound of the error of the direction in which paths leave their surfaces."""
+    *_, (_, _, _, following) = reference_paths(name, depth + 2)
+    z = np.sum(surface.normal * following.direction, axis=-1)
+    return 32 * U / np.maximum(z, 2.0**-12)
+
+
+def test_a_wrong_kernel_s_paths_are_caught(executor_named):
+    """The test above can fail: an origin lifted 64 times as far is 4,000 u off, times coordinates below 1."""
+    executor, part = executor_named("opencl"), Part(16, 16, 0, 16, 0, 1, 0)
+    programs = lower_scene(scene("furnace"), Settings(max_depth=1))
+    right = compile_path(programs, "opencl", lanes=executor.lanes, groups=("last_point",))
+    source = right.source.replace("3.81469727e-06f", "2.44140625e-04f")
+    assert source != right.source
+    wrong = replace(right, source=source, manifest={**right.manifest, "digest": ir.sha256(source.encode())})
+    assert np.abs(executor.trace(right, part) - executor.trace(wrong, part)).max() >= 1000 * U
+
+
+# ---- pixel by pixel ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", scenes.CANONICAL)
+def test_image_is_the_reference_s(executor, name):
+    """Two samples a pixel: at least 99 pixels in 100 have every layer to 1e-5 of the layer's size.
+
+    1e-5 is 168 u: a distance with 64 u s of error (above), twice, and rounding of sums. A path that falls on
+    the other side of a decision changes its pixel wholly.
+    """
+    job = R.Job(WIDTH, HEIGHT, 2, SEED, Settings(max_depth=4))
+    expected, found = R.render(scene(name), job), render_on(executor, scene(name), job)
+    frame.validate(found.frame)
+    assert found.frame.info == expected.frame.info
+    for layer, values in expected.frame.layers.items():
+        assert found.frame[layer].dtype == np.float32
+        size = np.abs(values).max(axis=-1, keepdims=True) + np.abs(values).mean()
+        near = np.abs(found.frame[layer] - values) <= 1e-5 * size
+        assert near.all(axis=-1).mean() >= 0.99, layer
+    near = np.abs(found.color_variance - expected.color_variance) <= 1e-4 * (1 + expected.color_variance)
+    assert near.all(axis=-1).mean() >= 0.99
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        Settings(max_depth=0),
+        Settings(max_depth=3, roulette_depth=1),
+        Settings(max_depth=2, strategy="light"),
+        Settings(max_depth=2, strategy="bsdf", heuristic="balance"),
+    ],
+)
+def test_settings(executor, settings):
+    """As above, with the kernel's sine of either profile."""
+    job = R.Job(21, 13, 2, 1, settings)
+    expected = R.render(scene("cornell"), job).frame["color"]
+    for profile in ("ieee", "native"):
+        found = render_on(executor, scene("cornell"), job, profile=profile).frame["color"]
+        # The angle of a direction may be off by 2^-11, the sine of GLSL, in theory; Mesa's is much better.
+        near = np.abs(found - expected) <= 1e-4 * (expected + expected.mean())
+        assert near.all(axis=-1).mean() >= 0.97
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 7), (17, 3), (33, 9)])
+def test_sizes_that_are_no_whole_vectors(executor, size):
+    job = R.Job(*size, 1, 3)
+    expected = R.render(scene("cornell"), job).frame["direction"]
+    found = render_on(executor, scene("cornell"), job).frame["direction"]
+    assert found.shape == expected.shape
+    assert np.abs(found - expected).max() <= 16 * U
+
+
+def test_all_schedules_give_the_same_image(executor_named):
+    """On one device vectors compute what numbers compute; 1e-5 leaves room for contraction."""
+    executor = executor_named("opencl")
+    programs, part = lower_scene(scene("cornell"), Settings(max_depth=3)), Part(29, 11, 0, 11, 0, 3, 1)
+    schedules = SCHEDULES["opencl"][1]
+    assert schedules == (1, 4, 8, 16)
+    kernels = [compile_path(programs, "opencl", lanes=lanes) for lanes in schedules]
+    images = [executor.trace(kernel, part) for kernel in kernels]
+    for image in images[1:]:
+        same = np.all(np.abs(image - images[0]) <= 1e-5 * (1 + np.abs(images[0])), axis=0)
+        assert same.mean() >= 0.99
+
+
+# ---- parts ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["numpy", *DEVICES])
+def test_image_does_not_depend_on_the_parts(executor_named, monkeypatch, name):
+    """Rows change no bit; ranges of samples change the order of sums of positives: 2 n u for n samples."""
+    executor, job = executor_named(name), R.Job(19, 11, 7, 2, Settings(max_depth=2), first_sample=2**31)
+    whole = render_on(executor, scene("cornell"), job)
+    monkeypatch.setattr(sys.modules[render_on.__module__], "PATHS_AT_ONCE", 4 * 19 * 7)
+    counted = []
+    rows = render_on(executor, scene("cornell"), job, on_progress=counted.append)
+    assert sum(counted) == 19 * 11 * 7
+    assert len(counted) == 3
+    assert all(np.array_equal(rows.frame[layer], whole.frame[layer]) for layer in frame.LAYERS)
+    monkeypatch.setattr(sys.modules[render_on.__module__], "SAMPLES_AT_ONCE", 3)
+    ranges = render_on(executor, scene("cornell"), job)
+    color = whole.frame["color"]
+    assert np.all(np.abs(ranges.frame["color"] - color) <= 14 * U * color)
+    # Squared differences lose what the means lose, relative to their squares.
+    error = np.abs(ranges.color_variance - whole.color_variance)
+    assert np.all(error <= 100 * U * (whole.color_variance + color.astype(np.float64) ** 2))
+
+
+def test_samples_are_numbered_on(executor):
+    """Samples 0 to 1 and 2 to 3 rendered apart have the mean of 0 to 3, to the rounding of five sums."""
+    job = R.Job(9, 7, 4, 2, Settings(max_depth=2))
+    whole = render_on(executor, scene("cornell"), job).frame["color"]
+    halves = [
+        render_on(executor, scene("cornell"), replace(job, spp=2, first_sample=k)).frame["color"]
+        for k in (0, 2)
+    ]
+    assert np.all(np.abs((halves[0] + halves[1]) / 2 - whole) <= 10 * U * whole)
+    assert not np.array_equal(*halves)
+
+
+# ---- as an estimator -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["minicubes", "cornell", "lone_light"])
+def test_kernel_estimates_the_reference_s_image(executor_named, name):
+    """Other seeds, so other paths: Welch's test on every pixel, and on the whole image as one number."""
+    executor = executor_named("opencl")
+    counts = (1024, 256)
+    a = render_on(executor, scene(name), R.Job(16, 12, counts[0], 1))
+    b = R.render(scene(name), R.Job(16, 12, counts[1], 2))
+    means = [r.frame["color"].astype(np.float64).mean(axis=-1).ravel() for r in (a, b)]
+    # The variance of the channels' mean is at most the mean of their variances.
+    variances = [r.color_variance.mean(axis=-1).ravel() for r in (a, b)]
+    noisy = (variances[0] > 1e-6) & (variances[1] > 1e-6)
+    assert noisy.sum() > 50
+    arguments = [x[noisy] for pair in zip(means, variances, strict=True) for x in pair]
+    assert_all_plausible(welch_p(*arguments[:2], counts[0], *arguments[2:], counts[1]))
+    error = np.sqrt(sum(v.mean() / n for v, n in zip(variances, counts, strict=True)) / means[0].size)
+    assert 2 * stats.norm.sf(abs(means[0].mean() - means[1].mean()) / error) >= SIGNIFICANCE
+
+
+# ---- refusals ------------------------------------------------------------------------------------------
+
+
+def test_double_precision_is_refused(executor):
+    with pytest.raises(InputError, match="dtype is float64: kernels compute in float32; render with --exec"):
+        render_on(executor, scene("empty"), R.Job(4, 4, dtype="float64"))
+
+
+def test_kernel_in_another_language_is_refused(executor):
+    other = {"numpy": "opencl", "opencl": "opengl", "opengl": "numpy"}[executor.name]
+    kernel = compile_path(lower_scene(scene("empty"), Settings()), other)
+    with pytest.raises(InputError, match=f"artifact for executor '{executor.name}': target is {other}"):
+        executor.trace(kernel, Part(1, 1, 0, 1, 0, 1, 0))
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", DEVICES)
+def test_source_that_does_not_compile_is_told_with_the_log(executor_named, name):
+    executor = executor_named(name)
+    kernel = compile_scene(executor, scene("empty"), R.Job(1, 1))
+    source = kernel.source.replace("int n = 0", "int n = nonsense", 1)
+    broken = replace(kernel, source=source, manifest={**kernel.manifest, "digest": "broken"})
+    with pytest.raises(CompileError, match=r"(?s)does not build the kernel: .*nonsense"):
+        executor.trace(broken, Part(1, 1, 0, 1, 0, 1, 0))
+
+
+def test_too_wide_an_image_is_refused(executor_named):
+    executor = executor_named("opengl-egl")
+    kernel = compile_scene(executor, scene("empty"), R.Job(1, 1))
+    with pytest.raises(InputError, match="texture for the sums is 100000 x 1 with 4 channels: this OpenGL"):
+        executor.trace(kernel, Part(100000, 1, 0, 1, 0, 1, 0))
+
+
+def test_a_frame_has_all_layers():
+    assert set(FRAME_GROUPS) == {*frame.LAYERS, "deviation"}

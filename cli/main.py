@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from ..refimpl.errors import WamnetError
-from . import compare, demo, denoise, render, train
+from . import compare, dataset, demo, denoise, render, train
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
 
@@ -44,6 +44,7 @@ def _register(command: Callable[..., None], examples: str, name: str | None = No
 
 _register(render.render, render.RENDER_EXAMPLES)
 _register(render.scene, render.SCENE_EXAMPLES)
+_register(dataset.dataset, dataset.EXAMPLES)
 _register(train.train, train.EXAMPLES)
 _register(compile_model, COMPILE_EXAMPLES, "compile")
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)

@@ -24,6 +24,8 @@ EXAMPLES = """Examples:
 
 wamnet train -i noisy.exr -t reference.exr -o model.safetensors
 
+wamnet train --dataset cubes --steps 20000
+
 wamnet train -i n0.exr -t r0.exr -i n1.exr -t r1.exr --features color,normal --steps 4000
 
 wamnet train -i noisy.exr -t reference.exr --resume --steps 20000"""
@@ -35,15 +37,19 @@ CHECKPOINT_INTERVAL_S = 30.0
 
 def train(
     inputs: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Option("-i", "--input", metavar="FILE", help="Noisy frame (.exr); repeat.", show_default=False),
-    ],
+    ] = None,
     targets: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Option(
             "-t", "--target", metavar="FILE", help="Its reference, in the same order.", show_default=False
         ),
-    ],
+    ] = None,
+    dataset: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Data set, in place of frames.", show_default=False),
+    ] = None,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="Model to write (.safetensors).")
     ] = Path("model.safetensors"),
@@ -61,19 +67,20 @@ def train(
     seed: Annotated[int | None, typer.Option(help="Seed of the first weights and of the draws.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint beside MODEL.")] = False,
 ) -> None:
-    """Train a network on noisy frames and their references.
+    """Train a network on noisy frames and their references, or on the training frames of a data set.
 
     A checkpoint is kept beside the model. After Ctrl-C, --resume goes on from there, to the same bits; with
     more --steps it goes on after the end.
     """
     from ..compiler.model_file import load_checkpoint
 
+    inputs, targets = inputs or [], targets or []
     check_output(output, (".safetensors",), [*inputs, *targets])
     check_output(checkpoint_path(output))
     state = load_checkpoint(checkpoint_path(output)) if resume else None
     choices = {"features": options.parse_names(features) if features else None, "steps": steps, "seed": seed}
     recipe = choose_recipe(preset.value, state, choices)
-    state, _ = fit(recipe, read_pairs(inputs, targets), output, state)
+    state, _ = fit(recipe, read_training(dataset, inputs, targets), output, state)
     say(f"{output}: {state.step} steps; checkpoint in {checkpoint_path(output)}")
 
 
@@ -83,6 +90,23 @@ def choose_recipe(preset: str, state: TrainState | None, choices: dict[str, Any]
 
     base = PRESETS[preset] if state is None else state.recipe
     return replace(base, **{name: value for name, value in choices.items() if value is not None})
+
+
+def read_training(
+    dataset: Path | None, inputs: Sequence[Path], targets: Sequence[Path]
+) -> list[tuple[Frame, Frame]]:
+    """Read the pairs to train on: a data set's, or those of the named frames; one of the two."""
+    from . import dataset_files
+
+    if dataset is None and not inputs and not targets:
+        rule = "training needs frames"
+        raise InputError("list of frames", "empty", rule, "give -i and -t, or --dataset")
+    if dataset is None:
+        return read_pairs(inputs, targets)
+    if inputs or targets:
+        rule = "the frames come from there"
+        raise InputError("--dataset", str(dataset), rule, "leave out --dataset, or -i and -t")
+    return dataset_files.read_pairs(dataset)
 
 
 def read_pairs(inputs: Sequence[Path], targets: Sequence[Path]) -> list[tuple[Frame, Frame]]:

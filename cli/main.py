@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from ..refimpl.errors import WamnetError
-from . import compare, dataset, demo, denoise, render, train
+from . import animate, compare, dataset, demo, denoise, render, train
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
 
@@ -49,6 +49,7 @@ _register(train.train, train.EXAMPLES)
 _register(compile_model, COMPILE_EXAMPLES, "compile")
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)
+_register(animate.animate, animate.EXAMPLES)
 _register(denoise.executors, denoise.EXECUTORS_EXAMPLES)
 _register(demo.demo, demo.EXAMPLES)
 

@@ -133,6 +133,18 @@ def frame_times(request: Request) -> list[tuple[str, float]]:
     return train + test
 
 
+def animation_times(start_s: float, seconds: float, fps: float) -> list[float]:
+    """Return the times of a film, 1 / fps apart, from the start to before the end; the first at least."""
+    if not (all(map(math.isfinite, (start_s, seconds, fps))) and seconds > 0.0 and fps > 0.0):
+        what = "animation (start, seconds, pictures per second)"
+        raise InputError(what, (start_s, seconds, fps), "it must be finite and last", "change it")
+    count = max(1, round(seconds * fps))
+    if count > LARGEST_FRAMES:
+        rule = f"a film has {LARGEST_FRAMES} at most"
+        raise InputError("number of pictures", count, rule, "make it shorter, or use fewer per second")
+    return [start_s + k / fps for k in range(count)]
+
+
 def plan(request: Request) -> list[FramePlan]:
     """Return all frames of a data set, training first, or refuse the request.
 

@@ -125,3 +125,14 @@ def test_a_worker_of_another_version_refuses() -> None:
     copy = pickle.loads(pickle.dumps(caught.value))
     assert str(copy) == str(caught.value)
     assert copy.way_out == "install that one there"
+
+
+def test_animation_times() -> None:
+    """From the start to before the end; one at least; refusals."""
+    assert frame_plan.animation_times(1.0, 0.5, 8.0) == [1.0, 1.125, 1.25, 1.375]
+    assert frame_plan.animation_times(0.0, 0.1, 1.0) == [0.0]
+    for wrong in ((0.0, -1.0, 5.0), (0.0, 1.0, 0.0), (float("inf"), 1.0, 5.0)):
+        with pytest.raises(InputError, match="it must be finite and last; change it"):
+            frame_plan.animation_times(*wrong)
+    with pytest.raises(InputError, match="number of pictures is 1000000: a film has 100000 at most"):
+        frame_plan.animation_times(0.0, 1000.0, 1000.0)

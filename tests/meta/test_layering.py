@@ -17,7 +17,7 @@ ALLOWED = {
         "OpenEXR",
         "PIL",
         "distributed",
-        "imageio",
+        "imageio_ffmpeg",
         "typer",
         "click",
         "rich",

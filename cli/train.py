@@ -84,7 +84,6 @@ def train(
     jumps, so the model differs from that of a run which had this length from the start.
     """
     from ..compiler.model_file import load_checkpoint
-    from ..refimpl.train import check_recipe
 
     inputs, targets = inputs or [], targets or []
     check_output(output, (".safetensors",), [*inputs, *targets])
@@ -92,13 +91,27 @@ def train(
     saved = checkpoint_path(output)
     check_begin(saved, preset, resume, restart)
     state = load_checkpoint(saved) if resume else None
+    recipe = _wanted(preset, state, features, steps, seed)
+    pairs = read_training(dataset, inputs, targets, recipe.features)
+    state = _fit_to_the_end(recipe, pairs, output, state)
+    say(f"{output}: {state.step} steps; checkpoint in {saved}")
+
+
+def _wanted(
+    preset: Preset | None,
+    state: TrainState | None,
+    features: str | None,
+    steps: int | None,
+    seed: int | None,
+) -> Recipe:
+    """Return the recipe that the options ask for, checked."""
+    from ..refimpl.train import check_recipe
+
     names = None if features is None else options.parse_names(features)
     choices = {"features": names, "steps": steps, "seed": seed}
     recipe = choose_recipe((preset or Preset.short).value, state, choices)
     check_recipe(recipe)
-    pairs = read_training(dataset, inputs, targets, recipe.features)
-    state = _fit_to_the_end(recipe, pairs, output, state)
-    say(f"{output}: {state.step} steps; checkpoint in {saved}")
+    return recipe
 
 
 def _fit_to_the_end(

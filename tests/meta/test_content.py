@@ -7,8 +7,8 @@ import re
 import pytest
 
 FORBIDDEN = {
-    "a path of one machine": r"(?<![\w.}])/(work|home|root|Users)/\w|/tmp/brief|[A-Z]:\\\\Users",
-    "a package registry's host": r"pypi\.org|pythonhosted\.org|npmjs\.(com|org)|crates\.io|/opt/pypi",
+    "a path of one machine": r"(?<![\w.}])/(work|home|root|Users)/\w|[A-Z]:\\\\Users",
+    "a package registry's host": r"\b(pypi|pythonhosted|npmjs|crates)\.(org|com|io)\b",
     "a document from outside": r"\b(DESIGN|STYLE|EVIDENCE|NOTES|ANCHORS-\w+)\.md|\.\./shared",
     "unfinished work": r"\b(TODO|FIXME|XXX|HACK)\b",
     "a writing tool": r"(?i)\b(chatgpt|copilot|claude|gemini|language model|ai assistant|co-authored-by)\b",
@@ -44,9 +44,9 @@ def text_of(path) -> str:
 @pytest.mark.parametrize(
     ("line", "reason"),
     [
-        ("cd /work/main", "a path of one machine"),
+        ("cd /home/someone/main", "a path of one machine"),
         ("see /home/anna/x", "a path of one machine"),
-        ("framework/work/x and {out}/work/x", None),
+        ("framework/home/x and {out}/home/x", None),
         ("# FIXME later", "unfinished work"),
         ("as in ../shared/paper", "a document from outside"),
         ("hackneyed methods", None),

@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..refimpl.errors import InputError
-from .outputs import write_text
+from .outputs import TEMPORARY, write_text
 
 if TYPE_CHECKING:
     from ..kernels.frame_plan import FramePlan, Picture, Request, Task
@@ -247,7 +247,7 @@ class Store:
 
     def _begin(self, on_look: Look | None) -> None:
         """Find what is there; write down what is not, before any of it is made."""
-        for stray in self.folder.glob(".manifest-*"):
+        for stray in self.folder.glob(f"{TEMPORARY}*"):
             stray.unlink()
         names = list(self.pictures)
         self.sums = dict(self.before) | _read_journal(self.unfinished / JOURNAL)

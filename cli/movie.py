@@ -36,8 +36,13 @@ def _opened(pictures: Sequence[Path]) -> Iterator[Any]:
     """Yield the pictures one after another, as RGB."""
     pillow = need("PIL.Image", "to read PNG files", "files")
     for path in pictures:
-        with pillow.open(path) as picture:
-            yield picture.convert("RGB")
+        try:
+            with pillow.open(path) as picture:
+                rgb = picture.convert("RGB")
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise InputError("picture", str(path), f"cannot be read ({reason})", "make it again") from None
+        yield rgb
 
 
 def _write_gif(path: Path, pictures: Sequence[Path], fps: float) -> None:

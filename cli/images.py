@@ -1,12 +1,14 @@
 """Pictures on disk: PNG for looking, EXR for computing, and one way to open either.
 
 1. PNG holds display-encoded colour in 8 bits a channel [`write_png`], [`read_png`].
-2. A picture to be compared is a PNG or the colour of an EXR; either knows its display-encoded and its linear
+2. Pictures side by side have labels, and a text that names their origin [`write_panels`], [`read_origin`].
+3. A picture to be compared is a PNG or the colour of an EXR; either knows its display-encoded and its linear
    form [`read_image`], [`Image`].
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +26,13 @@ EIGHT_BIT_MODES = ("1", "L", "LA", "P", "RGB", "RGBA")
 """Pillow's modes that fit 8 bits a channel; others would lose precision silently."""
 
 
+LABEL_PX = 18
+"""Height of the line of labels above pictures: Pillow's own font has letters of 11 pixels."""
+
+ORIGIN = "wamnet.origin"
+"""Name of the text in a PNG that says what it was made from."""
+
+
 @dataclass(frozen=True)
 class Image:
     """Colour (H, W, 3) display-encoded in [0, 1], and as linear radiance."""
@@ -38,6 +47,46 @@ def write_png(path: Path, encoded: Floats) -> None:
     picture = pillow.fromarray(encoding.to_8bit(encoded))
     with replacing(path) as new:
         picture.save(new, format="PNG")
+
+
+def write_panels(path: Path, panels: Sequence[tuple[str, Floats]], origin: str) -> None:
+    """Write pictures (H, W, 3) side by side under their labels; the file keeps a text that names its origin.
+
+    Both sides of the whole are even, as films want it.
+    """
+    pillow = need("PIL.Image", "to write PNG files", "files")
+    drawing, info = (
+        need("PIL.ImageDraw", "to label", "files"),
+        need("PIL.PngImagePlugin", "to label", "files"),
+    )
+    font = need("PIL.ImageFont", "to label", "files").load_default()
+    height, width, _ = panels[0][1].shape
+    whole = pillow.new("RGB", (_even(width * len(panels)), _even(height + LABEL_PX)))
+    for index, (label, encoded) in enumerate(panels):
+        bar = pillow.new("RGB", (width, LABEL_PX))
+        drawing.Draw(bar).text((3, 3), label, fill="white", font=font)
+        whole.paste(bar, (width * index, 0))
+        whole.paste(pillow.fromarray(encoding.to_8bit(encoded)), (width * index, LABEL_PX))
+    text = info.PngInfo()
+    text.add_text(ORIGIN, origin)
+    with replacing(path) as new:
+        whole.save(new, format="PNG", pnginfo=text)
+
+
+def _even(length: int) -> int:
+    """Return the length, or one more."""
+    return length + length % 2
+
+
+def read_origin(path: Path) -> str | None:
+    """Return the text that names the origin of a PNG; None if the file is damaged, "" if it has no text."""
+    pillow = need("PIL.Image", "to read PNG files", "files")
+    try:
+        with pillow.open(path, formats=["PNG"]) as picture:
+            picture.load()
+            return str(picture.text.get(ORIGIN, ""))
+    except (OSError, SyntaxError, ValueError):
+        return None
 
 
 def read_png(path: Path) -> Floats:

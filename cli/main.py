@@ -19,7 +19,7 @@ from typing import Annotated, Any
 import typer
 
 from ..refimpl.errors import WamnetError
-from . import compare, demo, denoise, render, train
+from . import animate, compare, dataset, demo, denoise, render, train
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
 
@@ -50,10 +50,12 @@ def _register(command: Callable[..., None], examples: str, name: str | None = No
 
 _register(render.render, render.RENDER_EXAMPLES)
 _register(render.scene, render.SCENE_EXAMPLES)
+_register(dataset.dataset, dataset.EXAMPLES)
 _register(train.train, train.EXAMPLES)
 _register(compile_model, COMPILE_EXAMPLES, "compile")
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)
+_register(animate.animate, animate.EXAMPLES)
 _register(denoise.executors, denoise.EXECUTORS_EXAMPLES)
 _register(demo.demo, demo.EXAMPLES)
 

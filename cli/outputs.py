@@ -17,6 +17,9 @@ from pathlib import Path
 
 from ..refimpl.errors import InputError
 
+TEMPORARY = ".wamnet-"
+"""How the names of unfinished files begin; a process that is killed leaves them behind."""
+
 
 def check_output(path: Path, suffixes: Sequence[str] = (), inputs: Sequence[Path] = ()) -> None:
     """Refuse an output path that could not be written, or whose writing would destroy an input."""
@@ -67,7 +70,7 @@ def replacing(path: Path) -> Iterator[Path]:
     check_output(path)
     try:
         # The name is short: one that repeats the output's could be longer than file systems allow.
-        handle, name = tempfile.mkstemp(prefix=".wamnet-", suffix=path.suffix, dir=path.parent)
+        handle, name = tempfile.mkstemp(prefix=TEMPORARY, suffix=path.suffix, dir=path.parent)
     except OSError as error:
         raise unwritable(path, error) from None
     os.close(handle)

@@ -25,6 +25,8 @@ EXAMPLES = """Examples:
 
 wamnet train -i noisy.exr -t reference.exr -o model.safetensors
 
+wamnet train --dataset cubes --steps 20000
+
 wamnet train -i n0.exr -t r0.exr -i n1.exr -t r1.exr --features color,normal --steps 4000
 
 wamnet train -i noisy.exr -t reference.exr --resume --steps 20000"""
@@ -36,15 +38,19 @@ CHECKPOINT_INTERVAL_S = 30.0
 
 def train(
     inputs: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Option("-i", "--input", metavar="FILE", help="Noisy frame (.exr); repeat.", show_default=False),
-    ],
+    ] = None,
     targets: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Option(
             "-t", "--target", metavar="FILE", help="Its reference, in the same order.", show_default=False
         ),
-    ],
+    ] = None,
+    dataset: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Data set, in place of frames.", show_default=False),
+    ] = None,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="Model to write (.safetensors).")
     ] = Path("model.safetensors"),
@@ -71,27 +77,41 @@ def train(
         bool, typer.Option("--restart", help="Begin anew, and replace the checkpoint of an earlier run.")
     ] = False,
 ) -> None:
-    """Train a network on noisy frames and their references.
+    """Train a network on noisy frames and their references, or on the training frames of a data set.
 
     A checkpoint is kept beside the model. After Ctrl-C, --resume goes on from there, to the same bits. With
     more --steps it goes on after the end; the learning rate, which falls over the length of the run, then
     jumps, so the model differs from that of a run which had this length from the start.
     """
     from ..compiler.model_file import load_checkpoint
-    from ..refimpl.train import check_recipe
 
+    inputs, targets = inputs or [], targets or []
     check_output(output, (".safetensors",), [*inputs, *targets])
     check_output(checkpoint_path(output))
     saved = checkpoint_path(output)
     check_begin(saved, preset, resume, restart)
     state = load_checkpoint(saved) if resume else None
+    recipe = _wanted(preset, state, features, steps, seed)
+    pairs = read_training(dataset, inputs, targets, recipe.features)
+    state = _fit_to_the_end(recipe, pairs, output, state)
+    say(f"{output}: {state.step} steps; checkpoint in {saved}")
+
+
+def _wanted(
+    preset: Preset | None,
+    state: TrainState | None,
+    features: str | None,
+    steps: int | None,
+    seed: int | None,
+) -> Recipe:
+    """Return the recipe that the options ask for, checked."""
+    from ..refimpl.train import check_recipe
+
     names = None if features is None else options.parse_names(features)
     choices = {"features": names, "steps": steps, "seed": seed}
     recipe = choose_recipe((preset or Preset.short).value, state, choices)
     check_recipe(recipe)
-    pairs = read_pairs(inputs, targets, recipe.features)
-    state = _fit_to_the_end(recipe, pairs, output, state)
-    say(f"{output}: {state.step} steps; checkpoint in {saved}")
+    return recipe
 
 
 def _fit_to_the_end(
@@ -135,6 +155,23 @@ def choose_recipe(preset: str, state: TrainState | None, choices: dict[str, Any]
 
     base = PRESETS[preset] if state is None else state.recipe
     return replace(base, **{name: value for name, value in choices.items() if value is not None})
+
+
+def read_training(
+    dataset: Path | None, inputs: Sequence[Path], targets: Sequence[Path], features: Sequence[str]
+) -> list[tuple[Frame, Frame]]:
+    """Read the pairs to train on: a data set's, or those of the named frames; one of the two."""
+    from . import dataset_files
+
+    if dataset is None and not inputs and not targets:
+        rule = "training needs frames"
+        raise InputError("list of frames", "empty", rule, "give -i and -t, or --dataset")
+    if dataset is None:
+        return read_pairs(inputs, targets, features)
+    if inputs or targets:
+        rule = "the frames come from there"
+        raise InputError("--dataset", str(dataset), rule, "leave out --dataset, or -i and -t")
+    return dataset_files.read_pairs(dataset)
 
 
 def read_pairs(

@@ -24,6 +24,10 @@ class InputError(WamnetError, ValueError):
         super().__init__(f"{what} is {_shown(value)}: {rule}; {way_out}")
         self.what, self.value, self.rule, self.way_out = what, value, rule, way_out
 
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, object, str, str]]:
+        """Return how a copy is made in another process: an exception's own way would lose the parts."""
+        return type(self), (self.what, self.value, self.rule, self.way_out)
+
 
 class TrainingError(WamnetError):
     """Training cannot go on, for example because the loss is no longer finite."""

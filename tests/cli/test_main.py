@@ -19,7 +19,18 @@ from wamnet.kernels import EXECUTORS
 from wamnet.refimpl.errors import TrainingError
 from wamnet.refimpl.train import PRESETS
 
-COMMANDS = ("render", "scene", "train", "compile", "denoise", "compare", "executors", "demo")
+COMMANDS = (
+    "render",
+    "scene",
+    "dataset",
+    "train",
+    "compile",
+    "denoise",
+    "compare",
+    "animate",
+    "executors",
+    "demo",
+)
 
 
 def run_process(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:

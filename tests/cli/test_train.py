@@ -110,6 +110,29 @@ def test_refusals_of_frames(refused, pair, tmp_path) -> None:
     assert text in refused("train", "-i", "nan.exr", "-t", "small.exr")
 
 
+def test_training_on_a_data_set(wamnet, refused, tmp_path) -> None:
+    """Its training pairs in their order, and no test pair: the model that the named frames give."""
+    set_of = ("dataset", "minicubes", "--frames", 2, "--test", 1, "--size", 13, "--spp", 2, "-o", "set")
+    assert wamnet(*set_of).status == 0
+    options = ("--steps", 2, "--features", "color,position")
+    assert wamnet("train", "--dataset", "set", *options, "-o", "a.safetensors").status == 0
+    named = [
+        part
+        for n in range(2)
+        for option, kind in (("-i", "noisy"), ("-t", "target"))
+        for part in (option, f"set/train/0000{n}-{kind}.exr")
+    ]
+    assert wamnet("train", *named, *options, "-o", "b.safetensors").status == 0
+    assert (tmp_path / "a.safetensors").read_bytes() == (tmp_path / "b.safetensors").read_bytes()
+    text = "--dataset is set: the frames come from there; leave out --dataset, or -i and -t"
+    assert text in refused("train", "--dataset", "set", *named)
+    assert "list of frames is empty: training needs frames; give -i and -t, or --dataset" in refused("train")
+    (tmp_path / "set/train/00001-target.exr").write_bytes(b"x")
+    text = "data set is set: 1 of its pictures are not as manifest.json says, first train/00001-target.exr"
+    assert text in refused("train", "--dataset", "set")
+    assert "data set is none: it has no manifest.json" in refused("train", "--dataset", "none")
+
+
 def test_resuming_with_another_recipe_or_other_frames(wamnet, refused, pair) -> None:
     """What was begun with one network and one set of frames is not finished with others."""
     assert wamnet("train", *pair, "--steps", 2).status == 0

@@ -12,7 +12,18 @@ ALLOWED = {
     "refimpl": {"numpy"},
     "compiler": {"numpy", "safetensors"},
     "kernels": {"numpy", "pyopencl", "pocl", "moderngl"},
-    "cli": {"numpy", "OpenEXR", "PIL", "typer", "click", "rich", "matplotlib", "jinja2"},
+    "cli": {
+        "numpy",
+        "OpenEXR",
+        "PIL",
+        "distributed",
+        "imageio_ffmpeg",
+        "typer",
+        "click",
+        "rich",
+        "matplotlib",
+        "jinja2",
+    },
 }
 """What each part may import besides the standard library; its keys are in the order of imports."""
 

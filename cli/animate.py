@@ -1,0 +1,161 @@
+"""`wamnet animate`: noisy, denoised and reference pictures of an animation side by side, as PNG, MP4 or GIF.
+
+1. Each time of the animation is rendered and denoised, and drawn as one labelled picture [`draw_frame`].
+2. A picture carries what it was made from, so that an interrupted run goes on where it was; pictures of
+   another animation are refused [`missing`].
+3. A film is made from the pictures when all are there; they lie in FILE.frames until then
+   [`movie.write_movie`].
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..refimpl.errors import InputError
+from . import machine, movie, options
+from .options import ExecutorName, Renderer
+from .outputs import check_output
+from .terminal import progress, say
+
+if TYPE_CHECKING:
+    from ..kernels.executor import Executor
+    from ..refimpl.denoise import Model
+    from ..refimpl.render import Job
+    from ..refimpl.scene import Scene
+
+EXAMPLES = """Examples:
+
+wamnet animate model.safetensors -o turning.mp4
+
+wamnet animate model.safetensors --seconds 2 --fps 5 --reference-spp 64 -o turning.gif"""
+"""Shown below the help of `wamnet animate`."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One picture of an animation: its file, the scene at its time, its jobs, and what names all that."""
+
+    path: Path
+    scene: Scene
+    noisy: Job
+    reference: Job | None
+    origin: str
+
+
+def animate(
+    model: options.ModelFile,
+    scene: Annotated[str, typer.Option(help="Canonical scene.")] = "minicubes",
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="PATH", help="Film (.mp4, .gif), or folder of pictures.")
+    ] = Path("animation"),
+    start: Annotated[float, typer.Option(help="Begin, in seconds of the animation.")] = 0.0,
+    seconds: Annotated[float, typer.Option(help="Length; minicubes turn in 8 s.")] = 8.0,
+    fps: Annotated[float, typer.Option(help="Pictures per second.")] = 10.0,
+    size: Annotated[int, typer.Option(help="Width and height of each of the pictures, in pixels.")] = 128,
+    reference_spp: Annotated[
+        int, typer.Option(help="Paths per pixel of a reference beside them; 0 shows none.")
+    ] = 0,
+    seed: options.Seed = 0,
+    parameters: options.Parameters = None,
+    executor: options.Executor = ExecutorName.numpy,
+    renderer: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+) -> None:
+    """Show what a model does over an animation: noisy, denoised and reference side by side.
+
+    After any interruption the same command goes on where it was.
+    """
+    from ..compiler.model_file import load_model
+    from ..kernels import open_executor
+
+    is_film = output.suffix.lower() in movie.WRITERS
+    folder = output.with_name(output.name + ".frames") if is_film else output
+    if is_film:
+        check_output(output, tuple(movie.WRITERS), [model])
+        movie.check(output, fps)
+    elif output.suffix:
+        rule = f"a film's name must end in {' or '.join(movie.WRITERS)}, a folder's in none"
+        raise InputError("output", str(output), rule, "rename it")
+    network = load_model(model)
+    chosen = {**options.parse_parameters(parameters or []), "start": start, "seconds": seconds, "fps": fps}
+    facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
+    shots = plan_shots(folder, scene, chosen, (size, reference_spp, seed), facts)
+    left = missing(folder, shots)
+    folder.mkdir(exist_ok=True)
+    with open_executor(executor.value) as runner, progress("drawing", len(left)) as advance:
+        for shot in left:
+            draw_frame(shot, network, runner, renderer.value)
+            advance(1)
+    if is_film:
+        movie.write_movie(output, [shot.path for shot in shots], fps)
+        shutil.rmtree(folder)
+    say(f"{output}: {len(shots)} pictures, {len(left)} of them made now")
+
+
+def plan_shots(
+    folder: Path, name: str, chosen: dict[str, Any], numbers: tuple[int, int, int], facts: Sequence[str]
+) -> list[Shot]:
+    """Return the pictures of an animation; numbers are size, samples of the reference (or 0) and seed."""
+    from ..kernels.frame_plan import animation_times
+    from ..refimpl.render import Job
+    from ..refimpl.scene import scene_digest
+    from ..refimpl.scenes import canonical
+
+    size, spp, seed = numbers
+    times = animation_times(*(chosen.pop(key) for key in ("start", "seconds", "fps")))
+    shots = []
+    for index, time in enumerate(times):
+        scene = canonical(name, **{**chosen, "time": time})
+        noisy = Job(size, size, 1, seed + 2 * index)
+        reference = Job(size, size, spp, seed + 2 * index + 1) if spp else None
+        made_from = [scene_digest(scene), asdict(noisy), reference and asdict(reference), *facts]
+        text = json.dumps([*made_from, machine.versions()["wamnet"]])
+        origin = hashlib.sha256(text.encode()).hexdigest()
+        shots.append(Shot(folder / f"{index:05d}.png", scene, noisy, reference, origin))
+    return shots
+
+
+def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
+    """Return the pictures that are not there or damaged; refuse a folder with anything else in it."""
+    from . import images
+
+    if folder.exists() and not folder.is_dir():
+        raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
+    if not folder.parent.is_dir():
+        rule, way_out = "it does not exist", f"create it: mkdir -p '{folder.parent}'"
+        raise InputError("output folder", str(folder.parent), rule, way_out)
+    known = {shot.path: shot for shot in shots}
+    there = {}
+    for path in sorted(folder.iterdir()) if folder.exists() else []:
+        if path.name.startswith("."):
+            continue  # a picture that was being written when a run was killed
+        origin = images.read_origin(path) if path in known else ""
+        if path not in known or origin not in (None, known[path].origin):
+            rule = f"it holds something else: {path.name}"
+            raise InputError("output folder", str(folder), rule, "choose another with -o, or empty it")
+        there[path] = origin
+    return [shot for shot in shots if there.get(shot.path) is None]
+
+
+def draw_frame(shot: Shot, model: Model, executor: Executor, renderer: str) -> None:
+    """Render, denoise and write one picture."""
+    from ..kernels import denoise_on
+    from ..kernels.render_frame import render_frame
+    from ..refimpl.encoding import to_display
+    from . import images
+
+    stops = model.normalization.exposure_stops
+    noisy = render_frame(renderer, shot.scene, shot.noisy, workers=None).frame
+    panels = [("noisy, 1 spp", to_display(noisy["color"], stops))]
+    panels.append(("denoised", denoise_on(executor, model, noisy).image))
+    if shot.reference is not None:
+        frame = render_frame(renderer, shot.scene, shot.reference, workers=None).frame
+        panels.append((f"reference, {shot.reference.spp} spp", to_display(frame["color"], stops)))
+    images.write_panels(shot.path, panels, shot.origin)

@@ -1,0 +1,393 @@
+"""A data set's folder: its manifest, its pictures, and what an interrupted run leaves for the next one.
+
+1. The manifest, `manifest.json`, is written first: the request and every picture, without checksums. When all
+   pictures are there it is written again, with them [`Store.open`]. Reading it refuses what is none
+   [`read_manifest`].
+2. A rendered band is a file in `unfinished/` whose name ends in its checksum, so that it and its checksum
+   appear in one step [`Store.put`]. A picture whose bands are all there is joined, noted in a journal with
+   its checksum and bytes, and moved to its place. Each step can be the last one of a run: what was done
+   stays.
+3. Every file is compared with its checksum before it counts as done [`verify`]; one that is damaged or
+   missing is made again.
+4. One process at a time works in a folder [`_locked`]; another data set's folder is refused [`Store.open`].
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import re
+import shutil
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..refimpl.errors import InputError
+from .outputs import TEMPORARY, write_text
+
+if TYPE_CHECKING:
+    from ..kernels.frame_plan import FramePlan, Picture, Request, Task
+    from ..kernels.render_frame import Rows
+    from ..refimpl.frame import Frame
+
+SCHEMA = "wamnet-dataset-1"
+"""Name and version of the manifest's form; described in spec/dataset_files.md."""
+
+MANIFEST = "manifest.json"
+"""The file that says what a data set is; a folder that has one is a data set."""
+
+UNFINISHED = "unfinished"
+"""Folder of an unfinished data set's bands and journal; a finished one has none."""
+
+JOURNAL = "journal.jsonl"
+"""File in UNFINISHED: a line of JSON for each picture since the manifest was written."""
+
+LOCK = ".lock"
+"""File that is locked, and there, as long as a process works in the folder."""
+
+NAME = re.compile(r"(train|test)/\d{5}-(noisy|target)\.exr")
+"""What a picture's file may be called; nothing that leads out of the folder."""
+
+BAND = re.compile(r"(train|test)-(\d{5}-(?:noisy|target))\.(\d+)-(\d+)\.([0-9a-f]{64})\.exr")
+"""What a band's file is called: its picture, its rows [first, last), its SHA-256."""
+
+KINDS = ("noisy", "target")
+"""A frame's pictures in a manifest."""
+
+
+@dataclass(frozen=True)
+class Sum:
+    """What a file is known by: its length in bytes and its SHA-256 in hexadecimal."""
+
+    bytes: int
+    sha256: str
+
+
+Sums = Mapping[str, Sum]
+"""Pictures that were finished once, by name."""
+
+Look = Callable[[int], None]
+"""Called with a number of bytes that were just compared."""
+
+
+def sum_of(path: Path) -> Sum:
+    """Return what a file is known by."""
+    digest, length = hashlib.sha256(), 0
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+            length += len(block)
+    return Sum(length, digest.hexdigest())
+
+
+def verify(folder: Path, manifest: Mapping[str, Any], on_look: Look | None = None) -> dict[str, str]:
+    """Return the pictures that are not as the manifest says, by name, and what is wrong with each."""
+    sums = _sums_of(manifest) | _read_journal(folder / UNFINISHED / JOURNAL)
+    return _wrong(folder, _names(manifest), sums, on_look)
+
+
+def _wrong(folder: Path, names: Sequence[str], sums: Sums, on_look: Look | None) -> dict[str, str]:
+    """Return what is wrong with the named pictures, by name."""
+    wrong = {}
+    for name in names:
+        path, known = folder / name, sums.get(name)
+        if known is None:
+            wrong[name] = "not made yet"
+        elif not path.is_file():
+            wrong[name] = "missing"
+        elif path.stat().st_size != known.bytes or sum_of(path) != known:
+            wrong[name] = "damaged"
+        if on_look is not None and known is not None:
+            on_look(known.bytes)
+    return wrong
+
+
+def bytes_of(manifest: Mapping[str, Any]) -> int:
+    """Return the length of all finished pictures together."""
+    return sum(known.bytes for known in _sums_of(manifest).values())
+
+
+# ---- the manifest ----------------------------------------------------------------------------------------
+
+
+def manifest_of(request: Request, frames: Sequence[FramePlan], sums: Sums) -> dict[str, Any]:
+    """Return the manifest of a data set of which these pictures are finished."""
+    from ..kernels.frame_plan import describe, version
+
+    facts = [describe(frame) for frame in frames]
+    for frame in facts:
+        for kind in KINDS:
+            known = sums.get(frame[kind]["file"])
+            frame[kind] |= {"bytes": known and known.bytes, "sha256": known and known.sha256}
+    head = {"schema": SCHEMA, "wamnet": version(), "request": request.as_data()}
+    return {**head, "complete": all(known is not None for known in _known(facts)), "frames": facts}
+
+
+def _known(frames: Sequence[Mapping[str, Any]]) -> Iterator[str | None]:
+    """Yield the checksum of each picture, or None."""
+    for frame in frames:
+        yield from (frame[kind]["sha256"] for kind in KINDS)
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Return a data set's manifest, or say that the folder is none or that the manifest is damaged."""
+    path = folder / MANIFEST
+    if not path.is_file():
+        raise InputError("data set", str(folder), f"it has no {MANIFEST}", "make one: wamnet dataset")
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        schema = manifest["schema"]
+    except (OSError, ValueError, TypeError, KeyError):
+        raise _damaged(path) from None
+    if schema != SCHEMA:
+        raise InputError(f"{path}: schema", str(schema), f"it must be {SCHEMA}", "use that version of wamnet")
+    try:
+        good = isinstance(manifest["request"], dict) and isinstance(manifest["wamnet"], str)
+        good &= all(NAME.fullmatch(name) for name in _names(manifest)) and bool(manifest["frames"])
+        good &= all(frame["split"] in ("train", "test") for frame in manifest["frames"])
+        _sums_of(manifest)
+    except (TypeError, KeyError, ValueError, AttributeError):
+        good = False
+    if not good:
+        raise _damaged(path)
+    result: dict[str, Any] = manifest
+    return result
+
+
+def _damaged(path: Path) -> InputError:
+    """Return the refusal of a manifest that cannot be read."""
+    rule = "it is no manifest of a data set, or damaged"
+    return InputError("manifest", str(path), rule, "restore it, or make the data set in another folder")
+
+
+def _names(manifest: Mapping[str, Any]) -> list[str]:
+    """Return the names of all pictures."""
+    return [frame[kind]["file"] for frame in manifest["frames"] for kind in KINDS]
+
+
+def _sums_of(manifest: Mapping[str, Any]) -> dict[str, Sum]:
+    """Return what the manifest knows of its finished pictures."""
+    pictures = [frame[kind] for frame in manifest["frames"] for kind in KINDS]
+    return {p["file"]: Sum(int(p["bytes"]), str(p["sha256"])) for p in pictures if p["sha256"] is not None}
+
+
+# ---- using a data set ------------------------------------------------------------------------------------
+
+
+def read_pairs(folder: Path, split: str = "train") -> list[tuple[Frame, Frame]]:
+    """Read the pairs (noisy frame, target's colour) of a split; refuse one with a picture that is wrong.
+
+    Nothing but its colour is learnt from a target, so the other layers do not stay in memory.
+    """
+    from ..refimpl.frame import Frame
+    from . import exr
+
+    manifest = read_manifest(folder)
+    frames = [frame for frame in manifest["frames"] if frame["split"] == split]
+    refuse_wrong(folder, verify(folder, {**manifest, "frames": frames}))
+    pairs = []
+    for frame in frames:
+        noisy, target = (exr.read_frame(folder / frame[kind]["file"]) for kind in KINDS)
+        pairs.append((noisy, Frame({"color": target["color"]}, target.info)))
+    return pairs
+
+
+def refuse_wrong(folder: Path, wrong: Mapping[str, str]) -> None:
+    """Refuse a data set that has wrong pictures; name the first."""
+    if wrong:
+        name, what = next(iter(wrong.items()))
+        rule = f"{len(wrong)} of its pictures are not as {MANIFEST} says, first {name}: {what}"
+        way_out = "make them: run the command wamnet dataset that began it"
+        raise InputError("data set", str(folder), rule, way_out)
+
+
+# ---- making a data set -----------------------------------------------------------------------------------
+
+
+class Store:
+    """An open folder of a data set that is being made; made by [`Store.open`]."""
+
+    def __init__(self, folder: Path, request: Request, frames: Sequence[FramePlan], before: Sums) -> None:
+        """Keep what is to be made and the sums of an earlier run."""
+        self.folder, self.request, self.frames = folder, request, frames
+        self.unfinished = folder / UNFINISHED
+        self.pictures = {p.name: p for frame in frames for p in frame.pictures.values()}
+        self.before, self.sums = before, dict(before)
+        self.changed: list[str] = []
+        self.missing: dict[str, str] = {}
+        self._bands: dict[str, dict[Rows, Path]] = defaultdict(dict)
+
+    @classmethod
+    @contextmanager
+    def open(
+        cls, folder: Path, request: Request, frames: Sequence[FramePlan], on_look: Look | None = None
+    ) -> Iterator[Store]:
+        """Yield the store of a new data set, or of the same one begun before; refuse every other folder.
+
+        When the block ends well and nothing is missing, the data set is finished.
+        """
+        if folder.exists() and not folder.is_dir():
+            raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
+        if folder.is_dir() and not (folder / MANIFEST).exists() and _visible(folder):
+            rule = "it holds something else"
+            raise InputError("output folder", str(folder), rule, "choose a new or empty one with -o")
+        before = _known_before(folder, request, frames) if (folder / MANIFEST).exists() else {}
+        folder.mkdir(parents=True, exist_ok=True)
+        with _locked(folder):
+            store = cls(folder, request, frames, before)
+            store._begin(on_look)
+            yield store
+            if not store.missing and store.unfinished.exists():
+                store._finish()
+
+    def _begin(self, on_look: Look | None) -> None:
+        """Find what is there; write down what is not, before any of it is made."""
+        for stray in self.folder.glob(f"{TEMPORARY}*"):
+            stray.unlink()
+        names = list(self.pictures)
+        self.sums = dict(self.before) | _read_journal(self.unfinished / JOURNAL)
+        self.before = dict(self.sums)
+        self.missing = _wrong(self.folder, names, self.sums, on_look)
+        if not self.missing:
+            return
+        for name in self.missing:
+            self.sums.pop(name, None)
+        # First of all the manifest: a folder with anything else and none is not a data set.
+        self._write_manifest()
+        for path in {self.unfinished, *((self.folder / name).parent for name in self.missing)}:
+            path.mkdir(exist_ok=True)
+        (self.unfinished / JOURNAL).unlink(missing_ok=True)
+        for path in sorted(self.unfinished.iterdir()):
+            self._find_band(path)
+        for name in list(self.missing):
+            self._join_if_whole(self.pictures[name])
+
+    def _find_band(self, path: Path) -> None:
+        """Keep a band of a missing picture that is what its name says, and remove every other file."""
+        match = BAND.fullmatch(path.name)
+        name = f"{match[1]}/{match[2]}.exr" if match else ""
+        if match and name in self.missing and sum_of(path).sha256 == match[5]:
+            self._bands[name][int(match[3]), int(match[4])] = path
+        else:
+            path.unlink()
+
+    def tasks(self) -> list[Task]:
+        """Return the tasks that are left."""
+        from ..kernels.frame_plan import tasks_of
+
+        return [
+            task
+            for name in self.missing
+            for task in tasks_of(self.pictures[name])
+            if task.rows not in self._bands[name]
+        ]
+
+    def put(self, task: Task, band: Frame) -> None:
+        """Keep a rendered band; when it is its picture's last one, finish the picture."""
+        self._publish(task.picture, task.rows, band)
+        self._join_if_whole(task.picture)
+
+    def _publish(self, picture: Picture, rows: Rows, band: Frame) -> None:
+        """Write a band under a name that ends in its checksum."""
+        from . import exr
+
+        new = self.unfinished / "new.exr"
+        exr.write_frame(new, band)
+        first, last = rows
+        stem = picture.name.replace("/", "-").removesuffix(".exr")
+        path = self.unfinished / f"{stem}.{first}-{last}.{sum_of(new).sha256}.exr"
+        self._bands[picture.name][rows] = new.replace(path)
+
+    def _join_if_whole(self, picture: Picture) -> None:
+        """Finish a picture whose bands are all there; one that covers all rows is the picture."""
+        from ..kernels.frame_plan import join, tasks_of
+        from . import exr
+
+        bands, whole = self._bands[picture.name], (0, picture.job.height)
+        if whole not in bands:
+            if not all(task.rows in bands for task in tasks_of(picture)):
+                return
+            parts = [exr.read_frame(path) for _, path in sorted(bands.items())]
+            self._publish(picture, whole, join(parts))
+        path = bands[whole]
+        known = Sum(path.stat().st_size, path.suffixes[-2][1:])
+        with (self.unfinished / JOURNAL).open("a", encoding="utf-8") as journal:
+            line = {"file": picture.name, "bytes": known.bytes, "sha256": known.sha256}
+            journal.write(json.dumps(line) + "\n")
+        path.replace(self.folder / picture.name)
+        for rows, part in bands.items():
+            if rows != whole:
+                part.unlink()
+        if self.before.get(picture.name, known) != known:
+            self.changed.append(picture.name)
+        self.sums[picture.name] = known
+        del self.missing[picture.name], self._bands[picture.name]
+
+    def _finish(self) -> None:
+        """Write the manifest with all checksums, and remove what an unfinished data set has."""
+        self._write_manifest()
+        shutil.rmtree(self.unfinished, ignore_errors=True)
+
+    def _write_manifest(self) -> None:
+        """Write the manifest, all of it or nothing."""
+        manifest = manifest_of(self.request, self.frames, self.sums)
+        write_text(self.folder / MANIFEST, json.dumps(manifest, indent=1, allow_nan=False) + "\n")
+
+
+def _visible(folder: Path) -> bool:
+    """Tell whether a folder has anything but hidden files, as a run leaves that was killed at its start."""
+    return any(not path.name.startswith(".") for path in folder.iterdir())
+
+
+def _known_before(folder: Path, request: Request, frames: Sequence[FramePlan]) -> dict[str, Sum]:
+    """Return the sums in the manifest of a folder, or refuse it if it is another data set."""
+    there, wanted = read_manifest(folder), manifest_of(request, frames, {})
+    if there["wamnet"] != wanted["wamnet"]:
+        different = [f"wamnet {there['wamnet']} (now {wanted['wamnet']})"]
+    else:
+        keys = dict.fromkeys([*there["request"], *wanted["request"]])
+        pairs = [(key, there["request"].get(key), wanted["request"].get(key)) for key in keys]
+        different = [f"{key} {old} (now {new})" for key, old, new in pairs if old != new]
+    sums = _sums_of(there)
+    if not different and manifest_of(request, frames, sums)["frames"] != there["frames"]:
+        different = ["the frames themselves (now others)"]
+    if different:
+        rule = f"it holds another data set: {', '.join(different)}"
+        raise InputError("output folder", str(folder), rule, "choose another with -o, or the same request")
+    return sums
+
+
+def _read_journal(path: Path) -> dict[str, Sum]:
+    """Return the pictures that a journal knows; a line that is cut short is none."""
+    sums = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+        try:
+            entry = json.loads(line)
+            sums[str(entry["file"])] = Sum(int(entry["bytes"]), str(entry["sha256"]))
+        except (ValueError, TypeError, KeyError):
+            continue
+    return sums
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Keep other processes out of a folder; the system forgets the lock of a process that was killed."""
+    path = folder / LOCK
+    with path.open("a") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            mine = path.exists() and path.stat().st_ino == os.fstat(lock.fileno()).st_ino
+        except BlockingIOError:
+            mine = False
+        if not mine:
+            rule = "another process is making a data set there"
+            raise InputError("output folder", str(folder), rule, "wait for it, or choose another with -o")
+        try:
+            yield
+        finally:
+            path.unlink(missing_ok=True)

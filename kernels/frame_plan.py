@@ -1,0 +1,230 @@
+"""What a data set consists of: times, seeds, pictures, and the independent tasks that make them.
+
+1. Training times divide the animation evenly; test times lie between them, none on one [`frame_times`].
+2. Each time has a noisy picture and a target, each with random numbers of its own [`plan`].
+3. A picture is cut into bands of rows, each an independent task [`tasks_of`]; how is a function of the
+   request alone, so that an interrupted run finds its bands again whatever the number of workers is.
+4. A task is carried out anywhere [`carry_out`], and the bands of a picture are joined [`join`].
+
+The pictures are a function of the request and of the version of this package.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from ..refimpl.errors import InputError
+from ..refimpl.frame import Frame
+from ..refimpl.render import TILE_PIXELS, Job
+from ..refimpl.scene import Scene, scene_digest
+from ..refimpl.scenes import TURN_SECONDS, canonical
+from ..refimpl.transport import Settings
+from .render_frame import Progress, Rows, render_frame, renderer
+
+NOISY_SPP = 1
+"""Paths per pixel of a noisy picture: what the network is made for."""
+
+TASK_SAMPLES = 1 << 23
+"""Samples in a task at most, where one tile of pixels allows it: half a minute of the reference on one core,
+which is what the loss of a worker costs; a picture of 1024x1024 at 1024 spp is 128 tasks."""
+
+LARGEST_FRAMES = 100_000
+"""Largest number of training or of test frames: their names count them in five digits, and so sort."""
+
+KINDS = ("noisy", "target")
+"""The two pictures of each frame, in the order of their seeds."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """All that determines a data set, besides the version: scene, animation, numbers, sizes, seed, executor.
+
+    The animation runs from `start_s` for `seconds`; `parameters` are those of the canonical scene.
+    """
+
+    scene: str
+    parameters: Mapping[str, float | tuple[float, ...]] = field(default_factory=dict)
+    start_s: float = 0.0
+    seconds: float = TURN_SECONDS
+    frames: int = 8
+    test_frames: int = 2
+    size_px: int = 64
+    spp: int = 64
+    seed: int = 0
+    max_depth: int = 5
+    executor: str = "numpy"
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the request as JSON's types."""
+        data = asdict(self)
+        lists = {k: list(v) if isinstance(v, tuple) else v for k, v in sorted(self.parameters.items())}
+        return {**data, "parameters": lists}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One file: its name within the data set (with slashes), and what it shows: a scene at a time, a job."""
+
+    name: str
+    request: Request
+    time_s: float
+    job: Job
+
+    @property
+    def scene(self) -> Scene:
+        """Return the scene, made anew: thousands of pictures are kept, and few are looked at."""
+        return canonical(self.request.scene, **{**self.request.parameters, "time": self.time_s})
+
+
+@dataclass(frozen=True)
+class FramePlan:
+    """One time of the animation: its split, train or test, and its two pictures, by kind."""
+
+    split: str
+    time_s: float
+    pictures: Mapping[str, Picture]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A band of a picture, to be rendered by a version of this package."""
+
+    picture: Picture
+    rows: Rows
+    version: str
+
+    @property
+    def samples(self) -> int:
+        """Return the number of paths to be traced."""
+        return self.picture.job.width * (self.rows[1] - self.rows[0]) * self.picture.job.spp
+
+
+def version() -> str:
+    """Return the installed version of this package."""
+    return metadata.version("wamnet")
+
+
+def frame_times(request: Request) -> list[tuple[str, float]]:
+    """Return (split, time in seconds) of all frames, training first.
+
+    Training time k is start + seconds k / frames: the end of the animation, which is its start again in a
+    loop, is no time of its own. Test j lies in the gap after training time floor(j frames / tests); the tests
+    of one gap divide it evenly, so that a lone one is in its middle.
+    """
+    n, tests = request.frames, request.test_frames
+    train = [("train", request.start_s + request.seconds * k / n) for k in range(n)]
+    test = []
+    for j in range(tests):
+        gap = j * n // tests
+        # The gap's tests are those from ceil(gap tests / n) to before ceil((gap + 1) tests / n).
+        first, after = -(-gap * tests // n), -(-(gap + 1) * tests // n)
+        place = (j - first + 1) / (after - first + 1)
+        test.append(("test", request.start_s + request.seconds * (gap + place) / n))
+    times = [time for _, time in train + test]
+    if len(set(times)) < len(times) or not all(map(math.isfinite, times)):
+        rule = f"{len(times)} different times must fit into it"
+        raise InputError("seconds of the animation", request.seconds, rule, "make it longer")
+    return train + test
+
+
+def animation_times(start_s: float, seconds: float, fps: float) -> list[float]:
+    """Return the times of a film, 1 / fps apart, from the start to before the end; the first at least."""
+    if not (all(map(math.isfinite, (start_s, seconds, fps))) and seconds > 0.0 and fps > 0.0):
+        what = "animation (start, seconds, pictures per second)"
+        raise InputError(what, (start_s, seconds, fps), "it must be finite and last", "change it")
+    count = max(1, round(seconds * fps))
+    if count > LARGEST_FRAMES:
+        rule = f"a film has {LARGEST_FRAMES} at most"
+        raise InputError("number of pictures", count, rule, "make it shorter, or use fewer per second")
+    return [start_s + k / fps for k in range(count)]
+
+
+def plan(request: Request) -> list[FramePlan]:
+    """Return all frames of a data set, training first, or refuse the request.
+
+    Frame i has the seeds seed + 2 i (noisy) and seed + 2 i + 1 (target).
+    """
+    _check(request)
+    size, settings = request.size_px, Settings(max_depth=request.max_depth)
+    frames = []
+    numbers = {"train": 0, "test": 0}
+    for index, (split, time) in enumerate(frame_times(request)):
+        pictures = {}
+        for offset, (kind, spp) in enumerate(zip(KINDS, (NOISY_SPP, request.spp), strict=True)):
+            job = Job(size, size, spp, request.seed + 2 * index + offset, settings)
+            pictures[kind] = Picture(f"{split}/{numbers[split]:05d}-{kind}.exr", request, time, job)
+        frames.append(FramePlan(split, time, pictures))
+        numbers[split] += 1
+    return frames
+
+
+def _check(request: Request) -> None:
+    """Refuse an executor, a scene, numbers of frames, an animation or a seed that mean nothing."""
+    renderer(request.executor)
+    for name, low in (("frames", 1), ("test_frames", 0)):
+        value = getattr(request, name)
+        if not low <= value <= LARGEST_FRAMES:
+            rule = f"it must be an integer from {low} to {LARGEST_FRAMES}"
+            raise InputError(name, value, rule, "choose another number")
+    if not (math.isfinite(request.seconds) and request.seconds > 0.0 and math.isfinite(request.start_s)):
+        what = "animation (start, seconds)"
+        raise InputError(what, (request.start_s, request.seconds), "it must be finite and last", "change it")
+    if "time" in request.parameters:
+        value = request.parameters["time"]
+        raise InputError("parameter time", value, "each frame has its own", "use --start and --seconds")
+    canonical(request.scene, **request.parameters)
+    last = request.seed + 2 * (request.frames + request.test_frames) - 1
+    if request.seed < 0 or last >= 1 << 32:
+        rule = "seeds up to that plus twice the number of frames must fit into 32 bits"
+        raise InputError("seed", request.seed, rule, "choose a smaller one, 0 or more")
+
+
+def describe(frame: FramePlan) -> dict[str, Any]:
+    """Return a frame as JSON's types: split, scene, time, and of each picture its name and its job."""
+    scene = frame.pictures[KINDS[0]].scene
+    facts: dict[str, Any] = {
+        "split": frame.split,
+        "time_s": frame.time_s,
+        "scene": scene.name,
+        "scene_digest": scene_digest(scene),
+    }
+    for kind, picture in frame.pictures.items():
+        job = picture.job
+        facts[kind] = {"file": picture.name, "width": job.width, "height": job.height}
+        facts[kind] |= {"spp": job.spp, "seed": job.seed}
+    return facts
+
+
+def tasks_of(picture: Picture) -> list[Task]:
+    """Return the tasks of a picture, top to bottom; one for all rows if the executor cannot do bands.
+
+    A band has about TASK_SAMPLES samples, but a tile of pixels at least: smaller ones would be slow.
+    """
+    job, rows = picture.job, picture.job.height
+    if renderer(picture.request.executor).in_bands:
+        rows = max(TASK_SAMPLES // (job.width * job.spp), TILE_PIXELS // job.width, 1)
+    bands = [(first, min(first + rows, job.height)) for first in range(0, job.height, rows)]
+    here = version()
+    return [Task(picture, band, here) for band in bands]
+
+
+def carry_out(task: Task, on_progress: Progress | None = None) -> Frame:
+    """Render a task's rows; a worker that has another version of this package refuses."""
+    if task.version != version():
+        rule = f"the data set is made by {task.version}, and every worker must have the same"
+        raise InputError("version of wamnet on a worker", version(), rule, "install that one there")
+    picture = task.picture
+    executor = picture.request.executor
+    return render_frame(executor, picture.scene, picture.job, rows=task.rows, on_progress=on_progress).frame
+
+
+def join(bands: Sequence[Frame]) -> Frame:
+    """Return the frame whose bands, top to bottom, are given."""
+    layers = {name: np.concatenate([band[name] for band in bands]) for name in bands[0].layers}
+    return replace(bands[0], layers=layers)

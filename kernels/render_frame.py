@@ -1,0 +1,78 @@
+"""Frames by the name of what renders them: the one place that knows how each executor traces paths.
+
+1. The registry says how an executor renders, and whether it can render some of the rows alone [`RENDERERS`].
+2. [`render_frame`] renders all of a frame, or a band of rows of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..refimpl.errors import InputError
+from ..refimpl.render import Job, Render, render
+from ..refimpl.scene import Scene
+from .memory import keep_freed_memory
+from .render_pool import render_parallel
+
+Rows = tuple[int, int]
+"""A band of rows [first, last)."""
+
+Progress = Callable[[int], None]
+"""Called with the number of samples that were just finished."""
+
+
+class RenderRows(Protocol):
+    """Renders the rows of a job, on so many processes if it knows how."""
+
+    def __call__(
+        self, scene: Scene, job: Job, rows: Rows, workers: int | None, on_progress: Progress | None
+    ) -> Render:
+        """Return the rows [first, last) of the frame."""
+
+
+@dataclass(frozen=True)
+class Renderer:
+    """How an executor renders; one that is not `in_bands` is always asked for all rows."""
+
+    render_rows: RenderRows
+    in_bands: bool
+
+
+def _reference(
+    scene: Scene, job: Job, rows: Rows, workers: int | None, on_progress: Progress | None
+) -> Render:
+    """Render by the definition; only all rows together are shared among processes."""
+    if rows == (0, job.height) and workers != 1:
+        return render_parallel(scene, job, workers=workers, on_progress=on_progress)
+    keep_freed_memory()
+    return render(scene, job, rows=rows, on_progress=on_progress)
+
+
+RENDERERS: Mapping[str, Renderer] = {"numpy": Renderer(_reference, in_bands=True)}
+"""What traces paths, by the executor's name: a new one is a line here."""
+
+
+def renderer(executor: str) -> Renderer:
+    """Return how an executor renders, or refuse its name."""
+    if executor not in RENDERERS:
+        rule = f"must be one of {', '.join(RENDERERS)}"
+        raise InputError("executor that renders", executor, rule, "choose one of these")
+    return RENDERERS[executor]
+
+
+def render_frame(
+    executor: str,
+    scene: Scene,
+    job: Job,
+    *,
+    rows: Rows | None = None,
+    workers: int | None = 1,
+    on_progress: Progress | None = None,
+) -> Render:
+    """Render a scene on an executor: all rows, or the band [first, last).
+
+    `workers` is the number of processes that may share the work, None one per processor; it changes no bit.
+    """
+    return renderer(executor).render_rows(scene, job, rows or (0, job.height), workers, on_progress)

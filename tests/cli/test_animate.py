@@ -1,0 +1,130 @@
+"""Tests of `wamnet animate`: what the pictures show, films that can be read, resuming, refusals."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from wamnet.cli import animate, images
+from wamnet.cli.images import LABEL_PX, read_png
+from wamnet.compiler.model_file import load_model
+from wamnet.refimpl import encoding
+from wamnet.refimpl.denoise import denoise
+from wamnet.refimpl.render import Job, render
+from wamnet.refimpl.scenes import canonical
+
+SHORT = ("--seconds", 0.4, "--fps", 5, "--size", 13)
+
+
+@pytest.fixture(autouse=True)
+def model(samples, tmp_path) -> None:
+    """Put the model into the working folder."""
+    shutil.copy(samples / "model.safetensors", tmp_path / "m.safetensors")
+
+
+def test_the_pictures_are_the_references(wamnet, tmp_path) -> None:
+    """Noisy, denoised and reference of the second time, side by side below their labels."""
+    outcome = wamnet("animate", "m.safetensors", *SHORT, "--reference-spp", 2, "--start", 1, "-o", "a")
+    assert (outcome.status, outcome.out) == (0, "a: 2 pictures, 2 of them made now\n")
+    network, scene = load_model(tmp_path / "m.safetensors"), canonical("minicubes", time=1.2)
+    noisy, reference = (render(scene, Job(13, 13, spp, seed)).frame for spp, seed in ((1, 2), (2, 3)))
+    got = read_png(tmp_path / "a/00001.png")
+    assert got.shape == (LABEL_PX + 14, 40, 3)
+    assert got[:LABEL_PX].any()
+    want = [
+        encoding.to_display(noisy["color"]),
+        denoise(network, noisy),
+        encoding.to_display(reference["color"]),
+    ]
+    difference = np.abs(got[LABEL_PX:-1, :39] - np.concatenate(want, axis=1))
+    # Half a level of 8 bits, and float32's rounding of sums below 256.
+    assert difference.max() <= 0.5 / 255 + 256 * 2.0**-23
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".mp4"])
+def test_films(wamnet, tmp_path, suffix) -> None:
+    """As many pictures of that size as the animation has; their folder is gone."""
+    outcome = wamnet("animate", "m.safetensors", *SHORT, "-o", f"f{suffix}")
+    assert (outcome.status, outcome.out) == (0, f"f{suffix}: 2 pictures, 2 of them made now\n")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f"f{suffix}", "m.safetensors"]
+    if suffix == ".gif":
+        with Image.open(tmp_path / "f.gif") as film:
+            assert (film.n_frames, film.size, film.info["duration"]) == (2, (26, LABEL_PX + 14), 200)
+    else:
+        import imageio_ffmpeg
+
+        assert imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "f.mp4")) == (2, 0.4)
+        command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", tmp_path / "f.mp4"]
+        told = subprocess.run(command, capture_output=True, text=True, check=False).stderr
+        assert f" 26x{LABEL_PX + 14}" in told
+        assert " 5 fps" in told
+
+
+def test_an_interrupted_run_goes_on(wamnet, tmp_path, monkeypatch) -> None:
+    """The picture that was there is not drawn again, a damaged one is; the film has the same bytes."""
+    assert wamnet("animate", "m.safetensors", *SHORT, "-o", "whole.gif").status == 0
+    draw, drawn = animate.draw_frame, []
+
+    def once(shot, *arguments) -> None:
+        if drawn:
+            raise KeyboardInterrupt
+        drawn.append(shot.path.name)
+        draw(shot, *arguments)
+
+    monkeypatch.setattr(animate, "draw_frame", once)
+    assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a.gif").status == 130
+    assert not (tmp_path / "a.gif").exists()
+    monkeypatch.setattr(animate, "draw_frame", draw)
+    (tmp_path / "a.gif.frames/00001.png").write_bytes(b"damaged")
+    assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a.gif").out.endswith(
+        "2 pictures, 1 of them made now\n"
+    )
+    assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "whole.gif").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--fps", 0], "it must be finite and last; change it"),
+        (["--fps", 1e9], "number of pictures is 8000000000: a film has 100000 at most"),
+        (["--size", 0], "width is 0"),
+        (["--scene", "nowhere"], "scene is nowhere"),
+        (["--reference-spp", -1], "spp is -1"),
+        (
+            ["-o", "a.avi"],
+            "output is a.avi: a film's name must end in .mp4 or .gif, a folder's in none; rename",
+        ),
+        (["-o", "no/a.gif"], "output folder is no: it does not exist"),
+        (["-o", "no/a"], "output folder is no: it does not exist"),
+        (["-o", "file"], "output folder is file: it is a file"),
+        (["-o", "full"], "output folder is full: it holds something else: x; choose another with -o"),
+        (["--fps", 60, "-o", "a.gif"], "--fps is 60.0: a GIF has 50 at most; use fewer, or .mp4"),
+    ],
+)
+def test_refusals(refused, tmp_path, arguments, text) -> None:
+    """Before anything is drawn."""
+    (tmp_path / "file").write_text("kept")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full/x").write_text("kept")
+    assert text in refused("animate", "m.safetensors", *arguments)
+
+
+def test_another_animation_is_refused(wamnet, refused) -> None:
+    """Other pictures, and more of them, are not overwritten nor left among the new ones."""
+    wamnet("animate", "m.safetensors", *SHORT, "-o", "a")
+    assert "it holds something else: 00000.png" in refused(
+        "animate", "m.safetensors", *SHORT, "--seed", 1, "-o", "a"
+    )
+    fewer = ("--seconds", 0.2, "--fps", 5, "--size", 13)
+    assert "it holds something else: 00001.png" in refused("animate", "m.safetensors", *fewer, "-o", "a")
+    assert images.LABEL_PX > 0
+
+
+def test_without_the_package(refused, monkeypatch) -> None:
+    """The usual line, before the work."""
+    monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
+    assert "install it: pip install 'wamnet[video]'" in refused("animate", "m.safetensors", "-o", "a.mp4")

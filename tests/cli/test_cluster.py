@@ -1,0 +1,124 @@
+"""Tests of sharing tasks: here and on real Dask clusters, with a worker killed, and with nobody there."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import sys
+import time
+import types
+from functools import partial
+from operator import neg
+
+import pytest
+
+from wamnet.cli import cluster
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.render import Job
+
+TASKS = list(range(20))
+
+
+def gather(results: dict):
+    """Return a function that keeps each result once."""
+
+    def keep(task, result) -> None:
+        assert task not in results
+        results[task] = result
+
+    return keep
+
+
+def test_here_tasks_keep_their_order() -> None:
+    """One after another."""
+    results: dict = {}
+    cluster.do_here(TASKS, neg, gather(results))
+    assert list(results.items()) == [(task, -task) for task in TASKS]
+
+
+def test_on_a_scheduler_and_its_refusals(monkeypatch) -> None:
+    """Processes of this machine found by their scheduler's address; a worker's error is this process's."""
+    with cluster.open_client(1, None) as own:
+        with cluster.open_client(1, own.scheduler.address) as client:
+            results: dict = {}
+            cluster.do_on_cluster(client, TASKS, neg, gather(results))
+            assert results == {task: -task for task in TASKS}
+            cluster.do_on_cluster(client, [], neg, gather(results))
+        with pytest.raises(InputError, match="seed is -1: it must be an integer from 0 to"):
+            cluster.do_on_cluster(own, [-1], partial(Job, 2, 2, 1), gather(results))
+        own.retire_workers(list(own.scheduler_info()["workers"]), close_workers=True)
+        monkeypatch.setattr(cluster, "CONNECT_S", 0.5)
+        with (
+            pytest.raises(InputError, match="this scheduler has no worker; start one: dask worker tcp"),
+            cluster.open_client(1, own.scheduler.address),
+        ):
+            pass
+
+
+def test_the_tasks_of_a_lost_worker_are_done_again() -> None:
+    """One of two workers is killed while it has tasks; every task still has its result, once."""
+    results: dict = {}
+    keep = gather(results)
+
+    def slow(task: int) -> int:
+        time.sleep(0.1)
+        return task
+
+    with cluster.open_client(2, None) as client:
+        pids = client.run(os.getpid)
+
+        def kill_first(task, result) -> None:
+            keep(task, result)
+            if len(results) == 1:
+                busy = [worker for worker, tasks in client.processing().items() if tasks]
+                os.kill(pids[busy[0]], signal.SIGKILL)
+
+        cluster.do_on_cluster(client, TASKS, slow, kill_first)
+        assert set(client.run(os.getpid).values()) != set(pids.values())
+    assert results == {task: task for task in TASKS}
+
+
+def test_a_worker_that_a_task_kills() -> None:
+    """The scheduler gives up after a few workers, and that is one line."""
+    with (
+        cluster.open_client(1, None) as client,
+        pytest.raises(InputError, match="several workers have ended while they did the same task; use fewer"),
+    ):
+        cluster.do_on_cluster(client, [9], lambda number: os.kill(os.getpid(), number), lambda *_: None)
+
+
+def test_a_worker_without_the_package(monkeypatch) -> None:
+    """A function whose module only this process has, as where a worker lacks wamnet: a line, no waiting."""
+    module = types.ModuleType("only_here")
+    exec("def do(task): return task", module.__dict__)
+    monkeypatch.setitem(sys.modules, "only_here", module)
+    with (
+        cluster.open_client(1, None) as client,
+        pytest.raises(
+            InputError, match=r"package 'only_here' on a worker is missing: .* pip install 'wamnet"
+        ),
+    ):
+        cluster.do_on_cluster(client, [1], module.do, lambda *_: None)
+
+
+def test_nobody_is_there(monkeypatch) -> None:
+    """An address without a scheduler; an address that is none."""
+    monkeypatch.setattr(cluster, "CONNECT_S", 0.5)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+    for wrong in (address, "nonsense://x"):
+        with (
+            pytest.raises(InputError, match=f"--scheduler is {wrong}: no Dask scheduler answers there"),
+            cluster.open_client(1, wrong),
+        ):
+            pass
+
+
+def test_without_the_package(monkeypatch) -> None:
+    """The usual line, with the way to do without."""
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    text = r"'distributed' is missing: .*--workers 1.*; install it: pip install 'wamnet\[cluster\]'"
+    with pytest.raises(InputError, match=text), cluster.open_client(2, None):
+        pass

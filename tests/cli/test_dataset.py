@@ -1,0 +1,168 @@
+"""Tests of `wamnet dataset`: the same bytes from any number of processes, resumed, and checked."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from wamnet.cli import cluster, dataset_files, exr
+from wamnet.kernels import frame_plan
+from wamnet.refimpl.render import Job, render
+from wamnet.refimpl.scene import scene_digest
+from wamnet.refimpl.scenes import canonical
+
+TINY = ("minicubes", "--frames", 2, "--test", 1, "--size", 12, "--spp", 4)
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """Return every file."""
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_the_pictures_are_the_references(wamnet, tmp_path) -> None:
+    """Times, seeds and samples as the manifest says, all layers, to the bit; checked, and made once."""
+    outcome = wamnet("dataset", *TINY, "--seed", 5, "-o", "a")
+    assert (outcome.status, outcome.out) == (0, "a: 6 pictures at 3 times, 6 of them made now\n")
+    frames = json.loads((tmp_path / "a/manifest.json").read_text())["frames"]
+    assert [(frame["split"], frame["time_s"]) for frame in frames] == [
+        ("train", 0.0),
+        ("train", 4.0),
+        ("test", 2.0),
+    ]
+    for frame in frames:
+        scene = canonical("minicubes", time=frame["time_s"])
+        assert frame["scene_digest"] == scene_digest(scene)
+        for kind, spp in (("noisy", 1), ("target", 4)):
+            facts = frame[kind]
+            want = render(scene, Job(12, 12, spp, facts["seed"])).frame
+            got = exr.read_frame(tmp_path / "a" / facts["file"])
+            assert all((got[name] == values).all() for name, values in want.layers.items())
+            assert got.info == want.info
+    assert wamnet("dataset", "--check", "-o", "a").out == "a: 6 pictures are as manifest.json says\n"
+    assert wamnet("dataset", *TINY, "--seed", 5, "-o", "a").out.endswith(", 0 of them made now\n")
+
+
+def test_check_tells_and_a_run_mends(wamnet, tmp_path) -> None:
+    """Exit status 2 and nothing changed; then the same bytes again."""
+    wamnet("dataset", *TINY, "-o", "a")
+    before = content(tmp_path)
+    path = tmp_path / "a/train/00001-target.exr"
+    path.write_bytes(b"x")
+    outcome = wamnet("dataset", "--check", "-o", "a")
+    assert outcome.status == 2
+    assert outcome.out == "a/train/00001-target.exr: damaged\n"
+    assert outcome.err.startswith("wamnet: error: data set is a: 1 of its pictures are not as manifest.json")
+    assert path.read_bytes() == b"x"
+    outcome = wamnet("dataset", *TINY, "-o", "a")
+    assert outcome.out.startswith("a/train/00001-target.exr: damaged, is made again\n")
+    assert content(tmp_path) == before
+
+
+def test_bands_on_a_cluster_with_a_worker_killed(wamnet, tmp_path, monkeypatch) -> None:
+    """Two processes, pictures in three bands, a worker killed while it has some: one process's bytes."""
+    assert wamnet("dataset", *TINY, "--workers", 1, "-o", "one").status == 0
+    monkeypatch.setattr(frame_plan, "TASK_SAMPLES", 1)
+    monkeypatch.setattr(frame_plan, "TILE_PIXELS", 48)
+    share, killed = cluster.do_on_cluster, []
+
+    def with_a_loss(client, tasks, do, on_result) -> None:
+        pids = client.run(os.getpid)
+
+        def keep(task, band) -> None:
+            on_result(task, band)
+            busy = [worker for worker, keys in client.processing().items() if keys]
+            if busy and not killed:
+                os.kill(pids[busy[0]], signal.SIGKILL)
+                killed.append(busy[0])
+
+        share(client, tasks, do, keep)
+
+    monkeypatch.setattr(cluster, "do_on_cluster", with_a_loss)
+    assert wamnet("dataset", *TINY, "--workers", 2, "-o", "two").status == 0
+    assert killed
+    assert content(tmp_path / "two") == content(tmp_path / "one")
+
+
+def test_on_a_running_scheduler(wamnet, tmp_path) -> None:
+    """The same bytes through an address."""
+    assert wamnet("dataset", *TINY, "-o", "one").status == 0
+    with cluster.open_client(1, None) as client:
+        address = client.scheduler.address
+        assert wamnet("dataset", *TINY, "--scheduler", address, "-o", "two").status == 0
+    assert content(tmp_path / "two") == content(tmp_path / "one")
+
+
+@pytest.mark.parametrize(("sent", "workers"), [(signal.SIGINT, 1), (signal.SIGINT, 2), (signal.SIGKILL, 2)])
+def test_an_interrupted_process_is_gone_on_with(wamnet, tmp_path, sent, workers) -> None:
+    """The whole group is interrupted, or the process alone killed; nothing that was done is redone."""
+    arguments = [str(a) for a in (*TINY[:-3], 36, "--spp", 64, "-o", "a")]
+    command = [sys.executable, "-m", "wamnet.cli", "dataset", *arguments, "--workers", str(workers)]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, start_new_session=True) as process:
+        try:
+            journal = tmp_path / "a" / dataset_files.UNFINISHED / dataset_files.JOURNAL
+            for _ in range(600):
+                if journal.exists() and journal.read_text().count("\n") >= 2:
+                    break
+                time.sleep(0.05)
+            assert process.poll() is None
+            (os.killpg if sent == signal.SIGINT else os.kill)(process.pid, sent)
+            _, errors = process.communicate(timeout=60)
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+    if sent == signal.SIGINT:
+        assert (process.returncode, errors) == (130, b"wamnet: interrupted\n")
+    done = list((tmp_path / "a").rglob("0*.exr"))
+    times = {path: path.stat().st_mtime_ns for path in done}
+    assert len(done) >= 2
+    assert wamnet("dataset", *arguments).status == 0
+    assert {path: path.stat().st_mtime_ns for path in done} == times
+    assert wamnet("dataset", *arguments[:-1], "b").status == 0
+    assert content(tmp_path / "a") == content(tmp_path / "b")
+
+
+def test_ranges_and_parameters_are_passed_on(wamnet, tmp_path) -> None:
+    """Start, length, a parameter of the scene, depth."""
+    options = ("--start", 1, "--seconds", 2, "--set", "orbit_deg=20", "--max-depth", 1)
+    assert wamnet("dataset", *TINY, *options, "-o", "a").status == 0
+    manifest = json.loads((tmp_path / "a/manifest.json").read_text())
+    assert [frame["time_s"] for frame in manifest["frames"]] == [1.0, 2.0, 1.5]
+    assert manifest["request"]["parameters"] == {"orbit_deg": 20.0}
+    got = exr.read_frame(tmp_path / "a/test/00000-noisy.exr").info
+    assert got["scene_digest"] == scene_digest(canonical("minicubes", time=1.5, orbit_deg=20.0))
+    assert got["max_depth"] == "1"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ([], "argument SCENE is missing: a data set shows a scene; name one: minicubes"),
+        (["--check"], "data set is dataset: it has no manifest.json; make one"),
+        (["mine.json"], "scene is mine.json: no canonical scene has this name"),
+        (["minicubes", "--frames", 0], "frames is 0: it must be an integer from 1 to"),
+        (["minicubes", "--workers", 0], "workers is 0: at least one process must work"),
+        (["minicubes", "--workers", 2, "--scheduler", "x"], "a running scheduler has its own workers; leave"),
+        (["minicubes", "--set", "time=1"], "parameter time is 1.0: each frame has its own"),
+        (["minicubes", "--spp", 0], "spp is 0: it must be an integer from 1"),
+    ],
+)
+def test_refusals(refused, arguments, text) -> None:
+    """Before any work, and without a folder."""
+    assert text in refused("dataset", *arguments)
+
+
+def test_another_request_overwrites_nothing(refused, wamnet) -> None:
+    """One line with the difference and the way out."""
+    wamnet("dataset", *TINY, "-o", "a")
+    text = (
+        "output folder is a: it holds another data set: seed 0 (now 1); choose another with -o, or the same"
+    )
+    assert text in refused("dataset", *TINY, "--seed", 1, "-o", "a")

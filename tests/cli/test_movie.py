@@ -1,0 +1,19 @@
+"""Tests of films: a failure in the middle leaves no file, nor half of one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wamnet.cli.images import write_panels
+from wamnet.cli.movie import WRITERS, write_movie
+from wamnet.refimpl.errors import InputError
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_all_or_nothing(tmp_path, suffix) -> None:
+    """The second picture is missing."""
+    write_panels(tmp_path / "0.png", [("grey", np.full((16, 16, 3), 0.5))], "x")
+    with pytest.raises(InputError, match=r"1\.png.*cannot be read"):
+        write_movie(tmp_path / f"a{suffix}", [tmp_path / "0.png", tmp_path / "1.png"], 5.0)
+    assert [path.name for path in tmp_path.iterdir()] == ["0.png"]

@@ -64,6 +64,16 @@ def test_a_kernel_makes_the_pictures(wamnet, executor_named, tmp_path) -> None:
     assert wamnet("dataset", "--check", "-o", "a").status == 0
 
 
+@pytest.mark.parametrize("executor", ["opencl", "opengl"])
+def test_kernels_on_a_cluster_give_the_same_bytes(wamnet, executor_named, tmp_path, executor) -> None:
+    """A worker opens a device of its own, in a thread that is not its first one."""
+    executor_named({"opencl": "opencl", "opengl": "opengl-egl"}[executor])
+    for folder, workers in (("a", 1), ("b", 2)):
+        arguments = ("--executor", executor, "--workers", workers, "-o", folder)
+        assert wamnet("dataset", *TINY, *arguments).status == 0
+    assert content(tmp_path / "a") == content(tmp_path / "b")
+
+
 def test_check_tells_and_a_run_mends(wamnet, tmp_path) -> None:
     """Exit status 2 and nothing changed; then the same bytes again."""
     wamnet("dataset", *TINY, "-o", "a")

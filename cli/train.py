@@ -19,6 +19,7 @@ from .terminal import hint_on_interrupt, progress, say
 
 if TYPE_CHECKING:
     from ..refimpl.frame import Frame
+    from ..refimpl.siren import Siren
     from ..refimpl.train import Recipe, TrainState
 
 EXAMPLES = """Examples:
@@ -29,28 +30,51 @@ wamnet train --dataset cubes --steps 20000
 
 wamnet train -i n0.exr -t r0.exr -i n1.exr -t r1.exr --features color,normal --steps 4000
 
-wamnet train -i noisy.exr -t reference.exr --resume --steps 20000"""
+wamnet train -i noisy.exr -t reference.exr --resume --steps 20000
+
+wamnet train --dataset cubes --from model.safetensors --rank 12 --steps 2000 -o small.safetensors"""
 """Shown below the help of `wamnet train`."""
 
 CHECKPOINT_INTERVAL_S = 30.0
 """Seconds between two checkpoints: what a power cut may cost. Ctrl-C costs nothing."""
 
 
+Inputs = Annotated[
+    list[Path] | None,
+    typer.Option("-i", "--input", metavar="FILE", help="Noisy frame (.exr); repeat.", show_default=False),
+]
+Targets = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "-t", "--target", metavar="FILE", help="Its reference, in the same order.", show_default=False
+    ),
+]
+DataSet = Annotated[
+    Path | None,
+    typer.Option(metavar="FOLDER", help="Data set, in place of frames.", show_default=False),
+]
+Rank = Annotated[
+    int | None,
+    typer.Option(
+        help="Rank of the first layer: 16 takes a fifth of the operations; 0 for no restriction.",
+        show_default="the preset's",
+    ),
+]
+Begin = Annotated[
+    Path | None,
+    typer.Option(
+        "--from",
+        metavar="MODEL",
+        help="Begin with the weights of this model, cut to --rank, not with random ones.",
+        show_default=False,
+    ),
+]
+
+
 def train(
-    inputs: Annotated[
-        list[Path] | None,
-        typer.Option("-i", "--input", metavar="FILE", help="Noisy frame (.exr); repeat.", show_default=False),
-    ] = None,
-    targets: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "-t", "--target", metavar="FILE", help="Its reference, in the same order.", show_default=False
-        ),
-    ] = None,
-    dataset: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Data set, in place of frames.", show_default=False),
-    ] = None,
+    inputs: Inputs = None,
+    targets: Targets = None,
+    dataset: DataSet = None,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="Model to write (.safetensors).")
     ] = Path("model.safetensors"),
@@ -67,6 +91,8 @@ def train(
             show_default="the preset's",
         ),
     ] = None,
+    rank: Rank = None,
+    begin: Begin = None,
     steps: Annotated[int | None, typer.Option(help="Training steps.", show_default="the preset's")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first weights and of the draws.")] = None,
     resume: Annotated[
@@ -91,9 +117,10 @@ def train(
     saved = checkpoint_path(output)
     check_begin(saved, preset, resume, restart)
     state = load_checkpoint(saved) if resume else None
-    recipe = _wanted(preset, state, features, steps, seed)
+    recipe = _wanted(preset, state, features, steps, seed, rank)
+    network = _first_network(begin, state)
     pairs = read_training(dataset, inputs, targets, recipe.features)
-    state = _fit_to_the_end(recipe, pairs, output, state)
+    state = _fit_to_the_end(recipe, pairs, output, state, network)
     say(f"{output}: {state.step} steps; checkpoint in {saved}")
 
 
@@ -103,19 +130,35 @@ def _wanted(
     features: str | None,
     steps: int | None,
     seed: int | None,
+    rank: int | None,
 ) -> Recipe:
     """Return the recipe that the options ask for, checked."""
     from ..refimpl.train import check_recipe
 
     names = None if features is None else options.parse_names(features)
-    choices = {"features": names, "steps": steps, "seed": seed}
+    choices = {"features": names, "steps": steps, "seed": seed, "rank": rank}
     recipe = choose_recipe((preset or Preset.short).value, state, choices)
     check_recipe(recipe)
     return recipe
 
 
+def _first_network(begin: Path | None, state: TrainState | None) -> Siren | None:
+    """Return the network to begin with, if one is named."""
+    from .inputs import load_model
+
+    if begin is None:
+        return None
+    if state is not None:
+        raise InputError("--from", str(begin), "a resumed run goes on from its checkpoint", "leave it out")
+    return load_model(begin).siren
+
+
 def _fit_to_the_end(
-    recipe: Recipe, pairs: Sequence[tuple[Frame, Frame]], output: Path, begin: TrainState | None
+    recipe: Recipe,
+    pairs: Sequence[tuple[Frame, Frame]],
+    output: Path,
+    begin: TrainState | None,
+    network: Siren | None = None,
 ) -> TrainState:
     """Train, and say how to go on after an interrupt, and that a longer run is another one."""
     saved = checkpoint_path(output)
@@ -124,7 +167,7 @@ def _fit_to_the_end(
         return f"go on with --resume, from {saved}" if saved.exists() else "no step was done"
 
     with hint_on_interrupt(hint):
-        state, _ = fit(recipe, pairs, output, begin)
+        state, _ = fit(recipe, pairs, output, begin, network)
     if begin is not None and recipe.steps != begin.recipe.steps:
         before, now = begin.recipe.steps, recipe.steps
         say(f"the run of {before} steps became one of {now}: another model than with {now} from the start")
@@ -194,9 +237,16 @@ def read_pairs(
 
 
 def fit(
-    recipe: Recipe, pairs: Sequence[tuple[Frame, Frame]], output: Path, state: TrainState | None = None
+    recipe: Recipe,
+    pairs: Sequence[tuple[Frame, Frame]],
+    output: Path,
+    state: TrainState | None = None,
+    network: Siren | None = None,
 ) -> tuple[TrainState, float]:
-    """Train with a progress bar and checkpoints beside `output`; write the model there. Seconds come too."""
+    """Train with a progress bar and checkpoints beside `output`; write the model there. Seconds come too.
+
+    The run goes on from `state`, or begins with the weights of `network`, or with random ones.
+    """
     from ..compiler.model_file import save_checkpoint, save_model
     from ..refimpl.train import model_of, train
 
@@ -216,6 +266,7 @@ def fit(
             recipe,
             pairs,
             state=state,
+            network=network,
             on_progress=on_progress,
             on_checkpoint=lambda now: save_checkpoint(saved, now),
         )

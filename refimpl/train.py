@@ -4,7 +4,8 @@
 2. Each step, draw a minibatch of pixels [`draw_batch`]: any pixels of any frame, or members of a pool that
    was drawn once, as in the paper.
 3. Compute the mean squared error of display-encoded colour and its derivative [`loss_and_gradients`].
-4. Follow it with Adam, at a learning rate given by the schedule [`SCHEDULES`].
+4. Follow it with Adam, at a learning rate given by the schedule [`SCHEDULES`]; where the recipe asks for a
+   first layer of low rank, its factors are what moves [`factored`].
 5. Everything that the next step depends on is in [`TrainState`], so training can stop after any step and go
    on later to the same bits [`state_to_arrays`], [`state_from_arrays`].
 
@@ -25,11 +26,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from . import adam, dataset, siren
+from . import adam, dataset, factored, siren
 from .adam import AdamState
 from .dataset import Dataset, Normalization, Window
 from .denoise import OUTPUT_CHANNELS, Model
 from .errors import InputError, TrainingError
+from .factored import Factors
 from .frame import Frame
 from .siren import Siren
 
@@ -61,7 +63,7 @@ class Recipe:
     """All choices of a training run; `widths` are those of the hidden layers.
 
     `n_windows` is the size of the pool that minibatches are picked from; 0 draws new pixels every step.
-    `log_every` is in steps.
+    `log_every` is in steps. `rank` is that of the first layer, 0 for no restriction.
     """
 
     features: tuple[str, ...]
@@ -76,6 +78,7 @@ class Recipe:
     schedule: str
     seed: int = 0
     log_every: int = 100
+    rank: int = 0
 
     @property
     def layer_widths(self) -> tuple[int, ...]:
@@ -120,13 +123,16 @@ def check_recipe(recipe: Recipe) -> None:
     dataset.check_features(recipe.features)
     dataset.check_window(recipe.window)
     siren.check_shape(recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden)
-    for name, least in (("batch", 1), ("steps", 1), ("log_every", 1), ("n_windows", 0), ("seed", 0)):
+    counts = {"batch": 1, "steps": 1, "log_every": 1, "n_windows": 0, "seed": 0, "rank": 0}
+    for name, least in counts.items():
         value = getattr(recipe, name)
         if not isinstance(value, int) or not least <= value < POOL_STREAM:
             rule = f"a whole number from {least} to {POOL_STREAM - 1}"
             raise InputError(f"recipe: {name}", value, rule, "see the presets " + ", ".join(PRESETS))
     if not (math.isfinite(recipe.learning_rate) and recipe.learning_rate > 0):
         raise InputError("recipe: learning_rate", recipe.learning_rate, "finite and > 0", "try 0.001")
+    if recipe.rank > 0:
+        factored.check_rank(recipe.rank, recipe.window.size, *recipe.layer_widths[:2])
     if recipe.schedule not in SCHEDULES:
         known = ", ".join(SCHEDULES)
         raise InputError("recipe: schedule", recipe.schedule, "not a known schedule", f"use one of {known}")
@@ -155,7 +161,8 @@ def recipe_from_json(text: str) -> Recipe:
 class TrainState:
     """All that the next step depends on, after `step` steps; `history` holds (step, loss before that step).
 
-    `digest` names the data, so that training is not resumed on other frames by mistake.
+    `digest` names the data, so that training is not resumed on other frames by mistake. `factors` are those
+    of the first layer's weights, if the recipe restricts its rank.
     """
 
     siren: Siren
@@ -165,6 +172,32 @@ class TrainState:
     normalization: Normalization
     digest: str
     history: tuple[tuple[int, float], ...] = ()
+    factors: Factors | None = None
+
+    @property
+    def parameters(self) -> tuple[Array, ...]:
+        """Return the arrays that training moves: weights (or factors and the other weights), then biases."""
+        return _parameters(self.factors, self.siren.weights, self.siren.biases)
+
+
+def _parameters(
+    factors: Factors | None, weights: tuple[Array, ...], biases: tuple[Array, ...]
+) -> tuple[Array, ...]:
+    """Return weights and biases, with the factors in place of the first weights if there are any."""
+    if factors is None:
+        return weights + biases
+    return (factors.vertical, factors.horizontal, *weights[1:], *biases)
+
+
+def _with_parameters(state: TrainState, parameters: tuple[Array, ...]) -> TrainState:
+    """Return the state with other arrays in the order of `TrainState.parameters`."""
+    layers = len(state.siren.weights)
+    factors = None
+    if state.factors is not None:
+        factors = Factors(*parameters[:2])
+        parameters = (factored.expand(factors), *parameters[2:])
+    moved = replace(state.siren, weights=parameters[:layers], biases=parameters[layers:])
+    return replace(state, siren=moved, factors=factors)
 
 
 Progress = Callable[[TrainState, float], None]
@@ -175,12 +208,37 @@ Checkpoint = Callable[[TrainState], None]
 
 
 def start(
-    recipe: Recipe, normalization: Normalization, digest: str, dtype: DTypeLike = np.float32
+    recipe: Recipe,
+    normalization: Normalization,
+    digest: str,
+    dtype: DTypeLike = np.float32,
+    network: Siren | None = None,
 ) -> TrainState:
-    """Return the state before the first step."""
+    """Return the state before the first step: of random weights, or of a network that was trained before."""
     check_recipe(recipe)
-    network = siren.init(recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden, recipe.seed, dtype)
-    return TrainState(network, adam.init(network.weights + network.biases), 0, recipe, normalization, digest)
+    if network is None:
+        network = siren.init(
+            recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden, recipe.seed, dtype
+        )
+        factors = recipe.rank and factored.start(network.weights[0], recipe.window.size, recipe.rank)
+    else:
+        _check_network(network, recipe)
+        factors = recipe.rank and factored.cut(network.weights[0], recipe.window.size, recipe.rank)
+    if not factors:
+        moments = adam.init(network.weights + network.biases)
+        return TrainState(network, moments, 0, recipe, normalization, digest)
+    network = replace(network, weights=(factored.expand(factors), *network.weights[1:]))
+    moments = adam.init(_parameters(factors, network.weights, network.biases))
+    return TrainState(network, moments, 0, recipe, normalization, digest, factors=factors)
+
+
+def _check_network(network: Siren, recipe: Recipe) -> None:
+    """Refuse to go on with a network of another shape than the recipe's."""
+    has = (network.widths, network.omega_0_first, network.omega_0_hidden)
+    wants = (recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden)
+    if has != wants:
+        rule = f"the recipe has {wants}"
+        raise InputError("widths and omegas of the first network", has, rule, "use the recipe that it had")
 
 
 def train(
@@ -188,6 +246,7 @@ def train(
     pairs: Sequence[tuple[Frame, Frame]],
     *,
     state: TrainState | None = None,
+    network: Siren | None = None,
     until: int | None = None,
     dtype: DTypeLike = np.float32,
     on_progress: Progress | None = None,
@@ -196,6 +255,7 @@ def train(
 ) -> TrainState:
     """Train on (noisy, reference) pairs from the start or from `state`, up to step `until` (all by default).
 
+    A start from `network` goes on with its weights, cut to the recipe's rank; else they are random.
     `on_progress` is called every recipe.log_every steps and after the last. `on_checkpoint` is called every
     `checkpoint_every` steps, after the last, on an interrupt, and before TrainingError is raised: then
     with the last state whose loss is finite, if this call has seen one.
@@ -206,7 +266,7 @@ def train(
     )
     data = dataset.build(pairs, recipe.features, recipe.window, normalization)
     if state is None:
-        state = start(recipe, normalization, data.digest, dtype)
+        state = start(recipe, normalization, data.digest, dtype, network)
     state = _resumed(state, recipe, data.digest)
     pool = draw_pool(recipe, data)
     end = recipe.steps if until is None else min(until, recipe.steps)
@@ -277,15 +337,14 @@ def train_step(state: TrainState, data: Dataset, pool: Pixels | None) -> tuple[T
                 f"({recipe.learning_rate}) or check the frames"
             )
         rate = recipe.learning_rate * SCHEDULES[recipe.schedule](state.step, recipe.steps)
-        parameters, moments = adam.step(
-            network.weights + network.biases, gradients.dweights + gradients.dbiases, state.moments, rate
-        )
-    layers = len(network.weights)
-    moved = replace(network, weights=parameters[:layers], biases=parameters[layers:])
+        dfactors = state.factors and factored.backward(state.factors, gradients.dweights[0])
+        slopes = _parameters(dfactors, gradients.dweights, gradients.dbiases)
+        parameters, moments = adam.step(state.parameters, slopes, state.moments, rate)
+        moved = _with_parameters(state, parameters)
     history = state.history
     if state.step % recipe.log_every == 0:
         history = (*history, (state.step, loss))
-    return replace(state, siren=moved, moments=moments, step=state.step + 1, history=history), loss
+    return replace(moved, moments=moments, step=state.step + 1, history=history), loss
 
 
 Pixels = tuple[dataset.Indices, dataset.Indices, dataset.Indices]
@@ -336,6 +395,9 @@ def state_to_arrays(state: TrainState) -> tuple[dict[str, NDArray[Any]], dict[st
     arrays: dict[str, NDArray[Any]] = {}
     for layer, (weight, bias) in enumerate(zip(state.siren.weights, state.siren.biases, strict=True)):
         arrays[f"layer{layer}.weight"], arrays[f"layer{layer}.bias"] = weight, bias
+    if state.factors is not None:
+        arrays["layer0.vertical"] = state.factors.vertical
+        arrays["layer0.horizontal"] = state.factors.horizontal
     for index, (m, v) in enumerate(zip(state.moments.m, state.moments.v, strict=True)):
         arrays[f"adam.m{index}"], arrays[f"adam.v{index}"] = m, v
     arrays["history.step"] = np.array([step for step, _ in state.history], np.int64)
@@ -359,20 +421,30 @@ def state_from_arrays(arrays: Mapping[str, NDArray[Any]], text: Mapping[str, str
         recipe.omega_0_first,
         recipe.omega_0_hidden,
     )
-    step, moments = int(text["step"]), range(2 * len(layers))
+    factors = None
+    if recipe.rank > 0:
+        factors = Factors(arrays["layer0.vertical"], arrays["layer0.horizontal"])
+    moments = range(2 * len(layers) + (factors is not None))
+    step = int(text["step"])
     m = tuple(arrays[f"adam.m{index}"] for index in moments)
     v = tuple(arrays[f"adam.v{index}"] for index in moments)
     steps, losses = arrays["history.step"].tolist(), arrays["history.loss"].tolist()
     history = tuple(zip(steps, losses, strict=True))
     normalization = dataset.normalization_from_json(text["normalization"])
-    return TrainState(network, AdamState(m, v, step), step, recipe, normalization, text["digest"], history)
+    adam_state = AdamState(m, v, step)
+    return TrainState(network, adam_state, step, recipe, normalization, text["digest"], history, factors)
 
 
 def check_state(state: TrainState) -> None:
     """Refuse a state whose arrays do not have the shapes and the finite numbers that its recipe calls for."""
     widths = state.recipe.layer_widths
-    shapes = [(n_out, n_in) for n_in, n_out in pairwise(widths)] + [(n_out,) for n_out in widths[1:]]
-    parameters = state.siren.weights + state.siren.biases
+    weights: list[tuple[int, ...]] = [(n_out, n_in) for n_in, n_out in pairwise(widths)]
+    shapes = weights + [(n_out,) for n_out in widths[1:]]
+    parameters: tuple[Array, ...] = state.siren.weights + state.siren.biases
+    if state.factors is not None:
+        size, rank = state.recipe.window.size, state.recipe.rank
+        factors = [(widths[1], size, rank), (rank, widths[0] // size)]
+        shapes, parameters = [*factors, *shapes[1:]], state.parameters
     groups = {"parameter": parameters, "first moment": state.moments.m, "second moment": state.moments.v}
     for name, arrays in groups.items():
         for index, (array, shape) in enumerate(zip(arrays, shapes, strict=True)):

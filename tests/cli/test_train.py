@@ -181,3 +181,21 @@ def test_an_interrupt_tells_how_to_go_on(wamnet, pair, monkeypatch) -> None:
     assert outcome.status == 130
     assert outcome.err.splitlines()[0].startswith("wamnet: ")
     assert outcome.err.endswith("wamnet: interrupted\n")
+
+
+def test_a_model_is_cut_and_trained_on(wamnet, refused, pair, tmp_path) -> None:
+    """As the reference does it; not with --resume, nor with a model of another shape."""
+    assert wamnet("train", *pair, "--steps", 2, "-o", "full.safetensors").status == 0
+    more = ("--from", "full.safetensors", "--rank", 4, "--steps", 3, "-o", "cut.safetensors")
+    assert wamnet("train", *pair, *more).status == 0
+    choices = {"features": ("color", "normal"), "steps": 3, "rank": 4}
+    recipe = train.choose_recipe("short", None, choices)
+    frames = exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr")
+    network = load_model(tmp_path / "full.safetensors").siren
+    want = reference.train(recipe, [frames], network=network)
+    got = load_checkpoint(tmp_path / "cut.checkpoint.safetensors")
+    assert all((a == b).all() for a, b in zip(got.parameters, want.parameters, strict=True))
+    text = "--from is full.safetensors: a resumed run goes on from its checkpoint; leave it out"
+    assert text in refused("train", *pair[:4], "--resume", "-o", "cut.safetensors", *more[:2])
+    others = (*pair[:4], "--features", "color", *more[:2], "-o", "x.safetensors")
+    assert "widths and omegas of the first network is " in refused("train", *others)

@@ -26,7 +26,7 @@ a path have useful ranges; a whole path has none, since each bounce multiplies a
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,6 @@ from ..refimpl.errors import CompileError
 from .bounds import sine_range
 from .interpret import apply, element
 from .ir import Node, Program
-from .ops import OPS
 from .profiles import (
     EMITTED_COSINE,
     EMITTED_SINE,
@@ -49,7 +48,10 @@ SLACK = 2.0**-52
 """Relative widening of an end: twice float64's rounding of one operation; float32's half ulp is 2**-24."""
 
 SINE_SLACK = 2.0**-38
-"""Absolute widening of a sine's ends: float64's sine, and pi / 2 added to arguments below 2**13."""
+"""Absolute widening of a sine's ends: float64's sine, and pi / 2 added to arguments of [`SLACK_DOMAIN`]."""
+
+SLACK_DOMAIN = 2.0**14
+"""Largest argument of a sine, in radians, that has a range: adding pi / 2 in float64 is off by 2**-39."""
 
 
 @dataclass(frozen=True)
@@ -185,8 +187,9 @@ def _given(value: Any, dtype: str) -> Range:
     if isinstance(value, Range):
         return value
     plain = np.asarray(value).astype(element(dtype, np.dtype(np.float32)), copy=False)
-    wide = plain.astype(np.float64) if dtype == "float32" else plain
-    return Range(wide, wide, plain)
+    if dtype != "float32":
+        return Range(plain, plain, plain)
+    return Range(*_flushed(plain.astype(np.float64), plain.astype(np.float64)), plain)
 
 
 # ---- ends -------------------------------------------------------------------------------------------------
@@ -205,10 +208,14 @@ def _nearest(low: Any, high: Any) -> tuple[Any, Any]:
 
 def _made(context: Context, low: Any, high: Any, sure: Any, product: Any = None) -> Range:
     """Return a range of floats: zero is in it where a number may be flushed; without end if not finite."""
+    low, high = _whole(*_flushed(low, high))
+    return Range(low, high, context.plain, (sure & np.isfinite(low)) | (low == high), product)
+
+
+def _flushed(low: Any, high: Any) -> tuple[Any, Any]:
+    """Return ends with 0 between them where a number between them may be flushed."""
     small = (low <= FLUSH) & (high >= -FLUSH)
-    low, high = np.where(small, np.minimum(low, 0.0), low), np.where(small, np.maximum(high, 0.0), high)
-    low, high = _whole(low, high)
-    return Range(low, high, context.plain, sure | (low == high), product)
+    return np.where(small, np.minimum(low, 0.0), low), np.where(small, np.maximum(high, 0.0), high)
 
 
 def _whole(low: Any, high: Any) -> tuple[Any, Any]:
@@ -248,8 +255,10 @@ def _numbers(real: Rule) -> Rule:
 def _integers(context: Context, operands: list[Range]) -> Range:
     """Exact for points, modulo 2**32; else every integer of the kind."""
     limits = np.iinfo(context.node.type.dtype)
-    exact = [apply(context.node, [getattr(o, end) for o in operands], {}, np.dtype(np.float32))
-             for end in ("low", "high")]
+    exact = [
+        apply(context.node, [getattr(o, end) for o in operands], {}, np.dtype(np.float32))
+        for end in ("low", "high")
+    ]
     points = np.logical_and.reduce(np.broadcast_arrays(*(o.point for o in operands)))
     low = np.where(points, exact[0], exact[0].dtype.type(limits.min))
     high = np.where(points, exact[1], exact[1].dtype.type(limits.max))
@@ -291,7 +300,7 @@ def _corners(*values: Any) -> tuple[Any, Any]:
 
 
 def _divide(context: Context, operands: list[Range]) -> Range:
-    """The least and the largest quotient of ends, and the promise; none where the divisor may be 0, or huge."""
+    """The least and the largest quotient of ends, and the promise; none where b may be 0, or huge."""
     a, b = operands
     allowed = (b.low > 0) | (b.high < 0)
     if context.arithmetic.division is not None:
@@ -335,7 +344,8 @@ def _cos(context: Context, operands: list[Range]) -> Range:
 def _wave(context: Context, a: Range, shift: float, contract: SineContract) -> Range:
     """Return the range of sin(a + shift), computed as a contract promises."""
     own = np.inf if contract.error is None else contract.error + SINE_SLACK
-    inside = (np.maximum(np.abs(a.low), np.abs(a.high)) <= contract.domain) & np.isfinite(own)
+    domain = min(contract.domain, SLACK_DOMAIN)
+    inside = (np.maximum(np.abs(a.low), np.abs(a.high)) <= domain) & np.isfinite(own)
     low, high = sine_range(np.asarray(a.low) + shift, np.asarray(a.high) + shift)
     low, high = np.where(inside, low - own, -np.inf), np.where(inside, high + own, np.inf)
     return _made(context, low, high, _all_sure([a]) & inside)
@@ -360,26 +370,24 @@ def _absolute(context: Context, operands: list[Range]) -> Range:
 
 
 def _minimum(context: Context, operands: list[Range]) -> Range:
-    """Exact; only one that may be the least has a say. Of NaN either operand may come out."""
+    """Exact; only one that may be the least has a say."""
     a, b = operands
-    low, high = np.minimum(a.low, b.low), np.minimum(a.high, b.high)
     sure = (a.sure & (b.sure | (a.high <= b.low))) | (b.sure & (b.high <= a.low))
-    if context.node.type.dtype != "float32":
-        return Range(low, high, context.plain, sure | (low == high))
-    known = a.known & b.known
-    low, high = np.where(known, low, -np.inf), np.where(known, high, np.inf)
-    return Range(low, high, context.plain, (sure & known) | (low == high))
+    return _chosen(context, operands, np.minimum(a.low, b.low), np.minimum(a.high, b.high), sure)
 
 
 def _maximum(context: Context, operands: list[Range]) -> Range:
-    """max(a, b) = -min(-a, -b), of integers by reversing both ends."""
+    """Exact; only one that may be the largest has a say."""
     a, b = operands
-    low, high = np.maximum(a.low, b.low), np.maximum(a.high, b.high)
     sure = (a.sure & (b.sure | (a.low >= b.high))) | (b.sure & (b.low >= a.high))
-    if context.node.type.dtype != "float32":
-        return Range(low, high, context.plain, sure | (low == high))
-    known = a.known & b.known
-    low, high = np.where(known, low, -np.inf), np.where(known, high, np.inf)
+    return _chosen(context, operands, np.maximum(a.low, b.low), np.maximum(a.high, b.high), sure)
+
+
+def _chosen(context: Context, operands: list[Range], low: Any, high: Any, sure: Any) -> Range:
+    """Return the range of the least or largest; beside NaN either operand may come out."""
+    known = operands[0].known & operands[1].known
+    if context.node.type.dtype == "float32":
+        low, high = np.where(known, low, -np.inf), np.where(known, high, np.inf)
     return Range(low, high, context.plain, (sure & known) | (low == high))
 
 
@@ -497,12 +505,7 @@ def _one_point(a: Range, b: Range) -> Any:
     return a.point & b.point & (a.low == b.low)
 
 
-def middle(found: Range) -> tuple[Any, Any]:
-    """Return the middle (...) and the half width (...) of ranges of floats."""
-    return (found.low + found.high) / 2, (found.high - found.low) / 2
-
-
 def where(condition: Any, a: Range, b: Range) -> Range:
     """Return ranges (...): a where the condition (...) holds, else b."""
-    pick = [np.where(condition, x, y) for x, y in ((a.low, b.low), (a.high, b.high), (a.plain, b.plain))]
-    return replace(a, low=pick[0], high=pick[1], plain=pick[2], sure=np.where(condition, a.sure, b.sure))
+    pairs = (a.low, b.low), (a.high, b.high), (a.plain, b.plain), (a.sure, b.sure)
+    return Range(*(np.where(condition, first, second) for first, second in pairs))

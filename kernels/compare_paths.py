@@ -10,8 +10,9 @@
    when the kernel then went another way than the float32 reference, it is *different*.
 4. Beside the steps, the reference's own paths are followed, and how far the kernel's have moved from them is
    reported: that needs no explanation, it grows from bounce to bounce [`_own_paths`].
-5. The random numbers' generator is compared to the bit [`wrong_words`], and the picture by Welch's test on
-   every noisy pixel, from other random numbers (welch.py) [`compare_images`].
+5. The random numbers' generator is compared to the bit (random_words.py).
+
+The picture as a whole is compared by compare_images.py.
 """
 
 from __future__ import annotations
@@ -29,13 +30,11 @@ from ..compiler.lower_scene import PATH, SURFACE, PathPrograms, kinds, lower_sce
 from ..compiler.path_kernel import PathArtifact, compile_path
 from ..compiler.ranges import Arithmetic, Range
 from ..refimpl import render
-from ..refimpl.errors import InputError
 from ..refimpl.render import Job
 from ..refimpl.scene import Scene
-from . import random_words, welch
+from . import random_words
 from .executor import Executor, Part
 from .numpy_executor import follow
-from .render_on import render_on
 
 QUANTITIES: Mapping[str, list[str]] = {
     name: names({name: value}) for name, value in {**PATH, **SURFACE}.items() if name != "surface"
@@ -47,12 +46,6 @@ SHOWN = 10
 
 PATHS_AT_ONCE = 1 << 13
 """Paths whose ranges are evaluated together: their arrays stay in a core's cache."""
-
-IMAGE_RATIO = 4
-"""Samples of the kernel for each one of the reference in Welch's test: they cost next to nothing."""
-
-SIGNIFICANCE = 0.01
-"""Chance that Welch's test refuses a kernel that is right, over all pixels."""
 
 State = dict[str, NDArray[Any]]
 """Values of paths (P,) by the names of programs, and `alive`."""
@@ -97,8 +90,11 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Gap:
-    """How far a quantity is from the middle of its range, over sure steps: the largest |difference|, the
-    largest |difference| / bound, and the median of the bounds that are not 0 (0 if all are)."""
+    """How far a quantity is from the middle of its range, over the sure steps of all paths.
+
+    The largest |difference| and |difference| / bound, and the median of the bounds that are not 0 (0 if all
+    are).
+    """
 
     difference: float
     ratio: float
@@ -136,24 +132,6 @@ class PathReport:
     def passed(self) -> bool:
         """Return whether every difference is explained."""
         return self.wrong_words == 0 and not any(depth.unexplained for depth in self.depths)
-
-
-@dataclass(frozen=True)
-class ImageReport:
-    """Welch's test: `least` p-value of `comparisons` (pixels and channels with noise), and the level of each.
-
-    Without noise anywhere there is nothing to test, and `least` is 1.
-    """
-
-    comparisons: int
-    least: float
-    level: float
-    spp: tuple[int, int]
-
-    @property
-    def passed(self) -> bool:
-        """Return whether the pictures may be of one and the same; NaN may not."""
-        return self.least >= self.level
 
 
 # ---- paths ------------------------------------------------------------------------------------------------
@@ -334,7 +312,9 @@ def _judge(step: _Step, view: View) -> _Verdict:
 def _distances(step: _Step, name: str, expected: Range) -> tuple[Any, Any]:
     """Return |found - middle| and the bound (...), of the sure paths that a component has a meaning for."""
     sure = step.applies(name) & expected.sure
-    low, high, found = (np.broadcast_to(a, sure.shape)[sure] for a in (expected.low, expected.high, step.after[name]))
+    low, high, found = (
+        np.broadcast_to(a, sure.shape)[sure] for a in (expected.low, expected.high, step.after[name])
+    )
     return np.abs(found - (low + high) / 2), (high - low) / 2
 
 
@@ -381,47 +361,9 @@ def _moved(found: State, own: State, together: Any) -> tuple[Any, dict[str, floa
     together = together & (found["alive"] == alive) & (~alive | (found["surface"] == own["surface"]))
     going = together & alive
     moved = {
-        quantity: max(float(np.max(np.abs(found[name] - own[name])[going], initial=0.0)) for name in components)
+        quantity: max(
+            float(np.max(np.abs(found[name] - own[name])[going], initial=0.0)) for name in components
+        )
         for quantity, components in QUANTITIES.items()
     }
     return together, moved
-
-
-# ---- the picture ------------------------------------------------------------------------------------------
-
-
-def compare_images(
-    executor: Executor,
-    scene: Scene,
-    job: Job,
-    *,
-    significance: float = SIGNIFICANCE,
-    on_progress: Callable[[int], None] | None = None,
-) -> ImageReport:
-    """Compare the kernel's picture with the reference's of the next seed, pixel by pixel, channel by channel.
-
-    `job` says what the reference renders; the kernel takes [`IMAGE_RATIO`] times the samples. on_progress is
-    called with the number of the reference's samples that were just finished.
-    """
-    if job.spp < 2:
-        raise InputError("spp", job.spp, "Welch's test needs the variance of samples", "use 2 or more")
-    counts = (IMAGE_RATIO * job.spp, job.spp)
-    other = (job.seed + 1) % 2**32
-    found = render_on(executor, scene, replace(job, spp=counts[0]))
-    expected = render.render(scene, replace(job, seed=other), on_progress=on_progress)
-    variances = [r.color_variance for r in (found, expected)]
-    means = [r.frame["color"].astype(np.float64) for r in (found, expected)]
-    # Pixels that show one colour without noise are compared by their paths.
-    noisy = np.maximum(*variances) > rounding_variance(np.maximum(*means))
-    p = welch.welch_p(means[0][noisy], variances[0][noisy], counts[0], means[1][noisy], variances[1][noisy], counts[1])
-    least = float(np.min(p, initial=1.0))
-    comparisons = int(noisy.sum())
-    return ImageReport(comparisons, least, welch.sidak(significance, max(comparisons, 1)), counts)
-
-
-def rounding_variance(mean: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the variance (...) that rounding alone may give samples of a mean (...): (2**-18 mean)**2.
-
-    A sample is a sum of products over a few bounces, with a relative error far below 64 u.
-    """
-    return (2.0**-18 * mean) ** 2

@@ -51,7 +51,9 @@ def wrong_words(
     """Return for how many paths (P,) of an image the executor's generator gives other words."""
     kernel = compile_path(_programs(max_depth), executor.name, "ieee", executor.lanes, CARRIERS)
     sample, seed = (int(given[name][0]) for name in ("sample_number", "seed"))
-    found = executor.trace(kernel, Part(width, height, 0, height, sample, 1, seed)).reshape(len(kernel.planes), -1)
+    found = executor.trace(kernel, Part(width, height, 0, height, sample, 1, seed)).reshape(
+        len(kernel.planes), -1
+    )
     expected = [half.astype(np.float32) for word in words(given, max_depth) for half in _halves(word)]
     return int(np.any(found[: len(expected)] != np.stack(expected), axis=0).sum())
 
@@ -60,7 +62,11 @@ def _programs(max_depth: int) -> PathPrograms:
     """Return the programs of the empty scene with words in the place of features."""
 
     def look(*values: Any) -> dict[str, Any]:
-        halves = [half for word in words(dict(zip(COUNTERS, values, strict=True)), max_depth) for half in _halves(word)]
+        halves = [
+            half
+            for word in words(dict(zip(COUNTERS, values, strict=True)), max_depth)
+            for half in _halves(word)
+        ]
         carriers = planes(CARRIERS)
         # The planes that are left over repeat the first halves.
         return {name: halves[i % len(halves)].astype(np.float32) for i, name in enumerate(carriers)}

@@ -59,7 +59,7 @@ def student_p(t: Array, freedom: Array) -> Array:
 
 
 def incomplete_beta(a: Any, b: float, x: Any) -> Array:
-    """Return the regularised incomplete beta function I_x(a, b) (...) for a (...) > 0, b > 0, x (...) in [0, 1]."""
+    """Return the regularised incomplete beta function I_x(a, b) (...): a (...), b > 0, x (...) in [0, 1]."""
     a, x = np.broadcast_arrays(np.asarray(a, np.float64), np.asarray(x, np.float64))
     # The fraction converges quickly below the mean; above it, I_x(a, b) = 1 - I_1-x(b, a).
     below = x <= (a + 1) / (a + b + 2)

@@ -41,8 +41,14 @@ QUANTITIES: Mapping[str, list[str]] = {
 }
 """The floats of a path's state with the names of their components."""
 
+DECISIONS = ("alive", "surface")
+"""The components of a path's state that are no floats."""
+
 SHOWN = 10
 """Unexplained components that a report tells one by one."""
+
+SHOWN_EACH = 2
+"""Of these at most so many for each component and depth, so that others are seen too."""
 
 PATHS_AT_ONCE = 1 << 13
 """Paths whose ranges are evaluated together: their arrays stay in a core's cache."""
@@ -296,9 +302,11 @@ def _judge(step: _Step, view: View) -> _Verdict:
             wrong = applies & ~expected.holds(part.after[name])
             verdict.unexplained[lanes] |= wrong
             verdict.undecided[lanes] |= applies & ~expected.sure
-            verdict.examples += _examples(part, name, expected, np.flatnonzero(wrong)[:SHOWN], view)
+            verdict.examples += _examples(part, name, expected, np.flatnonzero(wrong)[:SHOWN_EACH], view)
         for quantity, components in QUANTITIES.items():
             gaps[quantity] += [_distances(part, name, found[name]) for name in components]
+    # Decisions tell more than what follows from them.
+    verdict.examples.sort(key=lambda example: example.component not in DECISIONS)
     verdict.gaps = {name: _gap(pairs) for name, pairs in gaps.items()}
     # Which undecided paths went another way than the reference goes from the same state?
     undecided = np.flatnonzero(verdict.undecided)

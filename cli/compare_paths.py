@@ -31,10 +31,11 @@ def compare_paths(
 ) -> None:
     """Compare the paths of the job's first sample, and the picture; end with status 1 if they disagree."""
     from .. import kernels
-    from ..kernels.compare_images import compare_images
+    from ..kernels.compare_images import check_samples, compare_images
     from ..kernels.compare_paths import View, compare_paths
 
     scene = load_scene(name, time, parameters)
+    check_samples(job)
     view = View(job.width, job.height, job.first_sample, job.seed)
     with kernels.open_executor(executor) as device:
         with progress(f"paths of {name}", job.settings.max_depth + 1) as advance:

@@ -71,8 +71,7 @@ def compare_images(
     `job` is the reference's; the kernel takes [`KERNEL_SAMPLES`] times its samples. on_progress is called
     with the number of the reference's samples that were just finished.
     """
-    if job.spp < 2:
-        raise InputError("spp", job.spp, "Welch's test needs the variance of samples", "use 2 or more")
+    check_samples(job)
     counts = (KERNEL_SAMPLES * job.spp, job.spp)
     found = render_on(executor, scene, replace(job, spp=counts[0]))
     other = replace(job, seed=(job.seed + 1) % 2**32)
@@ -89,6 +88,12 @@ def compare_images(
     comparisons = int(noisy.sum())
     level = welch.sidak(significance, max(comparisons, 1))
     return ImageReport(comparisons, least, level, significance, counts)
+
+
+def check_samples(job: Job) -> None:
+    """Refuse a job whose samples have no variance."""
+    if job.spp < 2:
+        raise InputError("spp", job.spp, "Welch's test needs the variance of samples", "use 2 or more")
 
 
 def blocks(picture: Render) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

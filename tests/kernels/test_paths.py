@@ -37,8 +37,8 @@ def scene(name):
 def test_image_is_the_reference_s(executor, name):
     """Two samples a pixel: at least 99 pixels in 100 have every layer to 1e-5 of the layer's size.
 
-    1e-5 is 168 u: a distance with 64 u s of error (spec/intersection.md), twice, and rounding of sums. A path that falls on
-    the other side of a decision changes its pixel wholly.
+    1e-5 is 168 u: a distance with 64 u s of error (spec/intersection.md), twice, and rounding of sums. A path
+    that falls on the other side of a decision changes its pixel wholly.
     """
     job = R.Job(WIDTH, HEIGHT, 2, SEED, Settings(max_depth=4))
     expected, found = R.render(scene(name), job), render_on(executor, scene(name), job)

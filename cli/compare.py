@@ -76,9 +76,7 @@ def compare(
             rich_help_panel=PANEL,
         ),
     ] = None,
-    executor: Annotated[
-        ExecutorName, typer.Option(help="What runs the kernel.", rich_help_panel=PANEL)
-    ] = ExecutorName.opencl,
+    executor: Annotated[ExecutorName, typer.Option(rich_help_panel=PANEL)] = ExecutorName.opencl,
     width: Annotated[int, typer.Option(help="Width in pixels.", rich_help_panel=PANEL)] = 64,
     height: Annotated[int, typer.Option(help="Height in pixels.", rich_help_panel=PANEL)] = 64,
     sample: Annotated[
@@ -99,12 +97,11 @@ def compare(
     MSE, PSNR and SSIM compare what is seen (sRGB-encoded, clipped to white); relMSE and SMAPE compare linear
     radiance.
 
-    With --paths every step of every path is computed with a bound of what rounding may change in it: a
-    difference beyond it is [bold]unexplained[/]. Steps with a decision nearer to its threshold than the bound
-    are [bold]undecided[/]; those that went another way than the reference would, [bold]different[/]. Against
-    the reference's own paths, [bold]parted[/] counts those that have gone another way so far, [bold]moved[/]
-    is how far vertices of the others are off. Then Welch's test compares the pictures. Exit status 1 if
-    anything is unexplained or the test fails.
+    With --paths each step of each path has a bound of what rounding may change: what differs more is
+    [bold]unexplained[/]. A step with a decision within the bound of its threshold is [bold]undecided[/]; if
+    it went another way than the reference, [bold]different[/]. Of the reference's own paths, [bold]parted[/]
+    have gone another way so far; the vertices of the others have [bold]moved[/]. Welch's test compares
+    pictures. Exit status 1 if anything is unexplained or the test fails.
     """
     if paths is None:
         _refuse_given(context, (*OF_PATHS, *OF_SCENE), "without --paths SCENE")

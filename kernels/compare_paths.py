@@ -1,7 +1,8 @@
 """Path kernels against the reference, step by step: what differs must be explained by rounding.
 
 1. A kernel tells the state of each path after its last arrival; stopped at depth 0, 1, ... it tells all of
-   them [`_states`].
+   them [`_states`]. These are builds of the same text but for the depth: a compiler that made different code
+   of them would show as unexplained.
 2. One step of the reference starts from the *kernel's own* state, so that errors do not pile up: `start` or
    `scatter` gives ranges for the ray that the kernel has next, `arrive` on that ray gives ranges for the
    surface and the radiance (compiler/ranges.py) [`step_ranges`].
@@ -32,6 +33,7 @@ from ..compiler.ranges import Arithmetic, Range
 from ..refimpl import render
 from ..refimpl.render import Job
 from ..refimpl.scene import Scene
+from ..refimpl.transport import Settings
 from . import random_words
 from .executor import Executor, Part
 from .numpy_executor import follow
@@ -151,7 +153,7 @@ def kernel_of_states(programs: PathPrograms, executor: Executor) -> PathArtifact
 def compare_paths(
     executor: Executor,
     scene: Scene,
-    settings: render.Settings,
+    settings: Settings,
     view: View,
     *,
     arithmetic: Arithmetic = ranges.PROMISED,
@@ -228,8 +230,11 @@ def _as_kind(values: NDArray[Any], kind: str) -> NDArray[Any]:
     """Return a plane of floats as the kind of number that it stands for."""
     if kind == "bool":
         return values > 0
-    # A number that is none stays visible: no surface has it.
-    return np.nan_to_num(values, nan=-1.0).astype(kind) if kind == "int32" else values
+    if kind == "float32":
+        return values
+    # What is no whole number of the kind stays visible: no surface is numbered -1.
+    whole = (np.abs(values) < 2.0**24) & (values == np.floor(values))
+    return np.where(whole, values, -1.0).astype(kind)
 
 
 @dataclass(frozen=True)
@@ -259,6 +264,7 @@ class _Step:
         parts = self.programs
         if self.before is None:
             sent = ranges.evaluate(parts.start, self.given, self.arithmetic, guided)
+            sent["alive"] = Range(np.True_, np.True_, np.True_)
         else:
             depth = np.full(len(self.given["x"]), self.depth - 1, np.uint32)
             inputs = {**self.given, **self.before, "depth": depth}
@@ -291,7 +297,7 @@ class _Verdict:
 def _judge(step: _Step, view: View) -> _Verdict:
     """Compare the kernel's state after a step with its ranges, in blocks of paths."""
     count = len(step.given["x"])
-    verdict = _Verdict(*(np.zeros(count, bool) for _ in range(3)), {})
+    verdict = _Verdict(np.zeros(count, bool), np.zeros(count, bool), np.zeros(count, bool), {})
     gaps: dict[str, list[tuple[Any, Any]]] = {name: [] for name in QUANTITIES}
     for first in range(0, count, PATHS_AT_ONCE):
         lanes = slice(first, first + PATHS_AT_ONCE)
@@ -329,7 +335,7 @@ def _distances(step: _Step, name: str, expected: Range) -> tuple[Any, Any]:
 def _gap(pairs: list[tuple[Any, Any]]) -> Gap:
     """Return the largest distance, the largest ratio and the median bound; NaN counts as infinite."""
     distance, bound = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-    distance = np.nan_to_num(distance, nan=np.inf)
+    distance = np.where(np.isnan(distance), np.inf, distance)
     ratio = np.divide(distance, bound, out=np.where(distance > 0, np.inf, 0.0), where=bound > 0)
     some = bound[bound > 0]
     return Gap(
@@ -368,10 +374,10 @@ def _moved(found: State, own: State, together: Any) -> tuple[Any, dict[str, floa
     alive = own["alive"]
     together = together & (found["alive"] == alive) & (~alive | (found["surface"] == own["surface"]))
     going = together & alive
-    moved = {
-        quantity: max(
-            float(np.max(np.abs(found[name] - own[name])[going], initial=0.0)) for name in components
-        )
-        for quantity, components in QUANTITIES.items()
-    }
+    moved = {}
+    for quantity, components in QUANTITIES.items():
+        # A value that is the same in all paths stands for all.
+        expected = [np.broadcast_to(own[name], going.shape)[going] for name in components]
+        differences = [np.abs(found[n][going] - e) for n, e in zip(components, expected, strict=True)]
+        moved[quantity] = float(np.max(np.concatenate(differences), initial=0.0))
     return together, moved

@@ -38,8 +38,9 @@ HALF = 16
 
 def words(given: Mapping[str, Any], max_depth: int) -> list[Any]:
     """Return four words (...): those of all blocks that paths of this depth use, joined by exclusive or."""
+    seed, pixel, sample = (given[name] for name in COUNTERS)
     blocks = [
-        rng.random_block(*(given[name] for name in COUNTERS), np.uint32(block))
+        rng.random_block(seed, pixel, sample, np.uint32(block))
         for block in range(1 + BLOCKS_PER_BOUNCE * max_depth)
     ]
     return [reduce(lambda a, b: a ^ b, same) for same in zip(*blocks, strict=True)]

@@ -276,21 +276,49 @@ def test_a_decision_that_differs_is_counted(executor, monkeypatch):
     assert report.depths[0].parted == report.depths[0].different
 
 
-def test_a_state_that_is_no_number_is_unexplained(executor_named):
-    executor = executor_named("numpy")
+def broken(executor, plane, value):
+    """Return an executor like this one that tells another value of one plane in pixel (2, 1)."""
 
     class Broken(type(executor)):
         def _trace(self, kernel, part):
             sums = super()._trace(kernel, part)
-            for plane in ("last_point_x", "last_surface"):
-                if plane in kernel.planes:
-                    sums[kernel.planes.index(plane), 1, 2] = np.nan
+            if plane in kernel.planes:
+                sums[kernel.planes.index(plane), 1, 2] = value
             return sums
 
-    report = compare_paths.compare_paths(Broken(), scene("cornell"), Settings(max_depth=0), View(5, 4))
+    return Broken()
+
+
+@pytest.mark.parametrize(
+    ("plane", "value"),
+    [
+        ("last_point_x", np.nan),
+        ("last_point_x", np.inf),
+        ("last_surface", np.nan),
+        ("last_surface", np.inf),
+        ("last_surface", 2.5),
+        ("alive", 0.0),
+        ("alive", np.nan),
+    ],
+)
+def test_a_state_that_cannot_be_is_unexplained(executor_named, plane, value):
+    executor = broken(executor_named("numpy"), plane, value)
+    report = compare_paths.compare_paths(executor, scene("cornell"), Settings(max_depth=0), View(5, 4))
     assert report.depths[0].unexplained == 1
-    assert {(e.x, e.y, e.component) for e in report.examples} == {(2, 1, "point_x"), (2, 1, "surface")}
-    assert report.depths[0].gaps["point"].ratio == np.inf
+    assert {(e.x, e.y, e.component) for e in report.examples} == {(2, 1, plane.removeprefix("last_"))}
+    assert (report.depths[0].gaps["point"].ratio == np.inf) == (plane == "last_point_x")
+
+
+def test_paths_that_end_too_early_or_too_late_are_unexplained(executor_named):
+    """In the open scene half of the paths end at once."""
+    for value in (0.0, 1.0):
+        executor = broken(executor_named("numpy"), "alive", value)
+        views = [View(5, 4, seed=seed) for seed in range(3)]
+        reports = [
+            compare_paths.compare_paths(executor, scene("lone_light"), Settings(max_depth=1), view)
+            for view in views
+        ]
+        assert any(e.component == "alive" for report in reports for e in report.examples)
 
 
 def test_other_random_words_are_counted(executor_named):

@@ -106,6 +106,12 @@ def test_points_round_to_the_neighbours_of_the_exact_result(op, a, b):
     assert np.nextafter(np.float32(found.low), np.float32(np.inf)) >= found.high
 
 
+def test_ties_may_fall_on_either_side():
+    """1 + 2^-24 is the middle between 1 and its neighbour 1 + 2^-23: rounding to nearest allows both."""
+    found = float_op("add", [np.float32(1), np.float32(2.0**-24)])
+    assert (found.low, found.high) == (1, 1 + 2.0**-23)
+
+
 @given(a=numbers, b=numbers, c=numbers, minus=st.booleans())
 def test_sums_may_read_products_before_or_after_rounding(a, b, c, minus):
     """a b + c and c - a b with one rounding and with two, against rationals."""
@@ -210,6 +216,12 @@ def test_a_selection_is_its_branch_or_the_hull_of_both():
         found = choose(condition, a, b)
         assert (found.low, found.high) == (low, high)
         assert found.sure == (low == high)
+    sure = replace(a, sure=np.True_)
+    for condition, first, second in (((True, True), sure, a), ((False, False), a, sure)):
+        assert choose(condition, first, second).sure
+        assert not choose(condition, second, first).sure
+    assert not choose((False, True), sure, sure).point
+    assert not choose((False, True), sure, replace(sure, high=np.float64(9))).sure
 
 
 def test_guided_decisions_are_the_reference_s():
@@ -222,11 +234,14 @@ def test_guided_decisions_are_the_reference_s():
 
 def test_an_undecided_value_that_is_not_chosen_has_no_say():
     """A box behind the nearest surface may be undecided: the distance is sure all the same."""
-    unsure = between(3.0, 4.0)
+    unsure, sure = between(3.0, 4.0), replace(between(2.0, 3.75), sure=np.True_)
     assert float_op("minimum", [np.float32(2), unsure]).sure
     assert float_op("maximum", [np.float32(5), unsure]).sure
     assert not float_op("minimum", [np.float32(3.5), unsure]).sure
     assert not float_op("maximum", [np.float32(3.5), unsure]).sure
+    assert not float_op("minimum", [sure, unsure]).sure
+    assert not float_op("maximum", [replace(sure, low=np.float64(3.5)), unsure]).sure
+    assert float_op("minimum", [sure, between(4.0, 5.0)]).sure
     assert not float_op("add", [np.float32(3.5), unsure]).sure
     assert float_op("multiply", [np.float32(0), unsure]).sure
 
@@ -296,13 +311,15 @@ def test_what_may_overflow_has_no_range_and_nothing_after_it():
     for found in (
         float_op("add", [huge, huge]),
         float_op("multiply", [huge, huge]),
-        float_op("divide", [np.float32(1), between(-1, 1)]),
+        float_op("divide", [np.float32(1), between(-0.5, 1)]),
         float_op("divide", [np.float32(1), np.float32(2.0**127)]),
         float_op("sqrt", [between(-1e-9, 1)]),
         float_op("minimum", [np.float32(1), between(-np.inf, np.inf)]),
     ):
         assert not found.known
         assert not found.sure
+        assert found.holds(1e38)
+        assert found.holds(-1e38)
         assert not found.holds(np.nan)
     assert not float_op("absolute", [between(-np.inf, np.inf)]).known
     decided = evaluate(

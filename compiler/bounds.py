@@ -265,7 +265,7 @@ def _power(context: Context, operands: list[Enclosure]) -> Enclosure:
 
 
 def power_error(exponent: Array, logarithm: Array) -> Array:
-    """Return the largest relative error of pow(x, y) over all targets, for |y| and |log2 x| (...) up to these.
+    """Return the largest relative error of pow(x, y) over all targets; |y|, |log2 x| (...) at most these.
 
     OpenCL states it. GLSL's is that of exp2(y log2(x)): an error d of y log2(x) is a factor of 2^d.
     """
@@ -273,7 +273,8 @@ def power_error(exponent: Array, logarithm: Array) -> Array:
     d = exponent * np.maximum(LOG2_RELATIVE * logarithm, LOG2_ABSOLUTE) * (1 + UNIT_ROUNDOFF)
     d = d + UNIT_ROUNDOFF * product
     own = 2 * UNIT_ROUNDOFF * (EXP2_ULPS[0] + EXP2_ULPS[1] * (product + d))
-    return np.maximum(np.expm1(d * np.log(2.0) + np.log1p(own)), OPENCL_POWER)
+    error: Array = np.maximum(np.expm1(d * np.log(2.0) + np.log1p(own)), OPENCL_POWER)
+    return error
 
 
 def _sin(context: Context, operands: list[Enclosure]) -> Enclosure:
@@ -327,7 +328,7 @@ def _reciprocal(context: Context, operands: list[Enclosure]) -> Enclosure:
     return _divide(context, [Enclosure(one, one, np.zeros_like(one)), operands[0]])
 
 
-def _decided(below: tuple[Array, Array], above: tuple[Array, Array]) -> Enclosure:
+def _decided(below: tuple[Any, Any], above: tuple[Any, Any]) -> Enclosure:
     """Return a truth value from (sure for the reference, sure for the kernel) of True, and of False.
 
     It is 1 or 0; the error is 0 where both are sure to decide alike, else 1.

@@ -37,7 +37,6 @@ from .profiles import (
     LARGEST_DIVISOR,
     LOG2_ABSOLUTE,
     LOG2_RELATIVE,
-    OPENCL_POWER,
     RELATIVE_ERROR,
     UNIT_ROUNDOFF,
     SineContract,
@@ -267,13 +266,13 @@ def _power(context: Context, operands: list[Enclosure]) -> Enclosure:
 def power_error(exponent: Array, logarithm: Array) -> Array:
     """Return the largest relative error of pow(x, y) over all targets; |y|, |log2 x| (...) at most these.
 
-    OpenCL states it. GLSL's is that of exp2(y log2(x)): an error d of y log2(x) is a factor of 2^d.
+    They compute exp2(y log2(x)), or something as good: an error d of y log2(x) is a factor of 2^d.
     """
     product = exponent * logarithm
     d = exponent * np.maximum(LOG2_RELATIVE * logarithm, LOG2_ABSOLUTE) * (1 + UNIT_ROUNDOFF)
     d = d + UNIT_ROUNDOFF * product
     own = 2 * UNIT_ROUNDOFF * (EXP2_ULPS[0] + EXP2_ULPS[1] * (product + d))
-    error: Array = np.maximum(np.expm1(d * np.log(2.0) + np.log1p(own)), OPENCL_POWER)
+    error: Array = np.expm1(d * np.log(2.0) + np.log1p(own))
     return error
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..refimpl.dataset import FEATURES, Normalization
+from ..refimpl.errors import CompileError
 from . import bounds, ir, profiles
 from .compile import sine_contract, target_named
 from .encode_dialect import ENCODE_DIALECTS, EncodeDialect
@@ -32,7 +33,7 @@ SCHEMA = "wamnet-encode-kernel-1"
 
 @dataclass(frozen=True)
 class EncodeArtifact:
-    """A compiled encoding; `program` is what was emitted, `planes` what it reads, `images` what it makes."""
+    """A compiled encoding; `program` is what was emitted, from `planes` of sums it makes `images`."""
 
     target: str
     profile: str
@@ -51,12 +52,25 @@ class EncodeArtifact:
 
 
 def compile_encode(
-    features: Sequence[str], normalization: Normalization, target: str, profile: str = "ieee"
+    features: Sequence[str],
+    normalization: Normalization,
+    target: str,
+    profile: str = "ieee",
+    planes: Sequence[str] | None = None,
 ) -> EncodeArtifact:
-    """Return the kernel that turns sums over samples into the encoded images of features."""
+    """Return the kernel that turns sums over samples into the encoded images of features.
+
+    `planes` are those that the sums have, in order; by default the features' own alone.
+    """
     chosen, promised = target_named(target), profiles.profile_named(profile)
     program = pipeline.run(lower_encode(features, normalization), promised.passes)
-    planes = planes_of(features)
+    planes = tuple(planes or planes_of(features))
+    lacking = set(planes_of(features)) - set(planes)
+    if lacking:
+        raise CompileError(
+            f"the sums have no planes {', '.join(sorted(lacking))}: the features {', '.join(features)} are "
+            "made of them; let the path kernel add them up"
+        )
     known = [FEATURES[name] for name in features]
     images = tuple(Image(f.name, f.channels, f.low, f.high, f.encoding(normalization)) for f in known)
     dialect = ENCODE_DIALECTS.get(target)
@@ -92,8 +106,9 @@ def error_at(
     artifact: EncodeArtifact, sums: Mapping[str, Any], samples: int
 ) -> dict[str, NDArray[np.float64]]:
     """Return the bound (H, W, C) of each image's error against float64, at planes of sums (H, W) by name."""
-    inputs = {name: np.asarray(sums[name], np.float64) for name in artifact.planes}
-    inputs[SAMPLES] = np.full(inputs[artifact.planes[0]].shape, float(samples))
+    names = planes_of([image.name for image in artifact.images])
+    inputs = {name: np.asarray(sums[name], np.float64) for name in names}
+    inputs[SAMPLES] = np.full(inputs[names[0]].shape, float(samples))
     contract = sine_contract(artifact.profile, artifact.target)
     boxes = {name: (value, value) for name, value in inputs.items()}
     found = bounds.enclose(artifact.program, boxes, contract)
@@ -132,7 +147,8 @@ def _emit(
     `bounded`: the language must keep the order of operations, on which bounds rest.
     """
     lines = []
-    for number, name in enumerate(planes):
+    for name in planes_of([image.name for image in images]):
+        number = planes.index(name)
         buffer, component = divmod(number, dialect.planes_per_input)
         lines.append(dialect.load.format(plane=number, name=name, buffer=buffer, component=component))
     texts = _statements(program, dialect, lines)

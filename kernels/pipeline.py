@@ -33,13 +33,15 @@ from ..refimpl.scene import Scene
 from ..refimpl.transport import Settings
 from .executor import Executor, Part
 from .passes import PICTURE
-from .render_on import SAMPLES_AT_ONCE
+from .render_on import SAMPLES_AT_ONCE, compile_scene
 
 
 class Pipeline:
     """A scene and a model on an open executor, for pictures of one size; a context manager.
 
-    `show` names features that are to be readable besides those of the model. The kernels are `path`,
+    `show` names features that are to be readable besides those of the model. With `whole`, paths are traced
+    by the kernel of render_on.py, which writes more than is needed: one to compile where both are used. The
+    kernels are `path`,
     `encode` and `denoise`; `passes` runs them one by one.
     """
 
@@ -53,6 +55,7 @@ class Pipeline:
         settings: Settings | None = None,
         profile: str = "ieee",
         show: Sequence[str] = (),
+        whole: bool = False,
     ) -> None:
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
@@ -62,17 +65,23 @@ class Pipeline:
         self._settings = settings or Settings()
         self._features = tuple(dict.fromkeys((*model.features, *show)))
         check_features(self._features)
-        self.encode = compile_encode(self._features, model.normalization, executor.name, profile)
-        self.denoise = compile_program(lower(model), executor.name, profile)
+        self._whole = whole
         self.path = self._compiled(scene)
+        self.encode = compile_encode(
+            self._features, model.normalization, executor.name, profile, self.path.planes
+        )
+        self.denoise = compile_program(lower(model), executor.name, profile)
         self._drawn = False
         self.passes = executor.passes(self.encode, self.denoise, size)
 
     def _compiled(self, scene: Scene) -> PathArtifact:
         """Return the path kernel of a scene, built."""
-        programs, executor = lower_scene(scene, self._settings), self._executor
-        groups = layers_of(self._features)
-        kernel = compile_path(programs, executor.name, self._profile, executor.lanes, groups)
+        executor, profile = self._executor, self._profile
+        if self._whole:
+            kernel = compile_scene(executor, scene, Job(1, 1, settings=self._settings), profile)
+        else:
+            programs, groups = lower_scene(scene, self._settings), layers_of(self._features)
+            kernel = compile_path(programs, executor.name, profile, executor.lanes, groups)
         executor.build_path(kernel)
         return kernel
 

@@ -69,9 +69,9 @@ __kernel void wamnet_encode(
     float t33 = fmax(t29, 0.00313080009f);
     float t34 = fmax(t30, 0.00313080009f);
     float t35 = fmax(t31, 0.00313080009f);
-    float t37 = pow(t33, 0.416666657f);
-    float t38 = pow(t34, 0.416666657f);
-    float t39 = pow(t35, 0.416666657f);
+    float t37 = exp2(0.416666657f * log2(t33));
+    float t38 = exp2(0.416666657f * log2(t34));
+    float t39 = exp2(0.416666657f * log2(t35));
     float t41 = 1.05499995f * t37;
     float t42 = 1.05499995f * t38;
     float t43 = 1.05499995f * t39;

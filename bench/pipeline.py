@@ -83,7 +83,7 @@ def _measure(
 
     with Pipeline(executor, scene, model, (size, size)) as pipeline:
         ways: dict[str, Callable[[], Any]] = {"separate": separate, "one pipeline": pipeline.run}
-        parts = _parts(executor, pipeline, size)
+        parts = _parts(pipeline)
         for way in (*ways.values(), *parts.values()):
             way()  # whatever a driver does at first
         times: dict[str, list[float]] = {way: [] for way in (*ways, *parts)}
@@ -101,14 +101,14 @@ def _measure(
     return times, statistics.median(compiling)
 
 
-def _parts(executor: Any, pipeline: Pipeline, size: int) -> dict[str, Callable[[], Any]]:
-    """Return the parts of the pipeline, each followed by reading back, which waits; that is a part too."""
+def _parts(pipeline: Pipeline) -> dict[str, Callable[[], Any]]:
+    """Return the parts of the pipeline, each ended by waiting for the device."""
     passes, part = pipeline.passes, pipeline.part(0, 1, 0)
 
     def waited(work: Callable[[], None]) -> Callable[[], None]:
         def both() -> None:
             work()
-            passes.read(PICTURE)
+            passes.finish()
 
         return both
 

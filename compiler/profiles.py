@@ -7,9 +7,9 @@
 
 Sources: OpenCL C 1.2 specification, section 7.4 (divide 2.5 ulp, sqrt 3 ulp, sin 4 ulp, exp2 and log2 3 ulp,
 full profile); GLSL 4.60 specification, section 4.7.1 (+ - * correctly rounded, a / b 2.5 ulp for 2**-126 <=
-|b| <= 2**126, sqrt as 1.0 / inversesqrt(): 2 ulp and 2.5 ulp, pow as exp2 and log2). GLSL 3.30 states nothing; the
-later text describes the same hardware and is assumed. GLSL leaves the rounding mode open: rounding to nearest
-is assumed too. OpenCL says it of each device, and the executor asks.
+|b| <= 2**126, sqrt as 1.0 / inversesqrt(): 2 ulp and 2.5 ulp, pow as exp2 and log2). GLSL 3.30 states
+nothing; the later text describes the same hardware and is assumed. GLSL leaves the rounding mode open:
+rounding to nearest is assumed too. OpenCL says it of each device, and the executor asks.
 """
 
 from __future__ import annotations

@@ -259,6 +259,11 @@ class OpenCLPasses(Passes):
             cl.enqueue_copy(self._executor._queue, result, self._images[name])
         return result
 
+    def finish(self) -> None:
+        """Wait for the queue."""
+        with self._executor._told(self.size):
+            self._executor._queue.finish()
+
     def close(self) -> None:
         """Release the buffers."""
         for buffer in (self._sums, *self._images.values()):

@@ -295,6 +295,11 @@ class OpenGLPasses(Passes):
             pixels = np.frombuffer(self._images[name].read(), np.float32).reshape(*self.size, 4)
         return pixels[..., : self.channels(name)].copy()
 
+    def finish(self) -> None:
+        """Wait for the context."""
+        with self._executor._context:
+            self._executor._context.finish()
+
     def close(self) -> None:
         """Release the textures."""
         with self._executor._context:

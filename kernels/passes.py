@@ -45,6 +45,9 @@ class Passes(ABC):
     def read(self, name: str) -> NDArray[np.float32]:
         """Copy an image to the host, (H, W, C): a feature by name, or the result, [`PICTURE`]."""
 
+    def finish(self) -> None:
+        """Wait until all passes that were started have ended; reading waits by itself."""
+
     def close(self) -> None:
         """Give the images back."""
 

@@ -194,6 +194,7 @@ def test_nothing_is_read_back_or_uploaded_in_between_on_opencl(executor_named, m
         monkeypatch.setattr(module.cl, "enqueue_copy", copy)
         monkeypatch.setattr(module.cl, "Buffer", buffer)
         pipeline.draw(1)
+        pipeline.passes.finish()
         assert (copied, uploaded) == ([], [])
         pipeline.picture()
         assert copied == [(9, 21, 3)]
@@ -222,6 +223,7 @@ def test_nothing_is_read_back_or_uploaded_in_between_on_opengl(executor_named, m
         monkeypatch.setattr(kind, "read", record)
         monkeypatch.setattr(context, "texture", texture)
         pipeline.draw(1)
+        pipeline.passes.finish()
         assert (read, made) == ([], [])
         pipeline.picture()
         assert read == [(21, 9)]

@@ -50,6 +50,10 @@ class EncodeArtifact:
         """Return the hash that names this artifact: of its source."""
         return str(self.manifest["digest"])
 
+    def contents(self) -> Mapping[str, bytes]:
+        """Return the files besides the manifest, by name."""
+        return {self.source_name: self.source.encode()}
+
 
 def compile_encode(
     features: Sequence[str],

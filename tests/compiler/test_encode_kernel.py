@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from wamnet.compiler import ir
+from wamnet.compiler import artifact, ir
 from wamnet.compiler.encode_kernel import compile_encode, error_at
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.lower_encode import SAMPLES, channel_name, layers_of, lower_encode, planes_of
@@ -90,6 +90,13 @@ def test_the_manifest_names_what_was_made():
     assert [image.name for image in made.images] == ["normal", "depth"]
     assert made.images[1].encoding == FEATURES["depth"].encoding(SCALES)
     assert "image_color" not in made.source
+
+
+def test_it_is_written_as_other_kernels_are(tmp_path):
+    made = compile_encode(("color",), SCALES, "opencl")
+    assert [path.name for path in artifact.write(made, tmp_path)] == ["encode.cl", "manifest.json"]
+    assert (tmp_path / "encode.cl").read_text() == made.source
+    assert json.loads((tmp_path / "manifest.json").read_text()) == made.manifest
 
 
 def test_planes_of_a_whole_frame_are_read_where_they_lie():

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 
 from ..refimpl.errors import CompileError
-from .bounds import sine_range
+from .bounds import power_error, sine_range
 from .interpret import apply, element
 from .ir import Node, Program
 from .profiles import (
@@ -195,7 +195,7 @@ def _given(value: Any, dtype: str) -> Range:
 # ---- ends -------------------------------------------------------------------------------------------------
 
 
-def _wider(low: Any, high: Any, relative: float = 0.0) -> tuple[Any, Any]:
+def _wider(low: Any, high: Any, relative: Any = 0.0) -> tuple[Any, Any]:
     """Return ends moved outward, relative to their size, by the given amount and float64's rounding."""
     return low - (relative + SLACK) * np.abs(low), high + (relative + SLACK) * np.abs(high)
 
@@ -329,6 +329,17 @@ def _sqrt(context: Context, operands: list[Range]) -> Range:
     low, high = _approximate(low, high, context.arithmetic.root)
     low, high = np.where(a.low >= 0, low, -np.inf), np.where(a.low >= 0, high, np.inf)
     return _made(context, low, high, _all_sure(operands) & (a.low >= 0))
+
+
+def _power(context: Context, operands: list[Range]) -> Range:
+    """Monotone in both, so of the powers of ends, and the promise; none where x may be 0 or below."""
+    x, y = operands
+    low, high = _corners(x.low**y.low, x.low**y.high, x.high**y.low, x.high**y.high)
+    exponent = np.maximum(np.abs(y.low), np.abs(y.high))
+    logarithm = np.maximum(np.abs(np.log2(x.low)), np.abs(np.log2(x.high)))
+    low, high = _wider(low, high, power_error(exponent, logarithm))
+    low, high = np.where(x.low > 0, low, -np.inf), np.where(x.low > 0, high, np.inf)
+    return _made(context, low, high, _all_sure(operands) & (x.low > 0))
 
 
 def _sin(context: Context, operands: list[Range]) -> Range:
@@ -480,6 +491,7 @@ RULES: Mapping[str, Rule] = {
     "maximum": _maximum,
     "floor": _floor,
     "sqrt": _sqrt,
+    "power": _power,
     "sin": _sin,
     "cos": _cos,
     "less": _compare(lambda a, b: (a.high < b.low, a.low >= b.high)),

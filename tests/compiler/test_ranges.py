@@ -11,6 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from wamnet.compiler import ops, ranges
+from wamnet.compiler.bounds import power_error
 from wamnet.compiler.interpret import apply, interpret
 from wamnet.compiler.ir import Node, Program, Type, attributes
 from wamnet.compiler.lower_scene import lower_scene
@@ -136,6 +137,23 @@ def test_promises_of_division_and_square_root(a, b, ulps):
     assert quotient.holds(a / b * (1 + ulps * 2.5 * U))
     root = float_op("sqrt", [np.float32(abs(a))])
     assert root.holds(np.sqrt(abs(a)) * (1 + ulps * 5 * U))
+
+
+@given(
+    x=st.floats(2.0**-10, 100, width=32),
+    width=st.floats(0, 1),
+    y=st.floats(0.125, 4, width=32),
+    data=st.data(),
+)
+def test_promise_of_powers(x, width, y, data):
+    """Off by all that bounds.py allows, anywhere between the ends; NumPy's own is far better."""
+    found = float_op("power", [between(x, x + width), between(y, y + width)])
+    a, b = (data.draw(st.floats(end, end + width)) for end in (x, y))
+    off = power_error(np.float64(b), np.abs(np.log2(np.float64(a))))
+    assert found.holds(a**b * (1 + off))
+    assert found.holds(a**b * (1 - off))
+    assert found.holds(found.plain)
+    assert not float_op("power", [between(0.0, x), np.float32(y)]).known
 
 
 @given(x=st.floats(-6000, 6000, width=32), width=st.floats(0, 4), at=st.floats(0, 1), off=st.floats(-1, 1))

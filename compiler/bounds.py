@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .ir import Gather, Node, Program
-from .ops import OPS
+from .ops import LOOPS, OPS
 from .profiles import FLUSH, LARGEST_DIVISOR, RELATIVE_ERROR, UNIT_ROUNDOFF, SineContract
 
 Array = NDArray[np.float64]
@@ -314,7 +314,7 @@ RULES: Mapping[str, Rule] = {
     "stack": _stack,
     "component": _component,
     "reciprocal": _reciprocal,
-    **dict.fromkeys(NO_BOUND, _no_rule),
+    **dict.fromkeys((*NO_BOUND, *LOOPS), _no_rule),
 }
 """One rule an operation; inputs are given."""
 

@@ -278,7 +278,10 @@ SHARING = [0.3] * 4 + [0.0, 0.5, 0.7, 0.7, 0.3, 0.9] + [1.1] * 4 + [1.3] * 3
 def test_boxes_are_grouped_by_rotation_and_small_groups_joined():
     geometry = I.build(many_boxes(SHARING), np.float64)
     shape = [(len(g.centers), g.shared, g.rotated, g.first_id) for g in geometry.groups]
-    assert shape == [(5, True, True, 0), (1, True, False, 5), (4, False, True, 6)] + [
+    assert shape == [
+        (5, True, True, 0),
+        (1, True, False, 5),
+        (4, False, True, 6),
         (4, True, True, 10),
         (3, False, True, 14),
     ]

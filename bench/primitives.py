@@ -5,10 +5,10 @@
 
 For scenes of 10 to 300 primitives in a room, each traced in both forms ("unrolled", "looped"): lines and
 size of the source, seconds to trace and emit it, seconds until the driver has built it (its caches on disk
-are turned off) and has followed a first row of paths, and million samples a second then. The forms take turns,
-so that drift of the machine's speed meets both alike; rates are medians, with the least and greatest. A
-sample is one path with up to five scatterings, each with a shadow ray. Then, for each number of primitives,
-the form that `render` chooses (compiler/path_kernel.py: most_unrolled) is marked with a star.
+are turned off) and has followed a first row of paths, and million samples a second then. The forms take
+turns, so that drift of the machine's speed meets both alike; rates are medians, with the least and greatest.
+A sample is one path with up to five scatterings, each with a shadow ray. A star marks the form that is chosen
+for a scene of so many primitives (compiler/path_kernel.py: most_unrolled).
 """
 
 from __future__ import annotations

@@ -8,11 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wamnet.compiler.ir import Type
 from wamnet.compiler.lower_scene import MOST_UNROLLED, lower_scene, primitives
 from wamnet.compiler.path_kernel import UNROLLED, compile_path, most_unrolled
+from wamnet.compiler.trace import trace
+from wamnet.compiler.verify import verify
 from wamnet.kernels.executor import Part
 from wamnet.kernels.render_on import compile_scene, render_on
 from wamnet.refimpl import render as R
+from wamnet.refimpl import vectors
 from wamnet.refimpl.scene import IDENTITY, Box, Camera, Light, Quad, Room, Scene, Sphere
 from wamnet.refimpl.transport import Settings
 
@@ -47,7 +51,7 @@ def color(random):
 MAKERS = {
     "shared": lambda random, i: box(random, turned(0.4)),
     "parallel": lambda random, i: box(random, IDENTITY),
-    "turned": lambda random, i: box(random, turned(0.1 * i + 0.1)),
+    "turned": lambda random, i: box(random, turned(0.13 * i + 0.1)),
     "sphere": lambda random, i: Sphere(place(random), random.uniform(0.05, 0.2), color(random)),
     "quad": lambda random, i: Quad(place(random), (0.3, 0.1, 0.0), (0.0, 0.2, 0.3), color(random)),
 }
@@ -122,6 +126,36 @@ def test_thresholds():
     """Lower bounds of what is known to be worth it: the canonical scenes are statements on every target."""
     assert MOST_UNROLLED == most_unrolled("opencl") == most_unrolled("numpy") == 32
     assert most_unrolled("opengl") == UNROLLED["opengl"] == 128
+
+
+def carried_about(surface):
+    """Return three numbers after a fold: two trade places, one is what the last row makes of it."""
+    rows = (np.array([0.5, -2.0, 4.0], np.float32), np.array([7, 1, 3], np.int32))
+
+    def step(values, number, integer):
+        a, b, same, _ = values
+        return b, a + number, same, number * same + integer.astype(np.float32)
+
+    return vectors.fold_rows(step, rows, (surface, surface * 0.5, surface * 2.0, surface))
+
+
+def test_numbers_that_trade_places(executor):
+    """A loop of our own in the place of the first hit's layers; halves and small integers are exact."""
+    programs = lower_scene(crowd(), Settings(max_depth=0))
+    names = ("albedo_r", "albedo_g", "albedo_b", "depth")
+
+    def look(surface):
+        return dict(zip(names, carried_about(surface.astype(np.float32)), strict=True))
+
+    program = trace(look, {"surface": Type("int32")}, most_unrolled=0)
+    programs = replace(programs, look=verify(program))
+    kernel = compile_path(
+        programs, executor.name, lanes=executor.lanes, groups=("albedo", "depth", "last_surface")
+    )
+    *found, surface = executor.trace(kernel, Part(24, 16, 0, 16, 0, 1, 3))
+    assert len(np.unique(surface)) >= 4
+    for values, expected in zip(found, carried_about(surface), strict=True):
+        assert np.array_equal(values, expected)
 
 
 def coincident(first):

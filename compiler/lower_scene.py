@@ -72,9 +72,10 @@ LAYERS: Values = {
 
 MOST_UNROLLED = 32
 """Most primitives of a scene that become statements each, unless a target has a number of its own
-(path_kernel.py: UNROLLED). To 30 boxes on PoCL statements and a loop are equally fast, as their code still
-fits the processor's caches; at 100 the loop is about twice as fast and ready in 0.5 s instead of 2 to 6
-(`python bench/primitives.py`)."""
+(path_kernel.py: UNROLLED). On PoCL, at 10 statements are up to a tenth faster; at 30 they are level for boxes
+that share a rotation and for quads, and a third slower for mixtures; at 100 they are 1.3 to 1.8 times slower,
+their code having left the processor's first cache, and take 2 to 6 s to trace and build instead of 0.5. 32
+keeps the 29 of `minicubes` statements (`python bench/primitives.py`)."""
 
 PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "eliminate_dead")
 """What every program of a path goes through: numbers in place of vectors, the bits that float32 gives."""

@@ -67,9 +67,9 @@ SCHEDULES: Mapping[str, tuple[Callable[[int], PathDialect | None], tuple[int, ..
 
 UNROLLED: Mapping[str, int] = {"opengl": 128}
 """By target, where it is not MOST_UNROLLED: most primitives of a scene that become statements each. llvmpipe
-reads a table at a loop's counter lane by lane, so loops stay three to four times slower than statements; but
-it compiles the statements of 100 primitives in 1 to 4 s, those of 300 in 9 to 60 s
-(`python bench/primitives.py --executors opengl`)."""
+reads a table at a loop's counter lane by lane, so a loop that Mesa does not unroll itself (it does up to some
+30 trips) is two to four times slower than statements; but it compiles the statements of 100 primitives in 1
+to 5 s, those of 300 in 9 to 60 s (`python bench/primitives.py --executors opengl`)."""
 
 
 def most_unrolled(target: str) -> int:

@@ -134,7 +134,7 @@ def carried_about(surface):
 
     def step(values, number, integer):
         a, b, same, _ = values
-        return b, a + number, same, number * same + integer.astype(np.float32)
+        return b + number, a, same, number * same + integer.astype(np.float32)
 
     return vectors.fold_rows(step, rows, (surface, surface * 0.5, surface * 2.0, surface))
 

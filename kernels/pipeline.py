@@ -41,8 +41,7 @@ class Pipeline:
 
     `show` names features that are to be readable besides those of the model. With `whole`, paths are traced
     by the kernel of render_on.py, which writes more than is needed: one to compile where both are used. The
-    kernels are `path`,
-    `encode` and `denoise`; `passes` runs them one by one.
+    kernels are `path`, `encode` and `denoise`; `passes` runs them one by one.
     """
 
     def __init__(

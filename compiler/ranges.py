@@ -35,6 +35,8 @@ from ..refimpl.errors import CompileError
 from .bounds import OUTWARD, power_error, sine_range
 from .interpret import apply, element
 from .ir import Node, Program
+from .loops import Loop, loops
+from .ops import LOOPS
 from .profiles import (
     EMITTED_COSINE,
     EMITTED_SINE,
@@ -135,51 +137,80 @@ def evaluate(
     program: Program, inputs: Mapping[str, Any], arithmetic: Arithmetic = PROMISED, guided: bool = False
 ) -> dict[str, Range]:
     """Return the range of each output for inputs (...), exact numbers or ranges by name."""
-    unread = _last_reads(program)
-    found: list[Any] = []
+    run = _Run(program, inputs, arithmetic, guided, [None] * len(program.nodes))
+    ends, in_bodies = loops(program)
+    unread = _last_reads(program, in_bodies)
     # Numbers that are too large or no numbers are recognised by their value [`_whole`].
     with np.errstate(all="ignore"):
-        for index, node in enumerate(program.nodes):
-            found.append(_range(program, node, found, inputs, arithmetic, guided))
+        for index in range(len(program.nodes)):
+            if index in ends:
+                run.loop(ends[index])
+            if index not in in_bodies:
+                run.found[index] = run.node(index)
             for done in unread[index]:
-                found[done] = None
-    return {name: found[index] for name, index in program.outputs}
+                run.found[done] = None
+    return {name: run.found[index] for name, index in program.outputs}
 
 
-def _last_reads(program: Program) -> list[list[int]]:
-    """Return, for each node, the nodes that it is the last to read: their arrays can be forgotten."""
-    outputs = {index for _, index in program.outputs}
+def _last_reads(program: Program, in_bodies: frozenset[int]) -> list[list[int]]:
+    """Return, for each node, the nodes that it is the last to read: their arrays can be forgotten.
+
+    What a loop reads is kept: it is read again in the next trip.
+    """
     last: dict[int, int] = {}
     for index, node in enumerate(program.nodes):
         last.update(dict.fromkeys(node.args, index))
+    kept = {index for _, index in program.outputs}
+    for index, node in enumerate(program.nodes):
+        if index in in_bodies or node.op in LOOPS:
+            kept |= {index, *node.args}
     forgotten: list[list[int]] = [[] for _ in program.nodes]
     for read, reader in last.items():
-        if read not in outputs:
+        if read not in kept:
             forgotten[reader].append(read)
     return forgotten
 
 
-def _range(
-    program: Program,
-    node: Node,
-    found: list[Any],
-    inputs: Mapping[str, Any],
-    arithmetic: Arithmetic,
-    guided: bool,
-) -> Range:
-    """Return the range of one node."""
-    if node.op == "input":
-        return _given(inputs[str(node["name"])], node.type.dtype)
-    if node.op == "constant":
-        return _given(np.asarray(node["value"]), node.type.dtype)
-    if node.op not in RULES or node.type.shape:
-        raise CompileError(
-            f"operation {node.op!r} giving {node.type} has no rule for ranges; there are rules for numbers "
-            f"and for: {', '.join(RULES)}; add one to RULES of compiler/ranges.py"
-        )
-    operands = [found[arg] for arg in node.args]
-    plain = apply(node, [o.plain for o in operands], program.parameters, np.dtype(np.float32))
-    return RULES[node.op](Context(node, program.parameters, arithmetic, plain, guided), operands)
+@dataclass(frozen=True)
+class _Run:
+    """A walk through a program; `found` holds the ranges of its nodes so far."""
+
+    program: Program
+    inputs: Mapping[str, Any]
+    arithmetic: Arithmetic
+    guided: bool
+    found: list[Any]
+
+    def loop(self, loop: Loop) -> None:
+        """Make the trips of a loop, as interpret.py does; the carried numbers are then its results."""
+        for trip in range(loop.trips):
+            for index in loop.body:
+                self.found[index] = self.node(index, trip)
+            after = [self.found[index] for index in loop.after]
+            for index, found in zip(loop.carried, after, strict=True):
+                self.found[index] = found
+
+    def node(self, index: int, trip: int = 0) -> Range:
+        """Return the range of one node."""
+        node, parameters = self.program.nodes[index], self.program.parameters
+        operands = [self.found[arg] for arg in node.args]
+        if node.op == "input":
+            return _given(self.inputs[str(node["name"])], node.type.dtype)
+        if node.op == "constant":
+            return _given(np.asarray(node["value"]), node.type.dtype)
+        if node.op == "row":
+            return _given(parameters[str(node["table"])][trip], node.type.dtype)
+        if node.op == "carried":
+            return operands[0]  # type: ignore[no-any-return]
+        if node.op == "loop":
+            return operands[int(node["index"])]  # type: ignore[no-any-return,arg-type]
+        if node.op not in RULES or node.type.shape:
+            raise CompileError(
+                f"operation {node.op!r} giving {node.type} has no rule for ranges; there are rules for "
+                f"numbers and for: {', '.join(RULES)}; add one to RULES of compiler/ranges.py"
+            )
+        plain = apply(node, [o.plain for o in operands], parameters, np.dtype(np.float32))
+        return RULES[node.op](Context(node, parameters, self.arithmetic, plain, self.guided), operands)
 
 
 def _given(value: Any, dtype: str) -> Range:
@@ -510,7 +541,8 @@ RULES: Mapping[str, Rule] = {
     "convert": _convert,
     "take": _take,
 }
-"""One rule an operation; inputs and constants are given. Vectors are taken apart before [`scalarize`]."""
+"""One rule an operation; inputs, constants and what makes up a loop are the walk's own [`_Run`]. Vectors are
+taken apart before, by `scalarize`."""
 
 
 def _one_point(a: Range, b: Range) -> Any:

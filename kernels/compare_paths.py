@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from ..compiler import ranges
 from ..compiler.emit_path import END
 from ..compiler.lower_scene import PATH, SURFACE, PathPrograms, kinds, lower_scene, names
-from ..compiler.path_kernel import PathArtifact, compile_path
+from ..compiler.path_kernel import PathArtifact, compile_path, most_unrolled
 from ..compiler.ranges import Arithmetic, Range
 from ..refimpl import render
 from ..refimpl.render import Job
@@ -164,7 +164,7 @@ def compare_paths(
 
     on_progress is called with 1 after each depth.
     """
-    programs = lower_scene(scene, settings)
+    programs = lower_scene(scene, settings, most_unrolled(executor.name))
     given = _given(view)
     before: State | None = None
     together = np.ones(view.width * view.height, bool)

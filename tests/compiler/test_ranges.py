@@ -21,6 +21,7 @@ from wamnet.compiler.ranges import CORRECT, PROMISED, Range, evaluate
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.scene import Sphere
 from wamnet.refimpl.transport import Settings
 
 U = 2.0**-24
@@ -56,9 +57,10 @@ def float_op(op, operands, arithmetic=PROMISED, guided=False):
 
 
 def test_every_operation_on_numbers_has_a_rule():
-    """Inputs and constants are given; the others are taken apart, or belong to networks."""
+    """Inputs and constants are given, loops walked; the others are taken apart, or belong to networks."""
     assert set(ops.OPS) - set(ranges.RULES) == {
-        *("input", "constant", "parameter", "affine", "stack", "component"),
+        *("input", "constant", *ops.LOOPS),
+        *("parameter", "affine", "stack", "component"),
     }
     assert set(ranges.RULES) <= set(ops.OPS)
 
@@ -464,3 +466,24 @@ def test_correct_arithmetic_leaves_one_number_or_two_neighbours(name):
         inputs |= {key: np.broadcast_to(value, x.shape) for key, value in computed.items()}
         inputs |= {"depth": np.zeros_like(x)}
     assert np.mean(points) >= 0.9  # of all numbers: 0.95 to 1 are seen, ties being rare
+
+
+def test_loops_have_the_ranges_of_their_trips_one_after_another():
+    """A scene of spheres with all statements, and with a table and a loop: the same ends, to the bit."""
+    spheres = tuple(Sphere((0.3 * i - 1.0, 0.1 * i, -0.2 * i), 0.2, (0.5, 0.6, 0.7)) for i in range(6))
+    scene = replace(scenes.canonical("lone_light"), spheres=spheres)
+    unrolled, looped = (lower_scene(scene, Settings(), most).arrive for most in (None, 0))
+    assert {node.op for node in looped.nodes} > {*ops.LOOPS}
+    random = np.random.default_rng(4)
+    directions = random.normal(size=(3, 500))
+    directions /= np.sqrt(np.sum(directions**2, axis=0))
+    names = [str(node["name"]) for node in looped.nodes if node.op == "input"]
+    inputs = {name: np.full(500, 0.25, np.float32) for name in names}
+    inputs |= {f"direction_{c}": directions[i].astype(np.float32) for i, c in enumerate("xyz")}
+    for guided in (False, True):
+        first, second = (evaluate(program, inputs, guided=guided) for program in (unrolled, looped))
+        for name, expected in first.items():
+            for end in ("low", "high", "plain", "sure"):
+                a, b = (np.broadcast_to(getattr(r, end), 500) for r in (expected, second[name]))
+                assert np.array_equal(a, b), (name, end)
+    assert len(np.unique(first["surface"].low)) > 2

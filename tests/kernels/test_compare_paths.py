@@ -50,7 +50,19 @@ BALLS = Scene(
 )
 """Spheres seen from outside, two lights to choose from, and a background: not in the canonical scenes."""
 
-SCENES = {**{name: scene(name) for name in scenes.CANONICAL}, "balls": BALLS}
+MANY = replace(
+    BALLS,
+    name="many",
+    spheres=tuple(
+        Sphere((0.5 * i - 1.5, 0.45 * j - 0.4, -0.5 * k), 0.1 + 0.01 * i, (0.9, 0.8, 0.7))
+        for i in range(7)
+        for j in range(4)
+        for k in range(3)
+    ),
+)
+"""More spheres than become statements each: a table and a loop."""
+
+SCENES = {**{name: scene(name) for name in scenes.CANONICAL}, "balls": BALLS, "many": MANY}
 
 
 # ---- right kernels -----------------------------------------------------------------------------------------

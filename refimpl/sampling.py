@@ -138,3 +138,11 @@ def to_world(local: Any, normal: Any) -> Any:
         + vectors.scale(bitangent, local[..., 1])
         + vectors.scale(normal, local[..., 2])
     )
+
+
+def to_local(world: Any, normal: Any) -> Any:
+    """Turn directions world (..., 3) into directions around +z, as [`to_world`] turns them back."""
+    tangent, bitangent = tangent_frame(normal)
+    return vectors.vector(
+        vectors.dot(world, tangent), vectors.dot(world, bitangent), vectors.dot(world, normal)
+    )

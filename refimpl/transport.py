@@ -6,15 +6,16 @@ A path starts at the camera [`camera_path`]. At each vertex
    that could have found the same light [`emission_weight`];
 2. [`scatter`] samples a point on a light, and adds its light when nothing is in between [`direct_light`]
    (next-event estimation);
-3. it then samples a cosine-weighted direction and multiplies the throughput beta by the reflectance (f cos /
-   pdf of a Lambertian surface is just that);
+3. it then samples a direction by the surface's material, and multiplies the throughput beta by f cos / pdf
+   (shading.py; for a Lambertian surface that is just the reflectance);
 4. a path ends where nothing was hit, and by Russian roulette if asked for. Drivers end it after `max_depth`
    scatterings, with the emission that the last direction meets.
 
 Both ways to find a light are combined by multiple importance sampling (Veach, "Robust Monte Carlo Methods for
 Light Transport Simulation", 1997, chapter 9) with the balance or the power heuristic; each way alone is an
 unbiased estimator as well, which the tests use. Emission of surfaces that are no lights, and of the
-background, is found by the second way alone and has weight 1.
+background, is found by the second way alone and has weight 1; so has whatever a mirrored or refracted
+direction meets, since no light sample ever takes it.
 
 The functions hold no state, write nothing in place, use no mask as an index, and get their random numbers
 from (seed, pixel, sample), so that lanes are independent: a compiler can trace them as it traces the network.
@@ -29,10 +30,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike
 
-from . import intersection, rng, sampling, vectors
+from . import intersection, rng, sampling, shading, vectors
 from .errors import InputError
 from .intersection import Geometry, Hit, Surface
+from .materials.material import SINGLE_PDF, Site
 from .scene import Scene
+from .shading import Materials
 
 HEURISTICS = {"balance": 1, "power": 2}
 """Exponent of the densities in the multiple importance sampling weight, by the heuristic's name."""
@@ -49,7 +52,7 @@ ROULETTE_LIMIT = 0.95
 LEAST_DENSITY = 1e-15
 """Floor of cosines and densities that divide: its inverse squared is still finite in float32."""
 
-CAMERA_PDF = 1e30
+CAMERA_PDF = SINGLE_PDF
 """Density of a camera ray's direction, in 1/sr: it is no sample, light sampling is no alternative to it, and
 the weight of what it meets is 1."""
 
@@ -109,8 +112,14 @@ class World:
     """All constants of light transport in one float type."""
 
     geometry: Geometry
+    materials: Materials
     lights: Lights | None
     settings: Settings
+
+    @property
+    def samples_lights(self) -> bool:
+        """Whether points on lights are sampled: there are some, and a material that they can light."""
+        return self.lights is not None and self.settings.strategy != "bsdf" and not self.materials.single
 
 
 class Counters(NamedTuple):
@@ -138,7 +147,8 @@ def build(scene: Scene, settings: Settings, dtype: DTypeLike = np.float32) -> Wo
     """Lay out a scene as constants of one float type."""
     geometry = intersection.build(scene, dtype)
     powered = [light for light in scene.lights if light.power * sum(light.color) > 0.0]
-    return World(geometry, _build_lights(scene, dtype) if powered else None, settings)
+    lights = _build_lights(scene, dtype) if powered else None
+    return World(geometry, shading.build(scene, dtype), lights, settings)
 
 
 def _build_lights(scene: Scene, dtype: DTypeLike) -> Lights:
@@ -193,16 +203,21 @@ def scatter(
     block = np.uint32(1) + np.uint32(BLOCKS_PER_BOUNCE) * depth
     u_pick, u_light_0, u_light_1, u_roulette = _uniforms(world, counters, block)
     # Add light that a sampled point of a light sends here.
-    origin = intersection.spawn_origin(surface.point, surface.normal, np.where(alive, hit.t, 0.0))
-    beta, radiance = path.beta * surface.reflectance, path.radiance
-    if world.lights is not None and world.settings.strategy != "bsdf":
-        light = direct_light(world, origin, surface.normal, u_pick, u_light_0, u_light_1)
-        radiance = radiance + beta * vectors.choose(alive, light, 0.0)
-    # Sample the next direction.
-    u_direction_0, u_direction_1, _, _ = _uniforms(world, counters, block + np.uint32(1))
-    local = sampling.sample_cosine_hemisphere(u_direction_0, u_direction_1)
-    direction = sampling.to_world(local, surface.normal)
-    pdf = sampling.cosine_hemisphere_pdf(local[..., 2])
+    t = np.where(alive, hit.t, 0.0)
+    origin = intersection.spawn_origin(surface.point, surface.normal, t)
+    site = shading.site(world.materials, surface, hit, path.direction, path.beta)
+    radiance = path.radiance
+    if world.samples_lights:
+        color, light = direct_light(world, site, hit, origin, u_pick, u_light_0, u_light_1)
+        radiance = radiance + color * vectors.choose(alive, light, 0.0)
+    # Sample the next direction, and leave the surface on its side.
+    u_direction_0, u_direction_1, u_choice, _ = _uniforms(world, counters, block + np.uint32(1))
+    direction, beta, pdf, through = shading.scattered(
+        world.materials, site, hit, u_direction_0, u_direction_1, u_choice
+    )
+    if through is not None:
+        behind = intersection.spawn_origin(surface.point, -surface.normal, t)
+        origin = vectors.choose(through, behind, origin)
     # End paths that carry nothing, and some others by Russian roulette.
     alive = alive & (vectors.largest(beta) > 0.0)
     if world.settings.roulette_depth is not None:
@@ -238,8 +253,10 @@ def emission_weight(world: World, path: Path, hit: Hit, surface: Surface) -> Any
     return np.where(is_light, mis_weight(world.settings, path.pdf, pdf_light), np.ones_like(hit.t))
 
 
-def direct_light(world: World, origin: Any, normal: Any, u_pick: Any, u0: Any, u1: Any) -> Any:
-    """Return the reflected light (..., 3), per unit of reflectance, of one point sampled on the lights."""
+def direct_light(
+    world: World, site: Site, hit: Hit, origin: Any, u_pick: Any, u0: Any, u1: Any
+) -> tuple[Any, Any]:
+    """Return a colour and light (..., 3); their product is what a point sampled on the lights adds."""
     lights = world.lights
     assert lights is not None
     # Pick a light and a point on it, a little off its surface.
@@ -255,16 +272,18 @@ def direct_light(world: World, origin: Any, normal: Any, u_pick: Any, u0: Any, u
     square = np.maximum(vectors.dot(offset, offset), LEAST_SQUARE)
     distance = np.sqrt(square)
     wi = offset / distance[..., np.newaxis]
-    cos_surface = np.maximum(vectors.dot(normal, wi), 0.0)
+    cos_surface = np.maximum(vectors.dot(site.normal, wi), 0.0)
     cos_light = np.maximum(-vectors.dot(light_normal, wi), 0.0)
     # Weight by f cos / pdf and by the heuristic, where both sides face each other and nothing is in between.
     pdf = light_pdf(lights, index, square, cos_light)
-    weight = sampling.INV_PI * cos_surface / pdf
+    color, factor = shading.value(world.materials, site, hit, wi, cos_surface)
+    weight = factor / pdf
     if world.settings.strategy == "mis":
-        weight = weight * mis_weight(world.settings, pdf, sampling.cosine_hemisphere_pdf(cos_surface))
+        other_pdf = shading.pdf(world.materials, site, hit, wi, cos_surface)
+        weight = weight * mis_weight(world.settings, pdf, other_pdf)
     facing = (cos_surface > 0.0) & (cos_light > 0.0)
     visible = facing & ~intersection.occluded(world.geometry, origin, wi, distance)
-    return vectors.scale(radiance, np.where(visible, weight, 0.0))
+    return color, vectors.scale(radiance, np.where(visible, weight, 0.0))
 
 
 def light_pdf(lights: Lights, index: Any, square: Any, cos_light: Any) -> Any:

@@ -13,6 +13,7 @@ from wamnet.compiler.lower_scene import LAYERS, PATH, SURFACE, lower_scene, name
 from wamnet.refimpl import render as R
 from wamnet.refimpl import rng, scenes, transport
 from wamnet.refimpl.camera import camera_basis
+from wamnet.refimpl.materials import Conductor, Dielectric, Lambertian, Mirror
 from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
 from wamnet.refimpl.transport import Settings
 
@@ -35,7 +36,22 @@ EVERYTHING = Scene(
 )
 """One of each kind of primitive and two of most, axis-parallel and turned."""
 
-SCENES = {**{name: scenes.canonical(name) for name in scenes.CANONICAL}, "everything": EVERYTHING}
+MATERIALS = replace(
+    EVERYTHING,
+    room=replace(EVERYTHING.room, materials=(Mirror(), None, Conductor(0.5), None, None, None)),
+    boxes=tuple(
+        replace(b, material=m)
+        for b, m in zip(EVERYTHING.boxes, (Dielectric(1.5), Dielectric(1.3), Conductor(0.1)), strict=True)
+    ),
+    spheres=tuple(replace(ball, material=Dielectric(1.8)) for ball in EVERYTHING.spheres),
+)
+"""Every kind of material, on every kind of surface that takes it, with different numbers."""
+
+SCENES = {
+    **{name: scenes.canonical(name) for name in scenes.CANONICAL},
+    "everything": EVERYTHING,
+    "materials": MATERIALS,
+}
 SETTINGS = [
     Settings(max_depth=3),
     Settings(max_depth=2, roulette_depth=1, heuristic="balance"),
@@ -143,6 +159,34 @@ def test_what_a_scene_lacks_is_in_no_program():
     assert ops(plain["scatter"], "reciprocal") == 0
     assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings(strategy="bsdf")).scatter, "sqrt") == 1
     assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings()).scatter, "sqrt") == 2
+
+
+@pytest.mark.parametrize("material", [Lambertian(), Mirror(), Conductor(0.3)])
+def test_one_material_needs_no_selection(material):
+    """With one kind and one number nothing depends on which surface was hit, but that there is one."""
+    walls = replace(SCENES["furnace"].room, materials=(material,) * 6)
+    scatter = lower_scene(replace(room_with(lights=(LIGHT,)), room=walls), Settings()).scatter
+    index = next(
+        i for i, node in enumerate(scatter.nodes) if node.op == "input" and node["name"] == "surface"
+    )
+    users = [node for node in scatter.nodes if index in node.args]
+    # Two questions: is there a surface to gather light at, is the distance that of a hit? One node, by its
+    # value.
+    assert [user.op for user in users] == ["less"]
+    assert ops(scatter, "take") == 0
+
+
+def test_a_second_material_is_selected_by_surface():
+    walls = SCENES["furnace"].room
+    one, two = (
+        lower_scene(
+            replace(room_with(), room=replace(walls, materials=(material,) * 3 + (None,) * 3)), Settings()
+        )
+        for material in (None, Mirror())
+    )
+    # Three components of the direction, and the density; the throughput is the same.
+    assert ops(two.scatter, "select") - ops(one.scatter, "select") >= 4
+    assert one.scatter == lower_scene(room_with(), Settings()).scatter
 
 
 @pytest.mark.parametrize(

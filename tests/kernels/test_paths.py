@@ -28,6 +28,11 @@ U = 2.0**-24
 
 DEVICES = ("opencl", "opengl-egl")
 
+MATT = [name for name in scenes.CANONICAL if name != "glossy"]
+"""Scenes whose directions do not depend on the direction before: the bounds below hold for them. A mirror
+turns a ray by twice what its normal is off, which for a ball is the hit's error over the radius, at every
+bounce again."""
+
 
 def scene(name):
     """Return a canonical scene; the mini cubes are turned, so that no axes are parallel."""
@@ -70,7 +75,7 @@ def farthest(a, b):
     return np.abs(a - b).max(axis=-1)
 
 
-@pytest.mark.parametrize("name", scenes.CANONICAL)
+@pytest.mark.parametrize("name", MATT)
 def test_paths_are_those_of_the_reference(executor, name):
     """Vertices, directions and throughputs agree within a bound until a decision falls differently.
 
@@ -131,7 +136,8 @@ def test_image_is_the_reference_s(executor, name):
     """Two samples a pixel: at least 99 pixels in 100 have every layer to 1e-5 of the layer's size.
 
     1e-5 is 168 u: a distance with 64 u s of error (above), twice, and rounding of sums. A path that falls on
-    the other side of a decision changes its pixel wholly.
+    the other side of a decision changes its pixel wholly. Curved mirrors and glass multiply errors, by up to
+    2 t / r a bounce, but what they show is smooth but for edges.
     """
     job = R.Job(WIDTH, HEIGHT, 2, SEED, Settings(max_depth=4))
     expected, found = R.render(scene(name), job), render_on(executor, scene(name), job)
@@ -226,7 +232,7 @@ def test_samples_are_numbered_on(executor):
 # ---- as an estimator -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["minicubes", "cornell", "lone_light"])
+@pytest.mark.parametrize("name", ["minicubes", "glossy", "cornell", "lone_light"])
 def test_kernel_estimates_the_reference_s_image(executor_named, name):
     """Other seeds, so other paths: Welch's test on every pixel, and on the whole image as one number."""
     executor = executor_named("opencl")

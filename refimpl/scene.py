@@ -1,7 +1,7 @@
 """Scenes as frozen data, and their JSON form, validated at the border.
 
-A scene has a pinhole camera, a constant background radiance, at most one room, and any number of boxes,
-spheres, quads and area lights. Lengths are in scene units, colours are linear RGB. Coordinates are
+A scene has a pinhole camera, a constant background radiance or a sky, at most one room, and any number of
+boxes, spheres, quads and area lights. Lengths are in scene units, colours are linear RGB. Coordinates are
 right-handed with y up.
 
 1. [`from_json`] reads a text, refuses what breaks a rule with the path of the value
@@ -49,6 +49,9 @@ LARGEST_NUMBER = 1e12
 OMITTED: Mapping[str, bool] = {"omitted at its default": True}
 """Mark of a field that the canonical text leaves out while it has its default: texts and digests of scenes
 that were made before the field existed stay as they are."""
+
+LARGEST_CONCENTRATION = 1e6
+"""Largest concentration of a sun's lobe: it is then 0.05 degrees wide, and float32 still resolves it."""
 
 WALLS = ("low_x", "high_x", "low_y", "high_y", "low_z", "high_z")
 """Order of a room's walls: 2 * axis + (1 at the high end). `low_y` is the floor."""
@@ -129,6 +132,23 @@ class Light:
 
 
 @dataclass(frozen=True)
+class Sky:
+    """Light from infinitely far, in place of a constant background: a gradient and a soft sun.
+
+    zenith, horizon and ground are radiances straight up, level, and straight down; between them radiance is
+    linear in the height of the direction. The sun's lobe around `sun_direction` sends `sun_irradiance` (W /
+    m^2 per channel) onto a surface that faces it; `sun_concentration` k makes it narrow: half of its light
+    comes from within 1 - cos = 1 / (1 + k)."""
+
+    zenith: Vector
+    horizon: Vector
+    ground: Vector
+    sun_direction: Vector = (0.0, 1.0, 0.0)
+    sun_irradiance: Vector = BLACK
+    sun_concentration: float = 1000.0
+
+
+@dataclass(frozen=True)
 class Scene:
     """Everything that a picture depends on except its size, samples and seed."""
 
@@ -140,6 +160,7 @@ class Scene:
     quads: tuple[Quad, ...] = ()
     lights: tuple[Light, ...] = ()
     background: Vector = BLACK
+    environment: Sky | None = field(default=None, metadata=OMITTED)
     info: dict[str, str] = field(default_factory=dict, compare=False)
 
 
@@ -304,6 +325,8 @@ def validate(scene: Scene) -> Scene:
     _check(
         scene.background, "scene.background", _not_negative, "radiance must not be negative", "use 0 or more"
     )
+    if scene.environment is not None:
+        _check_sky(scene.environment, scene.background)
     for path, part in _parts(scene):
         _check_finite(part, path)
         if not isinstance(part, Light):
@@ -358,6 +381,25 @@ def _check_camera(camera: Camera) -> None:
         )
     if not _spans_area(forward, camera.up):
         raise InputError(f"{path}.up", camera.up, "it must not be parallel to the view", "choose another up")
+
+
+def _check_sky(sky: Sky, background: Vector) -> None:
+    path = "scene.environment"
+    _check_finite(sky, path)
+    for name in ("zenith", "horizon", "ground", "sun_irradiance"):
+        _check(
+            getattr(sky, name), f"{path}.{name}", _not_negative, "light must not be negative", "use 0 or more"
+        )
+    if _length(sky.sun_direction) == 0.0:
+        raise InputError(
+            f"{path}.sun_direction", sky.sun_direction, "it must not be zero", "straight up is 0, 1, 0"
+        )
+    if not 0.0 <= sky.sun_concentration <= LARGEST_CONCENTRATION:
+        rule = f"it must lie in [0, {LARGEST_CONCENTRATION:g}]"
+        raise InputError(f"{path}.sun_concentration", sky.sun_concentration, rule, "1000 is a sun in haze")
+    if max(background) > 0.0:
+        rule = "an environment takes the background's place"
+        raise InputError("scene.background", background, rule, "make it 0, or remove the environment")
 
 
 def _check_room(room: Room, path: str) -> None:

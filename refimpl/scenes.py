@@ -16,7 +16,7 @@ from typing import Any
 
 from .errors import InputError
 from .materials import Conductor, Dielectric, Mirror
-from .scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sphere, Vector, validate
+from .scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sky, Sphere, Vector, validate
 
 TURN_SECONDS = 8.0
 """Time in which the mini cubes turn once, in seconds: slow enough to follow, fast enough for a loop."""
@@ -124,6 +124,35 @@ def glossy(time: float = 0.0, roughness: float = 0.22, ior: float = 1.5) -> Scen
     )
 
 
+def daylight(time: float = 0.0, haze: float = 400.0) -> Scene:
+    """Return a gold ball, a glass ball and a matt block on a plain, under a sky whose sun goes round.
+
+    haze is the concentration of the sun's lobe: the lower, the softer its shadows.
+    """
+    angle = 2.0 * math.pi * time / TURN_SECONDS
+    sky = Sky(
+        (0.16, 0.30, 0.62),
+        (0.62, 0.70, 0.80),
+        (0.18, 0.16, 0.14),
+        (math.cos(angle + 0.9), 0.75, math.sin(angle + 0.9)),
+        (2.6, 2.2, 1.6),
+        haze,
+    )
+    plain = Quad((-40.0, 0.0, -40.0), (0.0, 0.0, 80.0), (80.0, 0.0, 0.0), (0.52, 0.48, 0.42))
+    block = Box((0.1, 0.46, -1.1), (0.45, 0.45, 0.45), (0.24, 0.42, 0.62), _about_y(math.radians(25.0)))
+    gold = Sphere((-0.85, 0.61, 0.1), 0.6, (1.0, 0.78, 0.34), material=Conductor(0.18))
+    glass = Sphere((0.75, 0.56, 0.35), 0.55, (0.98, 0.98, 0.98), material=Dielectric())
+    return Scene(
+        "daylight",
+        Camera((0.0, 1.5, 4.6), (0.0, 0.45, 0.0), vertical_fov_deg=36.0),
+        boxes=(block,),
+        spheres=(gold, glass),
+        quads=(plain,),
+        environment=sky,
+        info={"time": repr(time)},
+    )
+
+
 def cornell(time: float = 0.0) -> Scene:
     """Return a box with a red and a green wall, two turned blocks and one light; time changes nothing."""
     white, red, green = (0.73, 0.73, 0.73), (0.65, 0.06, 0.05), (0.12, 0.45, 0.15)
@@ -176,6 +205,7 @@ def empty(time: float = 0.0, background: float = 0.25) -> Scene:
 CANONICAL: dict[str, Callable[..., Scene]] = {
     "minicubes": minicubes,
     "glossy": glossy,
+    "daylight": daylight,
     "cornell": cornell,
     "furnace": furnace,
     "lone_light": lone_light,

@@ -4,18 +4,18 @@ A path starts at the camera [`camera_path`]. At each vertex
 
 1. [`arrive`] finds the next surface [`closest_hit`] and adds what it emits, weighted against the light sample
    that could have found the same light [`emission_weight`];
-2. [`scatter`] samples a point on a light, and adds its light when nothing is in between [`direct_light`]
-   (next-event estimation);
+2. [`scatter`] samples a point on a light or a direction to the sky, and adds its light when nothing is in
+   between [`direct_light`] (next-event estimation);
 3. it then samples a direction by the surface's material, and multiplies the throughput beta by f cos / pdf
    (shading.py; for a Lambertian surface that is just the reflectance);
 4. a path ends where nothing was hit, and by Russian roulette if asked for. Drivers end it after `max_depth`
    scatterings, with the emission that the last direction meets.
 
-Both ways to find a light are combined by multiple importance sampling (Veach, "Robust Monte Carlo Methods for
-Light Transport Simulation", 1997, chapter 9) with the balance or the power heuristic; each way alone is an
-unbiased estimator as well, which the tests use. Emission of surfaces that are no lights, and of the
-background, is found by the second way alone and has weight 1; so has whatever a mirrored or refracted
-direction meets, since no light sample ever takes it.
+Both ways to find a light are combined by multiple importance sampling (Veach, "Robust Monte Carlo Methods
+for Light Transport Simulation", 1997, chapter 9) with the balance or the power heuristic; each way alone is
+an unbiased estimator as well, which the tests use. Emission of surfaces that are no lights, and of a
+constant background, is found by the second way alone and has weight 1; so has whatever a mirrored or
+refracted direction meets, since no light sample ever takes it.
 
 The functions hold no state, write nothing in place, use no mask as an index, and get their random numbers
 from (seed, pixel, sample), so that lanes are independent: a compiler can trace them as it traces the network.
@@ -30,7 +30,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike
 
-from . import intersection, rng, sampling, shading, vectors
+from . import environment, intersection, rng, sampling, shading, vectors
+from .environment import Environment
 from .errors import InputError
 from .intersection import Geometry, Hit, Surface
 from .materials.material import SINGLE_PDF, Site
@@ -51,6 +52,10 @@ ROULETTE_LIMIT = 0.95
 
 LEAST_DENSITY = 1e-15
 """Floor of cosines and densities that divide: its inverse squared is still finite in float32."""
+
+SKY_SHARE = 0.5
+"""Share of the light samples that go to the sky where a scene has lamps too: a lamp's power and a sky's
+radiance cannot be compared without knowing the size of what they light. A half: its halving is exact."""
 
 CAMERA_PDF = SINGLE_PDF
 """Density of a camera ray's direction, in 1/sr: it is no sample, light sampling is no alternative to it, and
@@ -114,12 +119,14 @@ class World:
     geometry: Geometry
     materials: Materials
     lights: Lights | None
+    environment: Environment | None
     settings: Settings
 
     @property
     def samples_lights(self) -> bool:
-        """Whether points on lights are sampled: there are some, and a material that they can light."""
-        return self.lights is not None and self.settings.strategy != "bsdf" and not self.materials.single
+        """Whether lights and the sky are sampled: there is one, and a material that it can light."""
+        has_some = self.lights is not None or self.environment is not None
+        return has_some and self.settings.strategy != "bsdf" and not self.materials.single
 
 
 class Counters(NamedTuple):
@@ -147,12 +154,16 @@ def build(scene: Scene, settings: Settings, dtype: DTypeLike = np.float32) -> Wo
     """Lay out a scene as constants of one float type."""
     geometry = intersection.build(scene, dtype)
     powered = [light for light in scene.lights if light.power * sum(light.color) > 0.0]
-    lights = _build_lights(scene, dtype) if powered else None
-    return World(geometry, shading.build(scene, dtype), lights, settings)
+    sky = None if scene.environment is None else environment.build(scene.environment, dtype)
+    lights = _build_lights(scene, dtype, 1.0 if sky is None else 1.0 - SKY_SHARE) if powered else None
+    return World(geometry, shading.build(scene, dtype), lights, sky, settings)
 
 
-def _build_lights(scene: Scene, dtype: DTypeLike) -> Lights:
-    """Return the tables of the lights; a light is picked in proportion to its power times its mean colour."""
+def _build_lights(scene: Scene, dtype: DTypeLike, share: float) -> Lights:
+    """Return the tables of the lights; a light is picked in proportion to its power times its mean colour.
+
+    share is the probability that any of them is picked, and not the sky.
+    """
     lights = scene.lights
     edge_u, edge_v = (
         np.array([light.edge_u for light in lights]),
@@ -172,7 +183,7 @@ def _build_lights(scene: Scene, dtype: DTypeLike) -> Lights:
         [intersection.light_radiance(light) for light in lights],
         [1.0 / intersection.quad_area_pdf(light) for light in lights],
         cumulative,
-        sampling.discrete_pdf(np.arange(len(lights)), cumulative),
+        share * sampling.discrete_pdf(np.arange(len(lights)), cumulative),
     )
     return Lights(*(np.asarray(table, dtype) for table in tables))
 
@@ -187,6 +198,10 @@ def arrive(world: World, path: Path) -> tuple[Path, Surface, Hit]:
     """Find the next surface of paths and add what it emits; return state, surface and hit."""
     hit = intersection.closest_hit(world.geometry, path.origin, path.direction)
     surface = intersection.surface_at(world.geometry, hit, path.origin, path.direction)
+    if world.environment is not None:
+        missed = hit.surface == world.geometry.nothing
+        sky = environment.radiance(world.environment, path.direction)
+        surface = surface._replace(emission=vectors.choose(missed, sky, surface.emission))
     weight = emission_weight(world, path, hit, surface)
     radiance = path.radiance + path.beta * vectors.scale(surface.emission, weight)
     return path._replace(radiance=radiance), surface, hit
@@ -239,24 +254,88 @@ def _uniforms(world: World, counters: Counters, block: Any) -> rng.Block:
 
 def emission_weight(world: World, path: Path, hit: Hit, surface: Surface) -> Any:
     """Return the weight (...) of emission that a BSDF sample (or the camera) has found."""
-    if world.lights is None or world.settings.strategy == "bsdf":
+    if not world.samples_lights:
         return np.ones_like(hit.t)
-    # Only lights can be found by light sampling.
-    is_light = surface.light >= 0
     if world.settings.strategy == "light":
-        found_twice = is_light & (path.pdf < CAMERA_PDF)
+        found_twice = _sampled(world, hit, surface) & (path.pdf < CAMERA_PDF)
         return np.where(found_twice, np.zeros_like(hit.t), np.ones_like(hit.t))
-    index = np.maximum(surface.light, 0)
-    cos_light = np.abs(vectors.dot(surface.normal, path.direction))
-    distance = np.where(is_light, hit.t, 0.0)  # the square of a miss would overflow
-    pdf_light = light_pdf(world.lights, index, distance * distance, cos_light)
-    return np.where(is_light, mis_weight(world.settings, path.pdf, pdf_light), np.ones_like(hit.t))
+    weight = np.ones_like(hit.t)
+    if world.lights is not None:
+        is_light = surface.light >= 0
+        index = np.maximum(surface.light, 0)
+        cos_light = np.abs(vectors.dot(surface.normal, path.direction))
+        distance = np.where(is_light, hit.t, 0.0)  # the square of a miss would overflow
+        pdf_light = light_pdf(world.lights, index, distance * distance, cos_light)
+        weight = np.where(is_light, mis_weight(world.settings, path.pdf, pdf_light), weight)
+    if world.environment is not None:
+        missed = hit.surface == world.geometry.nothing
+        weight = np.where(
+            missed, mis_weight(world.settings, path.pdf, _sky_pdf(world, path.direction)), weight
+        )
+    return weight
+
+
+def _sampled(world: World, hit: Hit, surface: Surface) -> Any:
+    """Tell (...) whether light samples could have found the same: only lights and the sky can be."""
+    if world.environment is None:
+        return surface.light >= 0
+    return (hit.surface == world.geometry.nothing) | (surface.light >= 0)
 
 
 def direct_light(
     world: World, site: Site, hit: Hit, origin: Any, u_pick: Any, u0: Any, u1: Any
 ) -> tuple[Any, Any]:
-    """Return a colour and light (..., 3); their product is what a point sampled on the lights adds."""
+    """Return a colour and light (..., 3); their product is what a sample of the lights or the sky adds."""
+    wi, cos_surface, cos_light, pdf, radiance, distance = _towards(world, site, origin, u_pick, u0, u1)
+    # Weight by f cos / pdf and by the heuristic, where both sides face each other and nothing is in between.
+    color, factor = shading.value(world.materials, site, hit, wi, cos_surface)
+    weight = factor / pdf
+    if world.settings.strategy == "mis":
+        other_pdf = shading.pdf(world.materials, site, hit, wi, cos_surface)
+        weight = weight * mis_weight(world.settings, pdf, other_pdf)
+    facing = (cos_surface > 0.0) & (cos_light > 0.0)
+    visible = facing & ~intersection.occluded(world.geometry, origin, wi, distance)
+    return color, vectors.scale(radiance, np.where(visible, weight, 0.0))
+
+
+class Towards(NamedTuple):
+    """A sampled way to light: unit wi (..., 3), cosines (...) at both ends, and more.
+
+    pdf (...) of wi in 1/sr, the radiance (..., 3) that comes from there, and the distance (...).
+    """
+
+    wi: Any
+    cos_surface: Any
+    cos_light: Any
+    pdf: Any
+    radiance: Any
+    distance: Any
+
+
+def _towards(world: World, site: Site, origin: Any, u_pick: Any, u0: Any, u1: Any) -> Towards:
+    """Sample a light or the sky, whichever there is; of both, one by the choice's first bit."""
+    if world.environment is None:
+        return _towards_light(world, site, origin, u_pick, u0, u1)
+    if world.lights is None:
+        return _towards_sky(world, site, u_pick, u0, u1)
+    is_sky = u_pick < SKY_SHARE
+    rest = np.where(is_sky, u_pick / SKY_SHARE, (u_pick - SKY_SHARE) / (1.0 - SKY_SHARE))
+    sky, light = (
+        _towards_sky(world, site, rest, u0, u1),
+        _towards_light(world, site, origin, rest, u0, u1),
+    )
+    return Towards(
+        vectors.choose(is_sky, sky.wi, light.wi),
+        np.where(is_sky, sky.cos_surface, light.cos_surface),
+        np.where(is_sky, sky.cos_light, light.cos_light),
+        np.where(is_sky, sky.pdf, light.pdf),
+        vectors.choose(is_sky, sky.radiance, light.radiance),
+        np.where(is_sky, sky.distance, light.distance),
+    )
+
+
+def _towards_light(world: World, site: Site, origin: Any, u_pick: Any, u0: Any, u1: Any) -> Towards:
+    """Sample a point on a light."""
     lights = world.lights
     assert lights is not None
     # Pick a light and a point on it, a little off its surface.
@@ -274,16 +353,27 @@ def direct_light(
     wi = offset / distance[..., np.newaxis]
     cos_surface = np.maximum(vectors.dot(site.normal, wi), 0.0)
     cos_light = np.maximum(-vectors.dot(light_normal, wi), 0.0)
-    # Weight by f cos / pdf and by the heuristic, where both sides face each other and nothing is in between.
-    pdf = light_pdf(lights, index, square, cos_light)
-    color, factor = shading.value(world.materials, site, hit, wi, cos_surface)
-    weight = factor / pdf
-    if world.settings.strategy == "mis":
-        other_pdf = shading.pdf(world.materials, site, hit, wi, cos_surface)
-        weight = weight * mis_weight(world.settings, pdf, other_pdf)
-    facing = (cos_surface > 0.0) & (cos_light > 0.0)
-    visible = facing & ~intersection.occluded(world.geometry, origin, wi, distance)
-    return color, vectors.scale(radiance, np.where(visible, weight, 0.0))
+    return Towards(
+        wi, cos_surface, cos_light, light_pdf(lights, index, square, cos_light), radiance, distance
+    )
+
+
+def _towards_sky(world: World, site: Site, u_choice: Any, u0: Any, u1: Any) -> Towards:
+    """Sample a direction to the sky; what shines from everywhere faces everything."""
+    sky = world.environment
+    assert sky is not None
+    wi = environment.sample(sky, u_choice, u0, u1)
+    cos_surface = np.maximum(vectors.dot(site.normal, wi), 0.0)
+    far = np.full_like(cos_surface, intersection.MISS)
+    radiance = environment.radiance(sky, wi)
+    return Towards(wi, cos_surface, np.ones_like(cos_surface), _sky_pdf(world, wi), radiance, far)
+
+
+def _sky_pdf(world: World, direction: Any) -> Any:
+    """Return the density (...), in 1/sr, with which light sampling finds a direction (..., 3) to the sky."""
+    assert world.environment is not None
+    pdf = environment.pdf(world.environment, direction)
+    return pdf if world.lights is None else SKY_SHARE * pdf
 
 
 def light_pdf(lights: Lights, index: Any, square: Any, cos_light: Any) -> Any:

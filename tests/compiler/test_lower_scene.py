@@ -47,10 +47,16 @@ MATERIALS = replace(
 )
 """Every kind of material, on every kind of surface that takes it, with different numbers."""
 
+DAY = replace(
+    EVERYTHING, room=None, background=(0.0, 0.0, 0.0), environment=scenes.canonical("daylight").environment
+)
+"""Lamps under a sky."""
+
 SCENES = {
     **{name: scenes.canonical(name) for name in scenes.CANONICAL},
     "everything": EVERYTHING,
     "materials": MATERIALS,
+    "day": DAY,
 }
 SETTINGS = [
     Settings(max_depth=3),
@@ -159,6 +165,15 @@ def test_what_a_scene_lacks_is_in_no_program():
     assert ops(plain["scatter"], "reciprocal") == 0
     assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings(strategy="bsdf")).scatter, "sqrt") == 1
     assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings()).scatter, "sqrt") == 2
+
+
+def test_a_sky_is_sampled_where_there_is_one():
+    """Numbers: two for the direction, two and a choice for the sky."""
+    scene = replace(SCENES["daylight"], spheres=(), environment=SCENES["daylight"].environment)
+    assert ops(lower_scene(scene, Settings()).scatter, "convert") == 5
+    assert ops(lower_scene(scene, Settings(strategy="bsdf")).scatter, "convert") == 2
+    single = replace(scene, boxes=(), quads=(), spheres=SCENES["daylight"].spheres[1:])
+    assert ops(lower_scene(single, Settings()).scatter, "convert") == 1
 
 
 @pytest.mark.parametrize("material", [Lambertian(), Mirror(), Conductor(0.3)])

@@ -28,7 +28,7 @@ U = 2.0**-24
 
 DEVICES = ("opencl", "opengl-egl")
 
-MATT = [name for name in scenes.CANONICAL if name != "glossy"]
+MATT = [name for name in scenes.CANONICAL if name not in ("glossy", "daylight")]
 """Scenes whose directions do not depend on the direction before: the bounds below hold for them. A mirror
 turns a ray by twice what its normal is off, which for a ball is the hit's error over the radius, at every
 bounce again."""
@@ -232,7 +232,7 @@ def test_samples_are_numbered_on(executor):
 # ---- as an estimator -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["minicubes", "glossy", "cornell", "lone_light"])
+@pytest.mark.parametrize("name", ["minicubes", "glossy", "daylight", "cornell", "lone_light"])
 def test_kernel_estimates_the_reference_s_image(executor_named, name):
     """Other seeds, so other paths: Welch's test on every pixel, and on the whole image as one number."""
     executor = executor_named("opencl")

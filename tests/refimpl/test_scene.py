@@ -37,10 +37,13 @@ MATERIALS = replace(
     spheres=(replace(EVERYTHING.spheres[0], material=Conductor()),),
     quads=(replace(EVERYTHING.quads[0], material=Mirror()),),
 )
+DAY = replace(EVERYTHING, background=S.BLACK, environment=S.Sky(GREY, GREY, GREY))
 
 
 @pytest.mark.parametrize(
-    "scene", [EVERYTHING, MATERIALS, *(make() for make in scenes.CANONICAL.values())], ids=lambda s: s.name
+    "scene",
+    [EVERYTHING, MATERIALS, DAY, *(make() for make in scenes.CANONICAL.values())],
+    ids=lambda s: s.name,
 )
 def test_json_round_trip(scene):
     again = S.from_json(S.to_json(scene))
@@ -52,6 +55,7 @@ def test_json_round_trip(scene):
 def test_materials_are_in_the_text_only_where_there_are_some():
     """Texts and digests of scenes without materials are those of the time before there were any."""
     assert "material" not in S.to_json(EVERYTHING)
+    assert "environment" not in S.to_json(EVERYTHING)
     assert S.scene_digest(EVERYTHING) == DIGEST
     text = json.loads(S.to_json(MATERIALS))
     assert text["boxes"][0]["material"] == {"kind": "dielectric", "ior": 1.33}
@@ -182,6 +186,43 @@ REFUSALS = [
 def test_refuses(path, value, message):
     with pytest.raises(InputError, match=message):
         S.from_json(changed(path, value))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"zenith": (0.0, -1.0, 0.0)},
+            r"environment.zenith is .*: light must not be negative; use 0 or more",
+        ),
+        (
+            {"sun_irradiance": (0.0, -1.0, 0.0)},
+            r"environment.sun_irradiance is .*: light must not be negative",
+        ),
+        (
+            {"sun_direction": (0.0, 0.0, 0.0)},
+            r"environment.sun_direction is .*: it must not be zero; straight up",
+        ),
+        (
+            {"sun_concentration": -1.0},
+            r"environment.sun_concentration is -1.0: it must lie in \[0, 1e\+06\]; 1000 is",
+        ),
+        (
+            {"sun_concentration": float("nan")},
+            r"environment.sun_concentration is nan: all numbers must be finite",
+        ),
+    ],
+)
+def test_refuses_a_sky(change, message):
+    with pytest.raises(InputError, match=message):
+        S.validate(replace(DAY, environment=replace(DAY.environment, **change)))
+
+
+def test_refuses_a_sky_before_a_background():
+    with pytest.raises(
+        InputError, match=r"scene.background is .*: an environment takes the background's place; m"
+    ):
+        S.validate(replace(DAY, background=GREY))
 
 
 @pytest.mark.parametrize("text", ["", "{", "[1]", '"x"', "NaN", "[" * 100_000])

@@ -291,7 +291,7 @@ def _no_rule(context: Context, operands: list[Enclosure]) -> Enclosure:
 
 NO_BOUND = (
     *("cos", "less", "less_equal", "greater", "greater_equal", "equal", "not_equal"),
-    *("logical_and", "logical_or", "logical_not", "bitwise_xor", "right_shift"),
+    *("logical_and", "logical_or", "logical_not", "bitwise_and", "bitwise_xor", "right_shift"),
     *("select", "convert", "take"),
 )
 """Operations without a rule: a program whose output depends on one has no bound, and says so."""

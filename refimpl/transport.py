@@ -24,13 +24,14 @@ Drivers loop.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike
 
-from . import environment, intersection, rng, sampling, shading, vectors
+from . import environment, intersection, rng, sampling, shading, sobol, vectors
 from .environment import Environment
 from .errors import InputError
 from .intersection import Geometry, Hit, Surface
@@ -43,6 +44,10 @@ HEURISTICS = {"balance": 1, "power": 2}
 
 STRATEGIES = ("mis", "light", "bsdf")
 """Ways to find a light: both combined, light samples alone, directions of the BSDF alone."""
+
+SAMPLERS: Mapping[str, Callable[..., rng.Block]] = {"pcg4d": rng.uniforms, "sobol": sobol.uniforms}
+"""Sources of random numbers by name: four uniform floats of (seed, pixel, sample, block). The first is the
+default: its samples are independent."""
 
 BLOCKS_PER_BOUNCE = 2
 """Blocks of four random numbers that a scattering uses; block 0 belongs to the camera."""
@@ -76,6 +81,7 @@ class Settings:
     roulette_depth: int | None = None
     strategy: str = "mis"
     heuristic: str = "power"
+    sampler: str = "pcg4d"
 
     def __post_init__(self) -> None:
         """Refuse settings outside their rules."""
@@ -93,6 +99,13 @@ class Settings:
             raise InputError(
                 "heuristic", self.heuristic, "it is unknown", f"known are {', '.join(HEURISTICS)}"
             )
+        if self.sampler not in SAMPLERS:
+            raise InputError("sampler", self.sampler, "it is unknown", f"known are {', '.join(SAMPLERS)}")
+
+    def facts(self) -> dict[str, Any]:
+        """Return the settings by name, without the sampler where it is the default."""
+        facts = asdict(self)
+        return {key: facts[key] for key in facts if key != "sampler" or facts[key] != next(iter(SAMPLERS))}
 
 
 @dataclass(frozen=True)
@@ -249,7 +262,8 @@ def _roulette(first: int, beta: Any, alive: Any, u: Any, depth: Any) -> tuple[An
 
 def _uniforms(world: World, counters: Counters, block: Any) -> rng.Block:
     """Return four uniform numbers (...) of the given block in the world's float type."""
-    return rng.uniforms(counters.seed, counters.pixel, counters.sample, block, world.geometry.dtype)
+    draw = SAMPLERS[world.settings.sampler]
+    return draw(counters.seed, counters.pixel, counters.sample, block, world.geometry.dtype)
 
 
 def emission_weight(world: World, path: Path, hit: Hit, surface: Surface) -> Any:

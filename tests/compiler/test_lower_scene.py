@@ -62,6 +62,7 @@ SETTINGS = [
     Settings(max_depth=3),
     Settings(max_depth=2, roulette_depth=1, heuristic="balance"),
     Settings(max_depth=2, strategy="light"),
+    Settings(max_depth=1, sampler="sobol"),
     Settings(max_depth=2, strategy="bsdf"),
 ]
 
@@ -76,7 +77,7 @@ def components(values, *tuples):
     }
 
 
-@pytest.mark.parametrize("settings", SETTINGS, ids=lambda s: f"{s.strategy}-{s.roulette_depth}")
+@pytest.mark.parametrize("settings", SETTINGS, ids=lambda s: f"{s.strategy}-{s.roulette_depth}-{s.sampler}")
 @pytest.mark.parametrize("name", SCENES)
 def test_programs_give_the_reference_s_bits(name, settings):
     """All programs at each depth, on the reference's own states, in float32, the same sine in both."""
@@ -86,7 +87,9 @@ def test_programs_give_the_reference_s_bits(name, settings):
     y, x = np.divmod(np.arange(16 * 12), 16)
     counters = transport.Counters(rng.counter(7), R.pixel_counter(x, y), rng.counter(3))
     basis = camera_basis(scene.camera, np.float32)
-    path = R.start(basis, *(a.astype(np.float32) for a in (x, y)), 16, 12, counters, np.float32)
+    path = R.start(
+        basis, *(a.astype(np.float32) for a in (x, y)), 16, 12, counters, np.float32, settings.sampler
+    )
     given = {"x": x.astype(np.uint32), "y": y.astype(np.uint32), "width": 16, "height": 12}
     given |= {"seed": counters.seed, "sample_number": counters.sample}
     check(interpret(programs.start, given), {**components(PATH, path), "pixel": counters.pixel})

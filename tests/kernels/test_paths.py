@@ -158,6 +158,7 @@ def test_image_is_the_reference_s(executor, name):
         Settings(max_depth=0),
         Settings(max_depth=3, roulette_depth=1),
         Settings(max_depth=2, strategy="light"),
+        Settings(max_depth=2, sampler="sobol"),
         Settings(max_depth=2, strategy="bsdf", heuristic="balance"),
     ],
 )

@@ -49,6 +49,7 @@ class Dialect:
         "negative": "-{0}",
         "floor": "floor({0})",
         "sqrt": "sqrt({0})",
+        "power": "pow({0}, {1})",
         "sin": "sin({0})",
         "cos": "cos({0})",
         "reciprocal": "1.0f / {0}",

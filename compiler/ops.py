@@ -15,7 +15,7 @@ import numpy as np
 
 from .ir import DTYPES, Attribute, Parameters, Type
 
-Rounding = Literal["exact", "nearest", "divide", "sqrt", "sine", "cosine", "dot"]
+Rounding = Literal["exact", "nearest", "divide", "sqrt", "power", "sine", "cosine", "dot"]
 """How a target computes it: exactly, correctly rounded, or with its class's error (profiles.py)."""
 
 TypeRule = Callable[[Sequence[Type], Mapping[str, Attribute], Parameters], Type]
@@ -234,6 +234,7 @@ OPS: Mapping[str, Op] = {
         _row("maximum", np.maximum, 2, kinds=NUMBERS),
         _row("floor", np.floor, 1),
         _row("sqrt", np.sqrt, 1, "sqrt"),
+        _row("power", np.power, 2, "power"),
         _row("sin", np.sin, 1, "sine"),
         _row("cos", np.cos, 1, "cosine"),
         _compare("less", np.less),

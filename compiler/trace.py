@@ -37,6 +37,7 @@ TRACEABLE = (
     *(f"np.{name}" for name in dict.fromkeys(_UFUNCS.values())),
     *("np.matmul", "np.clip", "np.where", "np.stack", "np.moveaxis(np.stack(...), 0, -1)", "np.take"),
     *("np.full_like", "np.zeros_like", "np.ones_like", "x ** 1", "x ** 2", "x.astype", "x[..., i]"),
+    "x ** y with a positive constant y (x >= 0)",
 )
 """The closed list, as error messages and the spec show it."""
 
@@ -267,9 +268,11 @@ def _where(builder: Builder, condition: Any, a: Any, b: Any) -> Traced:
 
 
 def _power(builder: Builder, x: Any, exponent: Any) -> Traced:
-    """Turn x ** 1 and x ** 2 into what NumPy computes for them."""
+    """Turn x ** 1 and x ** 2 into what NumPy computes for them; another power must be a positive float."""
+    if isinstance(x, Traced) and isinstance(exponent, float) and exponent > 0.0:
+        return emit(builder, "power", x, exponent)
     if not isinstance(x, Traced) or not isinstance(exponent, int) or exponent not in (1, 2):
-        _refuse("a power other than x ** 1 and x ** 2")
+        _refuse("a power other than x ** 1, x ** 2 and x ** y with a positive float y")
     return x if exponent == 1 else emit(builder, "multiply", x, x)
 
 

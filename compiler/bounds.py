@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .ir import Gather, Node, Program
-from .ops import OPS
+from .ops import LOOPS, OPS
 from .profiles import (
     EXP2_ULPS,
     FLUSH,
@@ -409,7 +409,7 @@ RULES: Mapping[str, Rule] = {
     "greater": _greater,
     "greater_equal": _greater_equal,
     "select": _select,
-    **dict.fromkeys(NO_BOUND, _no_rule),
+    **dict.fromkeys((*NO_BOUND, *LOOPS), _no_rule),
 }
 """One rule an operation; inputs are given."""
 

@@ -67,6 +67,7 @@ class Dialect:
         "right_shift": "{0} >> {1}",
         "select": "{0} ? {1} : {2}",
         "take": "{table}[{0}]",
+        "row": "{table}[{0}]",
     }
 
     def variable(self, dtype: str) -> str:

@@ -85,6 +85,7 @@ class OpenCLVectorPath(OpenCLPath):
         self.sum_store = f"vstore{lanes}({{value}}, 0, sums + {{plane}} * plane + at);"
         entries = ", ".join(f"({{table}})[({{0}}).s{lane:x}]" for lane in range(lanes))
         self.operations = {**OpenCLPath.operations, "take": f"({{type}})({entries})"}
+        self.operations["row"] = "({type})({table}[{0}])"
 
     def number(self, value: Any, dtype: str) -> str:
         """Return the text of a number in all lanes."""

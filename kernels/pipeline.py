@@ -24,7 +24,7 @@ from ..compiler.encode_kernel import compile_encode
 from ..compiler.lower import lower
 from ..compiler.lower_encode import layers_of
 from ..compiler.lower_scene import lower_scene
-from ..compiler.path_kernel import PathArtifact, compile_path
+from ..compiler.path_kernel import PathArtifact, compile_path, most_unrolled
 from ..refimpl.dataset import check_features
 from ..refimpl.denoise import Model, check_model
 from ..refimpl.errors import InputError
@@ -79,7 +79,8 @@ class Pipeline:
         if self._whole:
             kernel = compile_scene(executor, scene, Job(1, 1, settings=self._settings), profile)
         else:
-            programs, groups = lower_scene(scene, self._settings), layers_of(self._features)
+            programs = lower_scene(scene, self._settings, most_unrolled(executor.name))
+            groups = layers_of(self._features)
             kernel = compile_path(programs, executor.name, profile, executor.lanes, groups)
         executor.build_path(kernel)
         return kernel

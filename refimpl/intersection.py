@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from . import vectors
+from .materials import Material
 from .scene import BLACK, IDENTITY, WALLS, Box, Light, Quad, Scene, Sphere, Vector
 
 MISS = 1e30
@@ -122,7 +123,7 @@ class Surface(NamedTuple):
 def build(scene: Scene, dtype: DTypeLike = np.float32) -> Geometry:
     """Return the scene's geometry as constants; computed in float64 and then rounded to dtype."""
     walls = len(WALLS) if scene.room is not None else 0
-    boxes = sorted(scene.boxes, key=lambda box: _rotations(scene).index(box.rotation))
+    boxes = _grouped(scene)
     sphere_id = walls + len(boxes)
     quad_id = sphere_id + len(scene.spheres)
     quads: tuple[Quad | Light, ...] = scene.quads + scene.lights
@@ -155,6 +156,11 @@ def build(scene: Scene, dtype: DTypeLike = np.float32) -> Geometry:
 def _rotations(scene: Scene) -> list[Any]:
     """Return the different rotations of the scene's boxes, in order of first use."""
     return list(dict.fromkeys(box.rotation for box in scene.boxes))
+
+
+def _grouped(scene: Scene) -> list[Box]:
+    """Return the boxes in the order of their ids: by rotation."""
+    return sorted(scene.boxes, key=lambda box: _rotations(scene).index(box.rotation))
 
 
 def _box_groups(scene: Scene, first_id: int, constant: Any) -> tuple[BoxGroup, ...]:
@@ -213,6 +219,19 @@ def _material_rows(scene: Scene, boxes: list[Box]) -> list[tuple[Vector, Vector]
     rows += [(part.reflectance, part.emission) for part in parts]
     rows += [(BLACK, light_radiance(light)) for light in scene.lights]
     return [*rows, (BLACK, scene.background)]
+
+
+def materials_by_id(scene: Scene) -> list[tuple[Material | None, Vector]]:
+    """Return (material, centre) of each surface that reflects, in the order of ids.
+
+    The centre of what has no inside is 0.
+    """
+    rows: list[tuple[Material | None, Vector]] = []
+    if scene.room is not None:
+        rows += [(material, BLACK) for material in scene.room.materials or (None,) * len(WALLS)]
+    bodies: tuple[Box | Sphere, ...] = (*_grouped(scene), *scene.spheres)
+    rows += [(body.material, body.center) for body in bodies]
+    return [*rows, *((quad.material, BLACK) for quad in scene.quads)]
 
 
 def light_radiance(light: Light) -> Vector:

@@ -47,14 +47,16 @@ def render_on(
     *,
     on_progress: Callable[[int], None] | None = None,
     profile: str = "ieee",
+    kernel: PathArtifact | None = None,
 ) -> Render:
     """Render a scene on an executor, in float32.
 
-    on_progress is called with the number of samples that were just finished.
+    on_progress is called with the number of samples that were just finished. kernel is one that
+    [`compile_scene`] has made for this scene and these settings; None: it is made here.
     """
     if job.dtype != "float32":
         raise InputError("dtype", job.dtype, "kernels compute in float32", "render with --executor numpy")
-    kernel = compile_scene(executor, scene, job, profile)
+    kernel = kernel or compile_scene(executor, scene, job, profile)
     executor.build_path(kernel)
     totals = Totals(0, np.zeros((len(kernel.planes), job.height, job.width)))
     for parts in sample_ranges(job):
@@ -95,13 +97,14 @@ class Totals:
 
 
 def merge(kernel: PathArtifact, a: Totals, b: Totals) -> Totals:
-    """Return the totals over the samples of both."""
+    """Return the totals over the samples of both; a may have none."""
+    if not a.samples:
+        return b
     planes = a.planes + b.planes
-    if a.samples:
-        for names in zip(GROUPS["color"], GROUPS["deviation"], strict=True):
-            color, deviation = map(kernel.planes.index, names)
-            difference = b.planes[color] / b.samples - a.planes[color] / a.samples
-            planes[deviation] += difference**2 * (a.samples * b.samples / (a.samples + b.samples))
+    for names in zip(GROUPS["color"], GROUPS["deviation"], strict=True):
+        color, deviation = map(kernel.planes.index, names)
+        difference = b.planes[color] / b.samples - a.planes[color] / a.samples
+        planes[deviation] += difference**2 * (a.samples * b.samples / (a.samples + b.samples))
     return Totals(a.samples + b.samples, planes)
 
 

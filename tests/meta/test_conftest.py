@@ -32,7 +32,7 @@ def test_it(executor):
 
 @pytest.fixture
 def run(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch):
-    """Give a function that runs STUB, or the file made since, under the conftest with a given WAMNET_REQUIRE."""
+    """Give a function that runs STUB, or the file made since, under a given WAMNET_REQUIRE."""
     pytester.makeconftest((Path(__file__).parents[1] / "conftest.py").read_text())
     pytester.makepyfile(STUB)
 

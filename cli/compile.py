@@ -1,8 +1,12 @@
-"""`wamnet compile`: from a model to the source of a kernel, its weights and its manifest."""
+"""`wamnet compile`: from a model or a scene to the source of a kernel and its manifest.
+
+A name of a canonical scene, or a file that ends in .json, is a scene; anything else is a model.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,16 +17,22 @@ from . import options
 from .inputs import load_model
 from .options import Target
 from .outputs import check_parent, unwritable
+from .render import load_scene
 from .terminal import say
 
 if TYPE_CHECKING:
-    from ..compiler.artifact import Artifact
+    from ..compiler.artifact import Files
+    from ..compiler.path_kernel import PathArtifact
 
 EXAMPLES = """Examples:
 
 wamnet compile model.safetensors --target glsl -o kernel-glsl
 
-wamnet compile model.safetensors --target opencl --profile native -o kernel-opencl"""
+wamnet compile model.safetensors --target opencl --profile native -o kernel-opencl
+
+wamnet compile minicubes --time 2.5 --target glsl -o scene-glsl
+
+wamnet compile mine.json --target opencl --lanes 16 -o scene-opencl"""
 """Shown below the help of `wamnet compile`."""
 
 EXECUTOR_OF = {Target.opencl: "opencl", Target.glsl: "opengl"}
@@ -30,51 +40,110 @@ EXECUTOR_OF = {Target.opencl: "opencl", Target.glsl: "opengl"}
 
 
 def compile_model(
-    model: options.ModelFile,
+    model: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODEL",
+            help="Trained model (.safetensors), canonical scene or scene file (.json).",
+            show_default=False,
+        ),
+    ],
     target: Annotated[Target, typer.Option(help="Language of the kernel.", show_default=False)],
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="FOLDER", help="Folder for the files.", show_default="TARGET"),
     ] = None,
     profile: options.Profile = "ieee",
+    time: options.Time = None,
+    parameters: options.Parameters = None,
+    max_depth: Annotated[
+        int | None, typer.Option(help="Greatest number of bounces of a scene's paths.", show_default="5")
+    ] = None,
+    lanes: Annotated[
+        int | None,
+        typer.Option(help="Paths that a work item follows: 16 suit CPUs, 1 GPUs.", show_default="1"),
+    ] = None,
 ) -> None:
-    """Compile a model to a kernel: source, weights, and a manifest with its interface and error bound.
+    """Compile a model, or a scene, to a kernel: source, weights, and a manifest with its interface.
 
-    The source is meant to be read and pasted into another program. No device is needed.
+    The source is meant to be read and pasted into another program: a model's denoises, with a bound on its
+    error; a scene's traces paths. No device is needed.
     """
     from ..compiler.compile import compile_program
     from ..compiler.lower import lower
 
-    folder = output or Path(target.value)
-    check_folder(folder, EXECUTOR_OF[target])
-    kernel = compile_program(lower(load_model(model)), EXECUTOR_OF[target], profile)
+    folder, name = output or Path(target.value), EXECUTOR_OF[target]
+    kernel: Files
+    if is_scene(model):
+        check_folder(folder, name, of_scene=True)
+        kernel = _compiled_scene(model, name, profile, time, parameters or [], max_depth, lanes)
+    else:
+        given = {"--time": time, "--set": parameters, "--max-depth": max_depth, "--lanes": lanes}
+        for option, value in given.items():
+            if value is not None:
+                rule = f"{model} is no scene: neither a canonical one nor a .json file"
+                raise InputError(option, value, rule, "leave it out, or name a scene")
+        check_folder(folder, name)
+        kernel = compile_program(lower(load_model(Path(model))), name, profile)
     for path in write_kernel(kernel, folder):
         say(str(path))
 
 
-def check_folder(folder: Path, target: str) -> None:
-    """Refuse a folder where a kernel cannot lie, or that holds files of another program or target."""
-    from ..compiler.artifact import MANIFEST_NAME, SCHEMA
+def is_scene(name: str) -> bool:
+    """Tell whether a name is that of a scene."""
+    from ..refimpl.scenes import CANONICAL
+
+    return name in CANONICAL or Path(name).suffix.lower() == ".json"
+
+
+def _compiled_scene(
+    scene: str,
+    target: str,
+    profile: str,
+    time: float | None,
+    parameters: Sequence[str],
+    max_depth: int | None,
+    lanes: int | None,
+) -> PathArtifact:
+    """Return the kernel that follows a scene's paths."""
+    from ..compiler.lower_scene import lower_scene
+    from ..compiler.path_kernel import compile_path
+    from ..refimpl.transport import Settings
+
+    settings = Settings() if max_depth is None else Settings(max_depth=max_depth)
+    programs = lower_scene(load_scene(scene, time, parameters), settings)
+    return compile_path(programs, target, profile, 1 if lanes is None else lanes)
+
+
+def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:
+    """Refuse a folder where a kernel cannot lie, or that holds files of another program, kind or target."""
+    from ..compiler import artifact, path_kernel
 
     if folder.exists() and not folder.is_dir():
         raise InputError("output folder", str(folder), "it is a file", "choose another name with -o")
     check_parent(folder)
-    path = folder / MANIFEST_NAME
+    path = folder / artifact.MANIFEST_NAME
     if not path.exists():
         return
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         data = None
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        rule = f"its {MANIFEST_NAME} is not one that wamnet wrote"
+    kinds = {artifact.SCHEMA: "a model's kernel", path_kernel.SCHEMA: "a scene's kernel"}
+    schema = data.get("schema") if isinstance(data, dict) else None
+    if schema not in kinds:
+        rule = f"its {artifact.MANIFEST_NAME} is not one that wamnet wrote"
+        raise InputError("output folder", str(folder), rule, "choose another with -o")
+    wanted = path_kernel.SCHEMA if of_scene else artifact.SCHEMA
+    if schema != wanted:
+        rule = f"it holds {kinds[schema]}, and this is {kinds[wanted]}"
         raise InputError("output folder", str(folder), rule, "choose another with -o")
     if data.get("target") != target:
         rule = f"it holds a kernel for {data.get('target')}, and this one is for {target}"
         raise InputError("output folder", str(folder), rule, "choose another with -o")
 
 
-def write_kernel(kernel: Artifact, folder: Path) -> tuple[Path, ...]:
+def write_kernel(kernel: Files, folder: Path) -> tuple[Path, ...]:
     """Write a kernel's files; what the system refuses is told with the folder's name."""
     from ..compiler import artifact
 

@@ -121,12 +121,14 @@ def make(
 def _render(store: dataset_files.Store, workers: int | None, scheduler: str | None) -> None:
     """Do the tasks that are left in the store."""
     from ..kernels.frame_plan import Task, carry_out
+    from ..kernels.render_frame import renderer
     from ..refimpl.frame import Frame
 
     tasks = store.tasks()
     total = sum(task.samples for task in tasks)
     if workers is None:
-        workers = len(os.sched_getaffinity(0)) if total >= LEAST_SAMPLES else 1
+        alone = total < LEAST_SAMPLES or renderer(store.request.executor).shares_work
+        workers = 1 if alone else len(os.sched_getaffinity(0))
     if not tasks:
         return
     with progress("rendering", total) as advance:

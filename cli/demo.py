@@ -1,18 +1,19 @@
-"""`wamnet demo`: the whole way, from a scene to a report, judged on a frame that the network has not seen.
+"""`wamnet demo`: the whole way, from a scene to a report, judged on frames that the network has not seen.
 
-1. Render the scene at the training times, noisy and as reference, and at one more time [`render_frames`].
+1. Make a data set of the scene's animation: noisy frames and references at training times, and at test times
+   between them [`render_frames`].
 2. Train the network on the training frames [`train_network`].
-3. Compile it for every executor, and run each that is there on the frame of the other time [`run_kernels`].
-4. Measure noisy and denoised picture against the reference of that time [`score`].
+3. Compile it for every executor, run each that is there on the first test frame, and the best one on all
+   [`run_kernels`].
+4. Measure noisy and denoised pictures against their references [`score`].
 5. Write pictures and frames [`write_pictures`], then `report.json` and `report.html` [`report.write`].
 
-A run that was interrupted goes on where it was: a frame's file names what it was made from and is used again
-if that is still so; training resumes from its checkpoint, which refuses other frames and other recipes.
+A run that was interrupted goes on where it was: the data set knows what of it is there; training resumes from
+its checkpoint, which refuses other frames and other recipes.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import shlex
@@ -24,14 +25,14 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from ..refimpl.errors import InputError
-from . import machine, train
+from ..refimpl.errors import ExecutorUnavailable, InputError
+from . import dataset, dataset_files, report, train
 from .compare import Score, measure
 from .compile import write_kernel
 from .outputs import unwritable, write_text
 from .packages import need
 from .runs import Run, run_all
-from .terminal import Advance, hint_on_interrupt, progress, say, table
+from .terminal import hint_on_interrupt, progress, say, table
 
 if TYPE_CHECKING:
     from ..refimpl.denoise import Model
@@ -56,8 +57,14 @@ QUICK_FOLDER = "out/demo-quick"
 PLAN_NAME = "plan.json"
 """File in the folder that says which plan its results are of."""
 
+DATA_SET = "frames"
+"""Folder of the data set, in the folder of the results."""
+
 SHOWN_FIRST = ("opencl", "opengl", "numpy")
 """Whose picture the report shows: that of a compiled kernel, if one ran here."""
+
+RENDERS_FIRST = ("opencl", "opengl")
+"""What renders the frames: the first kernel that runs here, else the reference."""
 
 _Result = TypeVar("_Result")
 
@@ -66,43 +73,56 @@ _Result = TypeVar("_Result")
 class Plan:
     """All sizes of a demonstration; the defaults take two to four minutes on two cores.
 
-    Times are those of the scene's animation, in seconds; the network never sees `test_time_s`. `steps` None
-    means the preset's.
+    The frames are those of `wamnet dataset`: test times lie between training times, and the network never
+    sees them. `steps` None means the preset's.
     """
 
     scene: str = "minicubes"
-    size_px: int = 192
-    train_times_s: tuple[float, ...] = tuple(0.5 * k for k in range(16))
-    test_time_s: float = 3.25
-    noisy_spp: int = 1
-    train_reference_spp: int = 24
-    test_reference_spp: int = 256
+    size_px: int = 256
+    train_frames: int = 12
+    test_frames: int = 2
+    reference_spp: int = 1024
     preset: str = "short"
     steps: int | None = None
     seed: int = 1
+    renderer: str = "opencl"
 
 
-QUICK = Plan(size_px=24, train_times_s=(0.0, 1.0), train_reference_spp=4, test_reference_spp=8, steps=60)
+QUICK = Plan(size_px=24, train_frames=2, test_frames=2, reference_spp=8, steps=60)
 """Small enough to test the whole way; its pictures are not meant to be looked at."""
+
+REFERENCE_SPP_OF_NUMPY = 32
+"""Samples of a reference where no kernel runs: NumPy's would take an hour, and are thirty times slower."""
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """A test frame: its time, the noisy frame, its reference, the denoised picture (H, W, 3), the scores.
+
+    `scores` has a tuple for each picture, input and denoised.
+    """
+
+    time_s: float
+    noisy: Frame
+    reference: Frame
+    denoised: Any
+    scores: dict[str, tuple[Score, ...]]
 
 
 @dataclass(frozen=True)
 class Results:
-    """What a demonstration has found; frames and pictures are those of the held-out time.
+    """What a demonstration has found.
 
-    `denoised` (H, W, 3) is the picture of the executor `denoised_by`; `scores` and `seconds` have a name for
-    each picture and each step.
+    The test frames' pictures are those of the executor `denoised_by`; `runs` were made on the first of them.
     """
 
-    noisy: Frame
-    reference: Frame
-    denoised: Any
+    train_times_s: tuple[float, ...]
+    unseen: tuple[Unseen, ...]
     denoised_by: str
     model: Model
     state: TrainState
     seconds_per_step: float | None
     runs: tuple[Run, ...]
-    scores: dict[str, tuple[Score, ...]]
     seconds: dict[str, float]
 
 
@@ -128,17 +148,15 @@ def demo(
         bool, typer.Option("--quick", help="Tiny frames: try whether everything works.")
     ] = False,
 ) -> None:
-    """Render, train, compile, denoise an unseen frame and write a report, in a few minutes.
+    """Render, train, compile, denoise unseen frames and write a report, in a few minutes.
 
     Open FOLDER/report.html afterwards. After Ctrl-C, the same command goes on where it was.
     """
-    from . import report
-
     for module in ("matplotlib", "jinja2"):
         need(module, "to draw the report", "report")
     if quick and size is not None:
         raise InputError("--size", size, "--quick has a size of its own", "leave out one of them")
-    plan = QUICK if quick else Plan(size_px=Plan.size_px if size is None else size)
+    plan = for_this_machine(QUICK if quick else Plan(size_px=Plan.size_px if size is None else size))
     folder = output or Path(QUICK_FOLDER if quick else FOLDER)
     command = f"wamnet demo {'--quick' if quick else f'--size {plan.size_px}'} -o {shlex.quote(str(folder))}"
     begin(plan, folder)
@@ -146,6 +164,22 @@ def demo(
         results = carry_out(plan, folder)
         report.write(folder, plan, results, command)
     _tell(results, folder)
+
+
+def for_this_machine(plan: Plan) -> Plan:
+    """Return the plan with the first kernel that runs here as its renderer, or one that NumPy can do."""
+    from ..kernels import open_executor
+
+    for name in RENDERS_FIRST:
+        try:
+            open_executor(name).close()
+        except ExecutorUnavailable as error:
+            say(f"not rendered with {name}: {error}")
+        else:
+            return replace(plan, renderer=name)
+    spp = min(plan.reference_spp, REFERENCE_SPP_OF_NUMPY)
+    say(f"rendered with NumPy, which is slow: references have {spp} paths per pixel")
+    return replace(plan, renderer="numpy", reference_spp=spp)
 
 
 def begin(plan: Plan, folder: Path) -> None:
@@ -175,12 +209,17 @@ def begin(plan: Plan, folder: Path) -> None:
 def carry_out(plan: Plan, output: Path) -> Results:
     """Do all steps in the folder `output` and return what they have found."""
     seconds: dict[str, float] = {}
-    pairs, (noisy, reference) = _timed(seconds, "rendering", lambda: render_frames(plan, output))
+    _timed(seconds, "rendering", lambda: render_frames(plan, output))
+    times, pairs = zip(*_pairs(output, "train"), strict=True)
     model, state, per_step = _timed(seconds, "training", lambda: train_network(plan, pairs, output))
-    images, runs = _timed(seconds, "kernels", lambda: run_kernels(model, noisy, output))
-    by = next(name for name in SHOWN_FIRST if name in images)
-    scores = score(model, noisy, reference, images[by])
-    results = Results(noisy, reference, images[by], by, model, state, per_step, runs, scores, seconds)
+    tests = _pairs(output, "test")
+    inputs = [noisy for _, (noisy, _) in tests]
+    images, by, runs = _timed(seconds, "kernels", lambda: run_kernels(model, inputs, output))
+    unseen = tuple(
+        Unseen(time, noisy, reference, image, score(model, noisy, reference, image))
+        for (time, (noisy, reference)), image in zip(tests, images, strict=True)
+    )
+    results = Results(times, unseen, by, model, state, per_step, runs, seconds)
     write_pictures(output, results)
     return results
 
@@ -194,45 +233,28 @@ def _timed(seconds: dict[str, float], name: str, step: Callable[[], _Result]) ->
     return result
 
 
-def render_frames(plan: Plan, output: Path) -> tuple[list[Pair], Pair]:
-    """Render the training pairs and the held-out pair (noisy, reference), or take those of an earlier run."""
-    spps = [plan.train_reference_spp] * len(plan.train_times_s) + [plan.test_reference_spp]
-    times = (*plan.train_times_s, plan.test_time_s)
-    folder = output / "frames"
-    folder.mkdir(exist_ok=True)
-    pairs = []
-    with progress("rendering", plan.size_px**2 * (plan.noisy_spp * len(times) + sum(spps))) as advance:
-        for index, (time, spp) in enumerate(zip(times, spps, strict=True)):
-            # Each frame has random numbers of its own, and so have a noisy frame and its reference.
-            seed = plan.seed + 2 * index
-            noisy = _frame(folder / f"{index}-noisy.exr", plan, time, plan.noisy_spp, seed, advance)
-            reference = _frame(folder / f"{index}-reference.exr", plan, time, spp, seed + 1, advance)
-            pairs.append((noisy, reference))
-    return pairs[:-1], pairs[-1]
+def render_frames(plan: Plan, output: Path) -> None:
+    """Render what an earlier run has not: the data set of the plan."""
+    from ..kernels import frame_plan
+
+    request = frame_plan.Request(
+        plan.scene,
+        frames=plan.train_frames,
+        test_frames=plan.test_frames,
+        size_px=plan.size_px,
+        spp=plan.reference_spp,
+        seed=plan.seed,
+        executor=plan.renderer,
+    )
+    dataset.make(output / DATA_SET, request, frame_plan.plan(request), workers=1, scheduler=None)
 
 
-def _frame(path: Path, plan: Plan, time: float, spp: int, seed: int, advance: Advance) -> Frame:
-    """Return the frame in `path` if this version made it from the same scene and job, else render it."""
-    from ..kernels.render_pool import render_parallel
-    from ..refimpl.render import Job
-    from ..refimpl.scene import scene_digest
-    from ..refimpl.scenes import canonical
-    from . import exr
-
-    scene, job = canonical(plan.scene, time=time), Job(plan.size_px, plan.size_px, spp, seed)
-    origin = json.dumps([scene_digest(scene), asdict(job), machine.versions()["wamnet"]])
-    origin = hashlib.sha256(origin.encode()).hexdigest()
-    try:
-        kept = exr.read_frame(path)
-        if kept.info.get("demo_origin") == origin:
-            advance(plan.size_px**2 * spp)
-            return kept
-    except InputError:
-        pass  # There is no such file yet, or it is damaged: render.
-    frame = render_parallel(scene, job, on_progress=advance).frame
-    frame = replace(frame, info={**frame.info, "demo_origin": origin})
-    exr.write_frame(path, frame)
-    return frame
+def _pairs(output: Path, split: str) -> list[tuple[float, Pair]]:
+    """Return time and pair (noisy, reference) of each frame of a split."""
+    folder = output / DATA_SET
+    frames = dataset_files.read_manifest(folder)["frames"]
+    times = [float(frame["time_s"]) for frame in frames if frame["split"] == split]
+    return list(zip(times, dataset_files.read_pairs(folder, split), strict=True))
 
 
 def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Model, TrainState, float | None]:
@@ -243,7 +265,7 @@ def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Mode
     recipe = replace(PRESETS[plan.preset], seed=plan.seed)
     if plan.steps is not None:
         recipe = replace(recipe, steps=plan.steps, log_every=max(1, plan.steps // 20))
-    path, speed = output / "model.safetensors", output / "frames" / "seconds_per_step.txt"
+    path, speed = output / "model.safetensors", output / "seconds_per_step.txt"
     done = 0
     try:
         begin = load_checkpoint(train.checkpoint_path(path))
@@ -266,16 +288,26 @@ def _seconds(path: Path) -> float | None:
     return value if math.isfinite(value) and value > 0.0 else None
 
 
-def run_kernels(model: Model, noisy: Frame, output: Path) -> tuple[dict[str, Any], tuple[Run, ...]]:
-    """Write the kernel of each target, and run each executor on the noisy frame."""
+def run_kernels(
+    model: Model, frames: Sequence[Frame], output: Path
+) -> tuple[list[Any], str, tuple[Run, ...]]:
+    """Write the kernel of each target, run each executor on the first frame, and one of them on all.
+
+    Return the pictures, whose they are, and what was found about each executor.
+    """
     from ..compiler.compile import TARGETS, compile_program
     from ..compiler.lower import lower
+    from ..kernels import denoise_on, open_executor
 
     kernels = {target: compile_program(lower(model), target) for target in TARGETS}
     for target, kernel in kernels.items():
         write_kernel(kernel, output / "kernels" / target)
     with progress("running kernels", len(kernels)) as advance:
-        return run_all(model, noisy, kernels, advance)
+        images, runs = run_all(model, frames[0], kernels, advance)
+    by = next(name for name in SHOWN_FIRST if name in images)
+    with open_executor(by) as executor:
+        others = [denoise_on(executor, model, frame).image for frame in frames[1:]]
+    return [images[by], *others], by, runs
 
 
 def score(model: Model, noisy: Frame, reference: Frame, denoised: Any) -> dict[str, tuple[Score, ...]]:
@@ -297,25 +329,30 @@ def score(model: Model, noisy: Frame, reference: Frame, denoised: Any) -> dict[s
 
 
 def write_pictures(output: Path, results: Results) -> None:
-    """Write the held-out frames as EXR, and noisy, denoised, reference and normal as PNG."""
+    """Write each test frame's pictures as PNG, and the denoised one as EXR too."""
     from ..refimpl.encoding import normal_to_display, to_display
-    from . import exr, images
+    from . import images
     from .denoise import write_denoised
 
     stops = results.model.normalization.exposure_stops
-    for name, frame in (("noisy", results.noisy), ("reference", results.reference)):
-        exr.write_frame(output / f"{name}.exr", frame)
-        images.write_png(output / f"{name}.png", to_display(frame["color"], stops))
-    for suffix in (".exr", ".png"):
-        write_denoised(output / f"denoised{suffix}", results.denoised, results.model, results.noisy)
-    images.write_png(output / "normal.png", normal_to_display(results.noisy["normal"]))
+    folder = output / report.FOLDER
+    folder.mkdir(exist_ok=True)
+    for index, frame in enumerate(results.unseen):
+        for name, picture in (("noisy", frame.noisy), ("reference", frame.reference)):
+            images.write_png(folder / f"{index}-{name}.png", to_display(picture["color"], stops))
+        for suffix in (".exr", ".png"):
+            path = folder / f"{index}-denoised{suffix}"
+            write_denoised(path, frame.denoised, results.model, frame.noisy)
+        images.write_png(folder / f"{index}-normal.png", normal_to_display(frame.noisy["normal"]))
 
 
 def _tell(results: Results, output: Path) -> None:
-    """Print the two tables of the report, and where it is."""
-    before, after = results.scores["input"], results.scores["denoised"]
-    rows = [(a.metric, str(a), str(b)) for a, b in zip(before, after, strict=True)]
-    table("Unseen frame against its reference", ("metric", "input", "denoised"), rows)
+    """Print the tables of the report, and where it is."""
+    for frame in results.unseen:
+        before, after = frame.scores["input"], frame.scores["denoised"]
+        rows = [(a.metric, str(a), str(b)) for a, b in zip(before, after, strict=True)]
+        title = f"Unseen time {frame.time_s:.2f} s"
+        table(title, ("metric", "input", "denoised"), rows)
     table(
         "Executors against the float64 reference",
         ("executor", "time", "error", "bound"),

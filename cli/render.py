@@ -16,7 +16,6 @@ from .outputs import check_output, write_text
 from .terminal import progress, say
 
 if TYPE_CHECKING:
-    from ..refimpl.render import Job, Render
     from ..refimpl.scene import Scene
 
 RENDER_EXAMPLES = """Examples:
@@ -71,6 +70,7 @@ def render(
     The same scene, size, samples and seed give the same frame, whatever the number of workers; kernels
     (OpenCL, OpenGL) give it up to rounding, much sooner.
     """
+    from ..kernels.render_frame import render_frame, renderer
     from ..refimpl.render import Job
     from ..refimpl.transport import Settings
 
@@ -78,26 +78,15 @@ def render(
     path = output or Path(f"{Path(scene).stem}.exr")
     check_output(path, (".exr", ".png"), [Path(scene)])
     job = Job(width, height, spp, seed, Settings(max_depth=max_depth), dtype.value)
+    if workers is not None and renderer(executor.value).shares_work:
+        rule = f"{executor.value} shares the work by itself"
+        raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
     started = clock.perf_counter()
     with progress(f"rendering {scene}", width * height * spp) as advance:
-        frame = _render_on(executor, loaded, job, workers, advance).frame
+        frame = render_frame(executor.value, loaded, job, workers=workers, on_progress=advance).frame
     seconds = clock.perf_counter() - started
     write_picture(path, frame, exposure)
     say(f"{path}: {width}x{height} pixels, {spp} spp, {seconds:.1f} s")
-
-
-def _render_on(executor: Renderer, scene: Scene, job: Job, workers: int | None, advance: Any) -> Render:
-    """Render with the reference on several processes, or with a kernel on a device."""
-    from .. import kernels
-    from ..kernels.render_pool import render_parallel
-
-    if executor is Renderer.numpy:
-        return render_parallel(scene, job, workers=workers, on_progress=advance)
-    if workers is not None:
-        rule = f"{executor.value} shares the work by itself"
-        raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
-    with kernels.open_executor(executor.value) as device:
-        return kernels.render_on(device, scene, job, on_progress=advance)
 
 
 def write_picture(path: Path, frame: Any, exposure: float) -> None:

@@ -20,20 +20,27 @@ from .outputs import write_text
 
 if TYPE_CHECKING:
     from ..refimpl.denoise import Model
-    from .demo import Plan, Results
+    from .demo import Plan, Results, Unseen
 
-SCHEMA = "wamnet-demo-1"
+SCHEMA = "wamnet-demo-2"
 """Name and version of the form of `report.json`."""
 
+FOLDER = "pictures"
+"""Folder of the pictures, in the folder of the results; their names begin with the test frame's number."""
+
 PICTURES = ("noisy", "denoised", "reference", "normal")
-"""Pictures that the report shows, by the names of their files."""
+"""Pictures of a test frame that the report shows, by the ends of their files' names."""
 
 
 def write(output: Path, plan: Plan, results: Results, command: str) -> None:
     """Write `report.json` and `report.html` into the folder that has the pictures."""
     data = facts(plan, results, command)
     write_text(output / "report.json", json.dumps(data, indent=2, allow_nan=False) + "\n")
-    pictures = {name: _embedded((output / f"{name}.png").read_bytes()) for name in PICTURES}
+    folder = output / FOLDER
+    pictures = [
+        {name: _embedded((folder / f"{index}-{name}.png").read_bytes()) for name in PICTURES}
+        for index in range(len(results.unseen))
+    ]
     write_text(output / "report.html", page(data, pictures, draw(results)))
 
 
@@ -44,7 +51,11 @@ def facts(plan: Plan, results: Results, command: str) -> dict[str, Any]:
         "command": command,
         "plan": asdict(plan),
         "model": _model_facts(results.model),
-        "scores": {name: scores_as_data(scores) for name, scores in results.scores.items()},
+        "unseen": [
+            {"time_s": frame.time_s, **{name: scores_as_data(s) for name, s in frame.scores.items()}}
+            for frame in results.unseen
+        ],
+        "train_times_s": results.train_times_s,
         "denoised_by": results.denoised_by,
         "runs": [asdict(run) for run in results.runs],
         "training": {
@@ -70,27 +81,35 @@ def _model_facts(model: Model) -> dict[str, Any]:
     }
 
 
-def draw(results: Results) -> dict[str, dict[str, str]]:
-    """Return each plot as an embedded picture for a light and for a dark page."""
-    from ..refimpl.encoding import to_display
-    from ..refimpl.metrics import error_map
+def draw(results: Results) -> dict[str, Any]:
+    """Return each plot as an embedded picture for a light and for a dark page.
 
-    stops = results.model.normalization.exposure_stops
-    noisy, target = (to_display(frame["color"], stops) for frame in (results.noisy, results.reference))
-    maps = [("input", error_map(noisy, target)), ("denoised", error_map(results.denoised, target))]
-    drawn: dict[str, dict[str, str]] = {"input_error": {}, "denoised_error": {}, "training": {}}
-    for name, theme in (("light", plots.LIGHT), ("dark", plots.DARK)):
-        of_input, of_denoised = plots.error_maps(maps, theme)
-        drawn["input_error"][name], drawn["denoised_error"][name] = (
-            _embedded(of_input),
-            _embedded(of_denoised),
+    `errors` has the maps of each test frame by picture, both on one scale; `training` is the curve.
+    """
+    drawn: dict[str, Any] = {"errors": [], "training": {}}
+    themes = (("light", plots.LIGHT), ("dark", plots.DARK))
+    for frame in results.unseen:
+        maps = _error_maps(frame, results.model.normalization.exposure_stops)
+        by_theme = {name: plots.error_maps(list(maps.items()), theme) for name, theme in themes}
+        drawn["errors"].append(
+            {title: {name: _embedded(by_theme[name][k]) for name in by_theme} for k, title in enumerate(maps)}
         )
+    for name, theme in themes:
         curve = plots.training_curve(results.state.history, results.seconds_per_step, theme)
         drawn["training"][name] = _embedded(curve)
     return drawn
 
 
-def page(data: dict[str, Any], pictures: dict[str, str], drawn: dict[str, dict[str, str]]) -> str:
+def _error_maps(frame: Unseen, stops: float) -> dict[str, Any]:
+    """Return the absolute error (H, W) of the noisy and the denoised picture."""
+    from ..refimpl.encoding import to_display
+    from ..refimpl.metrics import error_map
+
+    noisy, target = (to_display(layers["color"], stops) for layers in (frame.noisy, frame.reference))
+    return {"input": error_map(noisy, target), "denoised": error_map(frame.denoised, target)}
+
+
+def page(data: dict[str, Any], pictures: list[dict[str, str]], drawn: dict[str, Any]) -> str:
     """Return the report as one HTML page."""
     import jinja2
 

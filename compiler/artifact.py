@@ -1,8 +1,9 @@
 """What the compiler hands out: source, weights and a manifest that says how to call it and what it promises.
 
 Everything is a function of program, target and profile, to the byte: no time, no path, no machine.
-[`write`] writes all files of an artifact under names that nobody else has, then gives them their own names
-one by one, the manifest last; it carries the hashes of the others: a mixture with another artifact shows.
+[`write`] writes all files of an artifact (a denoiser's, or a scene's: path_kernel.py) under names that nobody
+else has, then gives them their own names one by one, the manifest last; it carries the hashes of the others:
+a mixture with another artifact shows.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,10 @@ class Artifact:
         """Return the hash that names this artifact: of source and weights."""
         return str(self.manifest["digest"])
 
+    def contents(self) -> Mapping[str, bytes]:
+        """Return the files besides the manifest, by name."""
+        return {self.source_name: self.source.encode(), WEIGHTS_NAME: weight_bytes(self)}
+
 
 WEIGHTS_NAME = "weights.bin"
 """File of the weights: little-endian float32, nothing else."""
@@ -50,28 +55,33 @@ MANIFEST_NAME = "manifest.json"
 """File of the manifest."""
 
 
+class Files(Protocol):
+    """An artifact of any kind: a manifest, and files beside it."""
+
+    manifest: Mapping[str, Any]
+
+    def contents(self) -> Mapping[str, bytes]:
+        """Return the files besides the manifest, by name."""
+
+
 def weight_bytes(artifact: Artifact) -> bytes:
     """Return the weights as they are written."""
     return artifact.weights.astype("<f4").tobytes()
 
 
-def manifest_text(artifact: Artifact) -> str:
+def manifest_text(artifact: Files) -> str:
     """Return the manifest as it is written."""
     return json.dumps(artifact.manifest, indent=2, sort_keys=True, allow_nan=False) + "\n"
 
 
-def write(artifact: Artifact, folder: str | os.PathLike[str]) -> tuple[Path, ...]:
-    """Write source, weights and manifest into `folder`; no file is ever seen half written.
+def write(artifact: Files, folder: str | os.PathLike[str]) -> tuple[Path, ...]:
+    """Write source, weights if there are any, and manifest into `folder`; no file is ever seen half written.
 
     Others may write there at once. What fails before the first file has its name leaves the folder as it was.
     """
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
-    contents = {
-        artifact.source_name: artifact.source.encode(),
-        WEIGHTS_NAME: weight_bytes(artifact),
-        MANIFEST_NAME: manifest_text(artifact).encode(),
-    }
+    contents = {**artifact.contents(), MANIFEST_NAME: manifest_text(artifact).encode()}
     own = secrets.token_hex(8)
     parts = {target / name: target / f".{name}.{own}.part" for name in contents}
     try:

@@ -48,6 +48,10 @@ class PathArtifact:
         """Return the hash that names this artifact: of its source."""
         return str(self.manifest["digest"])
 
+    def contents(self) -> Mapping[str, bytes]:
+        """Return the files besides the manifest, by name."""
+        return {self.source_name: self.source.encode()}
+
 
 def _no_dialect(lanes: int) -> None:
     """The interpreter needs the programs alone."""

@@ -202,13 +202,12 @@ def describe(frame: FramePlan) -> dict[str, Any]:
 
 
 def tasks_of(picture: Picture) -> list[Task]:
-    """Return the tasks of a picture, top to bottom; one for all rows if the executor cannot do bands.
+    """Return the tasks of a picture, top to bottom.
 
     A band has about TASK_SAMPLES samples, but a tile of pixels at least: smaller ones would be slow.
     """
-    job, rows = picture.job, picture.job.height
-    if renderer(picture.request.executor).in_bands:
-        rows = max(TASK_SAMPLES // (job.width * job.spp), TILE_PIXELS // job.width, 1)
+    job = picture.job
+    rows = max(TASK_SAMPLES // (job.width * job.spp), TILE_PIXELS // job.width, 1)
     bands = [(first, min(first + rows, job.height)) for first in range(0, job.height, rows)]
     here = version()
     return [Task(picture, band, here) for band in bands]

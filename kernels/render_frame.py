@@ -1,11 +1,14 @@
 """Frames by the name of what renders them: the one place that knows how each executor traces paths.
 
-1. The registry says how an executor renders, and whether it can render some of the rows alone [`RENDERERS`].
+1. The registry says how an executor renders, and whether it uses all cores by itself [`RENDERERS`].
 2. [`render_frame`] renders all of a frame, or a band of rows of it.
+3. A device stays open in the thread that opened it: opening it and building a kernel take longer than a
+   small picture [`_device`].
 """
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -13,7 +16,10 @@ from typing import Protocol
 from ..refimpl.errors import InputError
 from ..refimpl.render import Job, Render, render
 from ..refimpl.scene import Scene
+from .executor import Executor
 from .memory import keep_freed_memory
+from .registry import open_executor
+from .render_on import render_on
 from .render_pool import render_parallel
 
 Rows = tuple[int, int]
@@ -34,10 +40,10 @@ class RenderRows(Protocol):
 
 @dataclass(frozen=True)
 class Renderer:
-    """How an executor renders; one that is not `in_bands` is always asked for all rows."""
+    """How an executor renders; one that `shares_work` by itself gains nothing from more processes."""
 
     render_rows: RenderRows
-    in_bands: bool
+    shares_work: bool
 
 
 def _reference(
@@ -50,7 +56,34 @@ def _reference(
     return render(scene, job, rows=rows, on_progress=on_progress)
 
 
-RENDERERS: Mapping[str, Renderer] = {"numpy": Renderer(_reference, in_bands=True)}
+_opened = threading.local()
+"""The devices that are open, by name: a thread's own, since a graphics context belongs to one."""
+
+
+def _device(name: str) -> Executor:
+    """Return this thread's device, open."""
+    devices: dict[str, Executor] = _opened.__dict__
+    if name not in devices:
+        devices[name] = open_executor(name)
+    return devices[name]
+
+
+def _by_kernel(name: str) -> RenderRows:
+    """Return how a device renders."""
+
+    def render_rows(
+        scene: Scene, job: Job, rows: Rows, workers: int | None, on_progress: Progress | None
+    ) -> Render:
+        return render_on(_device(name), scene, job, rows=rows, on_progress=on_progress)
+
+    return render_rows
+
+
+RENDERERS: Mapping[str, Renderer] = {
+    "numpy": Renderer(_reference, shares_work=False),
+    "opencl": Renderer(_by_kernel("opencl"), shares_work=True),
+    "opengl": Renderer(_by_kernel("opengl"), shares_work=True),
+}
 """What traces paths, by the executor's name: a new one is a line here."""
 
 
@@ -73,6 +106,7 @@ def render_frame(
 ) -> Render:
     """Render a scene on an executor: all rows, or the band [first, last).
 
-    `workers` is the number of processes that may share the work, None one per processor; it changes no bit.
+    `workers` is the number of processes that may share the work, None one per processor; it changes no bit. A
+    device shares the work by itself, with none.
     """
     return renderer(executor).render_rows(scene, job, rows or (0, job.height), workers, on_progress)

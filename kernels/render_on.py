@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,9 @@ from ..compiler.lower_scene import lower_scene
 from ..compiler.path_kernel import PathArtifact, compile_path
 from ..refimpl.errors import InputError
 from ..refimpl.frame import LAYERS, Frame
-from ..refimpl.render import Job, Render, render_info
+from ..refimpl.render import Job, Render, checked_rows, render_info
 from ..refimpl.scene import Scene
+from ..refimpl.transport import Settings
 from .executor import Executor, Part
 
 SAMPLES_AT_ONCE = 16
@@ -35,9 +37,19 @@ PATHS_AT_ONCE = 1 << 20
 """About how many paths a kernel follows before the host hears of it: a fraction of a second on a CPU."""
 
 
+KEPT_SCENES = 8
+"""Compiled scenes that a process keeps: bands of one picture, and noisy picture and target, share theirs."""
+
+
 def compile_scene(executor: Executor, scene: Scene, job: Job, profile: str = "ieee") -> PathArtifact:
     """Return the kernel that renders a scene on an executor."""
-    return compile_path(lower_scene(scene, job.settings), executor.name, profile, executor.lanes)
+    return _compiled(scene, job.settings, executor.name, profile, executor.lanes)
+
+
+@lru_cache(KEPT_SCENES)
+def _compiled(scene: Scene, settings: Settings, target: str, profile: str, lanes: int) -> PathArtifact:
+    """Return the kernel; it depends on nothing else."""
+    return compile_path(lower_scene(scene, settings), target, profile, lanes)
 
 
 def render_on(
@@ -45,32 +57,35 @@ def render_on(
     scene: Scene,
     job: Job,
     *,
+    rows: tuple[int, int] | None = None,
     on_progress: Callable[[int], None] | None = None,
     profile: str = "ieee",
     kernel: PathArtifact | None = None,
 ) -> Render:
-    """Render a scene on an executor, in float32.
+    """Render the rows [first, last) of a scene on an executor, all by default, in float32.
 
     on_progress is called with the number of samples that were just finished. kernel is one that
     [`compile_scene`] has made for this scene and these settings; None: it is made here.
     """
     if job.dtype != "float32":
         raise InputError("dtype", job.dtype, "kernels compute in float32", "render with --executor numpy")
+    first, last = checked_rows(job, rows)
     kernel = kernel or compile_scene(executor, scene, job, profile)
     executor.build_path(kernel)
-    totals = Totals(0, np.zeros((len(kernel.planes), job.height, job.width)))
-    for parts in sample_ranges(job):
-        rows = []
+    totals = Totals(0, np.zeros((len(kernel.planes), last - first, job.width)))
+    for parts in sample_ranges(job, (first, last)):
+        sums = []
         for part in parts:
-            rows.append(executor.trace(kernel, part).astype(np.float64))
+            sums.append(executor.trace(kernel, part).astype(np.float64))
             if on_progress is not None:
                 on_progress(part.rows * part.width * part.samples)
-        totals = merge(kernel, totals, Totals(parts[0].samples, np.concatenate(rows, axis=1)))
+        totals = merge(kernel, totals, Totals(parts[0].samples, np.concatenate(sums, axis=1)))
     return _render(kernel, totals, render_info(scene, job))
 
 
-def sample_ranges(job: Job) -> Iterator[list[Part]]:
-    """Yield the parts of a job: for each range of samples the ranges of rows, top to bottom."""
+def sample_ranges(job: Job, band: tuple[int, int]) -> Iterator[list[Part]]:
+    """Yield the parts of a band of rows: for each range of samples the ranges of rows, top to bottom."""
+    first, last = band
     for first_sample in range(0, job.spp, SAMPLES_AT_ONCE):
         samples = min(SAMPLES_AT_ONCE, job.spp - first_sample)
         rows = max(1, PATHS_AT_ONCE // (job.width * samples))
@@ -79,12 +94,12 @@ def sample_ranges(job: Job) -> Iterator[list[Part]]:
                 job.width,
                 job.height,
                 first_row,
-                min(rows, job.height - first_row),
+                min(rows, last - first_row),
                 job.first_sample + first_sample,
                 samples,
                 job.seed,
             )
-            for first_row in range(0, job.height, rows)
+            for first_row in range(first, last, rows)
         ]
 
 

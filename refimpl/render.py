@@ -87,9 +87,7 @@ def render(
 
     on_progress is called with the number of samples that were just finished.
     """
-    first, last = rows if rows is not None else (0, job.height)
-    if not 0 <= first < last <= job.height:
-        raise InputError("rows", rows, f"they must be a range within 0 to {job.height}", "give first < last")
+    first, last = checked_rows(job, rows)
     _check_range("tile_pixels", tile_pixels, 1, MAX_IMAGE_SIDE_PX**2)
     world = transport.build(scene, job.settings, job.dtype)
     basis = camera_basis(scene.camera, job.dtype)
@@ -103,6 +101,14 @@ def render(
     variance = np.concatenate([variance for _, variance in tiles]).reshape(*shape, 3)
     layers = {name: mean.astype(job.dtype) for name, mean in means.items()}
     return Render(Frame(layers, render_info(scene, job)), variance)
+
+
+def checked_rows(job: Job, rows: tuple[int, int] | None) -> tuple[int, int]:
+    """Return the rows [first, last) of a job, all for None, or refuse them."""
+    first, last = rows if rows is not None else (0, job.height)
+    if not 0 <= first < last <= job.height:
+        raise InputError("rows", rows, f"they must be a range within 0 to {job.height}", "give first < last")
+    return first, last
 
 
 def _render_tile(

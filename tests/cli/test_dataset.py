@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from wamnet.cli import cluster, dataset_files, exr
@@ -48,6 +49,29 @@ def test_the_pictures_are_the_references(wamnet, tmp_path) -> None:
             assert got.info == want.info
     assert wamnet("dataset", "--check", "-o", "a").out == "a: 6 pictures are as manifest.json says\n"
     assert wamnet("dataset", *TINY, "--seed", 5, "-o", "a").out.endswith(", 0 of them made now\n")
+
+
+def test_a_kernel_makes_the_pictures(wamnet, executor_named, tmp_path) -> None:
+    """Nearly all pixels are the reference's (tests/kernels/test_paths.py)."""
+    executor_named("opencl")
+    assert wamnet("dataset", *TINY, "--executor", "opencl", "-o", "a").status == 0
+    assert wamnet("dataset", *TINY, "-o", "b").status == 0
+    assert json.loads((tmp_path / "a/manifest.json").read_text())["request"]["executor"] == "opencl"
+    for name in ("train/00001-noisy.exr", "train/00001-target.exr"):
+        got, want = (exr.read_frame(tmp_path / folder / name) for folder in "ab")
+        near = np.abs(got["color"] - want["color"]) <= 1e-5 * (want["color"] + want["color"].mean())
+        assert near.all(axis=-1).mean() >= 0.97
+    assert wamnet("dataset", "--check", "-o", "a").status == 0
+
+
+@pytest.mark.parametrize("executor", ["opencl", "opengl"])
+def test_kernels_on_a_cluster_give_the_same_bytes(wamnet, executor_named, tmp_path, executor) -> None:
+    """A worker opens a device of its own, in a thread that is not its first one."""
+    executor_named({"opencl": "opencl", "opengl": "opengl-egl"}[executor])
+    for folder, workers in (("a", 1), ("b", 2)):
+        arguments = ("--executor", executor, "--workers", workers, "-o", folder)
+        assert wamnet("dataset", *TINY, *arguments).status == 0
+    assert content(tmp_path / "a") == content(tmp_path / "b")
 
 
 def test_check_tells_and_a_run_mends(wamnet, tmp_path) -> None:

@@ -32,34 +32,54 @@ def report(finished):
     return json.loads((finished / "report.json").read_text())
 
 
+def first_noisy(folder):
+    """Return the noisy frame of the first test time."""
+    return exr.read_frame(folder / "frames/test/00000-noisy.exr")
+
+
 def test_all_files_are_there(finished) -> None:
     """Pictures, frames, model, kernels and both reports."""
     names = {path.relative_to(finished).as_posix() for path in finished.rglob("*") if path.is_file()}
-    pictures = {f"{name}.png" for name in ("noisy", "denoised", "reference", "normal")}
-    frames = {f"{name}.exr" for name in ("noisy", "denoised", "reference")}
+    ends = ("noisy.png", "denoised.png", "reference.png", "normal.png", "denoised.exr")
+    pictures = {f"pictures/{index}-{end}" for index in (0, 1) for end in ends}
+    frames = {f"frames/test/{k:05d}-{kind}.exr" for k in (0, 1) for kind in ("noisy", "target")}
     kernels = {"kernels/opencl/denoise.cl", "kernels/opengl/denoise.frag", "kernels/opencl/manifest.json"}
     assert pictures | frames | kernels | {"model.safetensors", "report.json", "report.html"} <= names
     assert not [name for name in names if name.startswith(".") or "/." in name]
 
 
-def test_the_frame_is_held_out(finished, report) -> None:
-    """Its time is no training time, in the plan and in the files."""
-    times = {exr.read_frame(path).info["time"] for path in (finished / "frames").glob("[01]-*.exr")}
-    held_out = exr.read_frame(finished / "noisy.exr").info["time"]
-    assert float(held_out) == report["plan"]["test_time_s"]
-    assert held_out not in times
-    assert demo.Plan.test_time_s not in demo.Plan.train_times_s
+def test_the_frames_are_held_out(finished, report) -> None:
+    """Two times that are no training times, in the report and in the files."""
+    times = {exr.read_frame(path).info["time"] for path in (finished / "frames/train").glob("*.exr")}
+    held_out = [exr.read_frame(finished / f"frames/test/0000{k}-noisy.exr").info["time"] for k in (0, 1)]
+    assert [float(time) for time in held_out] == [frame["time_s"] for frame in report["unseen"]]
+    assert {float(time) for time in times} == set(report["train_times_s"])
+    assert len({*held_out, *times}) == 2 + len(times) == 2 + demo.QUICK.train_frames
+
+
+def test_the_full_plan_is_what_is_promised() -> None:
+    """Frames of 256x256 or larger, references of 1024 samples, several training times, two unseen ones."""
+    plan = demo.Plan()
+    assert plan.size_px >= 256
+    assert plan.reference_spp >= 1024
+    assert plan.train_frames >= 4
+    assert plan.test_frames >= 2
 
 
 def test_the_numbers_are_those_of_the_files(finished, report) -> None:
-    """Metrics of the written EXR files; linear ones up to white, as the report says."""
-    noisy, reference = (exr.read_frame(finished / f"{name}.exr")["color"] for name in ("noisy", "reference"))
-    a, b = encoding.to_display(noisy), encoding.to_display(reference)
-    scores = report["scores"]["input"]["metrics"]
-    assert scores["PSNR"] == metrics.psnr(a, b)
-    assert scores["SSIM"] == metrics.ssim(a, b)
-    assert scores["relMSE"] == metrics.relmse(encoding.from_display(a), encoding.from_display(b))
-    assert set(report["scores"]) == {"input", "denoised"}
+    """Metrics of the EXR files; linear ones up to white, as the report says."""
+    for index, frame in enumerate(report["unseen"]):
+        noisy, reference = (
+            exr.read_frame(finished / f"frames/test/0000{index}-{kind}.exr")["color"]
+            for kind in ("noisy", "target")
+        )
+        a, b = encoding.to_display(noisy), encoding.to_display(reference)
+        scores = frame["input"]["metrics"]
+        assert scores["PSNR"] == metrics.psnr(a, b)
+        assert scores["SSIM"] == metrics.ssim(a, b)
+        assert scores["relMSE"] == metrics.relmse(encoding.from_display(a), encoding.from_display(b))
+        assert set(frame) == {"time_s", "input", "denoised"}
+        assert frame["denoised"]["metrics"]["PSNR"] != scores["PSNR"]
 
 
 def test_every_executor_is_told_and_within_its_bound(report) -> None:
@@ -76,11 +96,13 @@ def test_every_executor_is_told_and_within_its_bound(report) -> None:
 def test_the_denoised_picture_is_the_models(finished, report) -> None:
     """The written picture is the definition's, but for the kernel's bound and the rounding to 8 bits."""
     model = load_model(finished / "model.safetensors")
-    want = denoise(model, exr.read_frame(finished / "noisy.exr"), np.float64)
-    bound = next(run["bound_frame"] for run in report["runs"] if run["executor"] == report["denoised_by"])
+    # The bound for all frames: the one of a frame is that of the first.
+    bound = next(run["bound_all"] for run in report["runs"] if run["executor"] == report["denoised_by"])
     # Half a level of 8 bits, and float64's rounding of a sum below 256.
     slack = 0.5 / 255 + 256 * 2.0**-52
-    assert np.abs(read_png(finished / "denoised.png") - want).max() <= bound + slack
+    for k in (0, 1):
+        want = denoise(model, exr.read_frame(finished / f"frames/test/0000{k}-noisy.exr"), np.float64)
+        assert np.abs(read_png(finished / f"pictures/{k}-denoised.png") - want).max() <= bound + slack
 
 
 class Addresses(HTMLParser):
@@ -108,7 +130,7 @@ def test_the_report_stands_alone(finished, report) -> None:
     page.feed(html)
     assert page.addresses
     assert all(address.startswith("data:image/png;base64,") for address in page.addresses)
-    assert len(page.texts) == 7
+    assert len(page.texts) == 2 * 6 + 1
     assert all(page.texts)
     assert not page.tags & {"script", "link", "iframe"}
     assert not re.search(r"url\(|@import|https?:", re.sub(r"base64,[^\"]*", "", html))
@@ -125,25 +147,48 @@ def test_a_second_run_reuses_everything(finished, tmp_path, monkeypatch) -> None
     def never(*_args: object, **_options: object) -> None:
         raise AssertionError("this was done before")
 
-    monkeypatch.setattr("wamnet.kernels.render_pool.render_parallel", never)
+    monkeypatch.setattr("wamnet.kernels.frame_plan.render_frame", never)
     monkeypatch.setattr("wamnet.refimpl.train.train_step", never)
-    results = demo.carry_out(demo.QUICK, folder)
+    results = demo.carry_out(demo.for_this_machine(demo.QUICK), folder)
     assert results.state.step == demo.QUICK.steps
     assert results.seconds_per_step > 0
 
 
-def test_other_frames_are_rendered_and_trained_anew(finished, tmp_path, monkeypatch) -> None:
-    """Another seed: no file of the earlier run is mistaken for this one's; a damaged one is replaced."""
+def test_a_damaged_frame_is_rendered_again(finished, tmp_path) -> None:
+    """To the same bytes."""
     folder = tmp_path / "out"
     shutil.copytree(finished, folder)
-    monkeypatch.setattr(machine, "versions", lambda: {"wamnet": "another"})
-    (folder / "frames" / "0-noisy.exr").write_text("damaged")
-    pairs, _ = demo.render_frames(demo.replace(demo.QUICK, seed=7), folder)
-    assert pairs[0][0].info["seed"] == "7"
+    path = folder / "frames/train/00000-noisy.exr"
+    before = path.read_bytes()
+    path.write_text("damaged")
+    demo.render_frames(demo.for_this_machine(demo.QUICK), folder)
+    assert path.read_bytes() == before
+
+
+def test_another_recipe_is_trained_anew(finished, tmp_path) -> None:
+    """The checkpoint of another seed is not gone on with."""
+    folder = tmp_path / "out"
+    shutil.copytree(finished, folder)
+    pairs = [pair for _, pair in demo._pairs(folder, "train")]
     plan = demo.replace(demo.QUICK, seed=7, steps=3)
     _, state, _ = demo.train_network(plan, pairs, folder)
     assert state.step == 3
     assert state.recipe.seed == 7
+
+
+def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
+    """And the user is told of both."""
+    from wamnet.refimpl.errors import ExecutorUnavailable
+
+    def nothing(name: str):
+        raise ExecutorUnavailable(f"{name}: nothing there")
+
+    monkeypatch.setattr("wamnet.kernels.open_executor", nothing)
+    plan = demo.for_this_machine(demo.Plan())
+    assert plan == demo.replace(demo.Plan(), renderer="numpy", reference_spp=demo.REFERENCE_SPP_OF_NUMPY)
+    told = capsys.readouterr().out
+    assert "not rendered with opengl: opengl: nothing there" in told
+    assert "rendered with NumPy, which is slow: references have 32 paths per pixel" in told
 
 
 def test_an_executor_that_is_missing_is_told(finished, monkeypatch) -> None:
@@ -161,7 +206,7 @@ def test_an_executor_that_is_missing_is_told(finished, monkeypatch) -> None:
     monkeypatch.setattr("wamnet.kernels.open_executor", only_numpy)
     model = load_model(finished / "model.safetensors")
     kernels = {name: compile_program(lower(model), name) for name in ("numpy", "opencl")}
-    images, found = runs.run_all(model, exr.read_frame(finished / "noisy.exr"), kernels, lambda _: None)
+    images, found = runs.run_all(model, first_noisy(finished), kernels, lambda _: None)
     assert set(images) == {"numpy"}
     assert found[1] == runs.Run("opencl", missing="opencl: nothing there")
 
@@ -169,7 +214,7 @@ def test_an_executor_that_is_missing_is_told(finished, monkeypatch) -> None:
 def test_a_target_that_promises_nothing_has_no_bound(finished) -> None:
     """OpenGL's own sine."""
     model = load_model(finished / "model.safetensors")
-    assert runs.frame_bound(model, exr.read_frame(finished / "noisy.exr"), "opengl", "native") is None
+    assert runs.frame_bound(model, first_noisy(finished), "opengl", "native") is None
 
 
 def test_refusals(refused, tmp_path) -> None:
@@ -193,7 +238,7 @@ def test_a_folder_holds_one_plan(refused, tmp_path, finished) -> None:
     shutil.copytree(finished, tmp_path / "out")
     text = "output folder is out: it holds results of another plan; choose another with -o"
     assert text in refused("demo", "--size", 16, "-o", "out")
-    demo.begin(demo.QUICK, tmp_path / "out")
+    demo.begin(demo.for_this_machine(demo.QUICK), tmp_path / "out")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "noisy.exr").write_text("precious")
     assert "it holds files that are not the demo's" in refused("demo", "--quick", "-o", "mine")
@@ -209,7 +254,7 @@ def test_an_interrupt_tells_how_to_go_on(wamnet, tmp_path, monkeypatch, quick) -
 
     monkeypatch.setattr(demo, "carry_out", interrupt)
     outcome = wamnet("demo", *(["--quick"] if quick else []))
-    command = "--quick -o out/demo-quick" if quick else "--size 192 -o out/demo"
+    command = "--quick -o out/demo-quick" if quick else "--size 256 -o out/demo"
     assert outcome.err == f"wamnet: go on with the same command: wamnet demo {command}\nwamnet: interrupted\n"
     assert outcome.status == 130
 
@@ -226,8 +271,9 @@ def test_an_unknown_time_is_no_error(finished, report, tmp_path, content) -> Non
     assert demo._seconds(path) is None
     assert plots.training_curve([(1, 0.5), (2, 0.25)], None, plots.LIGHT).startswith(b"\x89PNG")
     data = {**report, "training": {**report["training"], "seconds_per_step": None}}
-    pictures = dict.fromkeys(("noisy", "denoised", "reference", "normal"), "")
-    drawn = {key: {"light": "", "dark": ""} for key in ("input_error", "denoised_error", "training")}
+    pictures = [dict.fromkeys(("noisy", "denoised", "reference", "normal"), "")] * 2
+    plot = {"light": "", "dark": ""}
+    drawn = {"errors": [{"input": plot, "denoised": plot}] * 2, "training": plot}
     assert "<dd>– <small>60 steps</small>" in page(data, pictures, drawn)
 
 

@@ -64,6 +64,49 @@ def test_compile_writes_a_kernel(wamnet, here, target, source) -> None:
     assert (here / "n" / source).read_text() != first
 
 
+@pytest.mark.parametrize(("target", "source"), [("opencl", "path.cl"), ("glsl", "path.frag")])
+def test_compile_writes_a_scene_s_kernel(wamnet, here, target, source) -> None:
+    """The bytes that the compiler gives for this scene, time and schedule; a scene file is a scene too."""
+    from wamnet.compiler.lower_scene import lower_scene
+    from wamnet.compiler.path_kernel import compile_path
+    from wamnet.refimpl.scenes import canonical
+    from wamnet.refimpl.transport import Settings
+
+    lanes = ["--lanes", 16] if target == "opencl" else []
+    options = ["--target", target, "--max-depth", 2, *lanes]
+    outcome = wamnet("compile", "minicubes", "--time", 1.5, *options, "-o", "a")
+    assert (outcome.status, outcome.out.split()) == (0, [f"a/{source}", "a/manifest.json"])
+    programs = lower_scene(canonical("minicubes", time=1.5), Settings(max_depth=2))
+    executor = {"opencl": "opencl", "glsl": "opengl"}[target]
+    kernel = compile_path(programs, executor, "ieee", 16 if lanes else 1)
+    assert (here / "a" / source).read_text() == kernel.source
+    assert json.loads((here / "a/manifest.json").read_text()) == json.loads(json.dumps(kernel.manifest))
+    wamnet("scene", "minicubes", "--time", 1.5, "-o", "s.json")
+    assert wamnet("compile", "s.json", *options, "-o", "b").status == 0
+    assert (here / "b" / source).read_text() == kernel.source
+
+
+def test_refusals_of_compiling_a_scene(wamnet, refused, here) -> None:
+    """Options of scenes with a model; a folder with the other kind; what no schedule does; no such scene."""
+    glsl = ["--target", "glsl"]
+    text = (
+        "--time is 2.0: model.safetensors is no scene: neither a canonical one nor a .json file; leave it out"
+    )
+    assert text in refused("compile", "model.safetensors", *glsl, "--time", 2)
+    assert "--lanes is 4: model.safetensors is no scene" in refused(
+        "compile", "model.safetensors", *glsl, "--lanes", 4
+    )
+    assert "target opengl does not follow 4 paths at once; it can do 1" in refused(
+        "compile", "cornell", *glsl, "--lanes", 4
+    )
+    assert "max_depth is -1: it counts scatterings" in refused("compile", "cornell", *glsl, "--max-depth", -1)
+    assert "scene file is none.json: it cannot be read" in refused("compile", "none.json", *glsl)
+    assert wamnet("compile", "cornell", *glsl, "-o", "k").status == 0
+    assert "output folder is k: it holds a scene's kernel, and this is a model's kernel" in refused(
+        "compile", "model.safetensors", *glsl, "-o", "k"
+    )
+
+
 def test_refusals_of_compile(refused, here) -> None:
     """No model; another kind of file; no such profile or target; a file in the folder's place."""
     target = ["--target", "glsl"]

@@ -133,4 +133,4 @@ def test_a_full_disk_while_a_kernel_is_written(
 
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(InputError, match=r"output folder is .*kernel: cannot be written \(No space left"):
-        compile_model(samples / "model.safetensors", Target.glsl, tmp_path / "kernel")
+        compile_model(str(samples / "model.safetensors"), Target.glsl, tmp_path / "kernel")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
 import pytest
 
 from wamnet.kernels.render_frame import RENDERERS, render_frame
@@ -12,15 +15,46 @@ from wamnet.refimpl.scenes import canonical
 SCENE = canonical("cornell")
 
 
-@pytest.mark.parametrize("executor", RENDERERS)
-def test_bands_are_the_frame(executor) -> None:
-    """Rows rendered apart and joined are all rows, to the bit, where an executor can do bands at all."""
+REQUIRED = {"numpy": "numpy", "opencl": "opencl", "opengl": "opengl-egl"}
+"""The executor whose absence skips or fails a renderer's tests, by the renderer's name."""
+
+
+@pytest.mark.parametrize("name", RENDERERS)
+def test_bands_are_the_frame(executor_named, name) -> None:
+    """Rows rendered apart and joined are all rows, to the bit."""
+    executor_named(REQUIRED[name])
     job = Job(7, 5, 2, 3)
-    whole = render_frame(executor, SCENE, job)
+    whole = render_frame(name, SCENE, job)
     assert whole.frame.height == 5
-    if RENDERERS[executor].in_bands:
-        parts = join_rows([render_frame(executor, SCENE, job, rows=rows) for rows in ((0, 2), (2, 5))])
-        assert all((parts.frame[name] == values).all() for name, values in whole.frame.layers.items())
+    parts = join_rows([render_frame(name, SCENE, job, rows=rows) for rows in ((0, 2), (2, 5))])
+    assert all((parts.frame[layer] == values).all() for layer, values in whole.frame.layers.items())
+
+
+@pytest.mark.parametrize("name", ["opencl", "opengl"])
+def test_a_kernel_renders_the_scene(executor_named, name) -> None:
+    """The first hits of one path a pixel are those of the reference; 1e-5 is derived in test_paths.py."""
+    executor_named(REQUIRED[name])
+    job = Job(7, 5, 1, 3)
+    want, got = (render_frame(renderer, SCENE, job).frame for renderer in ("numpy", name))
+    near = np.abs(got["position"] - want["position"]) <= 1e-5 * (1 + np.abs(want["position"]))
+    assert near.all(axis=-1).mean() >= 0.97  # one path of 35 may pass an edge by less than rounding
+
+
+@pytest.mark.parametrize("name", RENDERERS)
+def test_rows_outside_the_picture_are_refused(executor_named, name) -> None:
+    """By all of them in the same words."""
+    executor_named(REQUIRED[name])
+    with pytest.raises(InputError, match=r"rows is \(2, 9\): they must be a range within 0 to 5"):
+        render_frame(name, SCENE, Job(7, 5), rows=(2, 9))
+
+
+def test_threads_have_devices_of_their_own(executor_named) -> None:
+    """A graphics context belongs to one thread; a worker of a cluster renders in a thread of its own."""
+    executor_named("opengl-egl")
+    job = Job(5, 4, 1, 3)
+    with ThreadPoolExecutor(1) as pool:
+        other = pool.submit(render_frame, "opengl", SCENE, job).result()
+    assert (other.frame["color"] == render_frame("opengl", SCENE, job).frame["color"]).all()
 
 
 def test_numpy_is_the_reference() -> None:

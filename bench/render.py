@@ -33,7 +33,6 @@ import numpy as np
 
 from wamnet.cli import machine
 from wamnet.kernels import open_executor, render_on
-from wamnet.kernels.render_on import compile_scene
 from wamnet.kernels.render_pool import render_parallel
 from wamnet.refimpl.render import Job
 from wamnet.refimpl.scene import Scene
@@ -155,8 +154,7 @@ def _reference(scene: Scene, job: Job, workers: int) -> Frames:
 def _kernel(name: str, scene: Scene, job: Job) -> Frames:
     """Return how a kernel makes frames."""
     executor = open_executor(name)
-    kernel = compile_scene(executor, scene, job)
-    return lambda seed: render_on(executor, scene, replace(job, seed=seed), kernel=kernel).frame["color"]
+    return lambda seed: render_on(executor, scene, replace(job, seed=seed)).frame["color"]
 
 
 def _peer(scene: Scene, job: Job) -> Frames:
@@ -193,10 +191,9 @@ def _agreement(ways: Sequence[Way]) -> list[str]:
     mean, error = _mean_and_error(ways[0].means)
     for way in ways[1:]:
         other, its_error = _mean_and_error(way.means)
-        distance = (other - mean) / np.hypot(error, its_error)
-        texts.append(
-            f"{way.name}: mean colour {other:.6f}, {ways[0].name}'s {mean:.6f}: {distance:+.1f} errors"
-        )
+        both = np.hypot(error, its_error)
+        distance = f"{(other - mean) / both:+.1f} errors" if both > 0.0 else "no spread"
+        texts.append(f"{way.name}: mean colour {other:.6f}, {ways[0].name}'s {mean:.6f}: {distance}")
     return [*texts, ""]
 
 

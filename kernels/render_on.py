@@ -60,17 +60,15 @@ def render_on(
     rows: tuple[int, int] | None = None,
     on_progress: Callable[[int], None] | None = None,
     profile: str = "ieee",
-    kernel: PathArtifact | None = None,
 ) -> Render:
     """Render the rows [first, last) of a scene on an executor, all by default, in float32.
 
-    on_progress is called with the number of samples that were just finished. kernel is one that
-    [`compile_scene`] has made for this scene and these settings; None: it is made here.
+    on_progress is called with the number of samples that were just finished.
     """
     if job.dtype != "float32":
         raise InputError("dtype", job.dtype, "kernels compute in float32", "render with --executor numpy")
     first, last = checked_rows(job, rows)
-    kernel = kernel or compile_scene(executor, scene, job, profile)
+    kernel = compile_scene(executor, scene, job, profile)
     executor.build_path(kernel)
     totals = Totals(0, np.zeros((len(kernel.planes), last - first, job.width)))
     for parts in sample_ranges(job, (first, last)):

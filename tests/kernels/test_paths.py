@@ -213,14 +213,6 @@ def test_image_does_not_depend_on_the_parts(executor_named, monkeypatch, name):
     assert np.all(error <= 100 * U * (whole.color_variance + color.astype(np.float64) ** 2))
 
 
-def test_a_kernel_made_before_gives_the_same_frame(executor_named):
-    executor, job = executor_named("opencl"), R.Job(9, 7, 4, 2, Settings(max_depth=2))
-    kernel = compile_scene(executor, scene("cornell"), job)
-    made_before = render_on(executor, scene("cornell"), job, kernel=kernel)
-    made_here = render_on(executor, scene("cornell"), job)
-    assert all(np.array_equal(made_before.frame[layer], made_here.frame[layer]) for layer in frame.LAYERS)
-
-
 def test_samples_are_numbered_on(executor):
     """Samples 0 to 1 and 2 to 3 rendered apart have the mean of 0 to 3, to the rounding of five sums."""
     job = R.Job(9, 7, 4, 2, Settings(max_depth=2))

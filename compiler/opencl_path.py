@@ -115,6 +115,7 @@ class OpenCLVectorPath(OpenCLPath):
             **OpenCLPath.operations,
             **{name: template.format(lanes=lanes) for name, template in VECTOR_OPERATIONS.items()},
             "take": f"({{type}})({entries})",
+            "row": "({type})({table}[{0}])",
         }
         self.helpers = {"floor": FLOOR.format(lanes=lanes)}
 

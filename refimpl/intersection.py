@@ -51,6 +51,12 @@ LEAST_SHARED = 4
 rotations is then one table of boxes, not hundreds of groups. (To turn a ray costs twice a slab test.)"""
 
 
+CANCELLED = 16 * 2.0**-53
+"""A sum of products below this share of its terms' magnitudes is rounding noise: centre, rotation and
+products carry a few units of 2**-53 each. Boxes on a grid then share their slabs to the bit, and kernels
+compute each slab once: a centre of 1e-16 here and -7e-18 there would be two."""
+
+
 @dataclass(frozen=True)
 class BoxGroup:
     """N boxes; per box: center in rotated axes (N, 3), half extent (N, 3).
@@ -170,7 +176,7 @@ def _box_groups(scene: Scene, first_id: int, constant: Any) -> tuple[BoxGroup, .
     for joined, run in groupby(members, _joined):
         for boxes in [list(chain(*run))] if joined else run:
             matrices = np.array([box.rotation for box in boxes], np.float64)
-            centers = [m @ np.array(b.center) for m, b in zip(matrices, boxes, strict=True)]
+            centers = [_turned(m, np.array(b.center)) for m, b in zip(matrices, boxes, strict=True)]
             groups.append(
                 BoxGroup(
                     rotation=constant(matrices if joined else matrices[0]),
@@ -199,6 +205,13 @@ def _quad_tables(quads: tuple[Quad | Light, ...], constant: Any) -> tuple[Any, A
 def _rows(table: Any) -> Any:
     """Return a table as (N, 3), also without rows."""
     return table.reshape(-1, 3)
+
+
+def _turned(rotation: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return rotation (3, 3) times point (3,), with zeros where the terms cancel to their rounding errors."""
+    size = np.abs(rotation) @ np.abs(point)
+    turned = rotation @ point
+    return np.where(np.abs(turned) <= CANCELLED * size, 0.0, turned)
 
 
 def _quad_constants(quad: Quad | Light) -> tuple[Any, Any, Any, Any]:

@@ -162,9 +162,9 @@ __kernel void wamnet_trace(
 
             /* arrive: the next surface */
             {
-                float16 t16 = fabs(direction_x);
-                float16 t17 = fabs(direction_y);
-                float16 t18 = fabs(direction_z);
+                float16 t16 = as_float16(as_int16(direction_x) & 0x7fffffff);
+                float16 t17 = as_float16(as_int16(direction_y) & 0x7fffffff);
+                float16 t18 = as_float16(as_int16(direction_z) & 0x7fffffff);
                 int16 t19 = t16 < (float16)(1e-15f);
                 int16 t20 = t17 < (float16)(1e-15f);
                 int16 t21 = t18 < (float16)(1e-15f);
@@ -186,26 +186,26 @@ __kernel void wamnet_trace(
                 float16 t39 = t36 * t33;
                 float16 t40 = t37 * t34;
                 float16 t41 = t38 * t35;
-                float16 t42 = fabs(t33);
-                float16 t43 = fabs(t34);
-                float16 t44 = fabs(t35);
+                float16 t42 = as_float16(as_int16(t33) & 0x7fffffff);
+                float16 t43 = as_float16(as_int16(t34) & 0x7fffffff);
+                float16 t44 = as_float16(as_int16(t35) & 0x7fffffff);
                 float16 t46 = t39 - t42;
                 float16 t47 = t40 - t43;
                 float16 t48 = t41 - t44;
                 float16 t49 = t39 + t42;
                 float16 t50 = t40 + t43;
                 float16 t51 = t41 + t44;
-                float16 t52 = max(t46, t47);
-                float16 t53 = max(t52, t48);
-                float16 t54 = min(t49, t50);
-                float16 t55 = min(t54, t51);
+                float16 t52 = t46 < t47 ? t47 : t46;
+                float16 t53 = t52 < t48 ? t48 : t52;
+                float16 t54 = t50 < t49 ? t50 : t49;
+                float16 t55 = t51 < t54 ? t51 : t54;
                 int16 t56 = t53 <= t55;
                 int16 t57 = t55 > (float16)(0.0f);
                 int16 t58 = t56 && t57;
                 float16 t59 = t58 ? t55 : (float16)(1.00000002e+30f);
                 int16 t60 = t59 < (float16)(1.00000002e+30f);
                 int16 t62 = t60 ? (int16)(0) : (int16)(9);
-                float16 t63 = min((float16)(1.00000002e+30f), t59);
+                float16 t63 = t59 < (float16)(1.00000002e+30f) ? t59 : (float16)(1.00000002e+30f);
                 float16 t64 = t63;
                 int16 t65 = t62;
                 float16 t72 = origin_y - (float16)(0.100000001f);
@@ -236,7 +236,7 @@ __kernel void wamnet_trace(
                     float16 t90 = t85 * t85;
                     float16 t91 = t89 + t90;
                     float16 t92 = t86 - t91;
-                    float16 t93 = max(t92, (float16)(0.0f));
+                    float16 t93 = t92 < (float16)(0.0f) ? (float16)(0.0f) : t92;
                     float16 t94 = sqrt(t93);
                     int16 t95 = t79 < (float16)(0.0f);
                     float16 t96 = -t94;
@@ -250,8 +250,8 @@ __kernel void wamnet_trace(
                     int16 t105 = t98 == (float16)(0.0f);
                     float16 t106 = t105 ? (float16)(1e-15f) : t98;
                     float16 t107 = t104 / t106;
-                    float16 t108 = min(t98, t107);
-                    float16 t109 = max(t98, t107);
+                    float16 t108 = t107 < t98 ? t107 : t98;
+                    float16 t109 = t98 < t107 ? t107 : t98;
                     int16 t110 = t92 > (float16)(0.0f);
                     int16 t111 = t109 > (float16)(0.0f);
                     int16 t112 = t110 && t111;
@@ -260,7 +260,7 @@ __kernel void wamnet_trace(
                     float16 t115 = t112 ? t114 : (float16)(1.00000002e+30f);
                     int16 t116 = t115 < t64;
                     int16 t117 = t116 ? t70 : t65;
-                    float16 t118 = min(t64, t115);
+                    float16 t118 = t115 < t64 ? t115 : t64;
                     t64 = t118;
                     t65 = t117;
                 }
@@ -302,8 +302,8 @@ __kernel void wamnet_trace(
                 int16 t163 = t139 >= (int16)(6);
                 int16 t164 = t163 && t140;
                 int16 t165 = t139 - (int16)(6);
-                int16 t166 = max(t165, (int16)(0));
-                int16 t167 = min(t166, (int16)(2));
+                int16 t166 = t165 < (int16)(0) ? (int16)(0) : t165;
+                int16 t167 = (int16)(2) < t166 ? (int16)(2) : t166;
                 int16 t169 = t167 < (int16)(2);
                 float16 t171 = t169 ? (float16)(0.300000012f) : (float16)(0.600000024f);
                 int16 t172 = t167 < (int16)(1);
@@ -389,11 +389,11 @@ __kernel void wamnet_trace(
                 uint16 t45 = t43 >> (uint16)(16u);
                 uint16 t46 = t43 ^ t45;
                 float16 t50 = t29 ? t : (float16)(0.0f);
-                float16 t51 = fabs(point_x);
-                float16 t52 = fabs(point_y);
-                float16 t53 = fabs(point_z);
-                float16 t54 = max(t51, t52);
-                float16 t55 = max(t54, t53);
+                float16 t51 = as_float16(as_int16(point_x) & 0x7fffffff);
+                float16 t52 = as_float16(as_int16(point_y) & 0x7fffffff);
+                float16 t53 = as_float16(as_int16(point_z) & 0x7fffffff);
+                float16 t54 = t51 < t52 ? t52 : t51;
+                float16 t55 = t54 < t53 ? t53 : t54;
                 float16 t56 = t55 + t50;
                 float16 t58 = (float16)(3.81469727e-06f) * t56;
                 float16 t59 = normal_x * t58;
@@ -434,8 +434,8 @@ __kernel void wamnet_trace(
                 float16 t96 = t94 - (float16)(1.0f);
                 float16 t97 = (float16)(2.0f) * t92;
                 float16 t98 = t97 - (float16)(1.0f);
-                float16 t99 = fabs(t96);
-                float16 t100 = fabs(t98);
+                float16 t99 = as_float16(as_int16(t96) & 0x7fffffff);
+                float16 t100 = as_float16(as_int16(t98) & 0x7fffffff);
                 int16 t101 = t99 > t100;
                 float16 t102 = t101 ? t96 : t98;
                 float16 t103 = t101 ? t98 : t96;
@@ -453,7 +453,7 @@ __kernel void wamnet_trace(
                 float16 t118 = (float16)(1.0f) - t117;
                 float16 t119 = t116 * t116;
                 float16 t120 = t118 - t119;
-                float16 t121 = max((float16)(0.0f), t120);
+                float16 t121 = (float16)(0.0f) < t120 ? t120 : (float16)(0.0f);
                 float16 t122 = sqrt(t121);
                 int16 t123 = normal_z < (float16)(0.0f);
                 float16 t125 = t123 ? (float16)(-1.0f) : (float16)(1.0f);
@@ -487,10 +487,10 @@ __kernel void wamnet_trace(
                 float16 t153 = t147 + t150;
                 float16 t154 = t148 + t151;
                 float16 t155 = t149 + t152;
-                float16 t156 = max(t122, (float16)(0.0f));
+                float16 t156 = t122 < (float16)(0.0f) ? (float16)(0.0f) : t122;
                 float16 t158 = t156 * (float16)(0.318309873f);
-                float16 t159 = max(t65, t66);
-                float16 t160 = max(t159, t67);
+                float16 t159 = t65 < t66 ? t66 : t65;
+                float16 t160 = t159 < t67 ? t67 : t159;
                 int16 t161 = t160 > (float16)(0.0f);
                 int16 t162 = t29 && t161;
                 origin_x = t62;

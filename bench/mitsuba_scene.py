@@ -73,6 +73,14 @@ def check(scene: Scene, settings: Settings) -> None:
     if settings.roulette_depth is not None or settings.strategy != "mis" or settings.heuristic != "power":
         rule = "the peer combines both strategies by the power heuristic, without roulette"
         raise InputError("settings", settings, rule, "use the default ones but for max_depth")
+    materials = [part.material for part in (*scene.boxes, *scene.spheres, *scene.quads)]
+    materials += scene.room.materials if scene.room is not None else ()
+    if any(material is not None for material in materials):
+        rule = "only matt surfaces are exported"
+        raise InputError("scene with materials", scene.name, rule, "compare a scene without")
+    if scene.environment is not None:
+        rule = "no sky is exported"
+        raise InputError("scene with a sky", scene.name, rule, "compare a scene without")
     parts: tuple[Box | Sphere | Quad | Light, ...] = (
         *scene.boxes,
         *scene.spheres,

@@ -155,6 +155,13 @@ ROOM = scenes.furnace()
     [
         (ROOM, Settings(roulette_depth=2), "the peer combines both strategies by the power heuristic"),
         (ROOM, Settings(strategy="light"), "use the default ones but for max_depth"),
+        (scenes.glossy(), Settings(), "scene with materials is glossy: only matt surfaces are exported"),
+        (scenes.daylight(), Settings(), "scene with .* is daylight: .* compare a scene without"),
+        (
+            replace(ROOM, environment=scenes.daylight().environment),
+            Settings(),
+            "scene with a sky is furnace: no sky is exported",
+        ),
         (ROOM, Settings(heuristic="balance"), "without roulette; use the default ones"),
         (
             replace(ROOM, spheres=(Sphere((0.5, 0.0, 0.0), 0.6, (0.5,) * 3),)),

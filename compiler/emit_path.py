@@ -125,7 +125,12 @@ class _Kernel:
             entry=self.dialect.entry,
             lanes=self.dialect.lanes,
             lane_numbers=self.dialect.lane_numbers,
-            tables="\n".join(self.dialect.table_declaration(name, array) for name, array in declared.items()),
+            tables="\n".join(
+                [
+                    *(self.dialect.table_declaration(name, array) for name, array in declared.items()),
+                    *(text for op, text in self.dialect.helpers.items() if op in self._operations()),
+                ]
+            ),
             outputs="\n".join(
                 self.dialect.output_declaration.format(output=output)
                 for output in range(-(-len(self.planes) // self.dialect.planes_per_output))
@@ -135,6 +140,10 @@ class _Kernel:
             counter=self.dialect.types["uint32"],
             **uniforms,
         )
+
+    def _operations(self) -> set[str]:
+        """Return the names of all operations of the programs."""
+        return {node.op for program in self.programs.parts().values() for node in program.nodes}
 
     def _splat(self, value: str, dtype: str) -> str:
         """Return the text of a number that is the same in all lanes."""

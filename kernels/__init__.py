@@ -5,3 +5,4 @@ from .denoise_on import denoise_on as denoise_on
 from .registry import EXECUTORS as EXECUTORS
 from .registry import open_executor as open_executor
 from .render_on import render_on as render_on
+from .trainer import train_on as train_on

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..compiler.artifact import Artifact
 from ..compiler.ir import Gather, Image
 from ..compiler.path_kernel import PathArtifact
+from ..compiler.step_kernel import StepKernel
 from ..refimpl.errors import InputError
 
 Images = Mapping[str, NDArray[np.float32]]
@@ -66,6 +67,11 @@ class Executor(ABC):
     @abstractmethod
     def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
         """Return the sums (planes, rows, width) of a part."""
+
+    def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
+        """Return a trainer (opencl_trainer.py) for pictures laid out end to end, or refuse."""
+        rule = "it has no compiled trainer"
+        raise InputError("executor that trains", self.name, rule, "use executor opencl, or refimpl.train")
 
     def close(self) -> None:
         """Give the device back."""

@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
 from ..compiler.path_kernel import PathArtifact
+from ..compiler.step_kernel import StepKernel
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
 from .executor import Executor, Images, Part, black, gather_of, keep
+from .opencl_trainer import OpenCLTrainer
 
 DEVICE_VARIABLE = "WAMNET_OPENCL_DEVICE"
 """Environment variable that chooses a device where the caller does not."""
@@ -156,6 +158,10 @@ class OpenCLExecutor(Executor):
         self._paths[kernel.digest](self._queue, (columns, rows), local, output, *numbers)
         cl.enqueue_copy(self._queue, sums, output)
         return sums[:, : part.rows, : part.width]
+
+    def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
+        """Build the step's kernels, and copy pictures and targets to the device."""
+        return OpenCLTrainer(self._queue, self._compiled(kernel.source), kernel, values, targets)
 
     def _compiled(self, source: str) -> Any:
         """Return the built program, or raise with the driver's log."""

@@ -160,7 +160,14 @@ class OpenCLExecutor(Executor):
         return sums[:, : part.rows, : part.width]
 
     def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
-        """Build the step's kernels, and copy pictures and targets to the device."""
+        """Build the step's kernels, and copy pictures and targets to the device: a processor."""
+        if not self._device.type & cl.device_type.CPU:
+            raise InputError(
+                "device that trains",
+                self.device,
+                "the step is scheduled for processors: here it would take very long",
+                f"set {DEVICE_VARIABLE} to a part of a processor's name, such as portable (PoCL)",
+            )
         return OpenCLTrainer(self._queue, self._compiled(kernel.source), kernel, values, targets)
 
     def _compiled(self, source: str) -> Any:

@@ -3,15 +3,15 @@
 1. Data, pool and minibatches are the reference's, to the bit, and so are first weights, learning rates and
    the form of states: a run may go on with either trainer [`train_on`].
 2. Steps run in blocks that end where a callback is due. While the device works on one, the host draws the
-   minibatches of the next [`_Run.draw`].
-3. A loss that is not finite, or an interrupt, is told and kept as the reference does it [`_Run.settle`].
+   minibatches of the next [`Run.draw`].
+3. A loss that is not finite, or an interrupt, is told and kept as the reference does it [`Run.settle`].
 
 The definition is refimpl/train.py; how far a step may be from it: compiler/step.py.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -35,7 +35,7 @@ BLOCK_BYTES = 2**23
 
 
 @dataclass
-class _Run:
+class Run:
     """A run on a device: it begun at `begun`; `step` steps are with the device, of `seen` the host knows.
 
     `template` has what no step changes; `history` is that of the state after `seen` steps.
@@ -75,6 +75,14 @@ class _Run:
         self.step = steps.stop
         self.device.enqueue(steps.start, places, numbers)
 
+    def blocks(self, end: int, stops: Sequence[int]) -> Iterator[float]:
+        """Do the steps up to `end` in blocks that end at multiples of `stops`; yield each's last loss."""
+        upcoming = self.draw(self.step, _block_end(self.step, end, self.recipe, stops))
+        while self.step < end:
+            self.enqueue(upcoming)
+            upcoming = self.draw(self.step, _block_end(self.step, end, self.recipe, stops))
+            yield self.settle()
+
     def settle(self) -> float:
         """Wait for the device, and return the last loss; TrainingError if one is not finite."""
         losses, failed = self.device.finish()
@@ -98,7 +106,7 @@ class _Run:
 
     def _ordered(self, arrays: Any) -> tuple[NDArray[np.float32], ...]:
         """Return arrays by name in the order of a state, in its shapes."""
-        like = _named(self.template.siren.weights + self.template.siren.biases)
+        like = named(self.template.siren.weights + self.template.siren.biases)
         return tuple(arrays[name].reshape(array.shape) for name, array in like.items())
 
 
@@ -122,16 +130,12 @@ def train_on(
     if state is None:
         state = train.start(recipe, normalization, data.digest)
     state = train.resumed(state, recipe, data.digest)
-    run = _begin(executor, recipe, data, state)
+    run = begin(executor, recipe, data, state)
     end = recipe.steps if until is None else min(until, recipe.steps)
     keep = on_checkpoint or (lambda state: None)
     stops = [recipe.log_every, *([checkpoint_every] if checkpoint_every else [])]
     try:
-        upcoming = run.draw(run.step, _block_end(run.step, end, recipe, stops))
-        while run.step < end:
-            run.enqueue(upcoming)
-            upcoming = run.draw(run.step, _block_end(run.step, end, recipe, stops))
-            loss = run.settle()
+        for loss in run.blocks(end, stops):
             if on_progress and (run.step % recipe.log_every == 0 or run.step == end):
                 on_progress(run.state(run.step), loss)
             if checkpoint_every and run.step % checkpoint_every == 0 and run.step < end:
@@ -150,7 +154,7 @@ def train_on(
     return final
 
 
-def _begin(executor: Executor, recipe: Recipe, data: Dataset, state: TrainState) -> _Run:
+def begin(executor: Executor, recipe: Recipe, data: Dataset, state: TrainState) -> Run:
     """Compile the step, and put the state on the device."""
     if state.siren.dtype != np.float32:
         rule = "a device trains in float32"
@@ -159,11 +163,11 @@ def _begin(executor: Executor, recipe: Recipe, data: Dataset, state: TrainState)
     kernel = compile_step(recipe.layer_widths, omegas, recipe.batch, recipe.window.size)
     device = executor.open_trainer(kernel, data.values, data.targets)
     groups = (state.siren.weights + state.siren.biases, state.moments.m, state.moments.v)
-    device.load(state.step, *map(_named, groups))
-    return _Run(device, recipe, data, state.step, state.step, state, list(state.history))
+    device.load(state.step, *map(named, groups))
+    return Run(device, recipe, data, state.step, state.step, state, list(state.history))
 
 
-def _named(arrays: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def named(arrays: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Return weights W0, W1, ... and biases b0, b1, ... by name, from a state's order."""
     layers = len(arrays) // 2
     names = [f"W{layer}" for layer in range(layers)] + [f"b{layer}" for layer in range(layers)]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -99,8 +100,8 @@ def begin(opencl: Any, recipe: Recipe, kernel: StepKernel, state: TrainState, da
     """Return a trainer with the state on it, and a run that draws and hands out steps."""
     device = opencl.open_trainer(kernel, data.values, data.targets)
     groups = (state.siren.weights + state.siren.biases, state.moments.m, state.moments.v)
-    device.load(state.step, *map(trainer._named, groups))
-    return trainer._Run(device, recipe, data, state.step, state.step, state, [])
+    device.load(state.step, *map(trainer.named, groups))
+    return trainer.Run(device, recipe, data, state.step, state.step, state, [])
 
 
 def examples(recipe: Recipe, data: Dataset, number: int) -> tuple[Any, Any]:
@@ -121,7 +122,7 @@ def gradient_excess(
     loss = run.settle()
     found = run.device.sums()
     right = kernel_of(recipe).step
-    named = trainer._named(state.siren.weights + state.siren.biases)
+    named = trainer.named(state.siren.weights + state.siren.biases)
     at = step.with_parameters(right, named)
     windows, targets = examples(recipe, data, 0)
     exact, bound = step.sums(at, windows, targets), step.sum_errors(at, windows, targets)
@@ -217,10 +218,10 @@ def adam_excess(opencl: Any, kernel: StepKernel | None = None, recipe: Recipe = 
     right, program = kernel_of(recipe).step, lower_step.lower_adam()
     worst, bounded = 0.0, []
     for number in range(recipe.steps):
-        before = [trainer._named(arrays) for arrays in _groups(run.state(number))]
+        before = [trainer.named(arrays) for arrays in _groups(run.state(number))]
         run.enqueue(run.draw(number, number + 1))
         run.settle()
-        after = [trainer._named(arrays) for arrays in _groups(run.state(number + 1))]
+        after = [trainer.named(arrays) for arrays in _groups(run.state(number + 1))]
         at = step.with_parameters(right, before[0])
         windows, targets = examples(recipe, data, number)
         exact, bound = step.sums(at, windows, targets), step.sum_errors(at, windows, targets)
@@ -411,7 +412,7 @@ def test_an_interrupt_keeps_the_state_and_goes_on(opencl: Any) -> None:
 def test_an_interrupt_while_the_device_works(opencl: Any, monkeypatch: Any) -> None:
     """What was handed to the device is waited for, and kept with its losses."""
     kept: list[TrainState] = []
-    draw, calls = trainer._Run.draw, []
+    draw, calls = trainer.Run.draw, []
 
     def interrupted(run: Any, first: int, last: int) -> Any:
         calls.append(first)
@@ -420,7 +421,7 @@ def test_an_interrupt_while_the_device_works(opencl: Any, monkeypatch: Any) -> N
         return draw(run, first, last)
 
     with monkeypatch.context() as patch:
-        patch.setattr(trainer._Run, "draw", interrupted)
+        patch.setattr(trainer.Run, "draw", interrupted)
         with pytest.raises(KeyboardInterrupt):
             train_on(opencl, SMALL, PAIRS, on_checkpoint=kept.append)
     assert [state.step for state in kept] == [8]
@@ -478,6 +479,12 @@ def test_refusals(opencl: Any, executor_named: Any, monkeypatch: Any) -> None:
         train_on(executor_named("numpy"), SMALL, PAIRS)
     with pytest.raises(InputError, match="changed parts of the recipe is batch"):
         train_on(opencl, replace(SMALL, batch=5), PAIRS, state=train.train(SMALL, PAIRS, until=1))
+    with monkeypatch.context() as patch:
+        patch.setattr(opencl, "_device", SimpleNamespace(type=4))  # a GPU
+        with pytest.raises(
+            InputError, match=r"device that trains is .*: the step is scheduled for processors"
+        ):
+            train_on(opencl, SMALL, PAIRS)
     monkeypatch.setattr("wamnet.kernels.opencl_trainer.INDEX_LIMIT", 100)
     with pytest.raises(
         InputError, match=r"numbers of all training pictures is .*: the device takes fewer than 100"

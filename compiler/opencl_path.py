@@ -117,6 +117,7 @@ class OpenCLVectorPath(OpenCLPath):
             "take": f"({{type}})({entries})",
         }
         self.helpers = {"floor": FLOOR.format(lanes=lanes)}
+        self.operations["row"] = "({type})({table}[{0}])"
 
     def number(self, value: Any, dtype: str) -> str:
         """Return the text of a number in all lanes."""

@@ -20,7 +20,7 @@ from ..refimpl.errors import CompileError
 from . import emit_path, ir, opencl_path, profiles
 from .compile import asdict_finite, sine_contract, target_named
 from .glsl_path import GLSLPath
-from .lower_scene import PASSES, PathPrograms
+from .lower_scene import MOST_UNROLLED, PASSES, PathPrograms
 from .passes import pipeline
 from .path_dialect import PathDialect
 from .profiles import Profile
@@ -63,6 +63,18 @@ SCHEDULES: Mapping[str, tuple[Callable[[int], PathDialect | None], tuple[int, ..
     "opengl": (lambda lanes: GLSLPath(), (1,)),
 }
 """By target: the dialect for a number of paths at once, and the numbers that there are."""
+
+
+UNROLLED: Mapping[str, int] = {"opengl": 128}
+"""By target, where it is not MOST_UNROLLED: most primitives of a scene that become statements each. llvmpipe
+reads a table at a loop's counter lane by lane, so a loop that Mesa does not unroll itself (it does up to some
+30 trips) is two to four times slower than statements; but it compiles the statements of 100 primitives in 1
+to 5 s, those of 300 in 9 to 60 s (`python bench/primitives.py --executors opengl`)."""
+
+
+def most_unrolled(target: str) -> int:
+    """Return the number of primitives above which a scene becomes tables and loops on a target."""
+    return UNROLLED.get(target, MOST_UNROLLED)
 
 
 def compile_path(

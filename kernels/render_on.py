@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..compiler.emit_path import GROUPS
 from ..compiler.lower_scene import lower_scene
-from ..compiler.path_kernel import PathArtifact, compile_path
+from ..compiler.path_kernel import PathArtifact, compile_path, most_unrolled
 from ..refimpl.errors import InputError
 from ..refimpl.frame import LAYERS, Frame
 from ..refimpl.render import Job, Render, checked_rows, render_info
@@ -49,7 +49,8 @@ def compile_scene(executor: Executor, scene: Scene, job: Job, profile: str = "ie
 @lru_cache(KEPT_SCENES)
 def _compiled(scene: Scene, settings: Settings, target: str, profile: str, lanes: int) -> PathArtifact:
     """Return the kernel; it depends on nothing else."""
-    return compile_path(lower_scene(scene, settings), target, profile, lanes)
+    programs = lower_scene(scene, settings, most_unrolled(target))
+    return compile_path(programs, target, profile, lanes)
 
 
 def render_on(

@@ -258,6 +258,53 @@ def random_rays(count: int, reach: float, dtype) -> tuple[np.ndarray, np.ndarray
     return a, vectors.normalize(b - a)
 
 
+def turned(angle: float):
+    c, s = np.cos(angle), np.sin(angle)
+    return ((c, 0.0, -s), (0.0, 1.0, 0.0), (s, 0.0, c))
+
+
+def many_boxes(angles: list[float]) -> Scene:
+    """Return boxes turned by the given angles, which overlap in part."""
+    random = np.random.default_rng(4)
+    places, sizes = random.uniform(-1.5, 1.5, (len(angles), 3)), random.uniform(0.2, 0.6, (len(angles), 3))
+    rotations = [turned(angle) if angle else I.IDENTITY for angle in angles]
+    return scene_of(boxes=tuple(Box(p, h, GREY, r) for p, h, r in zip(places, sizes, rotations, strict=True)))
+
+
+SHARING = [0.3] * 4 + [0.0, 0.5, 0.7, 0.7, 0.3, 0.9] + [1.1] * 4 + [1.3] * 3
+"""Angles of boxes: two groups that share theirs, one parallel to the axes, and small groups around them."""
+
+
+def test_boxes_are_grouped_by_rotation_and_small_groups_joined():
+    geometry = I.build(many_boxes(SHARING), np.float64)
+    shape = [(len(g.centers), g.shared, g.rotated, g.first_id) for g in geometry.groups]
+    assert shape == [
+        (5, True, True, 0),
+        (1, True, False, 5),
+        (4, False, True, 6),
+        (4, True, True, 10),
+        (3, False, True, 14),
+    ]
+    assert geometry.groups[2].rotation.shape == (4, 3, 3)
+    assert np.array_equal(geometry.groups[2].rotation[1], geometry.groups[2].rotation[2])
+
+
+@pytest.mark.parametrize("dtype", TYPES)
+def test_boxes_that_share_a_rotation_are_hit_like_those_that_do_not(dtype, monkeypatch):
+    """Distances, surfaces and normals to the bit, whether rays are turned for a group or for each box."""
+    scene, (o, d) = many_boxes(SHARING), random_rays(3000, 1.9, dtype)
+    answers = []
+    for fewest in (1, I.LEAST_SHARED, 100):
+        monkeypatch.setattr(I, "LEAST_SHARED", fewest)
+        geometry = I.build(scene, dtype)
+        found = I.closest_hit(geometry, o, d)
+        answers.append((len(geometry.groups), *found, I.surface_at(geometry, found, o, d).normal))
+    assert [answer[0] for answer in answers] == [7, 5, 3]
+    assert len(np.unique(answers[0][2])) == len(SHARING) + 1
+    for answer in answers[1:]:
+        assert all(np.array_equal(a, b) for a, b in zip(answer[1:], answers[0][1:], strict=True))
+
+
 @pytest.mark.parametrize("name", ["minicubes", "cornell"])
 def test_closest_hit_is_the_least_of_single_primitives(name):
     """The scene's answer equals the least of the answers of scenes with one primitive each, to the bit."""

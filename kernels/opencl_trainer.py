@@ -62,9 +62,8 @@ class OpenCLTrainer:
         self._scratch = self._empty(self._groups * kernel.scratch_vectors * vector)
         self._sums = self._empty(self._groups * kernel.places[SQUARES].end * vector)
         self._failed = self._empty(4)
-        self._pending: list[Any] = []
-        self._losses = self._empty(4)
-        self._room = 1
+        # The block in the queue: its first step, its losses, the minibatches of the steps put there so far.
+        self._block: tuple[int, Any, list[Any]] = (0, self._empty(4), [])
         self._trained = {name: slot for name, slot in kernel.places.items() if name != SQUARES}
 
     def load(self, step: int, theta: Arrays, m: Arrays, v: Arrays) -> None:
@@ -75,13 +74,15 @@ class OpenCLTrainer:
         if copied:
             cl.enqueue_copy(self._queue, self._transposed, pack(self._kernel.copies, copied))
         cl.enqueue_copy(self._queue, self._failed, np.array([-1], np.int32))
+        self._block = (step, self._empty(4), [])
 
     def enqueue(
         self, step: int, places: NDArray[np.int32], numbers: Sequence[tuple[float, float, float]]
     ) -> None:
         """Put steps into the queue: places (steps, 3, batch), and each step's rate and growths."""
-        if len(numbers) > self._room:
-            self._losses, self._room = self._empty(4 * len(numbers)), len(numbers)
+        losses, drawn_so_far = self._empty(4 * len(numbers)), list[Any]()
+        # One assignment: an interrupt finds the old block or the new one, never a part of both.
+        self._block = (step, losses, drawn_so_far)
         for at, (minibatch, rates) in enumerate(zip(places, numbers, strict=True)):
             drawn = self._upload(minibatch)
             old, moved = self._states[(step + at) % 2], self._states[(step + at + 1) % 2]
@@ -92,21 +93,22 @@ class OpenCLTrainer:
             size = -(-self._count // UPDATE_SIZE) * UPDATE_SIZE
             self._update(
                 self._queue, (size,), (UPDATE_SIZE,), self._sums, np.int32(self._groups), old, moved,
-                self._transposed, self._losses, self._failed, np.int32(at), np.int32(step + at),
+                self._transposed, losses, self._failed, np.int32(at), np.int32(step + at),
                 *map(np.float32, rates),
             )  # fmt: skip
-            self._pending.append(drawn)
+            drawn_so_far.append(drawn)
         self._queue.flush()
 
-    def finish(self) -> tuple[NDArray[np.float32], int | None]:
-        """Wait; return the losses of the steps that were enqueued, and the step whose loss is not finite."""
-        losses = np.zeros(max(len(self._pending), 1), np.float32)
-        failed = np.zeros(1, np.int32)
-        cl.enqueue_copy(self._queue, losses, self._losses)
+    def finish(self) -> tuple[int, NDArray[np.float32], int | None]:
+        """Wait; return first step and losses of the last block, and the step whose loss is not finite.
+
+        May be called again: an interrupt in the wait loses nothing.
+        """
+        step, buffer, drawn = self._block
+        losses, failed = np.zeros(max(len(drawn), 1), np.float32), np.zeros(1, np.int32)
+        cl.enqueue_copy(self._queue, losses, buffer)
         cl.enqueue_copy(self._queue, failed, self._failed)
-        losses = losses[: len(self._pending)]
-        self._pending.clear()
-        return losses, None if failed[0] < 0 else int(failed[0])
+        return step, losses[: len(drawn)], None if failed[0] < 0 else int(failed[0])
 
     def state(self, step: int) -> tuple[Arrays, Arrays, Arrays]:
         """Return parameters and moments by name before `step`: the one reached, or the one before it."""

@@ -36,9 +36,9 @@ BLOCK_BYTES = 2**23
 
 @dataclass
 class Run:
-    """A run on a device: it begun at `begun`; `step` steps are with the device, of `seen` the host knows.
+    """A run on a device, from step `begun` on; `step` is the one reached.
 
-    `template` has what no step changes; `history` is that of the state after `seen` steps.
+    `template` has what no step changes; `history` holds losses by step.
     """
 
     device: Any
@@ -47,13 +47,12 @@ class Run:
     begun: int
     step: int
     template: TrainState
-    history: list[tuple[int, float]]
+    history: dict[int, float]
     pool: tuple[Indices, Indices, Indices] | None = field(init=False)
 
     def __post_init__(self) -> None:
         drawn = train.draw_pool(self.recipe, self.data)
         self.pool = None if drawn is None else dataset.places_of(self.data, *drawn)
-        self.seen = self.step
 
     def draw(self, first: int, last: int) -> NDArray[np.int32]:
         """Return places (steps, 3, batch), in numbers, of the minibatches of steps first to last - 1."""
@@ -72,8 +71,8 @@ class Run:
         """Hand a block of steps to the device."""
         steps = range(self.step, self.step + len(places))
         numbers = [(train.rate_at(self.recipe, step), *adam.growth(step + 1)) for step in steps]
-        self.step = steps.stop
         self.device.enqueue(steps.start, places, numbers)
+        self.step = steps.stop
 
     def blocks(self, end: int, stops: Sequence[int]) -> Iterator[float]:
         """Do the steps up to `end` in blocks that end at multiples of `stops`; yield each's last loss."""
@@ -84,15 +83,16 @@ class Run:
             yield self.settle()
 
     def settle(self) -> float:
-        """Wait for the device, and return the last loss; TrainingError if one is not finite."""
-        losses, failed = self.device.finish()
-        for step, loss in zip(range(self.seen, self.step), losses, strict=True):
-            if step % self.recipe.log_every == 0 and step != failed:
-                self.history.append((step, float(loss)))
-            if step == failed:
-                self.step = step
-                train.check_loss(float(loss), step, self.recipe)
-        self.seen = self.step
+        """Wait for the device, and return the last loss; TrainingError if one is not finite.
+
+        What the device was given counts, not what the host meant to give: an interrupt may lie between.
+        """
+        first, losses, failed = self.device.finish()
+        self.step = first + len(losses) if failed is None else failed
+        numbered = dict(zip(range(first, self.step + 1), map(float, losses), strict=False))
+        self.history.update((step, numbered[step]) for step in numbered if step % self.recipe.log_every == 0)
+        if failed is not None:
+            train.check_loss(numbered[failed], failed, self.recipe)
         return float(losses[-1]) if len(losses) else 0.0
 
     def state(self, step: int) -> TrainState:
@@ -100,7 +100,7 @@ class Run:
         theta, m, v = (self._ordered(arrays) for arrays in self.device.state(step))
         layers = len(theta) // 2
         network = replace(self.template.siren, weights=theta[:layers], biases=theta[layers:])
-        history = tuple(pair for pair in self.history if pair[0] < step)
+        history = tuple(pair for pair in sorted(self.history.items()) if pair[0] < step)
         moments = AdamState(m, v, step)
         return replace(self.template, siren=network, moments=moments, step=step, history=history)
 
@@ -164,7 +164,7 @@ def begin(executor: Executor, recipe: Recipe, data: Dataset, state: TrainState) 
     device = executor.open_trainer(kernel, data.values, data.targets)
     groups = (state.siren.weights + state.siren.biases, state.moments.m, state.moments.v)
     device.load(state.step, *map(named, groups))
-    return Run(device, recipe, data, state.step, state.step, state, list(state.history))
+    return Run(device, recipe, data, state.step, state.step, state, dict(state.history))
 
 
 def named(arrays: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:

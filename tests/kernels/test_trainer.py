@@ -23,6 +23,7 @@ from wamnet.compiler.bounds import enclose
 from wamnet.compiler.profiles import EMITTED_SINE, UNIT_ROUNDOFF
 from wamnet.compiler.step_kernel import StepKernel, compile_step
 from wamnet.kernels import trainer
+from wamnet.kernels.opencl_trainer import OpenCLTrainer
 from wamnet.kernels.trainer import train_on
 from wamnet.refimpl import adam, dataset, denoise, metrics, train
 from wamnet.refimpl.dataset import Dataset, Window
@@ -101,7 +102,7 @@ def begin(opencl: Any, recipe: Recipe, kernel: StepKernel, state: TrainState, da
     device = opencl.open_trainer(kernel, data.values, data.targets)
     groups = (state.siren.weights + state.siren.biases, state.moments.m, state.moments.v)
     device.load(state.step, *map(trainer.named, groups))
-    return trainer.Run(device, recipe, data, state.step, state.step, state, [])
+    return trainer.Run(device, recipe, data, state.step, state.step, state, {})
 
 
 def examples(recipe: Recipe, data: Dataset, number: int) -> tuple[Any, Any]:
@@ -427,6 +428,42 @@ def test_an_interrupt_while_the_device_works(opencl: Any, monkeypatch: Any) -> N
     assert [state.step for state in kept] == [8]
     assert [number for number, _ in kept[0].history] == [0, 4]
     assert tensors(train_on(opencl, SMALL, PAIRS, state=kept[0])) == tensors(train_on(opencl, SMALL, PAIRS))
+
+
+def test_an_interrupt_while_steps_are_handed_out(opencl: Any, monkeypatch: Any) -> None:
+    """The state kept is that of the steps that the device was given, in the middle of a block."""
+    kept: list[TrainState] = []
+    load = OpenCLTrainer.load
+
+    def interrupting(device: Any, *arguments: Any) -> None:
+        load(device, *arguments)
+        update, calls = device._update, []
+
+        def interrupted(*numbers: Any) -> None:
+            calls.append(1)
+            if len(calls) == 7:
+                raise KeyboardInterrupt
+            update(*numbers)
+
+        device._update = interrupted
+
+    with monkeypatch.context() as patch:
+        patch.setattr(OpenCLTrainer, "load", interrupting)
+        with pytest.raises(KeyboardInterrupt):
+            train_on(opencl, SMALL, PAIRS, on_checkpoint=kept.append)
+    assert [state.step for state in kept] == [6]
+    assert tensors(kept[0]) == tensors(train_on(opencl, SMALL, PAIRS, until=6))
+
+
+def test_waiting_again_changes_nothing(opencl: Any) -> None:
+    """An interrupt may come after the wait, and what follows it waits once more."""
+    data = data_of(SMALL)
+    state = train.start(SMALL, dataset.Normalization(), data.digest)
+    run = begin(opencl, SMALL, kernel_of(SMALL), state, data)
+    run.enqueue(run.draw(0, 5))
+    assert run.settle() == run.settle()
+    assert tensors(run.state(run.step)) == tensors(run.state(5))
+    assert [number for number, _ in run.state(5).history] == [0, 4]
 
 
 @pytest.mark.parametrize("log_every", [1, 4])

@@ -399,7 +399,7 @@ def _no_rule(context: Context, operands: list[Enclosure]) -> Enclosure:
 
 NO_BOUND = (
     *("cos", "equal", "not_equal", "logical_and", "logical_or", "logical_not"),
-    *("bitwise_xor", "right_shift", "convert", "take"),
+    *("bitwise_and", "bitwise_xor", "right_shift", "convert", "take"),
 )
 """Operations without a rule: a program whose output depends on one has no bound, and says so.
 

@@ -62,6 +62,7 @@ class Dialect:
         "logical_and": "{0} && {1}",
         "logical_or": "{0} || {1}",
         "logical_not": "!{0}",
+        "bitwise_and": "{0} & {1}",
         "bitwise_xor": "{0} ^ {1}",
         "right_shift": "{0} >> {1}",
         "select": "{0} ? {1} : {2}",

@@ -112,7 +112,8 @@ def lower_scene(scene: Scene, settings: Settings, most_unrolled: int | None = MO
         pixel = given["x"] + np.uint32(render.MAX_IMAGE_SIDE_PX) * given["y"]
         counters = Counters(given["seed"], pixel, given["sample_number"])
         x, y = given["x"].astype(np.float32), given["y"].astype(np.float32)
-        path = render.start(basis, x, y, given["width"], given["height"], counters, np.float32)
+        size = given["width"], given["height"]
+        path = render.start(basis, x, y, *size, counters, np.float32, settings.sampler)
         return {**_taken(PATH, path), "pixel": pixel}
 
     def arrive(given: Mapping[str, Any]) -> dict[str, Any]:

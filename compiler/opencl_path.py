@@ -115,9 +115,9 @@ class OpenCLVectorPath(OpenCLPath):
             **OpenCLPath.operations,
             **{name: template.format(lanes=lanes) for name, template in VECTOR_OPERATIONS.items()},
             "take": f"({{type}})({entries})",
+            "row": "({type})({table}[{0}])",
         }
         self.helpers = {"floor": FLOOR.format(lanes=lanes)}
-        self.operations["row"] = "({type})({table}[{0}])"
 
     def number(self, value: Any, dtype: str) -> str:
         """Return the text of a number in all lanes."""

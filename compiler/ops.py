@@ -272,6 +272,7 @@ OPS: Mapping[str, Op] = {
         _row("logical_and", np.logical_and, 2, kinds=("bool",)),
         _row("logical_or", np.logical_or, 2, kinds=("bool",)),
         _row("logical_not", np.logical_not, 1, kinds=("bool",)),
+        _row("bitwise_and", np.bitwise_and, 2, kinds=("uint32",)),
         _row("bitwise_xor", np.bitwise_xor, 2, kinds=("uint32",)),
         _row("right_shift", np.right_shift, 2, kinds=("uint32",)),
         Op("select", 3, _select, np.where, "exact", elementwise=True),

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..refimpl.errors import CompileError
@@ -121,7 +121,7 @@ def compile_path(
 
 def _header(programs: PathPrograms, language: str, profile: Profile, lanes: int) -> list[str]:
     """Return the lines of the comment at the top of the source, up to the arguments."""
-    settings = [f"{key} {value}" for key, value in asdict(programs.settings).items()]
+    settings = [f"{key} {value}" for key, value in programs.settings.facts().items()]
     return [
         f"wamnet path tracer, {language}. Generated: change the compiler, not this text.",
         f"scene     {programs.scene}, digest {programs.scene_digest[:32]}",
@@ -138,7 +138,7 @@ def _identity(programs: PathPrograms, name: str, text: str) -> dict[str, Any]:
         "schema": SCHEMA,
         "digest": ir.sha256(text.encode()),
         "scene": {"name": programs.scene, "digest": programs.scene_digest},
-        "settings": asdict(programs.settings),
+        "settings": programs.settings.facts(),
         "programs": {part: ir.digest(program) for part, program in programs.parts().items()},
         "bound": None,
         "files": {name: ir.sha256(text.encode())},

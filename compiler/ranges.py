@@ -536,6 +536,7 @@ RULES: Mapping[str, Rule] = {
     "logical_or": _or,
     "logical_not": _not,
     "bitwise_xor": _integers,
+    "bitwise_and": _integers,
     "right_shift": _integers,
     "select": _select,
     "convert": _convert,

@@ -30,11 +30,11 @@ from .ops import ELEMENTWISE, OPS, TypeRuleError
 
 _UFUNCS: Mapping[Any, str] = {
     **{op.definition: op.name for op in ELEMENTWISE if isinstance(op.definition, np.ufunc)},
-    np.bitwise_and: "logical_and",
+    np.bitwise_and: "bitwise_and",
     np.bitwise_or: "logical_or",
     np.invert: "logical_not",
 }
-"""NumPy's ufuncs that are operations; `&`, `|` and `~` are those of truth values."""
+"""NumPy's ufuncs that are operations; `|` and `~` are those of truth values, `&` also that of words."""
 
 TRACEABLE = (
     *(f"np.{name}" for name in dict.fromkeys(_UFUNCS.values())),
@@ -94,7 +94,8 @@ class Traced(NDArrayOperatorsMixin):
             return _power(self.builder, *operands)
         if ufunc not in _UFUNCS:
             _refuse(name)
-        return emit(self.builder, _UFUNCS[ufunc], *operands)
+        truth = ufunc is np.bitwise_and and self.type.dtype == "bool"
+        return emit(self.builder, "logical_and" if truth else _UFUNCS[ufunc], *operands)
 
     def __array_function__(self, function: Any, types: Any, args: Any, options: Any) -> Any:
         return _call(self.builder, function, args, options)

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from . import vectors
+from .materials import Material
 from .scene import BLACK, IDENTITY, WALLS, Box, Light, Quad, Scene, Sphere, Vector
 
 MISS = 1e30
@@ -48,6 +49,12 @@ trace the same paths."""
 LEAST_SHARED = 4
 """Fewest boxes of a rotation for which rays are turned once instead of for each box: a scene of hundreds of
 rotations is then one table of boxes, not hundreds of groups. (To turn a ray costs twice a slab test.)"""
+
+
+CANCELLED = 16 * 2.0**-53
+"""A sum of products below this share of its terms' magnitudes is rounding noise: centre, rotation and
+products carry a few units of 2**-53 each. Boxes on a grid then share their slabs to the bit, and kernels
+compute each slab once: a centre of 1e-16 here and -7e-18 there would be two."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +129,7 @@ class Surface(NamedTuple):
 def build(scene: Scene, dtype: DTypeLike = np.float32) -> Geometry:
     """Return the scene's geometry as constants; computed in float64 and then rounded to dtype."""
     walls = len(WALLS) if scene.room is not None else 0
-    boxes = sorted(scene.boxes, key=lambda box: _rotations(scene).index(box.rotation))
+    boxes = _grouped(scene)
     sphere_id = walls + len(boxes)
     quad_id = sphere_id + len(scene.spheres)
     quads: tuple[Quad | Light, ...] = scene.quads + scene.lights
@@ -157,6 +164,11 @@ def _rotations(scene: Scene) -> list[Any]:
     return list(dict.fromkeys(box.rotation for box in scene.boxes))
 
 
+def _grouped(scene: Scene) -> list[Box]:
+    """Return the boxes in the order of their ids: by rotation."""
+    return sorted(scene.boxes, key=lambda box: _rotations(scene).index(box.rotation))
+
+
 def _box_groups(scene: Scene, first_id: int, constant: Any) -> tuple[BoxGroup, ...]:
     """Group the boxes by rotation, join small groups, and turn the centres into the rotated axes."""
     members = [[box for box in scene.boxes if box.rotation == rotation] for rotation in _rotations(scene)]
@@ -164,7 +176,7 @@ def _box_groups(scene: Scene, first_id: int, constant: Any) -> tuple[BoxGroup, .
     for joined, run in groupby(members, _joined):
         for boxes in [list(chain(*run))] if joined else run:
             matrices = np.array([box.rotation for box in boxes], np.float64)
-            centers = [m @ np.array(b.center) for m, b in zip(matrices, boxes, strict=True)]
+            centers = [_turned(m, np.array(b.center)) for m, b in zip(matrices, boxes, strict=True)]
             groups.append(
                 BoxGroup(
                     rotation=constant(matrices if joined else matrices[0]),
@@ -195,6 +207,13 @@ def _rows(table: Any) -> Any:
     return table.reshape(-1, 3)
 
 
+def _turned(rotation: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return rotation (3, 3) times point (3,), with zeros where the terms cancel to their rounding errors."""
+    size = np.abs(rotation) @ np.abs(point)
+    turned = rotation @ point
+    return np.where(np.abs(turned) <= CANCELLED * size, 0.0, turned)
+
+
 def _quad_constants(quad: Quad | Light) -> tuple[Any, Any, Any, Any]:
     """Return corner, dual edges and unit normal: (p - corner) . dual is p's coordinate along the edge."""
     u, v = np.array(quad.edge_u, np.float64), np.array(quad.edge_v, np.float64)
@@ -213,6 +232,19 @@ def _material_rows(scene: Scene, boxes: list[Box]) -> list[tuple[Vector, Vector]
     rows += [(part.reflectance, part.emission) for part in parts]
     rows += [(BLACK, light_radiance(light)) for light in scene.lights]
     return [*rows, (BLACK, scene.background)]
+
+
+def materials_by_id(scene: Scene) -> list[tuple[Material | None, Vector]]:
+    """Return (material, centre) of each surface that reflects, in the order of ids.
+
+    The centre of what has no inside is 0.
+    """
+    rows: list[tuple[Material | None, Vector]] = []
+    if scene.room is not None:
+        rows += [(material, BLACK) for material in scene.room.materials or (None,) * len(WALLS)]
+    bodies: tuple[Box | Sphere, ...] = (*_grouped(scene), *scene.spheres)
+    rows += [(body.material, body.center) for body in bodies]
+    return [*rows, *((quad.material, BLACK) for quad in scene.quads)]
 
 
 def light_radiance(light: Light) -> Vector:

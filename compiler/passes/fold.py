@@ -26,6 +26,7 @@ NEUTRAL: Mapping[str, tuple[float, bool]] = {
     "divide": (1.0, False),
     "subtract": (0.0, False),
     "add": (-0.0, True),
+    "bitwise_and": (0xFFFFFFFF, True),
     "bitwise_xor": (0, True),
     "right_shift": (0, False),
     "logical_and": (True, True),

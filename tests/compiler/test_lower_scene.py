@@ -14,6 +14,7 @@ from wamnet.compiler.lower_scene import LAYERS, PATH, SURFACE, lower_scene, name
 from wamnet.refimpl import render as R
 from wamnet.refimpl import rng, scenes, transport
 from wamnet.refimpl.camera import camera_basis
+from wamnet.refimpl.materials import Conductor, Dielectric, Lambertian, Mirror
 from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
 from wamnet.refimpl.transport import Settings
 
@@ -36,11 +37,33 @@ EVERYTHING = Scene(
 )
 """One of each kind of primitive and two of most, axis-parallel and turned."""
 
-SCENES = {**{name: scenes.canonical(name) for name in scenes.CANONICAL}, "everything": EVERYTHING}
+MATERIALS = replace(
+    EVERYTHING,
+    room=replace(EVERYTHING.room, materials=(Mirror(), None, Conductor(0.5), None, None, None)),
+    boxes=tuple(
+        replace(b, material=m)
+        for b, m in zip(EVERYTHING.boxes, (Dielectric(1.5), Dielectric(1.3), Conductor(0.1)), strict=True)
+    ),
+    spheres=tuple(replace(ball, material=Dielectric(1.8)) for ball in EVERYTHING.spheres),
+)
+"""Every kind of material, on every kind of surface that takes it, with different numbers."""
+
+DAY = replace(
+    EVERYTHING, room=None, background=(0.0, 0.0, 0.0), environment=scenes.canonical("daylight").environment
+)
+"""Lamps under a sky."""
+
+SCENES = {
+    **{name: scenes.canonical(name) for name in scenes.CANONICAL},
+    "everything": EVERYTHING,
+    "materials": MATERIALS,
+    "day": DAY,
+}
 SETTINGS = [
     Settings(max_depth=3),
     Settings(max_depth=2, roulette_depth=1, heuristic="balance"),
     Settings(max_depth=2, strategy="light"),
+    Settings(max_depth=1, sampler="sobol"),
     Settings(max_depth=2, strategy="bsdf"),
 ]
 
@@ -55,7 +78,7 @@ def components(values, *tuples):
     }
 
 
-@pytest.mark.parametrize("settings", SETTINGS, ids=lambda s: f"{s.strategy}-{s.roulette_depth}")
+@pytest.mark.parametrize("settings", SETTINGS, ids=lambda s: f"{s.strategy}-{s.roulette_depth}-{s.sampler}")
 @pytest.mark.parametrize("name", SCENES)
 def test_programs_give_the_reference_s_bits(name, settings):
     """All programs at each depth, on the reference's own states, in float32, the same sine in both."""
@@ -79,7 +102,9 @@ def follow(scene, settings, most_unrolled):
     y, x = np.divmod(np.arange(16 * 12), 16)
     counters = transport.Counters(rng.counter(7), R.pixel_counter(x, y), rng.counter(3))
     basis = camera_basis(scene.camera, np.float32)
-    path = R.start(basis, *(a.astype(np.float32) for a in (x, y)), 16, 12, counters, np.float32)
+    path = R.start(
+        basis, *(a.astype(np.float32) for a in (x, y)), 16, 12, counters, np.float32, settings.sampler
+    )
     given = {"x": x.astype(np.uint32), "y": y.astype(np.uint32), "width": 16, "height": 12}
     given |= {"seed": counters.seed, "sample_number": counters.sample}
     check(interpret(programs.start, given), {**components(PATH, path), "pixel": counters.pixel})
@@ -182,6 +207,43 @@ def test_what_a_scene_lacks_is_in_no_program():
     assert ops(plain["scatter"], "reciprocal") == 0
     assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings(strategy="bsdf")).scatter, "sqrt") == 1
     assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings()).scatter, "sqrt") == 2
+
+
+def test_a_sky_is_sampled_where_there_is_one():
+    """Numbers: two for the direction, two and a choice for the sky."""
+    scene = replace(SCENES["daylight"], spheres=(), environment=SCENES["daylight"].environment)
+    assert ops(lower_scene(scene, Settings()).scatter, "convert") == 5
+    assert ops(lower_scene(scene, Settings(strategy="bsdf")).scatter, "convert") == 2
+    single = replace(scene, boxes=(), quads=(), spheres=SCENES["daylight"].spheres[1:])
+    assert ops(lower_scene(single, Settings()).scatter, "convert") == 1
+
+
+@pytest.mark.parametrize("material", [Lambertian(), Mirror(), Conductor(0.3)])
+def test_one_material_needs_no_selection(material):
+    """With one kind and one number nothing depends on which surface was hit, but that there is one."""
+    walls = replace(SCENES["furnace"].room, materials=(material,) * 6)
+    scatter = lower_scene(replace(room_with(lights=(LIGHT,)), room=walls), Settings()).scatter
+    index = next(
+        i for i, node in enumerate(scatter.nodes) if node.op == "input" and node["name"] == "surface"
+    )
+    users = [node for node in scatter.nodes if index in node.args]
+    # Two questions: is there a surface to gather light at, is the distance that of a hit? One node, by its
+    # value.
+    assert [user.op for user in users] == ["less"]
+    assert ops(scatter, "take") == 0
+
+
+def test_a_second_material_is_selected_by_surface():
+    walls = SCENES["furnace"].room
+    one, two = (
+        lower_scene(
+            replace(room_with(), room=replace(walls, materials=(material,) * 3 + (None,) * 3)), Settings()
+        )
+        for material in (None, Mirror())
+    )
+    # Three components of the direction, and the density; the throughput is the same.
+    assert ops(two.scatter, "select") - ops(one.scatter, "select") >= 4
+    assert one.scatter == lower_scene(room_with(), Settings()).scatter
 
 
 @pytest.mark.parametrize(

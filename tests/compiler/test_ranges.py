@@ -282,7 +282,7 @@ def test_floor_and_cutting_off_are_decisions():
 words = st.integers(0, 2**32 - 1)
 
 
-@given(op=st.sampled_from(["add", "multiply", "subtract", "bitwise_xor"]), a=words, b=words)
+@given(op=st.sampled_from(["add", "multiply", "subtract", "bitwise_xor", "bitwise_and"]), a=words, b=words)
 def test_words_are_exact(op, a, b):
     """Modulo 2^32; where an operand is not known, nothing is."""
     program = program_of(op, [Type("uint32")] * 2, Type("uint32"))

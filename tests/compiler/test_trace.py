@@ -141,6 +141,8 @@ def test_float64_means_floats_alone():
         (lambda x: x.astype(np.float64), r"numbers are converted to float32, int32, uint32, not to float64"),
         (lambda x: x.astype(np.int32) >> 1, r"right_shift: operands must all be uint32, not int32"),
         (lambda x: (x > 0.0) + 1.0, r"add: operands must all be .*, not bool\[3\], float32"),
+        (lambda x: x.astype(np.int32) & 1, r"bitwise_and: operands must all be uint32, not int32"),
+        (lambda x: (x > 0.0) & x, r"logical_and: operands must all be bool, not bool\[3\], float32"),
         (lambda x: ~x.astype(np.uint32), r"logical_not: operands must all be bool"),
         (lambda x: np.where(x, x, x), r"select: operands must all be bool, not float32\[3\]"),
         (lambda x: np.where(x > 0.0, x, x > 0.0), r"select: operands must all be .*, not float32\[3\], bool"),

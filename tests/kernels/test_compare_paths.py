@@ -355,10 +355,18 @@ def test_views_outside_their_rules_are_refused():
 # ---- pictures ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["minicubes", "cornell", "lone_light", "balls"])
-def test_kernel_estimates_the_reference_s_image(executor_named, name):
+@pytest.mark.parametrize(
+    ("name", "spp"),
+    [
+        *((name, 128) for name in ("minicubes", "daylight", "cornell", "lone_light", "balls")),
+        # Light that glass gathers is far from normally distributed: of 15 pairs of the kernel's own pictures
+        # one was refused with 128 samples, none with 1024, whose least p-values lie as they should.
+        ("glossy", 1024),
+    ],
+)
+def test_kernel_estimates_the_reference_s_image(executor_named, name, spp):
     """Other seeds, so other paths: Welch's test on blocks of pixels, at a significance of 0.01 each."""
-    report = compare_images.compare_images(executor_named("opencl"), SCENES[name], Job(32, 24, 128, seed=1))
+    report = compare_images.compare_images(executor_named("opencl"), SCENES[name], Job(32, 24, spp, seed=1))
     assert report.comparisons >= 3 * 8
     assert report.passed, report
 

@@ -75,6 +75,7 @@ CASES = {
     "logical_and": lambda x: floats((x > 0.0) & (x < 1.0)),
     "logical_or": lambda x: floats((x < 0.0) | (x > 1.0)[..., 1][..., None]),
     "logical_not": lambda x: floats(~(x < 0.0)),
+    "bitwise_and": lambda x: (words(x) & words(x)[..., 1][..., None]).astype(np.float32),
     "bitwise_xor": lambda x: (words(x) ^ words(x)[..., 1][..., None]).astype(np.float32),
     "right_shift": lambda x: (words(x) >> np.uint32(3)).astype(np.float32),
     "select": lambda x: np.where(x < 0.5, x, np.maximum(words(x).astype(np.int32), 7).astype(np.float32)),
@@ -89,6 +90,7 @@ EXACT = (
     *("less", "less_equal", "greater", "greater_equal", "equal", "not_equal", "logical_and", "logical_or"),
     *(
         "logical_not",
+        "bitwise_and",
         "bitwise_xor",
         "right_shift",
         "select",

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.emit_path import FRAME_GROUPS
-from wamnet.compiler.ir import Node, Type
 from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.ops import OPS
 from wamnet.compiler.path_kernel import SCHEDULES, compile_path
 from wamnet.kernels.executor import Part
 from wamnet.kernels.render_on import compile_scene, render_on
@@ -40,7 +38,8 @@ def test_image_is_the_reference_s(executor, name):
     """Two samples a pixel: at least 99 pixels in 100 have every layer to 1e-5 of the layer's size.
 
     1e-5 is 168 u: a distance with 64 u s of error (spec/intersection.md), twice, and rounding of sums. A path
-    that falls on the other side of a decision changes its pixel wholly.
+    that falls on the other side of a decision changes its pixel wholly. Curved mirrors and glass multiply
+    errors, by up to 2 t / r a bounce, but what they show is smooth but for edges.
     """
     job = R.Job(WIDTH, HEIGHT, 2, SEED, Settings(max_depth=4))
     expected, found = R.render(scene(name), job), render_on(executor, scene(name), job)
@@ -61,6 +60,7 @@ def test_image_is_the_reference_s(executor, name):
         Settings(max_depth=0),
         Settings(max_depth=3, roulette_depth=1),
         Settings(max_depth=2, strategy="light"),
+        Settings(max_depth=2, sampler="sobol"),
         Settings(max_depth=2, strategy="bsdf", heuristic="balance"),
     ],
 )
@@ -130,54 +130,6 @@ def test_samples_are_numbered_on(executor):
     ]
     assert np.all(np.abs((halves[0] + halves[1]) / 2 - whole) <= 10 * U * whole)
     assert not np.array_equal(*halves)
-
-
-# ---- operations on vectors -----------------------------------------------------------------------------
-
-EDGES = [0.0, -0.0, 0.25, -0.25, 1.0, -1.0, 2.5, -2.5, 1e30, -1e30, 2.0**23 - 0.5, 0.5 - 2.0**23, 2.0**31]
-"""Numbers where a floor by cutting off, or a comparison in place of a function, could go wrong."""
-
-
-@pytest.mark.parametrize("lanes", SCHEDULES["opencl"][1][1:])
-@pytest.mark.parametrize("operation", ["absolute", "floor", "minimum", "maximum"])
-def test_operators_on_vectors_compute_what_numpy_computes(executor_named, lanes, operation):
-    """All pairs of the edges; equal to the bit, but for the sign of zero, which comparisons do not see."""
-    context = executor_named("opencl")._context
-    dialect = SCHEDULES["opencl"][0](lanes)
-    arity = OPS[operation].arity
-    a, b = (part.ravel().astype(np.float32) for part in np.meshgrid(EDGES, EDGES))
-    a, b = (np.resize(part, -(-len(a) // lanes) * lanes) for part in (a, b))
-    found = on_vectors(context, dialect, operation, arity, a, b)
-    assert np.array_equal(found, OPS[operation].definition(*(a, b)[:arity]))
-
-
-def on_vectors(context, dialect, operation, arity, a, b):
-    """Return the dialect's operation on arrays of whole vectors."""
-    cl = pytest.importorskip("pyopencl")
-    n, real = dialect.lanes, dialect.types["float32"]
-    value = dialect.expression(Node(operation, (), Type()), "float32", ["x", "y"][:arity])
-    source = f"""{dialect.helpers.get(operation, "")}
-    __kernel void run(__global const float *a, __global const float *b, __global float *c)
-    {{
-        size_t i = get_global_id(0);
-        {real} x = vload{n}(i, a);
-        {real} y = vload{n}(i, b);
-        {real} z = {value};
-        vstore{n}(z, i, c);
-    }}"""
-    flags, result = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR, np.empty_like(a)
-    buffers = [cl.Buffer(context, flags, hostbuf=part) for part in (a, b)]
-    output = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, result.nbytes)
-    with cl.CommandQueue(context) as queue:
-        cl.Program(context, source).build().run(queue, (len(a) // n,), None, *buffers, output)
-        cl.enqueue_copy(queue, result, output)
-    return result
-
-
-def test_a_kernel_without_floor_lacks_its_function():
-    assert "floor" in compile_path(lower_scene(scene("furnace"), Settings()), "opencl", lanes=16).source
-    source = compile_path(lower_scene(scene("furnace"), Settings()), "opencl", "native", lanes=16).source
-    assert "floor" not in source
 
 
 # ---- refusals ------------------------------------------------------------------------------------------

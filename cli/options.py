@@ -50,6 +50,13 @@ class Renderer(str, Enum):
     opengl = "opengl"
 
 
+class TrainerName(str, Enum):
+    """What trains: the reference, or its steps compiled."""
+
+    numpy = "numpy"
+    opencl = "opencl"
+
+
 class Target(str, Enum):
     """Languages that a model is compiled to."""
 
@@ -99,6 +106,12 @@ Profile = Annotated[
         "--profile",
         help="What the arithmetic promises: [bold]ieee[/] brings its own sine and a bound on the error, "
         "[bold]native[/] uses the target's sine.",
+    ),
+]
+Trainer = Annotated[
+    TrainerName,
+    typer.Option(
+        "--executor", help="What trains: the reference, or its step compiled, which is much faster."
     ),
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Any other number gives other random numbers.")]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,7 +15,7 @@ import typer
 from ..refimpl.errors import InputError
 from . import options
 from .inputs import CHECKPOINT_MARK, need_layers
-from .options import Preset
+from .options import Preset, TrainerName
 from .outputs import check_output
 from .terminal import hint_on_interrupt, progress, say
 
@@ -26,7 +28,7 @@ EXAMPLES = """Examples:
 
 wamnet train -i noisy.exr -t reference.exr -o model.safetensors
 
-wamnet train --dataset cubes --steps 20000
+wamnet train --dataset cubes --steps 20000 --executor opencl
 
 wamnet train -i n0.exr -t r0.exr -i n1.exr -t r1.exr --features color,normal --steps 4000
 
@@ -102,6 +104,7 @@ def train(
     restart: Annotated[
         bool, typer.Option("--restart", help="Begin anew, and replace the checkpoint of an earlier run.")
     ] = False,
+    executor: options.Trainer = TrainerName.numpy,
 ) -> None:
     """Train a network on noisy frames and their references, or on the training frames of a data set.
 
@@ -120,7 +123,7 @@ def train(
     recipe = _wanted(preset, state, features, steps, seed, rank)
     network = _first_network(begin, state)
     pairs = read_training(dataset, inputs, targets, recipe.features)
-    state = _fit_to_the_end(recipe, pairs, output, state, network)
+    state = _fit_to_the_end(recipe, pairs, output, state, network, executor.value)
     say(f"{output}: {state.step} steps; checkpoint in {saved}")
 
 
@@ -158,7 +161,8 @@ def _fit_to_the_end(
     pairs: Sequence[tuple[Frame, Frame]],
     output: Path,
     begin: TrainState | None,
-    network: Siren | None = None,
+    network: Siren | None,
+    executor: str,
 ) -> TrainState:
     """Train, and say how to go on after an interrupt, and that a longer run is another one."""
     saved = checkpoint_path(output)
@@ -167,7 +171,7 @@ def _fit_to_the_end(
         return f"go on with --resume, from {saved}" if saved.exists() else "no step was done"
 
     with hint_on_interrupt(hint):
-        state, _ = fit(recipe, pairs, output, begin, network)
+        state, _ = fit(recipe, pairs, output, begin, network, executor)
     if begin is not None and recipe.steps != begin.recipe.steps:
         before, now = begin.recipe.steps, recipe.steps
         say(f"the run of {before} steps became one of {now}: another model than with {now} from the start")
@@ -242,13 +246,14 @@ def fit(
     output: Path,
     state: TrainState | None = None,
     network: Siren | None = None,
+    executor: str = "numpy",
 ) -> tuple[TrainState, float]:
     """Train with a progress bar and checkpoints beside `output`; write the model there. Seconds come too.
 
     The run goes on from `state`, or begins with the weights of `network`, or with random ones.
     """
     from ..compiler.model_file import save_checkpoint, save_model
-    from ..refimpl.train import model_of, train
+    from ..refimpl.train import model_of
 
     saved, seen = checkpoint_path(output), state.step if state is not None else 0
     started = kept = monotonic()
@@ -262,17 +267,32 @@ def fit(
                 save_checkpoint(saved, now)
                 kept = monotonic()
 
-        state = train(
-            recipe,
-            pairs,
-            state=state,
-            network=network,
-            on_progress=on_progress,
-            on_checkpoint=lambda now: save_checkpoint(saved, now),
-        )
+        with _trainer(executor) as train:
+            state = train(
+                recipe,
+                pairs,
+                state=state,
+                network=network,
+                on_progress=on_progress,
+                on_checkpoint=lambda now: save_checkpoint(saved, now),
+            )
     seconds = monotonic() - started
     save_model(output, model_of(state, facts(pairs)))
     return state, seconds
+
+
+@contextmanager
+def _trainer(executor: str) -> Iterator[Callable[..., TrainState]]:
+    """Give the reference's trainer, or that of a device, which is closed afterwards."""
+    if executor == "numpy":
+        from ..refimpl.train import train
+
+        yield train
+        return
+    from .. import kernels
+
+    with kernels.open_executor(executor) as device:
+        yield partial(kernels.train_on, device)
 
 
 def facts(pairs: Sequence[tuple[Frame, Frame]]) -> dict[str, str]:

@@ -23,7 +23,7 @@ with the contract that its profile gives.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -92,11 +92,15 @@ class Enclosure:
 
 @dataclass(frozen=True)
 class Context:
-    """What a rule may look at beside its operands: the node, the parameters in float64, the sine."""
+    """What a rule may look at beside its operands: the node, the parameters in float64, sine and cosine.
+
+    `cosine` None: nothing is promised of it.
+    """
 
     node: Node
     parameters: Mapping[str, Array]
     sine: SineContract
+    cosine: SineContract | None = None
 
 
 Rule = Callable[[Context, list[Enclosure]], Enclosure]
@@ -290,6 +294,20 @@ def _sin(context: Context, operands: list[Enclosure]) -> Enclosure:
     return Enclosure(low, high, np.where(safe, error, np.inf))
 
 
+def _cos(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """cos(a) = sin(a + pi/2), with the cosine's own contract; without one no bound."""
+    if context.cosine is None:
+        return _no_rule(context, operands)
+    (a,) = operands
+    # float64 rounds a + pi/2, which moves the sine by less than this.
+    slack = 2.0**-51 * (a.largest + 2.0)
+    quarter = np.pi / 2
+    shifted = Enclosure(a.low + quarter - slack, a.high + quarter + slack, a.error)
+    found = _sin(replace(context, sine=context.cosine), [shifted])
+    inside = argument_reach(a) <= context.cosine.domain
+    return replace(found, error=np.where(inside, found.error, np.inf))
+
+
 def argument_reach(a: Enclosure) -> Array:
     """Return the largest |argument| that the kernel's sine may be given."""
     return a.largest + a.read
@@ -383,7 +401,10 @@ NO_BOUND = (
     *("cos", "equal", "not_equal", "logical_and", "logical_or", "logical_not"),
     *("bitwise_and", "bitwise_xor", "right_shift", "convert", "take"),
 )
-"""Operations without a rule: a program whose output depends on one has no bound, and says so."""
+"""Operations without a rule: a program whose output depends on one has no bound, and says so.
+
+A cosine has one where its caller states a contract, as that of a training step does.
+"""
 
 RULES: Mapping[str, Rule] = {
     "constant": _constant,
@@ -410,6 +431,7 @@ RULES: Mapping[str, Rule] = {
     "greater_equal": _greater_equal,
     "select": _select,
     **dict.fromkeys((*NO_BOUND, *LOOPS), _no_rule),
+    "cos": _cos,
 }
 """One rule an operation; inputs are given."""
 
@@ -417,7 +439,12 @@ RULES: Mapping[str, Rule] = {
 # ---- programs ---------------------------------------------------------------------------------------
 
 
-def enclose(program: Program, inputs: Mapping[str, tuple[Any, Any]], sine: SineContract) -> list[Enclosure]:
+def enclose(
+    program: Program,
+    inputs: Mapping[str, tuple[Any, Any]],
+    sine: SineContract,
+    cosine: SineContract | None = None,
+) -> list[Enclosure]:
     """Return the enclosure of every node for inputs in the given boxes (low, high), each (..., n)."""
     parameters = {name: array.astype(np.float64) for name, array in program.parameters.items()}
     found: list[Enclosure] = []
@@ -429,7 +456,7 @@ def enclose(program: Program, inputs: Mapping[str, tuple[Any, Any]], sine: SineC
         operands = [_spread(found[arg], program.nodes[arg], node) for arg in node.args]
         # An infinite bound may meet a weight of 0: _outward reads the NaN as no bound.
         with np.errstate(invalid="ignore"):
-            found.append(_outward(RULES[node.op](Context(node, parameters, sine), operands)))
+            found.append(_outward(RULES[node.op](Context(node, parameters, sine, cosine), operands)))
     return found
 
 

@@ -76,7 +76,7 @@ EMITTED_SINE = SineContract(
 EMITTED_COSINE = SineContract(
     f"emitted, odd polynomial of degree {sine.DEGREE}", sine.COSINE_ERROR, sine.COSINE_DOMAIN
 )
-"""The cosine of compiler/sine.py."""
+"""The cosine of compiler/sine.py; denoisers have none, the derivative of a sine does."""
 
 PROFILES: Mapping[str, Profile] = {
     profile.name: profile

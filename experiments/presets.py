@@ -6,6 +6,7 @@
 3. Print a Markdown table [`main`]: seconds, and PSNR and SSIM of display-encoded colour.
 
     python experiments/presets.py --frames out/presets --only paper short omega_0=3,batch=1024
+    python experiments/presets.py --only paper short --executor opencl
 
 Candidates without a name are the preset `short` with the changes that they list. Times are wall-clock times.
 """
@@ -22,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wamnet.kernels import open_executor, train_on
 from wamnet.refimpl import dataset, metrics
 from wamnet.refimpl.denoise import denoise
 from wamnet.refimpl.frame import Frame
@@ -87,10 +89,17 @@ def frames(folder: Path, size: int, times: Sequence[float], reference_spp: int) 
     return pairs
 
 
-def score(recipe: Recipe, trained: Sequence[Pair], tested: Sequence[Pair]) -> tuple[float, list[Picture]]:
+def score(
+    recipe: Recipe, trained: Sequence[Pair], tested: Sequence[Pair], executor: str = "numpy"
+) -> tuple[float, list[Picture]]:
     """Train on some pairs; return the seconds, and the pictures of the tested ones with their targets."""
     started = time.perf_counter()
-    model = model_of(train(recipe, trained))
+    if executor == "numpy":
+        state = train(recipe, trained)
+    else:
+        with open_executor(executor) as device:
+            state = train_on(device, recipe, trained)
+    model = model_of(state)
     seconds = time.perf_counter() - started
     scales = model.normalization
     return seconds, [(denoise(model, noisy), dataset.target_image(clean, scales)) for noisy, clean in tested]
@@ -109,6 +118,7 @@ def main() -> None:
     parser.add_argument("--reference-spp", type=int, default=64, help="samples of the training references")
     parser.add_argument("--unseen-spp", type=int, default=512, help="samples of the test references")
     parser.add_argument("--only", nargs="+", default=["paper", "short"], help="names, or key=value,...")
+    parser.add_argument("--executor", default="numpy", choices=["numpy", "opencl"], help="what trains")
     options = parser.parse_args()
     unseen = frames(options.frames, options.size, UNSEEN_TIMES, options.unseen_spp)
     step = TURN_SECONDS / options.training_frames
@@ -118,7 +128,8 @@ def main() -> None:
     print("| recipe | s | PSNR dB: a training frame, unseen frames | SSIM |\n|---|---|---|---|", flush=True)
     row("input, 1 spp", 0.0, [_targets(pair) for pair in tested])
     for name in options.only:
-        row(name, *score(candidate(name), trained[:1] if name.startswith("paper") else trained, tested))
+        seen = trained[:1] if name.startswith("paper") else trained
+        row(name, *score(candidate(name), seen, tested, options.executor))
 
 
 def _targets(pair: Pair) -> Picture:

@@ -6,3 +6,4 @@ from .pipeline import Pipeline as Pipeline
 from .registry import EXECUTORS as EXECUTORS
 from .registry import open_executor as open_executor
 from .render_on import render_on as render_on
+from .trainer import train_on as train_on

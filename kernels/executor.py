@@ -20,6 +20,7 @@ from ..compiler.artifact import Artifact
 from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.ir import Gather, Image
 from ..compiler.path_kernel import PathArtifact
+from ..compiler.step_kernel import StepKernel
 from ..refimpl.errors import InputError
 
 if TYPE_CHECKING:
@@ -81,6 +82,11 @@ class Executor(ABC):
             self._check_target(artifact)
         self.check_size(denoise, size)
         return self._passes(encode, denoise, size)
+
+    def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
+        """Return a trainer (opencl_trainer.py) for pictures laid out end to end, or refuse."""
+        rule = "it has no compiled trainer"
+        raise InputError("executor that trains", self.name, rule, "use executor opencl, or refimpl.train")
 
     def close(self) -> None:
         """Give the device back."""

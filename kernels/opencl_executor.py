@@ -20,9 +20,11 @@ from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
 from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.path_kernel import PathArtifact
+from ..compiler.step_kernel import StepKernel
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
 from .executor import Executor, Images, Part, black, gather_of, keep
+from .opencl_trainer import OpenCLTrainer
 from .passes import PICTURE, Passes
 
 DEVICE_VARIABLE = "WAMNET_OPENCL_DEVICE"
@@ -186,6 +188,17 @@ class OpenCLExecutor(Executor):
         function = known or getattr(self._compiled(artifact.source), artifact.entry_point)
         keep(self._encoders, artifact.digest, function)
         return function
+
+    def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
+        """Build the step's kernels, and copy pictures and targets to the device: a processor."""
+        if not self._device.type & cl.device_type.CPU:
+            raise InputError(
+                "device that trains",
+                self.device,
+                "the step is scheduled for processors: here it would take very long",
+                f"set {DEVICE_VARIABLE} to a part of a processor's name, such as portable (PoCL)",
+            )
+        return OpenCLTrainer(self._queue, self._compiled(kernel.source), kernel, values, targets)
 
     def _compiled(self, source: str) -> Any:
         """Return the built program, or raise with the driver's log."""

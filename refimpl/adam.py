@@ -2,6 +2,7 @@
 
 1. Start with moments of zero [`init`].
 2. Each step, follow the gradient by the bias-corrected first moment over the root of the second [`step`].
+   What happens to one number is a function of numbers [`update`], which the compiler traces.
 
 Source: Kingma, Ba, "Adam: A Method for Stochastic Optimization", ICLR 2015, Algorithm 1, in the order of its
 lines and with epsilon outside the root. Parameters are a tuple of arrays of any shapes; nothing is changed in
@@ -54,13 +55,33 @@ def step(
 ) -> tuple[tuple[Array, ...], AdamState]:
     """Return the parameters and the state after one step along `gradients`, each shaped as its parameter."""
     t = state.t + 1
-    m = tuple(beta_1 * m_i + (1.0 - beta_1) * g for m_i, g in zip(state.m, gradients, strict=True))
-    v = tuple(beta_2 * v_i + (1.0 - beta_2) * (g * g) for v_i, g in zip(state.v, gradients, strict=True))
-    # Both means began at zero and are too small by this factor.
-    m_hat = tuple(m_i / (1.0 - beta_1**t) for m_i in m)
-    v_hat = tuple(v_i / (1.0 - beta_2**t) for v_i in v)
-    moved = tuple(
-        theta - learning_rate * m_hat_i / (np.sqrt(v_hat_i) + epsilon)
-        for theta, m_hat_i, v_hat_i in zip(parameters, m_hat, v_hat, strict=True)
-    )
+    grown = growth(t, beta_1, beta_2)
+    found = [
+        update(theta, g, m, v, learning_rate, grown, beta_1, beta_2, epsilon)
+        for theta, g, m, v in zip(parameters, gradients, state.m, state.v, strict=True)
+    ]
+    moved, m, v = (tuple(arrays) for arrays in zip(*found, strict=True))
     return moved, AdamState(m, v, t)
+
+
+def growth(t: int, beta_1: float = BETA_1, beta_2: float = BETA_2) -> tuple[float, float]:
+    """Return by what factor either mean, which began at zero, is still too small at step t."""
+    return 1.0 - beta_1**t, 1.0 - beta_2**t
+
+
+def update(
+    theta: Any,
+    g: Any,
+    m: Any,
+    v: Any,
+    learning_rate: Any,
+    grown: tuple[Any, Any],
+    beta_1: float = BETA_1,
+    beta_2: float = BETA_2,
+    epsilon: float = EPSILON,
+) -> tuple[Any, Any, Any]:
+    """Return parameter, m and v (...) after one step along gradient g (...); all may be tracing values."""
+    m = beta_1 * m + (1.0 - beta_1) * g
+    v = beta_2 * v + (1.0 - beta_2) * (g * g)
+    m_hat, v_hat = m / grown[0], v / grown[1]
+    return theta - learning_rate * m_hat / (np.sqrt(v_hat) + epsilon), m, v

@@ -392,11 +392,19 @@ def _starts(lengths: Sequence[int]) -> Indices:
 
 def examples_at(dataset: Dataset, frame: Indices, y: Indices, x: Indices) -> tuple[Array, Array]:
     """Return window vectors (N, D_in) and target colours (N, 3) of pixels given as frame, y, x (N,)."""
-    row_px = dataset.row_px[frame]
-    corner = dataset.start_px[frame] + y * row_px + x
-    width = row_px - dataset.window.size + 1
+    corner, row_px, target = places_of(dataset, frame, y, x)
     windows = _gather(dataset.values, corner, row_px, dataset.channels, dataset.window.size)
-    return windows, dataset.targets[dataset.first[frame] + y * width + x]
+    return windows, dataset.targets[target]
+
+
+def places_of(dataset: Dataset, frame: Indices, y: Indices, x: Indices) -> tuple[Indices, Indices, Indices]:
+    """Return where the examples of pixels frame, y, x (N,) lie, each (N,).
+
+    The pixel of `values` at the window's first corner, pixels from row to row there, the row of `targets`.
+    """
+    row_px = dataset.row_px[frame]
+    width = row_px - dataset.window.size + 1
+    return dataset.start_px[frame] + y * row_px + x, row_px, dataset.first[frame] + y * width + x
 
 
 def sample_pixels(

@@ -267,7 +267,7 @@ def train(
     data = dataset.build(pairs, recipe.features, recipe.window, normalization)
     if state is None:
         state = start(recipe, normalization, data.digest, dtype, network)
-    state = _resumed(state, recipe, data.digest)
+    state = resumed(state, recipe, data.digest)
     pool = draw_pool(recipe, data)
     end = recipe.steps if until is None else min(until, recipe.steps)
     keep = on_checkpoint or _forget
@@ -281,7 +281,7 @@ def train(
                 on_progress(state, loss)
             if checkpoint_every and state.step % checkpoint_every == 0 and state.step < end:
                 keep(state)
-        _check_parameters(state)
+        check_parameters(state)
     except KeyboardInterrupt:
         keep(state)
         raise
@@ -293,7 +293,7 @@ def train(
     return state
 
 
-def _check_parameters(state: TrainState) -> None:
+def check_parameters(state: TrainState) -> None:
     """Refuse to hand out parameters that the last step made infinite or NaN."""
     if not all(np.isfinite(array).all() for array in state.siren.weights + state.siren.biases):
         raise TrainingError(
@@ -306,7 +306,7 @@ def _forget(state: TrainState) -> None:
     """Keep no checkpoint."""
 
 
-def _resumed(state: TrainState, recipe: Recipe, digest: str) -> TrainState:
+def resumed(state: TrainState, recipe: Recipe, digest: str) -> TrainState:
     """Return `state` under `recipe`, which may change the number of steps and of log lines, nothing else."""
     same = replace(recipe, steps=state.recipe.steps, log_every=state.recipe.log_every)
     if same != state.recipe:
@@ -331,20 +331,29 @@ def train_step(state: TrainState, data: Dataset, pool: Pixels | None) -> tuple[T
         loss, gradients = loss_and_gradients(
             network, windows.astype(network.dtype), targets.astype(network.dtype)
         )
-        if not math.isfinite(loss):
-            raise TrainingError(
-                f"loss at step {state.step} is {loss}: it must stay finite; lower the learning rate "
-                f"({recipe.learning_rate}) or check the frames"
-            )
-        rate = recipe.learning_rate * SCHEDULES[recipe.schedule](state.step, recipe.steps)
+        check_loss(loss, state.step, recipe)
         dfactors = state.factors and factored.backward(state.factors, gradients.dweights[0])
         slopes = _parameters(dfactors, gradients.dweights, gradients.dbiases)
-        parameters, moments = adam.step(state.parameters, slopes, state.moments, rate)
+        parameters, moments = adam.step(state.parameters, slopes, state.moments, rate_at(recipe, state.step))
         moved = _with_parameters(state, parameters)
     history = state.history
     if state.step % recipe.log_every == 0:
         history = (*history, (state.step, loss))
     return replace(moved, moments=moments, step=state.step + 1, history=history), loss
+
+
+def check_loss(loss: float, step: int, recipe: Recipe) -> None:
+    """Refuse to follow a gradient when the loss is not finite."""
+    if not math.isfinite(loss):
+        raise TrainingError(
+            f"loss at step {step} is {loss}: it must stay finite; lower the learning rate "
+            f"({recipe.learning_rate}) or check the frames"
+        )
+
+
+def rate_at(recipe: Recipe, step: int) -> float:
+    """Return the learning rate of a step."""
+    return recipe.learning_rate * SCHEDULES[recipe.schedule](step, recipe.steps)
 
 
 Pixels = tuple[dataset.Indices, dataset.Indices, dataset.Indices]
@@ -362,9 +371,14 @@ def draw_batch(recipe: Recipe, step: int, data: Dataset, pool: Pixels | None) ->
     """Draw the pixels of one minibatch, a function of (recipe.seed, step) alone."""
     if pool is None:
         return dataset.sample_pixels(recipe.seed, step, recipe.batch, data.shapes)
-    pick = dataset.sample_indices(recipe.seed, step, PICK_TAG, recipe.batch, recipe.n_windows)
+    pick = draw_picks(recipe, step)
     frame, y, x = pool
     return frame[pick], y[pick], x[pick]
+
+
+def draw_picks(recipe: Recipe, step: int) -> dataset.Indices:
+    """Draw the members of the pool that make up one minibatch."""
+    return dataset.sample_indices(recipe.seed, step, PICK_TAG, recipe.batch, recipe.n_windows)
 
 
 def loss_and_gradients(network: Siren, windows: Array, targets: Array) -> tuple[float, siren.Gradients]:
@@ -373,10 +387,17 @@ def loss_and_gradients(network: Siren, windows: Array, targets: Array) -> tuple[
     Outputs are not clipped here: the derivative of a clipped output is 0 where it matters most.
     """
     outputs, cache = siren.forward_cached(network, windows)
+    squares, dy = squared_error(outputs, targets, outputs.size)
+    return float(np.mean(squares, dtype=np.float64)), siren.backward(network, cache, dy, with_dx=False)
+
+
+def squared_error(outputs: Any, targets: Any, count: int) -> tuple[Any, Any]:
+    """Return (y - t)^2 for y, t (..., 3), and d/dy of the sum of all squares over their `count`.
+
+    Both may be tracing values.
+    """
     error = outputs - targets
-    loss = float(np.mean(np.square(error), dtype=np.float64))
-    # d/dy of sum((y - t)^2) / (3 N).
-    return loss, siren.backward(network, cache, error * (2.0 / error.size), with_dx=False)
+    return error * error, error * (2.0 / count)
 
 
 def model_of(state: TrainState, info: Mapping[str, str] | None = None) -> Model:

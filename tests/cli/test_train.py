@@ -9,7 +9,9 @@ import pytest
 
 from wamnet.cli import exr, train
 from wamnet.compiler.model_file import load_checkpoint, load_model
+from wamnet.kernels import train_on
 from wamnet.refimpl import train as reference
+from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame
 
 
@@ -199,3 +201,30 @@ def test_a_model_is_cut_and_trained_on(wamnet, refused, pair, tmp_path) -> None:
     assert text in refused("train", *pair[:4], "--resume", "-o", "cut.safetensors", *more[:2])
     others = (*pair[:4], "--features", "color", *more[:2], "-o", "x.safetensors")
     assert "widths and omegas of the first network is " in refused("train", *others)
+
+
+def test_training_on_a_device(wamnet, refused, pair, tmp_path, executor_named) -> None:
+    """The model is train_on's, to the bit; a checkpoint of one executor is gone on with by the other."""
+    device = executor_named("opencl")
+    options = ("--steps", 4, "--executor", "opencl")
+    assert wamnet("train", *pair, *options, "-o", "m.safetensors").status == 0
+    recipe = train.choose_recipe("short", None, {"features": ("color", "normal"), "steps": 4})
+    frames = exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr")
+    want = train_on(device, recipe, [frames]).siren
+    found = load_model(tmp_path / "m.safetensors").siren
+    assert all((a == b).all() for a, b in zip(found.weights, want.weights, strict=True))
+    assert wamnet("train", *pair[:4], "--resume", "--steps", 6, "-o", "m.safetensors").status == 0
+    resumed = wamnet("train", *pair[:4], "--resume", "--steps", 8, *options[2:], "-o", "m.safetensors")
+    assert resumed.status == 0
+    assert load_checkpoint(tmp_path / "m.checkpoint.safetensors").step == 8
+    assert "Invalid value for '--executor'" in refused("train", *pair, "--executor", "opengl", "--restart")
+
+
+def test_a_device_that_is_missing(refused, pair, monkeypatch) -> None:
+    """The reason is told, and nothing is written."""
+
+    def missing(name: str) -> None:
+        raise ExecutorUnavailable(f"{name}: no such device here; take numpy")
+
+    monkeypatch.setattr("wamnet.kernels.open_executor", missing)
+    assert "opencl: no such device here; take numpy" in refused("train", *pair, "--executor", "opencl")

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from wamnet.compiler import bounds, ops
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import Gather, Image, Type
-from wamnet.compiler.profiles import EMITTED_SINE, SineContract
+from wamnet.compiler.profiles import EMITTED_COSINE, EMITTED_SINE, SineContract
+from wamnet.compiler.sine import COSINE_DOMAIN, COSINE_ERROR, cosine
 from wamnet.compiler.trace import trace
 from wamnet.refimpl.dataset import Window
 
@@ -342,3 +343,29 @@ def test_window_box_has_a_range_for_each_channel_and_zero_outside():
 
 def test_every_operation_but_inputs_has_a_rule():
     assert set(bounds.RULES) == set(ops.OPS) - {"input"}
+
+
+@given(
+    a=st.floats(-6400, 6400, width=32), width=st.floats(0, 4), shift=st.floats(-1, 1), error=st.floats(0, 0.1)
+)
+def test_a_cosine_with_a_contract_has_a_bound(a, width, shift, error):
+    """The range holds the cosine; the error the emitted cosine of a number that is off by up to `error`."""
+    program = trace(np.cos, {"x": Type()})
+    context = bounds.Context(program.nodes[-1], {}, EMITTED_SINE, EMITTED_COSINE)
+    exact, kernels = np.float64(a), np.float32(a + shift * error)
+    off = np.abs(kernels.astype(np.float64) - exact)
+    box = bounds.Enclosure(exact - width / 2, exact + width / 2, off)
+    found = bounds.RULES["cos"](context, [box])
+    assert found.low <= np.cos(exact) <= found.high
+    if abs(a) + width / 2 + off > COSINE_DOMAIN:
+        assert found.error == np.inf
+        return
+    if abs(a) + width / 2 + off <= COSINE_DOMAIN - 2:
+        assert abs(np.float64(cosine(kernels)) - np.cos(exact)) <= found.error
+        # A slope of at most 1 passes `off` on; the contract's own error comes once, flushing is far below it.
+        assert found.error <= off + 2 * COSINE_ERROR
+
+
+def test_a_cosine_without_a_contract_has_none():
+    program = trace(np.cos, {"x": Type()})
+    assert bounds.at_inputs(program, {"x": 1.0}, EMITTED_SINE)["color"] == np.inf

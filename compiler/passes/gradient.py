@@ -1,0 +1,150 @@
+"""The derivative of a program by its parameters: reverse mode, one rule an operation [`RULES`].
+
+1. Walk from the output to the inputs [`gradient`]. A value's slope is the derivative of the loss by the
+   value: the output's is given, those of operands follow by the chain rule. Slopes of a value with several
+   readers add up. Values that depend on no parameter need none.
+2. In one lane an affine map y = W x + b with slope dy gives dx = W^T dy, one more affine map, dW = dy x^T and
+   db = dy. The derivative of a loss over many lanes is their sum [`step.Sum`], which is no node: a program
+   works on each lane alone. So the program gets dy and x as outputs, and the sum stands beside it.
+
+Source: the chain rule in reverse order, as in Griewank and Walther, "Evaluating Derivatives", 2008, section
+3.2. tests/compiler/passes/test_gradient.py compares it with the backward pass written by hand in
+refimpl/siren.py, and each rule with central differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ...refimpl.errors import CompileError
+from ..ir import Builder, Node, Program, attributes
+from ..ops import OPS
+from ..step import TRANSPOSED, Sum
+from ..trace import Traced, emit
+
+Slopes = tuple[Traced, ...]
+"""The slope of each operand."""
+
+Rule = Callable[[Traced, Traced, tuple[Traced, ...]], Slopes]
+"""(the slope of the value, the value, its operands) -> their slopes."""
+
+
+def _divide(d: Traced, y: Traced, x: tuple[Traced, ...]) -> Slopes:
+    """d(a / b) = da / b - (a / b) db / b."""
+    over = d / x[1]
+    return over, -(over * y)
+
+
+RULES: Mapping[str, Rule] = {
+    "add": lambda d, y, x: (d, d),
+    "subtract": lambda d, y, x: (d, -d),
+    "multiply": lambda d, y, x: (d * x[1], d * x[0]),
+    "divide": _divide,
+    "negative": lambda d, y, x: (-d,),
+    "reciprocal": lambda d, y, x: (-(d * y * y),),
+    "sqrt": lambda d, y, x: (0.5 * d / y,),
+    "sin": lambda d, y, x: (d * np.cos(x[0]),),
+    "cos": lambda d, y, x: (-(d * np.sin(x[0])),),
+}
+"""One rule an operation; affine maps and parameters: [`gradient`]."""
+
+
+def gradient(program: Program, output: str, slope: str) -> tuple[Program, tuple[Sum, ...]]:
+    """Return the program with what the derivatives are made of, and one sum for each parameter.
+
+    `slope` is the output that holds the derivative of the loss by `output`.
+    """
+    ends = dict(program.outputs)
+    if program.nodes[ends[output]].type != program.nodes[ends[slope]].type:
+        raise CompileError(f"outputs {output!r} and {slope!r} have different types; a slope has its value's")
+    walk = _Walk(program)
+    walk.slopes[ends[output]] = Traced(walk.builder, ends[slope])
+    for index in range(ends[output], -1, -1):
+        if index in walk.slopes and walk.needs[index]:
+            walk.visit(index)
+    missing = set(program.parameters) - set(walk.sums)
+    if missing:
+        raise CompileError(f"the output does not depend on {', '.join(sorted(missing))}")
+    made = replace(
+        program,
+        nodes=tuple(walk.builder.nodes),
+        outputs=(*program.outputs, *walk.outputs),
+        parameters=dict(walk.builder.parameters),
+    )
+    return made, tuple(walk.sums[name] for name in program.parameters)
+
+
+class _Walk:
+    """What is known on the way from the output to the inputs: the slopes of values, and the sums so far."""
+
+    def __init__(self, program: Program) -> None:
+        self.program, self.needs = program, _depends_on_parameters(program)
+        self.builder = Builder()
+        for node in program.nodes:
+            self.builder.add(node)
+        self.builder.parameters.update(program.parameters)
+        self.slopes: dict[int, Traced] = {}
+        self.outputs: list[tuple[str, int]] = []
+        self.sums: dict[str, Sum] = {}
+
+    def visit(self, index: int) -> None:
+        """Pass the slope of a value on to its operands, and to its parameters."""
+        node, d = self.program.nodes[index], self.slopes[index]
+        if node.op == "parameter":
+            self._sum(str(node["name"]), d)
+        elif node.op == "affine":
+            self._sum(str(node["weight"]), d, node.args[0])
+            if node.get("bias") is not None:
+                self._sum(str(node["bias"]), d)
+            if self.needs[node.args[0]]:
+                self._add(index, node.args[0], _through(self.builder, node, d))
+        else:
+            operands = tuple(Traced(self.builder, arg) for arg in node.args)
+            for arg, part in zip(
+                node.args, _rule(node)(d, Traced(self.builder, index), operands), strict=True
+            ):
+                if self.needs[arg]:
+                    self._add(index, arg, part)
+
+    def _add(self, index: int, arg: int, part: Traced) -> None:
+        """Add to the slope of an operand."""
+        if part.type != self.program.nodes[arg].type:
+            op = self.program.nodes[index].op
+            raise CompileError(f"%{index} {op}: a number that depends on weights meets a vector")
+        self.slopes[arg] = self.slopes[arg] + part if arg in self.slopes else part
+
+    def _sum(self, parameter: str, left: Traced, right: int | None = None) -> None:
+        """Note the derivative by a parameter: the sum over the lanes of left right^T, or of left."""
+        if parameter in self.sums:
+            raise CompileError(f"parameter {parameter} is used twice: its derivative has no single sum")
+        factors = {"left": left.index} if right is None else {"left": left.index, "right": right}
+        names = {side: f"{parameter}.{side}" for side in factors}
+        self.outputs += [(names[side], factor) for side, factor in factors.items()]
+        self.sums[parameter] = Sum(parameter, names["left"], names.get("right"))
+
+
+def _depends_on_parameters(program: Program) -> list[bool]:
+    """Return, for each node, whether a parameter takes part in its value."""
+    found: list[bool] = []
+    for node in program.nodes:
+        found.append(bool(OPS[node.op].parameters) or any(found[arg] for arg in node.args))
+    return found
+
+
+def _through(builder: Builder, node: Node, d: Traced) -> Traced:
+    """Return W^T d; the transposed matrix has a name of its own, so that it can follow W."""
+    name = f"{node['weight']}{TRANSPOSED}"
+    builder.parameters[name] = np.ascontiguousarray(builder.parameters[str(node["weight"])].T)
+    return emit(builder, "affine", d, **dict(attributes(weight=name)))
+
+
+def _rule(node: Node) -> Rule:
+    """Return the rule of the node's operation."""
+    if node.op not in RULES:
+        raise CompileError(
+            f"{node.op} has no derivative rule; there are: {', '.join(('affine', 'parameter', *RULES))}"
+        )
+    return RULES[node.op]

@@ -1,0 +1,104 @@
+"""A step of training as a program of one example, and sums over the examples of a minibatch.
+
+1. The program maps a window and a target to the squared error, and to the factors of every derivative
+   [`Step`]. It is a program like any other: verified, interpreted, bounded, rewritten by passes.
+2. What the examples give is added up: for each sum the outer products of two outputs, or one output
+   [`Sum`, `sums`].
+3. Weights change from step to step: they are given anew [`with_parameters`]. A matrix that is also used
+   transposed stands there twice, the second time under its name and [`TRANSPOSED`].
+4. The error of a sum follows from the enclosures of what is added, for every order of summation
+   [`sum_errors`].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from .bounds import OUTWARD, Enclosure, enclose, gamma
+from .interpret import interpret
+from .ir import Program
+from .profiles import EMITTED_COSINE, EMITTED_SINE, FLUSH
+
+Array = NDArray[Any]
+
+TRANSPOSED = ".T"
+"""What the name of a transposed matrix ends in."""
+
+SQUARES = "squares"
+"""The output and the sum of squared errors."""
+
+WINDOW, TARGET = "window", "target"
+"""The program's inputs."""
+
+
+@dataclass(frozen=True)
+class Sum:
+    """The derivative by `parameter`: over the lanes, the sum of outputs left right^T, or of `left`."""
+
+    parameter: str
+    left: str
+    right: str | None = None
+
+
+@dataclass(frozen=True)
+class Step:
+    """A program of one example, and what is added up over `batch` examples."""
+
+    program: Program
+    sums: tuple[Sum, ...]
+    batch: int
+
+    @property
+    def trained(self) -> tuple[str, ...]:
+        """Return the names of the parameters that are trained, in the program's order."""
+        return tuple(known.parameter for known in self.sums if known.parameter != SQUARES)
+
+
+def with_parameters(step: Step, arrays: Mapping[str, Array]) -> Step:
+    """Return the step at other weights: `arrays` holds one for each parameter that is trained."""
+    given = {name: np.asarray(arrays[name.removesuffix(TRANSPOSED)]) for name in step.program.parameters}
+    parameters = {
+        name: np.ascontiguousarray(array.T if name.endswith(TRANSPOSED) else array)
+        for name, array in given.items()
+    }
+    return replace(step, program=replace(step.program, parameters=parameters))
+
+
+def sums(step: Step, windows: Array, targets: Array, dtype: DTypeLike = np.float64) -> dict[str, Array]:
+    """Return each sum over examples windows (N, D_in), targets (N, 3): as its parameter; squares (3,)."""
+    values = interpret(step.program, {WINDOW: windows, TARGET: targets}, dtype)
+    found = {}
+    for known in step.sums:
+        left = values[known.left]
+        found[known.parameter] = left.sum(axis=0) if known.right is None else left.T @ values[known.right]
+    return found
+
+
+def sum_errors(step: Step, windows: Array, targets: Array) -> dict[str, Array]:
+    """Return how far each sum of a kernel may be from the float64 one, at given examples.
+
+    N terms l_n r_n are added, each with the errors of its factors, one rounding for the product and at most N
+    for the sum; padding adds zeros, which round nothing, and the sum over groups is part of the order.
+    """
+    given = {name: (np.asarray(x, np.float64),) * 2 for name, x in ((WINDOW, windows), (TARGET, targets))}
+    nodes = enclose(step.program, given, EMITTED_SINE, EMITTED_COSINE)
+    ends = dict(step.program.outputs)
+    return {known.parameter: _sum_error(known, ends, nodes, len(windows)) for known in step.sums}
+
+
+def _sum_error(known: Sum, ends: Mapping[str, int], nodes: Sequence[Enclosure], n: int) -> Array:
+    """Return the bound of one sum, widened by more than float64 can have rounded it."""
+    left = nodes[ends[known.left]]
+    if known.right is None:
+        error = left.read.sum(axis=0) + gamma(n) * (left.seen + FLUSH).sum(axis=0) + n * FLUSH
+    else:
+        right = nodes[ends[known.right]]
+        factors = left.read.T @ right.largest + left.largest.T @ right.read + left.read.T @ right.read
+        error = factors + gamma(n + 1) * ((left.seen + FLUSH).T @ (right.seen + FLUSH)) + 2 * n * FLUSH
+    widened: Array = error * (1 + OUTWARD)
+    return widened

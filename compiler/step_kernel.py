@@ -1,0 +1,68 @@
+"""The kernels of a training step for OpenCL: source, layout, and what they promise [`compile_step`].
+
+1. Lower the reference's step and Adam [`lower_step.py`]; put the emitted sine and cosine in.
+2. Emit both kernels [`emit_step.py`].
+
+Profile `ieee`: any order of summation, fused multiply-add, emitted sine. What the derivatives of one step may
+be off is computed at given examples [`step.sum_errors`]. There is no bound for all weights that training may
+reach: sine and cosine are proven up to their domains alone, and beyond them the result means nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from . import ir
+from .emit_step import WindowForm, step_text, update_text
+from .ir import Program
+from .lower_step import lower_adam, lower_step
+from .opencl_path import schedule
+from .passes import pipeline
+from .profiles import PROFILES
+from .step import Step
+from .step_layout import LANES, Slot, slots, transposed_slots
+
+
+@dataclass(frozen=True)
+class StepKernel:
+    """Both kernels; `step` is the analysed one, `adam` the program of one number.
+
+    `places` says where parameters lie, `copies` where transposed matrices do; `scratch_vectors` is the memory
+    of a work item.
+    """
+
+    source: str
+    step: Step
+    adam: Program
+    places: Mapping[str, Slot]
+    copies: Mapping[str, Slot]
+    scratch_vectors: int
+
+    @property
+    def digest(self) -> str:
+        """Return the hash that names the kernels."""
+        return ir.sha256(self.source.encode())
+
+
+def compile_step(widths: tuple[int, ...], omegas: tuple[float, float], batch: int, size: int) -> StepKernel:
+    """Return the kernels that train layers of `widths` on windows of `size` x `size` pixels."""
+    return compile_lowered(lower_step(widths, *omegas, batch), size)
+
+
+def compile_lowered(step: Step, size: int) -> StepKernel:
+    """Return the kernels of a step; its window has `size` runs."""
+    dialect = schedule(LANES)
+    emitted = replace(step, program=pipeline.run(step.program, PROFILES["ieee"].passes))
+    operations = {node.op for node in emitted.program.nodes}
+    helpers = [text for op, text in dialect.helpers.items() if op in operations]
+    (n_in,) = next(node.type.shape for node in step.program.nodes if node.op == "input")
+    form = WindowForm(size, n_in // size)
+    text, scratch_vectors = step_text(emitted, form, dialect, helpers)
+    adam = lower_adam()
+    header = (
+        "/*\n * wamnet training step, OpenCL C 1.2. Generated: change the compiler, not this text.\n"
+        f" * program   {ir.digest(step.program)[:32]}\n */\n"
+    )
+    source = header + text + "\n" + update_text(step, adam, dialect)
+    return StepKernel(source, step, adam, slots(step), transposed_slots(step), scratch_vectors)

@@ -1,0 +1,561 @@
+"""The compiled trainer: derivatives and Adam within computed bounds, and the reference's rules for runs.
+
+Every test is of OpenCL, the executor that trains. An excess is the largest error over its bound: at most 1
+for a right kernel.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from statistical import SIGNIFICANCE, welch_p
+
+from wamnet.compiler import lower_step, step, step_kernel
+from wamnet.compiler.bounds import enclose
+from wamnet.compiler.profiles import EMITTED_SINE, UNIT_ROUNDOFF
+from wamnet.compiler.step_kernel import StepKernel, compile_step
+from wamnet.kernels import trainer
+from wamnet.kernels.opencl_trainer import OpenCLTrainer
+from wamnet.kernels.trainer import train_on
+from wamnet.refimpl import adam, dataset, denoise, metrics, train
+from wamnet.refimpl.dataset import Dataset, Window
+from wamnet.refimpl.encoding import from_display, to_display
+from wamnet.refimpl.errors import InputError, TrainingError
+from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.train import Recipe, TrainState
+
+Arrays = Mapping[str, Any]
+
+SMALL = Recipe(
+    features=("color",),
+    window=Window(5),
+    widths=(12, 20),
+    omega_0_first=1.0,
+    omega_0_hidden=5.0,
+    n_windows=0,
+    batch=100,
+    steps=20,
+    learning_rate=1e-3,
+    schedule="cosine",
+    seed=3,
+    log_every=4,
+)
+"""A run of some milliseconds; layers of less than one vector and of more."""
+
+BOUNDED = 0.9
+"""Least share of parameters for which a step of Adam has a bound: near g = 0 it has none."""
+
+
+@pytest.fixture(scope="module")
+def opencl(executor_named: Any) -> Any:
+    return executor_named("opencl")
+
+
+def pair(seed: int, height: int, width: int) -> tuple[Frame, Frame]:
+    """Return frames of noise: what a network does with them is of no interest here."""
+    random = np.random.default_rng(seed)
+
+    def frame() -> Frame:
+        color = random.uniform(0, 1, (height, width, 3)).astype(np.float32)
+        normal = random.uniform(-1, 1, (height, width, 3)).astype(np.float32)
+        return Frame({"color": color, "normal": normal})
+
+    return frame(), frame()
+
+
+PAIRS = [pair(1, 9, 13), pair(2, 11, 8)]
+
+
+def planes(seed: int) -> tuple[Frame, Frame]:
+    """Return a noisy and a clean plane in display-encoded colour: something to learn."""
+    random = np.random.default_rng(seed)
+    y, x = np.indices((32, 32))[..., None] / 32
+    clean = 0.5 + 0.15 * (random.uniform(-1, 1, 3) * x + random.uniform(-1, 1, 3) * y)
+    noisy = np.clip(clean + 0.1 * random.standard_normal(clean.shape), 0, 1)
+    frames = [Frame({"color": from_display(image).astype(np.float32)}) for image in (noisy, clean)]
+    return frames[0], frames[1]
+
+
+def tensors(state: TrainState) -> list[bytes]:
+    return [array.tobytes() for array in train.state_to_arrays(state)[0].values()]
+
+
+def kernel_of(recipe: Recipe) -> StepKernel:
+    omegas = recipe.omega_0_first, recipe.omega_0_hidden
+    return compile_step(recipe.layer_widths, omegas, recipe.batch, recipe.window.size)
+
+
+def data_of(recipe: Recipe, pairs: Any = PAIRS) -> Dataset:
+    return dataset.build(pairs, recipe.features, recipe.window, dataset.Normalization())
+
+
+def begin(opencl: Any, recipe: Recipe, kernel: StepKernel, state: TrainState, data: Dataset) -> Any:
+    """Return a trainer with the state on it, and a run that draws and hands out steps."""
+    device = opencl.open_trainer(kernel, data.values, data.targets)
+    groups = (state.siren.weights + state.siren.biases, state.moments.m, state.moments.v)
+    device.load(state.step, *map(trainer.named, groups))
+    return trainer.Run(device, recipe, data, state.step, state.step, state, {})
+
+
+def examples(recipe: Recipe, data: Dataset, number: int) -> tuple[Any, Any]:
+    return dataset.examples_at(data, *train.draw_batch(recipe, number, data, train.draw_pool(recipe, data)))
+
+
+# ---- derivatives -----------------------------------------------------------------------------------------
+
+
+def gradient_excess(
+    opencl: Any, recipe: Recipe, kernel: StepKernel | None = None, pairs: Any = PAIRS
+) -> float:
+    """Return the excess of the first step's sums over the bound at its examples."""
+    data = data_of(recipe, pairs)
+    state = train.start(recipe, dataset.Normalization(), data.digest)
+    run = begin(opencl, recipe, kernel or kernel_of(recipe), state, data)
+    run.enqueue(run.draw(0, 1))
+    loss = run.settle()
+    found = run.device.sums()
+    right = kernel_of(recipe).step
+    named = trainer.named(state.siren.weights + state.siren.biases)
+    at = step.with_parameters(right, named)
+    windows, targets = examples(recipe, data, 0)
+    exact, bound = step.sums(at, windows, targets), step.sum_errors(at, windows, targets)
+    assert sorted(found) == sorted(exact)
+    assert all(np.isfinite(error).all() and error.max() > 0 for error in bound.values())
+    worst = [np.max(np.abs(found[n].reshape(exact[n].shape) - exact[n]) / bound[n]) for n in exact]
+    # The loss is the sum of three squared errors, over 3 N: two more sums and a division.
+    squares = exact[step.SQUARES].sum()
+    allowed = bound[step.SQUARES].sum() + 8 * UNIT_ROUNDOFF * squares
+    return float(max(*worst, abs(loss * 3 * recipe.batch - squares) / allowed))
+
+
+@settings(max_examples=25)
+@given(
+    widths=st.lists(st.sampled_from([1, 3, 15, 16, 17, 40, 70]), max_size=3),
+    batch=st.sampled_from([1, 7, 8, 64, 65, 200, 700]),
+    features=st.sampled_from([("color",), ("color", "normal"), ("normal",)]),
+    window=st.builds(Window, st.integers(1, 7), st.sampled_from(["clamp", "zero"])),
+    omega_0_hidden=st.sampled_from([1.0, 10.0]),
+    n_windows=st.sampled_from([0, 30]),
+    seed=st.integers(0, 2**31),
+)
+def test_first_derivatives_are_within_the_bound(
+    opencl: Any,
+    widths: list[int],
+    batch: int,
+    features: tuple[str, ...],
+    window: Window,
+    omega_0_hidden: float,
+    n_windows: int,
+    seed: int,
+) -> None:
+    """Layers of parts of vectors and of several, tiles that are not full, borders, frames of two sizes."""
+    recipe = replace(
+        SMALL,
+        widths=tuple(widths),
+        batch=batch,
+        features=features,
+        window=window,
+        omega_0_hidden=omega_0_hidden,
+        n_windows=n_windows,
+        seed=seed,
+    )
+    assert gradient_excess(opencl, recipe) <= 1
+
+
+def test_presets_derivatives_are_within_the_bound(opencl: Any) -> None:
+    for preset in train.PRESETS.values():
+        recipe = replace(preset, features=("color", "normal"), batch=130, n_windows=0)
+        assert gradient_excess(opencl, recipe) <= 1
+
+
+def test_the_bound_is_no_wild_guess(opencl: Any) -> None:
+    """An omega_0 that is 0.1 % too large is found."""
+    lowered = lower_step.lower_step(SMALL.layer_widths, 1.0, 5.0 * 1.001, SMALL.batch)
+    assert gradient_excess(opencl, SMALL, step_kernel.compile_lowered(lowered, 5)) > 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("s0_0 += d0;", "s0_0 += 0.0f * d0;"),
+        ("n < count", "n < filled"),
+        ("begins ? ", "1 ? "),
+        ("x0 += row[e + 0];", ""),
+        ("dy * row[n] + k", "k"),
+    ],
+    ids=["bias", "fill", "restart", "rows forwards", "rows backwards"],
+)
+def test_planted_faults_in_the_text_are_found(opencl: Any, old: str, new: str) -> None:
+    """A missing bias derivative, examples counted twice, sums that forget, rows that are not followed."""
+    recipe = replace(SMALL, batch=700)
+    assert gradient_excess(opencl, recipe, with_source(kernel_of(recipe), old, new)) > 1
+
+
+def with_source(kernel: StepKernel, old: str, new: str) -> StepKernel:
+    assert old in kernel.source
+    return replace(kernel, source=kernel.source.replace(old, new))
+
+
+# ---- Adam ------------------------------------------------------------------------------------------------
+
+
+def adam_excess(opencl: Any, kernel: StepKernel | None = None, recipe: Recipe = SMALL) -> float:
+    """Return the largest excess in 20 steps, each from the device's own state before it.
+
+    The derivatives lie in a box around the float64 ones, as wide as their bound; the moved numbers of the
+    reference and of the kernel then both lie in what Adam makes of the box, up to the kernel's roundings.
+    """
+    data = data_of(recipe)
+    state = train.start(recipe, dataset.Normalization(), data.digest)
+    run = begin(opencl, recipe, kernel or kernel_of(recipe), state, data)
+    right, program = kernel_of(recipe).step, lower_step.lower_adam()
+    worst, bounded = 0.0, []
+    for number in range(recipe.steps):
+        before = [trainer.named(arrays) for arrays in _groups(run.state(number))]
+        run.enqueue(run.draw(number, number + 1))
+        run.settle()
+        after = [trainer.named(arrays) for arrays in _groups(run.state(number + 1))]
+        at = step.with_parameters(right, before[0])
+        windows, targets = examples(recipe, data, number)
+        exact, bound = step.sums(at, windows, targets), step.sum_errors(at, windows, targets)
+        rates = (train.rate_at(recipe, number), *adam.growth(number + 1))
+        for name in before[0]:
+            old, new = ([arrays[name] for arrays in arrays_of] for arrays_of in (before, after))
+            excess, share = _moved_excess(program, old, exact[name], bound[name], rates, new)
+            worst = max(worst, excess)
+            bounded.append(share * exact[name].size)
+    assert sum(bounded) >= BOUNDED * recipe.steps * sum(exact[name].size for name in right.trained)
+    return worst
+
+
+def _groups(state: TrainState) -> tuple[Any, Any, Any]:
+    return state.siren.weights + state.siren.biases, state.moments.m, state.moments.v
+
+
+def _moved_excess(
+    program: Any, points: list[Any], g: Any, error: Any, rates: tuple[float, ...], found: list[Any]
+) -> tuple[float, float]:
+    """Return the excess of parameter and moments after one step, and the share of them with a bound."""
+    theta, m, v = (array.astype(np.float64) for array in points)
+    values = dict(zip(("theta", "m", "v"), (theta, m, v), strict=True))
+    boxes = {name: (array, array) for name, array in values.items()} | {"g": (g - error, g + error)}
+    # The numbers that all parameters share are rounded to float32 on their way to the kernel.
+    for name, rate in zip(("learning_rate", "grown_1", "grown_2"), rates, strict=True):
+        boxes[name] = (np.float64(rate * (1 - UNIT_ROUNDOFF)), np.float64(rate * (1 + UNIT_ROUNDOFF)))
+    with np.errstate(all="ignore"):
+        nodes = enclose(program, boxes, EMITTED_SINE)
+    worst, bounded = 0.0, np.ones(theta.shape, bool)
+    for (_, index), array in zip(program.outputs, found, strict=True):
+        low, high, allowed = nodes[index].low, nodes[index].high, nodes[index].read
+        bounded &= np.isfinite(allowed)
+        outside = np.maximum(low - array, array - high)
+        worst = max(worst, float(np.max((outside / allowed)[np.isfinite(allowed)], initial=0.0)))
+    return worst, float(bounded.mean())
+
+
+def test_twenty_steps_of_adam_are_within_the_bound(opencl: Any) -> None:
+    assert adam_excess(opencl) <= 1
+
+
+def _swapped(theta: Any, g: Any, m: Any, v: Any, rate: Any, grown: Any) -> Any:
+    return adam_update(theta, g, m, v, rate, grown, adam.BETA_2, adam.BETA_1)
+
+
+def _inside(theta: Any, g: Any, m: Any, v: Any, rate: Any, grown: Any) -> Any:
+    m, v = adam.BETA_1 * m + (1.0 - adam.BETA_1) * g, adam.BETA_2 * v + (1.0 - adam.BETA_2) * (g * g)
+    return theta - rate * (m / grown[0]) / np.sqrt(v / grown[1] + adam.EPSILON), m, v
+
+
+adam_update = adam.update
+
+
+def test_copies_that_stay_behind_are_found(opencl: Any) -> None:
+    """The backward pass reads transposed weights; without their update the second step is wrong."""
+    faulty = with_source(kernel_of(SMALL), ") transposed[", ") if (0) transposed[")
+    assert gradient_excess(opencl, SMALL, faulty) <= 1
+    assert adam_excess(opencl, faulty) > 1
+
+
+@pytest.mark.parametrize("fault", [_swapped, _inside], ids=["betas swapped", "epsilon inside the root"])
+def test_planted_faults_in_adam_are_found(opencl: Any, monkeypatch: Any, fault: Any) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(adam, "update", fault)
+        faulty = kernel_of(SMALL)
+    assert adam_excess(opencl, faulty) > 1
+
+
+# ---- runs ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("changes", [{}, {"n_windows": 50, "schedule": "constant"}])
+def test_twenty_steps_are_the_references(opencl: Any, changes: Any) -> None:
+    """The float32 reference and the device round differently, and Adam makes much of little differences.
+
+    How much, the reference's own two precisions tell: where they are d apart at most, over all parameters,
+    float32's roundings in another order are as far from float64. 8 d leaves room (measured: below 1 d).
+    """
+    recipe = replace(SMALL, **changes)
+    want = train.train(recipe, PAIRS)
+    exact = train.train(recipe, PAIRS, dtype=np.float64)
+    found = train_on(opencl, recipe, PAIRS)
+    assert found.step == 20
+    assert (found.recipe, found.digest, found.normalization) == (want.recipe, want.digest, want.normalization)
+    apart = 0.0
+    far = 0.0
+    for a, b, c in zip(_flat(want), _flat(exact), _flat(found), strict=True):
+        assert a.shape == c.shape
+        assert c.dtype == np.float32
+        apart, far = max(apart, np.abs(a - b).max()), max(far, np.abs(c - b).max())
+    assert 0 < far <= 8 * apart
+    assert [number for number, _ in found.history] == [number for number, _ in want.history]
+    for (_, loss), (_, other) in zip(found.history, want.history, strict=True):
+        assert (
+            abs(loss - other) <= 1e-5 * other
+        )  # float32 adds 300 numbers of one sign: gamma(300) = 2e-5 / 2
+
+
+def _flat(state: TrainState) -> tuple[Any, ...]:
+    return state.siren.weights + state.siren.biases
+
+
+@pytest.mark.parametrize("changes", [{}, {"n_windows": 50, "schedule": "constant", "batch": 700}])
+def test_runs_repeat_and_resume_to_the_same_bits(opencl: Any, changes: Any) -> None:
+    recipe = replace(SMALL, **changes)
+    whole, again = (train_on(opencl, recipe, PAIRS) for _ in range(2))
+    half = train_on(opencl, recipe, PAIRS, until=7)
+    assert half.step == 7
+    restored = train.state_from_arrays(*train.state_to_arrays(half))
+    resumed = train_on(opencl, recipe, PAIRS, state=restored)
+    assert tensors(whole) == tensors(again) == tensors(resumed)
+    assert resumed == replace(whole, siren=resumed.siren, moments=resumed.moments)
+    train.check_state(whole)
+
+
+def test_a_run_may_change_its_trainer(opencl: Any) -> None:
+    """Either goes on from the other's state; both end near the run that did not change."""
+    whole = train.train(SMALL, PAIRS)
+    for first, second in ((train.train, device_train(opencl)), (device_train(opencl), train.train)):
+        half = first(SMALL, PAIRS, until=10)
+        end = second(SMALL, PAIRS, state=train.state_from_arrays(*train.state_to_arrays(half)))
+        assert end.step == 20
+        moved = max(np.abs(a - b).max() for a, b in zip(_flat(end), _flat(whole), strict=True))
+        # Twenty steps of at most 1e-3 each; had the second half begun anew, it would be off by some of them.
+        assert moved <= 1e-3
+
+
+def device_train(opencl: Any) -> Any:
+    return lambda *arguments, **options: train_on(opencl, *arguments, **options)
+
+
+def test_minibatches_are_the_references(opencl: Any) -> None:
+    """Places of windows, rows and targets, for new draws and for a pool, to the bit."""
+    for recipe in (SMALL, replace(SMALL, n_windows=40)):
+        data = data_of(recipe)
+        state = train.start(recipe, dataset.Normalization(), data.digest)
+        run = begin(opencl, recipe, kernel_of(recipe), state, data)
+        places = run.draw(3, 5)
+        for number in (3, 4):
+            windows, targets = examples(recipe, data, number)
+            corner, row, target = places[number - 3]
+            taps = corner[:, None, None] + row[:, None, None] * np.arange(5)[:, None] + np.arange(15)
+            assert np.array_equal(data.values[taps].reshape(windows.shape), windows)
+            assert np.array_equal(data.targets[target], targets)
+
+
+def test_progress_and_checkpoints_come_when_promised(opencl: Any) -> None:
+    seen: list[tuple[int, float]] = []
+    kept: list[int] = []
+    recipe = replace(SMALL, steps=7, log_every=3)
+    train_on(
+        opencl,
+        recipe,
+        PAIRS,
+        on_progress=lambda state, loss: seen.append((state.step, loss)),
+        on_checkpoint=lambda state: kept.append(state.step),
+        checkpoint_every=2,
+    )
+    assert [number for number, _ in seen] == [3, 6, 7]
+    losses: list[float] = []
+    train.train(replace(recipe, log_every=1), PAIRS, on_progress=lambda _, loss: losses.append(loss))
+    for number, loss in seen:
+        assert abs(loss - losses[number - 1]) <= 1e-5 * loss  # as in the test of twenty steps
+    assert kept == [2, 4, 6, 7]
+
+
+def test_no_step_left_is_no_step(opencl: Any) -> None:
+    kept: list[TrainState] = []
+    state = train_on(opencl, SMALL, PAIRS, until=2)
+    again = train_on(opencl, SMALL, PAIRS, state=state, until=2, on_checkpoint=kept.append)
+    assert tensors(again) == tensors(state) == tensors(kept[0])
+
+
+def test_an_interrupt_keeps_the_state_and_goes_on(opencl: Any) -> None:
+    kept: list[TrainState] = []
+
+    def interrupt(state: TrainState, loss: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_on(opencl, SMALL, PAIRS, on_progress=interrupt, on_checkpoint=kept.append)
+    assert [state.step for state in kept] == [SMALL.log_every]
+    whole = train_on(opencl, SMALL, PAIRS)
+    assert tensors(train_on(opencl, SMALL, PAIRS, state=kept[0])) == tensors(whole)
+
+
+def test_an_interrupt_while_the_device_works(opencl: Any, monkeypatch: Any) -> None:
+    """What was handed to the device is waited for, and kept with its losses."""
+    kept: list[TrainState] = []
+    draw, calls = trainer.Run.draw, []
+
+    def interrupted(run: Any, first: int, last: int) -> Any:
+        calls.append(first)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return draw(run, first, last)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(trainer.Run, "draw", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            train_on(opencl, SMALL, PAIRS, on_checkpoint=kept.append)
+    assert [state.step for state in kept] == [8]
+    assert [number for number, _ in kept[0].history] == [0, 4]
+    assert tensors(train_on(opencl, SMALL, PAIRS, state=kept[0])) == tensors(train_on(opencl, SMALL, PAIRS))
+
+
+def test_an_interrupt_while_steps_are_handed_out(opencl: Any, monkeypatch: Any) -> None:
+    """The state kept is that of the steps that the device was given, in the middle of a block."""
+    kept: list[TrainState] = []
+    load = OpenCLTrainer.load
+
+    def interrupting(device: Any, *arguments: Any) -> None:
+        load(device, *arguments)
+        update, calls = device._update, []
+
+        def interrupted(*numbers: Any) -> None:
+            calls.append(1)
+            if len(calls) == 7:
+                raise KeyboardInterrupt
+            update(*numbers)
+
+        device._update = interrupted
+
+    with monkeypatch.context() as patch:
+        patch.setattr(OpenCLTrainer, "load", interrupting)
+        with pytest.raises(KeyboardInterrupt):
+            train_on(opencl, SMALL, PAIRS, on_checkpoint=kept.append)
+    assert [state.step for state in kept] == [6]
+    assert tensors(kept[0]) == tensors(train_on(opencl, SMALL, PAIRS, until=6))
+
+
+def test_waiting_again_changes_nothing(opencl: Any) -> None:
+    """An interrupt may come after the wait, and what follows it waits once more."""
+    data = data_of(SMALL)
+    state = train.start(SMALL, dataset.Normalization(), data.digest)
+    run = begin(opencl, SMALL, kernel_of(SMALL), state, data)
+    run.enqueue(run.draw(0, 5))
+    assert run.settle() == run.settle()
+    assert tensors(run.state(run.step)) == tensors(run.state(5))
+    assert [number for number, _ in run.state(5).history] == [0, 4]
+
+
+@pytest.mark.parametrize("log_every", [1, 4])
+def test_a_loss_that_is_not_finite_stops_and_keeps_the_last_good_state(opencl: Any, log_every: int) -> None:
+    """As the reference's: the state kept is the one before the one whose loss is not finite."""
+    recipe = replace(SMALL, log_every=log_every)
+    good = train_on(opencl, recipe, PAIRS, until=10)
+    steep = replace(good, recipe=replace(recipe, learning_rate=1e30))
+    kept: list[TrainState] = []
+    with pytest.raises(
+        TrainingError, match=r"loss at step 11 is (inf|nan): it must stay finite; lower the lear"
+    ):
+        train_on(opencl, steep.recipe, PAIRS, state=steep, on_checkpoint=kept.append)
+    assert len(kept) == 1
+    assert tensors(kept[0]) == tensors(good)
+    with pytest.raises(TrainingError, match="loss at step 1"):
+        train_on(opencl, replace(recipe, learning_rate=1e30), PAIRS, on_checkpoint=kept.append)
+    assert kept[1].step == 0
+
+
+def test_frames_that_are_not_finite_leave_no_good_state(opencl: Any) -> None:
+    kept: list[TrainState] = []
+    noisy, reference = PAIRS[0]
+    bad = Frame({"color": np.full_like(noisy["color"], np.nan)})
+    with pytest.raises(TrainingError, match="loss at step 0 is nan"):
+        train_on(opencl, SMALL, [(bad, reference)], on_checkpoint=kept.append)
+    assert kept == []
+
+
+def test_parameters_that_are_not_finite_are_never_handed_out(opencl: Any) -> None:
+    """1e39 is no float32: the one step makes the parameters infinite, and no later loss would tell."""
+    kept: list[TrainState] = []
+    with (
+        np.errstate(over="ignore"),
+        pytest.raises(TrainingError, match="parameters after step 1 are not finite"),
+    ):
+        train_on(opencl, replace(SMALL, learning_rate=1e39, steps=1), PAIRS, on_checkpoint=kept.append)
+    assert [state.step for state in kept] == [0]
+
+
+def test_refusals(opencl: Any, executor_named: Any, monkeypatch: Any) -> None:
+    double = train.train(SMALL, PAIRS, until=1, dtype=np.float64)
+    with pytest.raises(
+        InputError, match="type of the state's numbers is float64: a device trains in float32"
+    ):
+        train_on(opencl, SMALL, PAIRS, state=double)
+    with pytest.raises(
+        InputError, match="executor that trains is numpy: it has no compiled trainer; use exec"
+    ):
+        train_on(executor_named("numpy"), SMALL, PAIRS)
+    with pytest.raises(InputError, match="changed parts of the recipe is batch"):
+        train_on(opencl, replace(SMALL, batch=5), PAIRS, state=train.train(SMALL, PAIRS, until=1))
+    with monkeypatch.context() as patch:
+        patch.setattr(opencl, "_device", SimpleNamespace(type=4))  # a GPU
+        with pytest.raises(
+            InputError, match=r"device that trains is .*: the step is scheduled for processors"
+        ):
+            train_on(opencl, SMALL, PAIRS)
+    monkeypatch.setattr("wamnet.kernels.opencl_trainer.INDEX_LIMIT", 100)
+    with pytest.raises(
+        InputError, match=r"numbers of all training pictures is .*: the device takes fewer than 100"
+    ):
+        train_on(opencl, SMALL, PAIRS)
+
+
+# ---- learning --------------------------------------------------------------------------------------------
+
+
+def test_quality_on_an_unseen_frame_is_the_references(opencl: Any) -> None:
+    """PSNR on a plane that no run has seen, five seeds each: Welch's test finds no difference of the means.
+
+    And they beat the mean over 3x3 pixels, whose error is sigma^2/9, on the same pixels.
+    """
+    pairs, (noisy, clean) = [planes(seed) for seed in range(4)], planes(99)
+    recipe = replace(SMALL, widths=(12, 12), omega_0_hidden=3.0, batch=128, steps=600, learning_rate=1e-2)
+    inner = (slice(2, -2), slice(2, -2))
+    target, given_image = (to_display(frame["color"].astype(np.float64)) for frame in (clean, noisy))
+    windows = np.lib.stride_tricks.sliding_window_view(given_image, (3, 3), axis=(0, 1))
+    box = metrics.psnr(windows.mean(axis=(-1, -2))[1:-1, 1:-1], target[inner])
+    found: dict[str, list[float]] = {"numpy": [], "opencl": []}
+    for seed in range(5):
+        for name, fit in (("numpy", train.train), ("opencl", device_train(opencl))):
+            model = train.model_of(fit(replace(recipe, seed=seed), pairs))
+            found[name].append(metrics.psnr(denoise.denoise(model, noisy, np.float64)[inner], target[inner]))
+    a, b = (np.array(values) for values in found.values())
+    assert b.mean() >= box
+    assert math.isfinite(box)
+    p = welch_p(a.mean(), a.var(ddof=1), 5, b.mean(), b.var(ddof=1), 5)
+    assert p >= SIGNIFICANCE
+
+
+def test_a_first_layer_of_low_rank_is_refused(opencl: Any) -> None:
+    """Its factors are moved by the reference alone."""
+    with pytest.raises(InputError, match="rank is 2: a device trains first layers in full; use executor num"):
+        train_on(opencl, replace(SMALL, rank=2), PAIRS)

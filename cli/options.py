@@ -94,6 +94,15 @@ Profile = Annotated[
         "[bold]native[/] uses the target's sine.",
     ),
 ]
+Schedule = Annotated[
+    str | None,
+    typer.Option(
+        "--schedule",
+        metavar="NAME",
+        help="Order of the kernel's work: [bold]plain[/] is made to be read, others to be fast.",
+        show_default=False,
+    ),
+]
 Seed = Annotated[int, typer.Option("--seed", help="Any other number gives other random numbers.")]
 Time = Annotated[
     float | None,

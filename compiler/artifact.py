@@ -58,7 +58,9 @@ MANIFEST_NAME = "manifest.json"
 class Files(Protocol):
     """An artifact of any kind: a manifest, and files beside it."""
 
-    manifest: Mapping[str, Any]
+    @property
+    def manifest(self) -> Mapping[str, Any]:
+        """Return what the other files are."""
 
     def contents(self) -> Mapping[str, bytes]:
         """Return the files besides the manifest, by name."""

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..compiler.artifact import Artifact
 from ..compiler.ir import Gather, Image
 from ..compiler.path_kernel import PathArtifact
+from ..compiler.schedules import PLAIN
 from ..refimpl.errors import InputError
 
 Images = Mapping[str, NDArray[np.float32]]
@@ -44,12 +45,14 @@ class Part:
 class Executor(ABC):
     """A device that is open; a context manager that closes it. `name` is its target, `device` a text.
 
-    `lanes` is the number of paths that its path kernels should follow at once.
+    `lanes` is the number of paths that its path kernels should follow at once, `schedule` the name of the
+    schedule that suits a denoiser on it.
     """
 
     name: str
     device: str
     lanes: int = 1
+    schedule: str = PLAIN
 
     @abstractmethod
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
@@ -141,22 +144,23 @@ def checked(artifact: Artifact, inputs: Images) -> Images:
                 f"must be float32 of shape (height, width, {image.channels}), all images of one size",
                 "encode the frame's features (refimpl.dataset.feature_image)",
             )
-        if not np.isfinite(array).all():
-            y, x, _ = np.argwhere(~np.isfinite(array))[0]
-            raise InputError(
-                f"image {image.name!r} at row {y}, column {x}",
-                array[y, x].tolist(),
-                "all numbers must be finite",
-                "mend or mask the frame first",
-            )
         _check_range(image, array)
     return {image.name: np.ascontiguousarray(inputs[image.name]) for image in wanted}
 
 
 def _check_range(image: Image, array: NDArray[np.float32]) -> None:
-    """Refuse numbers outside the range on which the kernel's bound rests."""
+    """Refuse numbers outside the range on which the kernel's bound rests, and what is no number."""
+    # NaN among the numbers makes both NaN, and fails.
     if image.low <= float(array.min()) and float(array.max()) <= image.high:
         return
+    if not np.isfinite(array).all():
+        y, x, _ = np.argwhere(~np.isfinite(array))[0]
+        raise InputError(
+            f"image {image.name!r} at row {y}, column {x}",
+            array[y, x].tolist(),
+            "all numbers must be finite",
+            "mend or mask the frame first",
+        )
     # In float64: a Python number would be rounded to the array's float32 first.
     outside = (array < np.float64(image.low)) | (array > np.float64(image.high))
     y, x, _ = np.argwhere(outside)[0]

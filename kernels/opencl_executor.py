@@ -28,6 +28,13 @@ DEVICE_VARIABLE = "WAMNET_OPENCL_DEVICE"
 LOCAL_SIZE = (16, 4)
 """Work items (x, y) in a group: one size for all images, so that PoCL compiles a kernel once."""
 
+TILE_LOCAL_SIZE = (1, 1)
+"""The same for kernels whose items compute several pixels: they are groups by themselves, and need no second
+loop around them."""
+
+CPU_SCHEDULES = {16: "tile16", 8: "tile8"}
+"""Schedule of a denoiser by the floats in a vector register of a processor; others have registers of 4."""
+
 STACK_BYTES = 2**20
 """Most bytes of a group's arrays on a processor: half the smallest stack that glibc gives a thread."""
 
@@ -62,7 +69,9 @@ class OpenCLExecutor(Executor):
         self._queue = cl.CommandQueue(self._context)
         self._built: dict[str, tuple[Any, Any, tuple[int, int]]] = {}
         self._paths: dict[str, Any] = {}
-        self.lanes = CPU_LANES if chosen.type & cl.device_type.CPU else 1
+        if chosen.type & cl.device_type.CPU:
+            self.lanes = CPU_LANES
+            self.schedule = CPU_SCHEDULES.get(chosen.native_vector_width_float, "tile4")
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
         """Compile the source, upload the weights, and run once."""
@@ -102,8 +111,9 @@ class OpenCLExecutor(Executor):
                 f"{width} numbers): at most {STACK_BYTES} fit a processor's stack; use narrower layers, or a "
                 "GPU, or executor numpy"
             )
-        x = min(LOCAL_SIZE[0], items)
-        return x, min(LOCAL_SIZE[1], items // x)
+        wanted = LOCAL_SIZE if artifact.manifest["schedule"]["pixels"] == 1 else TILE_LOCAL_SIZE
+        x = min(wanted[0], items)
+        return x, min(wanted[1], items // x)
 
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
         height, width = next(iter(images.values())).shape[:2]
@@ -127,7 +137,8 @@ class OpenCLExecutor(Executor):
         output = cl.Buffer(self._context, cl.mem_flags.WRITE_ONLY, result.nbytes)
         inputs = [self._upload(image) for image in images.values()]
         # Whole groups; the kernel leaves out what lies beyond the image.
-        size = tuple(-(-n // local) * local for n, local in zip((width, height), local_size, strict=True))
+        items = (-(-width // artifact.manifest["schedule"]["pixels"]), height)
+        size = tuple(-(-n // local) * local for n, local in zip(items, local_size, strict=True))
         kernel(self._queue, size, local_size, *inputs, weights, output, np.int32(width), np.int32(height))
         cl.enqueue_copy(self._queue, result, output)
         return result

@@ -91,6 +91,7 @@ def probe(name: str) -> tuple[str, str, str, str]:
 
     try:
         with open_executor(name) as executor:
-            return name, "ready", executor.schedule, executor.device
+            least = f" from {executor.schedule_pixels} pixels on" if executor.schedule_pixels else ""
+            return name, "ready", executor.schedule + least, executor.device
     except ExecutorUnavailable as error:
         return name, "missing", "", str(error)

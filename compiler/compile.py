@@ -25,6 +25,7 @@ from .artifact import Artifact
 from .dialect import Dialect
 from .emit import kernel_gather, output_channels
 from .glsl import GLSL
+from .glsl_inlined import GLSL_LADDER
 from .ir import OUTPUT_ENCODING, Program
 from .opencl import OpenCL
 from .opencl_tiled import OPENCL_LADDER
@@ -69,7 +70,7 @@ TARGETS: Mapping[str, Target] = {
             (Printed(),),
         ),
         _dialect_target(OpenCL(), *OPENCL_LADDER),
-        _dialect_target(GLSL()),
+        _dialect_target(GLSL(), *GLSL_LADDER),
     )
 }
 """All targets, by the name of the executor that runs them."""

@@ -48,6 +48,23 @@ class Blocks:
         return self.vectors * self.count
 
 
+def refused_by_vectors(program: Program, dialect: Dialect) -> str:
+    """Return why the values of a program cannot all be vectors of this dialect, or nothing."""
+    for index, node in enumerate(program.nodes):
+        if node.op in ("constant", "parameter", "input", "affine"):
+            continue
+        if not OPS[node.op].elementwise or node.op not in dialect.operations:
+            return f"%{index} is {node.op}, which has no form on vectors"
+        if node.type.dtype != "float32" or not node.type.shape:
+            return f"%{index} is {node.type}: vectors hold float32[n]"
+    output = program.nodes[program.outputs[0][1]]
+    if any(node.op != "affine" for node in _readers_of_window(program)):
+        return "something besides an affine map reads the window"
+    if output.op in ("constant", "parameter", "input"):
+        return "the output is not computed"
+    return ""
+
+
 class Tiled(Schedule):
     """A tile of `pixels` x `vectors` vectors of `lanes` numbers."""
 
@@ -69,17 +86,9 @@ class Tiled(Schedule):
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
-        for index, node in enumerate(program.nodes):
-            if node.op in ("constant", "parameter", "input", "affine"):
-                continue
-            if not OPS[node.op].elementwise or node.op not in self.dialect.operations:
-                return f"%{index} is {node.op}, which has no form on vectors"
-            if node.type.dtype != "float32" or not node.type.shape:
-                return f"%{index} is {node.type}: vectors hold float32[n]"
-        body = self._body(program)
+        if reason := refused_by_vectors(program, self.dialect):
+            return reason
         used = _readers_of_window(program)
-        if any(node.op != "affine" for node in used) or not body.declares(program.outputs[0][1]):
-            return "something besides an affine map reads the window, or the output is no computed vector"
         if _matrices(used) & _matrices(node for node in program.nodes if node not in used):
             return "a matrix is applied to the window and to a layer, which need it in two orders"
         if (found := self.private_bytes(program)) > LARGEST_PRIVATE:

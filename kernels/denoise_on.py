@@ -41,11 +41,12 @@ def images_of(model: Model, frame: Frame) -> Images:
 def denoise_on(
     executor: Executor, model: Model, frame: Frame, profile: str = "ieee", schedule: str | None = None
 ) -> RunResult:
-    """Return the denoised frame and the times; without a `schedule`, the one that suits the device."""
+    """Return the denoised frame and the times; without a `schedule`, the one that suits device and size."""
     images = images_of(model, frame)
     start = time.perf_counter()
-    artifact = compile_program(lower(model), executor.name, profile, schedule or executor.schedule)
-    executor.build(artifact, (frame.height, frame.width))
+    size = (frame.height, frame.width)
+    artifact = compile_program(lower(model), executor.name, profile, schedule or executor.schedule_for(size))
+    executor.build(artifact, size)
     built = time.perf_counter()
     image = executor.run(artifact, images)
     seconds = time.perf_counter() - built

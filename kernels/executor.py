@@ -46,13 +46,15 @@ class Executor(ABC):
     """A device that is open; a context manager that closes it. `name` is its target, `device` a text.
 
     `lanes` is the number of paths that its path kernels should follow at once, `schedule` the name of the
-    schedule that suits a denoiser on it.
+    schedule that suits a denoiser on it, for pictures of at least `schedule_pixels`: smaller ones are done
+    with the plain kernel before the other is compiled.
     """
 
     name: str
     device: str
     lanes: int = 1
     schedule: str = PLAIN
+    schedule_pixels: int = 0
 
     @abstractmethod
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
@@ -69,6 +71,10 @@ class Executor(ABC):
     @abstractmethod
     def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
         """Return the sums (planes, rows, width) of a part."""
+
+    def schedule_for(self, size: tuple[int, int]) -> str:
+        """Return the name of the schedule that suits one picture of `size` (height, width)."""
+        return self.schedule if size[0] * size[1] >= self.schedule_pixels else PLAIN
 
     def close(self) -> None:
         """Give the device back."""

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from wamnet.compiler import schedules
 from wamnet.compiler.compile import TARGETS, compile_program
+from wamnet.compiler.emit_inlined import LARGEST_WEIGHTS
 from wamnet.compiler.emit_tiled import LARGEST_PRIVATE
 from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.opencl_tiled import OPENCL_LADDER
@@ -41,6 +42,25 @@ def small(border="zero"):
 @pytest.mark.parametrize(("name", "border"), [("vector16", "clamp"), ("tile16", "zero")])
 def test_golden_tiles(golden, name, border):
     golden(f"{name}.denoise.cl", compile_program(small(border), "opencl", "ieee", name).source)
+
+
+def test_golden_inlined(golden):
+    golden("inlined.denoise.frag", compile_program(small(), "opengl", "ieee", "inlined").source)
+
+
+def test_inlined_weights_are_in_the_source_alone():
+    found = compile_program(small(), "opengl", "ieee", "inlined")
+    assert found.weights.size == found.manifest["weights"]["count"] == 0
+    assert found.manifest["weights"]["layout"] == []
+    assert "weight_texture" not in found.source
+    assert found.manifest["arguments"] in found.source.replace("\n *           ", "\n")
+
+
+def test_too_many_weights_to_inline_are_plain():
+    program = gathered(lambda x: np.sin(x @ rounded(16000, 3).T) @ rounded(2, 16000).T)
+    found = compile_program(program, "opengl", "ieee", "inlined").manifest["schedule"]
+    assert (found["name"], found["asked"]) == ("plain", "inlined")
+    assert found["reason"].startswith(f"it has 80000 weights, of at most {LARGEST_WEIGHTS}:")
 
 
 def test_the_manifest_says_what_was_picked():
@@ -76,7 +96,7 @@ REFUSED = {
     "component": (gathered(lambda x: x[..., 0] * 2.0), "%1 is component, which has no form on vectors"),
     "select": (gathered(lambda x: np.where(x @ W.T < 0.5, x, 2.0)), "%3 is less, which has no form"),
     "window": (gathered(lambda x: x * 2.0), "something besides an affine map reads the window"),
-    "constant": (gathered(lambda x: W[0] + 0.0 * x), "something besides an affine map reads the window"),
+    "output": (gathered(lambda x: x), "the output is not computed"),
     "shared": (SHARED, "a matrix is applied to the window and to a layer, which need it in two orders"),
     "private": (
         gathered(lambda x: np.sin(x @ rounded(12000, 3).T) @ rounded(1, 12000).T),

@@ -19,12 +19,17 @@ LADDER = [(t.name, s.name) for t in TARGETS.values() for s in t.schedules[1:]]
 """All schedules besides the plain ones, with their targets."""
 
 
+LARGEST = {"inlined": (3, 10)}
+"""Largest window and layer by schedule: Mesa compiles two thousand weights a second. The other schedules'
+layers may have more neurons than a block."""
+
+
 @st.composite
-def cases(draw):
-    """Draw (widths, channels, window size, border, image shape, seed): more neurons than a block holds."""
+def cases(draw, largest):
+    """Draw (widths, channels, window size, border, image shape, seed)."""
     channels = draw(st.sampled_from([{"a": 3}, {"a": 3, "b": 1}, {"a": 1, "b": 4, "c": 2}]))
-    size = draw(st.integers(1, 12))
-    hidden = draw(st.lists(st.integers(1, 70), min_size=0, max_size=3))
+    size = draw(st.integers(1, largest[0]))
+    hidden = draw(st.lists(st.integers(1, largest[1]), min_size=0, max_size=3))
     return {
         "widths": [size * size * sum(channels.values()), *hidden, draw(st.integers(1, 4))],
         "channels": channels,
@@ -49,8 +54,9 @@ def executor_of(executor_named, target):
 
 @pytest.mark.parametrize(("target", "schedule"), LADDER)
 @settings(max_examples=EXAMPLES)
-@given(case=cases(), group=st.tuples(st.integers(1, 5), st.integers(1, 4)))
-def test_error_is_within_the_bound(executor_named, kit, target, schedule, case, group):
+@given(data=st.data(), group=st.tuples(st.integers(1, 5), st.integers(1, 4)))
+def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, group):
+    case = data.draw(cases(LARGEST.get(schedule, (12, 70))))
     executor = executor_of(executor_named, target)
     network = kit.network(case["widths"], (9.0, 3.0), case["seed"])
     program = kit.denoiser(network, case["channels"], case["size"], case["border"])
@@ -67,8 +73,9 @@ def test_error_is_within_the_bound(executor_named, kit, target, schedule, case, 
 @pytest.mark.parametrize(("target", "schedule"), LADDER)
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 def test_the_paper_s_network(executor_named, kit, target, schedule, border):
-    network = kit.network([864, 32, 32, 32, 32, 3], (3.0, 3.0))
-    program = kit.denoiser(network, {"color": 3, "normal": 3}, 12, border)
+    size = LARGEST.get(schedule, (12,))[0]  # the paper's is 12
+    network = kit.network([6 * size * size, 32, 32, 32, 32, 3], (3.0, 3.0))
+    program = kit.denoiser(network, {"color": 3, "normal": 3}, size, border)
     random = np.random.default_rng(5)
     images = {name: random.uniform(-1, 1, (13, 31, 3)).astype(np.float32) for name in ("color", "normal")}
     artifact = compile_program(program, target, "ieee", schedule)
@@ -121,12 +128,34 @@ def test_a_wrong_tile_is_caught(executor_named, kit, schedule, fault):
     assert kit.excess(executor, program, images, kit.with_source(artifact, *FAULTS[fault])) > 1
 
 
+INLINED_FAULTS = {
+    "tap": ("ivec2(x, y) + ivec2(-2, 1)", "ivec2(x, y) + ivec2(-1, 1)"),
+    "border": ("clamp(at, ivec2(0)", "clamp(at, ivec2(1)"),
+    "vector": ("v1_1 += mat3x4", "v1_0 += mat3x4"),
+    "omega": ("= 3.0f * v1", "= 2.0f * v1"),
+    "components": ("v46_1.x;", "v46_0.x;"),
+}
+"""Pieces of an inlined kernel, and what makes it wrong."""
+
+
+@pytest.mark.parametrize("fault", INLINED_FAULTS)
+def test_a_wrong_inlined_kernel_is_caught(executor_named, kit, fault):
+    executor = executor_named("opengl-egl")
+    program = kit.denoiser(kit.network([48, 5, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
+    images = {"a": np.random.default_rng(8).uniform(-2, 2, (6, 7, 3)).astype(np.float32)}
+    artifact = compile_program(program, "opengl", "ieee", "inlined")
+    assert kit.excess(executor, program, images, artifact) <= 1
+    assert kit.excess(executor, program, images, kit.with_source(artifact, *INLINED_FAULTS[fault])) > 1
+
+
 def test_the_device_s_schedule_is_taken_and_told(executor, kit):
     network = kit.network([54, 8, 3], (3.0, 3.0))
     model = denoise.Model(network, ("color", "normal"), dataset.Window(3, "zero"), dataset.Normalization())
     noisy = frame.Frame({name: np.zeros((3, 4, 3), np.float32) for name in ("color", "normal")})
-    assert denoise_on(executor, model, noisy).schedule.startswith(f"{executor.schedule}: ")
+    assert denoise_on(executor, model, noisy).schedule.startswith(f"{executor.schedule_for((3, 4))}: ")
     asked = denoise_on(executor, model, noisy, schedule="plain")
     assert asked.schedule.startswith("plain: one ")
     artifact = compile_program(lower(model), executor.name, "ieee", executor.schedule)
-    assert artifact.manifest["schedule"]["name"] == executor.schedule
+    assert artifact.manifest["schedule"]["name"] == executor.schedule == executor.schedule_for((2000, 2000))
+    if executor.schedule_pixels:
+        assert executor.schedule_for((1, executor.schedule_pixels - 1)) == "plain"

@@ -148,6 +148,13 @@ def test_a_wrong_inlined_kernel_is_caught(executor_named, kit, fault):
     assert kit.excess(executor, program, images, kit.with_source(artifact, *INLINED_FAULTS[fault])) > 1
 
 
+def test_the_time_of_a_kernel_alone(executor_named, kit):
+    executor = executor_named("opencl")
+    artifact = compile_program(kit.program(lambda x: x * 1.625, {"a": 1}), "opencl")
+    executor.build(artifact)
+    assert executor.kernel_seconds(artifact, {"a": np.ones((2, 3, 1), np.float32)}) > 0
+
+
 def test_the_device_s_schedule_is_taken_and_told(executor, kit):
     network = kit.network([54, 8, 3], (3.0, 3.0))
     model = denoise.Model(network, ("color", "normal"), dataset.Window(3, "zero"), dataset.Normalization())

@@ -12,8 +12,9 @@ Time is wall-clock time of a frame: for kernels the executor's `run`, with its c
 and result; `kernel` is the OpenCL kernel alone, on images that the device has. Compile is the time until a
 first frame can be run: tracing, bound, emission, the driver. GFLOP/s counts two operations a weight and pixel
 and nothing for sines; OpenCL's are those of the kernel alone. The share is of the rate at which NumPy's BLAS
-multiplies float32 matrices of 4096 x 4096, measured between the ways. The error is the largest difference
-from float64 on a crop, beside the largest bound there.
+multiplies float32 matrices of 4096 x 4096, measured between the ways; OPENBLAS_CORETYPE=SkylakeX is twice as
+fast on processors with AVX-512 that OpenBLAS does not know. The error is the largest difference from float64
+on a crop, beside the largest bound there.
 
 On a machine that others use, compare single threads: OPENBLAS_NUM_THREADS=1 POCL_MAX_PTHREAD_COUNT=1
 OMP_NUM_THREADS=1, and processor time in place of wall-clock time with --cpu.

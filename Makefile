@@ -6,7 +6,7 @@
 
 VENV ?= .venv
 PYTHON ?= python3
-WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa
+WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba
 PYTEST_OPTIONS ?= -n 2
 export VENV PYTHON WAMNET_REQUIRE
 

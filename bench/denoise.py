@@ -42,6 +42,7 @@ from wamnet.compiler.interpret import interpret
 from wamnet.compiler.lower import lower
 from wamnet.kernels import open_executor
 from wamnet.kernels.executor import Images
+from wamnet.kernels.memory import keep_freed_memory
 from wamnet.refimpl import dataset, siren
 from wamnet.refimpl.denoise import Model
 
@@ -88,6 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--cpu", action="store_true", help="processor time of all threads, not wall-clock time"
     )
     given = parser.parse_args(arguments)
+    keep_freed_memory()
     clock = time.process_time if given.cpu else time.perf_counter
     model, images = _model(), _images(given.size)
     crop = {name: np.ascontiguousarray(image[:CROP, :CROP]) for name, image in images.items()}

@@ -1,6 +1,7 @@
 """`wamnet animate`: noisy, denoised and reference pictures of an animation side by side, as PNG, MP4 or GIF.
 
-1. Each time of the animation is rendered and denoised, and drawn as one labelled picture [`draw_frame`].
+1. Each time of the animation is rendered and denoised, and drawn as one labelled picture: by one pipeline
+   where one device does both [`draw_frames`], else one after the other [`draw_apart`].
 2. A picture carries what it was made from, so that an interrupted run goes on where it was; pictures of
    another animation are refused [`missing`].
 3. A film is made from the pictures when all are there; they lie in FILE.frames until then
@@ -12,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,6 +29,7 @@ from .terminal import progress, say
 if TYPE_CHECKING:
     from ..kernels.executor import Executor
     from ..refimpl.denoise import Model
+    from ..refimpl.frame import Frame
     from ..refimpl.render import Job
     from ..refimpl.scene import Scene
 
@@ -90,8 +92,8 @@ def animate(
     left = missing(folder, shots)
     folder.mkdir(exist_ok=True)
     with open_executor(executor.value) as runner, progress("drawing", len(left)) as advance:
-        for shot in left:
-            draw_frame(shot, network, runner, renderer.value)
+        draw = draw_frames if renderer.value == executor.value != "numpy" else draw_apart
+        for _ in draw(left, network, runner, renderer.value):
             advance(1)
     if is_film:
         movie.write_movie(output, [shot.path for shot in shots], fps)
@@ -144,18 +146,52 @@ def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
     return [shot for shot in shots if there.get(shot.path) is None]
 
 
-def draw_frame(shot: Shot, model: Model, executor: Executor, renderer: str) -> None:
-    """Render, denoise and write one picture."""
+def draw_apart(shots: Sequence[Shot], model: Model, executor: Executor, renderer: str) -> Iterator[None]:
+    """Render, denoise and write pictures, rendering and denoising on different devices."""
     from ..kernels import denoise_on
     from ..kernels.render_frame import render_frame
     from ..refimpl.encoding import to_display
+
+    for shot in shots:
+        frame = render_frame(renderer, shot.scene, shot.noisy, workers=None).frame
+        noisy = to_display(frame["color"], model.normalization.exposure_stops)
+        denoised = denoise_on(executor, model, frame).image
+        reference = None
+        if shot.reference is not None:
+            reference = render_frame(renderer, shot.scene, shot.reference, workers=None).frame
+        write_shot(shot, model, noisy, denoised, reference)
+        yield
+
+
+def draw_frames(shots: Sequence[Shot], model: Model, executor: Executor, renderer: str) -> Iterator[None]:
+    """Render, denoise and write pictures by one pipeline, on the device that does both."""
+    from contextlib import ExitStack
+
+    from ..kernels import Pipeline, render_on
+
+    with ExitStack() as stack:
+        pipeline = None
+        for shot in shots:
+            if pipeline is None:
+                size, whole = (shot.noisy.height, shot.noisy.width), shot.reference is not None
+                settings, show = shot.noisy.settings, ("color",)
+                made = Pipeline(executor, shot.scene, model, size, settings=settings, show=show, whole=whole)
+                pipeline = stack.enter_context(made)
+            else:
+                pipeline.set_scene(shot.scene)
+            denoised = pipeline.run(shot.noisy.seed)
+            reference = render_on(executor, shot.scene, shot.reference).frame if shot.reference else None
+            write_shot(shot, model, pipeline.image("color"), denoised, reference)
+            yield
+
+
+def write_shot(shot: Shot, model: Model, noisy: Any, denoised: Any, reference: Frame | None) -> None:
+    """Write a picture: noisy and denoised (H, W, 3), display-encoded, and the reference if there is one."""
+    from ..refimpl.encoding import to_display
     from . import images
 
-    stops = model.normalization.exposure_stops
-    noisy = render_frame(renderer, shot.scene, shot.noisy, workers=None).frame
-    panels = [("noisy, 1 spp", to_display(noisy["color"], stops))]
-    panels.append(("denoised", denoise_on(executor, model, noisy).image))
-    if shot.reference is not None:
-        frame = render_frame(renderer, shot.scene, shot.reference, workers=None).frame
-        panels.append((f"reference, {shot.reference.spp} spp", to_display(frame["color"], stops)))
+    panels = [("noisy, 1 spp", noisy), ("denoised", denoised)]
+    if reference is not None and shot.reference is not None:
+        shown = to_display(reference["color"], model.normalization.exposure_stops)
+        panels.append((f"reference, {shot.reference.spp} spp", shown))
     images.write_panels(shot.path, panels, shot.origin)

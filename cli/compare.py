@@ -1,4 +1,4 @@
-"""`wamnet compare`: how far a picture is from its reference, in every metric."""
+"""`wamnet compare`: how far a picture is from its reference, in every metric, and a kernel's paths."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import typer
 
 from ..refimpl.errors import InputError
 from . import options
+from .options import ExecutorName
 from .terminal import table
 
 if TYPE_CHECKING:
@@ -22,8 +23,24 @@ EXAMPLES = """Examples:
 
 wamnet compare denoised.png reference.png
 
-wamnet compare noisy.exr reference.exr --json"""
+wamnet compare noisy.exr reference.exr --json
+
+wamnet compare --paths minicubes
+
+wamnet compare --paths cornell --executor opengl --width 32 --height 32 --max-depth 3"""
 """Shown below the help of `wamnet compare`."""
+
+PANEL = "Paths"
+"""Title of the options that go with `--paths`."""
+
+OF_PATHS = ("executor", "width", "height", "sample", "spp", "seed", "max_depth")
+"""Options that go with `--paths` alone."""
+
+OF_SCENE = ("time", "parameters")
+"""Options of the scene."""
+
+OF_PICTURES = ("image", "reference", "exposure")
+"""Arguments and options of pictures."""
 
 
 @dataclass(frozen=True)
@@ -41,20 +58,78 @@ class Score:
 
 
 def compare(
+    context: typer.Context,
     image: Annotated[
-        Path, typer.Argument(metavar="IMAGE", help="Picture (.exr or .png).", show_default=False)
-    ],
+        Path | None, typer.Argument(metavar="IMAGE", help="Picture (.exr or .png).", show_default=False)
+    ] = None,
     reference: Annotated[
-        Path, typer.Argument(metavar="REFERENCE", help="What it should be.", show_default=False)
-    ],
+        Path | None, typer.Argument(metavar="REFERENCE", help="What it should be.", show_default=False)
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of a table.")] = False,
     exposure: options.Exposure = 0.0,
+    paths: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENE",
+            help="In place of pictures, compare the paths of a kernel with the reference's in this scene.",
+            show_default=False,
+            rich_help_panel=PANEL,
+        ),
+    ] = None,
+    executor: Annotated[ExecutorName, typer.Option(rich_help_panel=PANEL)] = ExecutorName.opencl,
+    width: Annotated[int, typer.Option(help="Width in pixels.", rich_help_panel=PANEL)] = 64,
+    height: Annotated[int, typer.Option(help="Height in pixels.", rich_help_panel=PANEL)] = 64,
+    sample: Annotated[
+        int, typer.Option(help="Number of the sample whose paths are compared.", rich_help_panel=PANEL)
+    ] = 0,
+    spp: Annotated[
+        int, typer.Option(help="Paths per pixel of the reference's picture.", rich_help_panel=PANEL)
+    ] = 64,
+    seed: Annotated[int, typer.Option(help="Seed of the random numbers.", rich_help_panel=PANEL)] = 0,
+    max_depth: Annotated[
+        int, typer.Option(help="Greatest number of bounces of a path.", rich_help_panel=PANEL)
+    ] = 5,
+    time: options.Time = None,
+    parameters: options.Parameters = None,
 ) -> None:
-    """Measure how far a picture is from its reference.
+    """Measure how far a picture is from its reference, or a path kernel from the reference's path tracer.
 
     MSE, PSNR and SSIM compare what is seen (sRGB-encoded, clipped to white); relMSE and SMAPE compare linear
     radiance.
+
+    With --paths each step of each path has a bound of what rounding may change: what differs more is
+    [bold]unexplained[/]. A step with a decision within the bound of its threshold is [bold]undecided[/]; if
+    it went another way than the reference, [bold]different[/]. Of the reference's own paths, [bold]parted[/]
+    have gone another way so far; the vertices of the others have [bold]moved[/]. Welch's test compares
+    pictures. Exit status 1 if anything is unexplained or the test fails.
     """
+    if paths is None:
+        _refuse_given(context, (*OF_PATHS, *OF_SCENE), "without --paths SCENE")
+        if image is None or reference is None:
+            rule = "it needs IMAGE and REFERENCE, or --paths SCENE"
+            raise InputError("wamnet compare", "incomplete", rule, "see wamnet compare --help")
+        compare_pictures(image, reference, exposure, as_json)
+        return
+    _refuse_given(context, OF_PICTURES, "with --paths")
+    from ..refimpl.render import Job
+    from ..refimpl.transport import Settings
+    from .compare_paths import compare_paths
+
+    job = Job(width, height, spp, seed, Settings(max_depth=max_depth), first_sample=sample)
+    compare_paths(paths, executor.value, job, time, parameters or [], as_json)
+
+
+def _refuse_given(context: typer.Context, names: Sequence[str], where: str) -> None:
+    """Refuse arguments and options that were given and have no meaning."""
+    for name in names:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name != "DEFAULT":
+            shown = {"parameters": "--set", "image": "IMAGE"}.get(name, f"--{name.replace('_', '-')}")
+            raise InputError("argument", shown, f"it has no meaning {where}", "leave it out")
+
+
+def compare_pictures(image: Path, reference: Path, exposure: float, as_json: bool) -> None:
+    """Print the score of a picture in each metric."""
     from .images import read_image
 
     a, b = read_image(image, exposure), read_image(reference, exposure)

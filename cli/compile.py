@@ -114,11 +114,11 @@ def _compiled_scene(
 ) -> PathArtifact:
     """Return the kernel that follows a scene's paths."""
     from ..compiler.lower_scene import lower_scene
-    from ..compiler.path_kernel import compile_path
+    from ..compiler.path_kernel import compile_path, most_unrolled
     from ..refimpl.transport import Settings
 
     settings = Settings() if max_depth is None else Settings(max_depth=max_depth)
-    programs = lower_scene(load_scene(scene, time, parameters), settings)
+    programs = lower_scene(load_scene(scene, time, parameters), settings, most_unrolled(target))
     return compile_path(programs, target, profile, 1 if lanes is None else lanes)
 
 

@@ -64,6 +64,13 @@ class FloatType(str, Enum):
     float64 = "float64"
 
 
+class Sampler(str, Enum):
+    """Sources of random numbers by name; equal to the registry in refimpl."""
+
+    pcg4d = "pcg4d"
+    sobol = "sobol"
+
+
 class Preset(str, Enum):
     """Training protocols by name; equal to the registry in refimpl."""
 

@@ -11,7 +11,7 @@ import typer
 
 from ..refimpl.errors import InputError
 from . import options
-from .options import FloatType, Renderer
+from .options import FloatType, Renderer, Sampler
 from .outputs import check_output, write_text
 from .terminal import progress, say
 
@@ -58,6 +58,9 @@ def render(
     time: options.Time = None,
     parameters: options.Parameters = None,
     max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
+    sampler: Annotated[
+        Sampler, typer.Option(help="Random numbers: independent, or evenly spread (less noise at many spp).")
+    ] = Sampler.pcg4d,
     dtype: Annotated[FloatType, typer.Option(help="Arithmetic; files hold float32.")] = FloatType.float32,
     executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
     workers: Annotated[
@@ -77,7 +80,7 @@ def render(
     loaded = load_scene(scene, time, parameters or [])
     path = output or Path(f"{Path(scene).stem}.exr")
     check_output(path, (".exr", ".png"), [Path(scene)])
-    job = Job(width, height, spp, seed, Settings(max_depth=max_depth), dtype.value)
+    job = Job(width, height, spp, seed, Settings(max_depth=max_depth, sampler=sampler.value), dtype.value)
     if workers is not None and renderer(executor.value).shares_work:
         rule = f"{executor.value} shares the work by itself"
         raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")

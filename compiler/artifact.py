@@ -60,7 +60,7 @@ class Files(Protocol):
 
     @property
     def manifest(self) -> Mapping[str, Any]:
-        """Return what the other files are."""
+        """Return what the manifest says, as JSON's types."""
 
     def contents(self) -> Mapping[str, bytes]:
         """Return the files besides the manifest, by name."""

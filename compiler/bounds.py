@@ -30,8 +30,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .ir import Gather, Node, Program
-from .ops import OPS
-from .profiles import FLUSH, LARGEST_DIVISOR, RELATIVE_ERROR, UNIT_ROUNDOFF, SineContract
+from .ops import LOOPS, OPS
+from .profiles import (
+    EXP2_ULPS,
+    FLUSH,
+    LARGEST_DIVISOR,
+    LOG2_ABSOLUTE,
+    LOG2_RELATIVE,
+    RELATIVE_ERROR,
+    UNIT_ROUNDOFF,
+    SineContract,
+)
 
 Array = NDArray[np.float64]
 
@@ -232,6 +241,41 @@ def _sqrt(context: Context, operands: list[Enclosure]) -> Enclosure:
     return _rounded(context, low, high, np.where(safe, moved + np.sqrt(FLUSH), np.inf))
 
 
+def _power(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """x^y = exp(y ln x) for x > 0: what moves y ln x by d moves it by a factor of exp(d) at most.
+
+    |y' ln x' - y ln x| <= |y'| |ln x' - ln x| + |y' - y| |ln x|, and |ln x' - ln x| <= e / (x - e). No bound
+    when the kernel's x may be 0 or below.
+    """
+    x, y = operands
+    least = x.low - x.read
+    safe = least > 0
+    with np.errstate(all="ignore"):
+        corners = np.broadcast_arrays(x.low**y.low, x.low**y.high, x.high**y.low, x.high**y.high)
+        low, high = np.minimum.reduce(corners), np.maximum.reduce(corners)
+        exponent = y.largest + y.read
+        logarithm = np.maximum(np.abs(np.log(least)), np.abs(np.log(x.high + x.read)))
+        moved = np.expm1(exponent * x.read / least + y.read * logarithm)
+        passed_on = np.where(safe, high * moved, np.inf)
+        relative = power_error(exponent, logarithm / np.log(2.0))
+    magnitude = np.abs(high) + passed_on
+    error = np.where(safe, passed_on + relative * magnitude + FLUSH, np.inf)
+    return _held(low, high, error, (1 + relative) * magnitude + FLUSH)
+
+
+def power_error(exponent: Array, logarithm: Array) -> Array:
+    """Return the largest relative error of pow(x, y) over all targets; |y|, |log2 x| (...) at most these.
+
+    They compute exp2(y log2(x)), or something as good: an error d of y log2(x) is a factor of 2^d.
+    """
+    product = exponent * logarithm
+    d = exponent * np.maximum(LOG2_RELATIVE * logarithm, LOG2_ABSOLUTE) * (1 + UNIT_ROUNDOFF)
+    d = d + UNIT_ROUNDOFF * product
+    own = 2 * UNIT_ROUNDOFF * (EXP2_ULPS[0] + EXP2_ULPS[1] * (product + d))
+    error: Array = np.expm1(d * np.log(2.0) + np.log1p(own))
+    return error
+
+
 def _sin(context: Context, operands: list[Enclosure]) -> Enclosure:
     """The mean value theorem, |cos| between the two arguments, and the contract's error on its domain."""
     (a,) = operands
@@ -283,6 +327,52 @@ def _reciprocal(context: Context, operands: list[Enclosure]) -> Enclosure:
     return _divide(context, [Enclosure(one, one, np.zeros_like(one)), operands[0]])
 
 
+def _decided(below: tuple[Any, Any], above: tuple[Any, Any]) -> Enclosure:
+    """Return a truth value from (sure for the reference, sure for the kernel) of True, and of False.
+
+    It is 1 or 0; the error is 0 where both are sure to decide alike, else 1.
+    """
+    low, high = np.where(below[0], 1.0, 0.0), np.where(above[0], 0.0, 1.0)
+    return Enclosure(low, high, np.where(below[1] | above[1], 0.0, 1.0))
+
+
+def _less(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """a < b is sure where the ranges, widened by both errors for the kernel, do not meet."""
+    a, b = operands
+    both = a.read + b.read
+    with np.errstate(invalid="ignore"):
+        return _decided((a.high < b.low, a.high + both < b.low), (a.low >= b.high, a.low - both >= b.high))
+
+
+def _less_equal(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """a <= b is not b < a."""
+    a, b = operands
+    found = _less(context, [b, a])
+    return Enclosure(1.0 - found.high, 1.0 - found.low, found.error)
+
+
+def _greater(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """a > b is b < a."""
+    return _less(context, operands[::-1])
+
+
+def _greater_equal(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """a >= b is b <= a."""
+    return _less_equal(context, operands[::-1])
+
+
+def _select(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """That of the value chosen; where the choice is not sure, either; where it may differ, their distance."""
+    condition, a, b = operands
+    sure = condition.error == 0.0
+    first, second = sure & (condition.low > 0.5), sure & (condition.high < 0.5)
+    low = np.where(first, a.low, np.where(second, b.low, np.minimum(a.low, b.low)))
+    high = np.where(first, a.high, np.where(second, b.high, np.maximum(a.high, b.high)))
+    apart = np.where(sure, 0.0, np.maximum(np.abs(a.high - b.low), np.abs(b.high - a.low)))
+    error = np.where(first, a.error, np.where(second, b.error, np.maximum(a.error, b.error) + apart))
+    return Enclosure(low, high, error)
+
+
 def _no_rule(context: Context, operands: list[Enclosure]) -> Enclosure:
     """No bound: a decision may fall differently in the kernel, and nothing is said of what follows."""
     shape = np.broadcast_shapes(*(np.shape(operand.low) for operand in operands))
@@ -290,9 +380,8 @@ def _no_rule(context: Context, operands: list[Enclosure]) -> Enclosure:
 
 
 NO_BOUND = (
-    *("cos", "less", "less_equal", "greater", "greater_equal", "equal", "not_equal"),
-    *("logical_and", "logical_or", "logical_not", "bitwise_xor", "right_shift"),
-    *("select", "convert", "take"),
+    *("cos", "equal", "not_equal", "logical_and", "logical_or", "logical_not"),
+    *("bitwise_and", "bitwise_xor", "right_shift", "convert", "take"),
 )
 """Operations without a rule: a program whose output depends on one has no bound, and says so."""
 
@@ -310,11 +399,17 @@ RULES: Mapping[str, Rule] = {
     "maximum": _maximum,
     "floor": _floor,
     "sqrt": _sqrt,
+    "power": _power,
     "sin": _sin,
     "stack": _stack,
     "component": _component,
     "reciprocal": _reciprocal,
-    **dict.fromkeys(NO_BOUND, _no_rule),
+    "less": _less,
+    "less_equal": _less_equal,
+    "greater": _greater,
+    "greater_equal": _greater_equal,
+    "select": _select,
+    **dict.fromkeys((*NO_BOUND, *LOOPS), _no_rule),
 }
 """One rule an operation; inputs are given."""
 

@@ -49,6 +49,7 @@ class Dialect:
         "negative": "-{0}",
         "floor": "floor({0})",
         "sqrt": "sqrt({0})",
+        "power": "pow({0}, {1})",
         "sin": "sin({0})",
         "cos": "cos({0})",
         "reciprocal": "1.0f / {0}",
@@ -61,10 +62,12 @@ class Dialect:
         "logical_and": "{0} && {1}",
         "logical_or": "{0} || {1}",
         "logical_not": "!{0}",
+        "bitwise_and": "{0} & {1}",
         "bitwise_xor": "{0} ^ {1}",
         "right_shift": "{0} >> {1}",
         "select": "{0} ? {1} : {2}",
         "take": "{table}[{0}]",
+        "row": "{table}[{0}]",
     }
 
     def variable(self, dtype: str) -> str:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from ..refimpl.errors import CompileError
 from .dialect import Dialect
 from .ir import Gather, Node, Program, users
-from .ops import OPS
+from .ops import LOOPS, OPS
 from .weights import layout, tables
 
 BORDERS: Mapping[str, tuple[str, str]] = {
@@ -73,6 +73,11 @@ def kernel_gather(program: Program) -> Gather:
         raise CompileError(
             f"the program has {len(program.outputs)} outputs and {'a' if program.gather else 'no'} gathered "
             "window: a kernel needs one output and a window; lower a model, or trace with a Gather"
+        )
+    if any(node.op in LOOPS for node in program.nodes):
+        raise CompileError(
+            "the program has a loop over the rows of tables, which this skeleton does not hold: trace it "
+            "without `most_unrolled`"
         )
     return program.gather
 

@@ -10,7 +10,8 @@
         add the path's radiance
 
 1. Each program is a block of statements, one a node, on variables that have the names of its inputs
-   [`_Kernel.block`]; its outputs are assigned at the block's end.
+   [`_Kernel.block`]; its outputs are assigned at the block's end. A loop over the rows of tables is a loop
+   on a counter that all paths share, so that a row is read once for all of them [`_Kernel._loop`].
 2. What is added up over the samples are planes, in groups [`GROUPS`]; a kernel writes the groups that it is
    asked for.
 3. A path that has ended is computed on with the others of its work item, and changes nothing: radiance is
@@ -27,6 +28,7 @@ from numpy.typing import NDArray
 
 from ..refimpl.errors import CompileError
 from .ir import Node, Program, Type, attributes
+from .loops import Loop, loops
 from .lower_scene import LAYERS, PATH, SURFACE, PathPrograms, Values, kinds, names
 from .path_dialect import PathDialect
 from .weights import tables
@@ -53,6 +55,9 @@ GROUPS: Mapping[str, Sequence[str]] = {
     **{group: [f"last_{n}" if n != "alive" else n for n in members] for group, members in END.items()},
 }
 """What a kernel can add up: groups of planes, by name."""
+
+TRIP = "i"
+"""Name of the counter of a loop over the rows of tables."""
 
 FRAME_GROUPS = ("color", "deviation", *LAYERS)
 """What a rendered frame needs."""
@@ -125,7 +130,12 @@ class _Kernel:
             entry=self.dialect.entry,
             lanes=self.dialect.lanes,
             lane_numbers=self.dialect.lane_numbers,
-            tables="\n".join(self.dialect.table_declaration(name, array) for name, array in declared.items()),
+            tables="\n".join(
+                [
+                    *(self.dialect.table_declaration(name, array) for name, array in declared.items()),
+                    *(text for op, text in self.dialect.helpers.items() if op in self._operations()),
+                ]
+            ),
             outputs="\n".join(
                 self.dialect.output_declaration.format(output=output)
                 for output in range(-(-len(self.planes) // self.dialect.planes_per_output))
@@ -135,6 +145,10 @@ class _Kernel:
             counter=self.dialect.types["uint32"],
             **uniforms,
         )
+
+    def _operations(self) -> set[str]:
+        """Return the names of all operations of the programs."""
+        return {node.op for program in self.programs.parts().values() for node in program.nodes}
 
     def _splat(self, value: str, dtype: str) -> str:
         """Return the text of a number that is the same in all lanes."""
@@ -245,23 +259,57 @@ class _Kernel:
     def _statements(self, part: str, program: Program, renamed: Mapping[str, str]) -> list[str]:
         """Write one statement for each operation; return the text of each value."""
         texts: list[str] = []
+        ends, in_bodies = loops(program)
         for index, node in enumerate(program.nodes):
             if node.op == "input":
                 name = str(node["name"])
                 texts.append(renamed.get(name, name))
             elif node.op == "constant":
                 texts.append(self.dialect.constant(node))
+            elif node.op == "loop":
+                if index in ends:
+                    self._loop(part, program, texts, ends[index])
+                texts.append(texts[node.args[int(node["index"])]])  # type: ignore[arg-type]
             else:
                 texts.append(f"t{index}")
-                expression = self._expression(part, program, node, texts)
-                self._line(f"{self.dialect.variable(node.type.dtype)} t{index} = {expression};")
+                if index not in in_bodies:
+                    self._statement(part, program, texts, index)
         return texts
+
+    def _statement(self, part: str, program: Program, texts: Sequence[str], index: int) -> None:
+        """Write the statement that computes a value."""
+        node = program.nodes[index]
+        expression = self._expression(part, program, node, texts)
+        self._line(f"{self.dialect.variable(node.type.dtype)} {texts[index]} = {expression};")
+
+    def _loop(self, part: str, program: Program, texts: Sequence[str], loop: Loop) -> None:
+        """Write a loop over the rows of tables: its body, then the assignments of what it carries."""
+        self._open(f"for (int {TRIP} = 0; {TRIP} < {loop.trips}; ++{TRIP}) {{")
+        for index in loop.body:
+            self._statement(part, program, texts, index)
+        before, after = [], []
+        for carried, new in zip(loop.carried, loop.after, strict=True):
+            value = texts[new]
+            if new in loop.carried and new != carried:
+                # Another carried number, which may be assigned before it is read: keep its value.
+                kind = self.dialect.variable(program.nodes[new].type.dtype)
+                before.append(f"{kind} new_{texts[carried]} = {value};")
+                value = f"new_{texts[carried]}"
+            if new != carried:
+                after.append(f"{texts[carried]} = {value};")
+        for line in before + after:
+            self._line(line)
+        self._close()
 
     def _expression(self, part: str, program: Program, node: Node, texts: Sequence[str]) -> str:
         """Return the right side of a statement."""
-        if node.op == "take":
+        if node.op == "carried":
+            return texts[node.args[0]]
+        if node.op in ("take", "row"):
             table = self.tables[part, str(node["table"])]
             node = Node(node.op, node.args, node.type, attributes(table=table))
+        if node.op == "row":
+            return self.dialect.expression(node, node.type.dtype, [TRIP])
         kind = program.nodes[node.args[-1]].type.dtype
         return self.dialect.expression(node, kind, [texts[arg] for arg in node.args])
 

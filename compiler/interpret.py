@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from .ir import Node, Parameters, Program
+from .loops import Loop, loops
 from .ops import OPS
 
 Array = NDArray[Any]
@@ -28,10 +29,30 @@ def interpret(
         name: array.astype(element(str(array.dtype), kind), copy=False)
         for name, array in program.parameters.items()
     }
-    values: list[Any] = []
-    for node in program.nodes:
-        values.append(_value(node, program, values, inputs, parameters, kind))
+    values: list[Any] = [None] * len(program.nodes)
+    ends, in_bodies = loops(program)
+    for index, node in enumerate(program.nodes):
+        if index in ends:
+            _run(ends[index], program, values, inputs, parameters, kind)
+        if index not in in_bodies:
+            values[index] = _value(node, program, values, inputs, parameters, kind)
     return {name: values[index] for name, index in program.outputs}
+
+
+def _run(
+    loop: Loop, program: Program, values: list[Any], given: Mapping[str, Array], parameters: Any, kind: Any
+) -> None:
+    """Make the trips of a loop; the carried numbers are then its results."""
+    for trip in range(loop.trips):
+        for index in loop.body:
+            node = program.nodes[index]
+            if node.op == "row":
+                values[index] = parameters[str(node["table"])][trip]
+            else:
+                values[index] = _value(node, program, values, given, parameters, kind)
+        after = [values[index] for index in loop.after]
+        for index, value in zip(loop.carried, after, strict=True):
+            values[index] = value
 
 
 def _value(
@@ -49,6 +70,10 @@ def _value(
         return element(node.type.dtype, kind).type(node["value"])
     if node.op == "parameter":
         return parameters[node["name"]]
+    if node.op == "carried":
+        return values[node.args[0]]
+    if node.op == "loop":
+        return values[node.args[int(node["index"])]]  # type: ignore[arg-type]
     operands = [_spread(values[arg], program.nodes[arg], node) for arg in node.args]
     return apply(node, operands, parameters, kind)
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,13 @@ LAYERS: Values = {
 }
 """The feature layers of the first hit, as refimpl/render.py: first_hit_layers."""
 
+MOST_UNROLLED = 32
+"""Most primitives of a scene that become statements each, unless a target has a number of its own
+(path_kernel.py: UNROLLED). On PoCL, at 10 statements are up to a tenth faster; at 30 they are level for boxes
+that share a rotation and for quads, and a third slower for mixtures; at 100 they are 1.3 to 1.8 times slower,
+their code having left the processor's first cache, and take 2 to 6 s to trace and build instead of 0.5. 32
+keeps the 29 of `minicubes` statements (`python bench/primitives.py`)."""
+
 PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "eliminate_dead")
 """What every program of a path goes through: numbers in place of vectors, the bits that float32 gives."""
 
@@ -90,8 +98,12 @@ class PathPrograms:
         return {name: getattr(self, name) for name in ("start", "arrive", "look", "scatter")}
 
 
-def lower_scene(scene: Scene, settings: Settings) -> PathPrograms:
-    """Return the programs of a path through a scene, in float32."""
+def lower_scene(scene: Scene, settings: Settings, most_unrolled: int | None = MOST_UNROLLED) -> PathPrograms:
+    """Return the programs of a path through a scene, in float32.
+
+    The primitives of a scene that has more than `most_unrolled` of them are tables and loops, else statements
+    for each; None unrolls any scene. What stands alone in its table is no loop.
+    """
     world = transport.build(scene, settings, np.float32)
     basis = camera_basis(scene.camera, np.float32)
 
@@ -100,7 +112,8 @@ def lower_scene(scene: Scene, settings: Settings) -> PathPrograms:
         pixel = given["x"] + np.uint32(render.MAX_IMAGE_SIDE_PX) * given["y"]
         counters = Counters(given["seed"], pixel, given["sample_number"])
         x, y = given["x"].astype(np.float32), given["y"].astype(np.float32)
-        path = render.start(basis, x, y, given["width"], given["height"], counters, np.float32)
+        size = given["width"], given["height"]
+        path = render.start(basis, x, y, *size, counters, np.float32, settings.sampler)
         return {**_taken(PATH, path), "pixel": pixel}
 
     def arrive(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -122,15 +135,22 @@ def lower_scene(scene: Scene, settings: Settings) -> PathPrograms:
 
     numbers = {**dict.fromkeys(("x", "y", "seed", "sample_number"), (NUMBER, COUNTER))}
     size = dict.fromkeys(("width", "height"), (NUMBER, FLOAT))
+    few = most_unrolled is None or primitives(scene) <= most_unrolled
+    lowered = partial(_lowered, most_unrolled=None if few else 1)
     return PathPrograms(
         scene.name,
         scene_digest(scene),
         settings,
-        _lowered("start", start, {**numbers, **size}),
-        _lowered("arrive", arrive, PATH),
-        _lowered("look", look, {**SURFACE, "direction": PATH["direction"]}),
-        _lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, "depth": (NUMBER, COUNTER)}),
+        lowered("start", start, {**numbers, **size}),
+        lowered("arrive", arrive, PATH),
+        lowered("look", look, {**SURFACE, "direction": PATH["direction"]}),
+        lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, "depth": (NUMBER, COUNTER)}),
     )
+
+
+def primitives(scene: Scene) -> int:
+    """Return the number of primitives that stand in tables: all but the room."""
+    return len(scene.boxes) + len(scene.spheres) + len(scene.quads) + len(scene.lights)
 
 
 def names(values: Values) -> list[str]:
@@ -143,10 +163,12 @@ def kinds(values: Values) -> dict[str, str]:
     return {name + end: kind for name, (ends, kind) in values.items() for end in ends}
 
 
-def _lowered(name: str, function: Any, values: Values) -> Program:
+def _lowered(name: str, function: Any, values: Values, most_unrolled: int | None) -> Program:
     """Trace a function of named numbers, and run the passes."""
     inputs = {component: Type(kind) for component, kind in kinds(values).items()}
-    program = trace(lambda *given: function(dict(zip(inputs, given, strict=True))), inputs)
+    program = trace(
+        lambda *given: function(dict(zip(inputs, given, strict=True))), inputs, most_unrolled=most_unrolled
+    )
     return pipeline.run(verify(program, f"traced {name}"), PASSES)
 
 

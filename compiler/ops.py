@@ -15,7 +15,7 @@ import numpy as np
 
 from .ir import DTYPES, Attribute, Parameters, Type
 
-Rounding = Literal["exact", "nearest", "divide", "sqrt", "sine", "cosine", "dot"]
+Rounding = Literal["exact", "nearest", "divide", "sqrt", "power", "sine", "cosine", "dot"]
 """How a target computes it: exactly, correctly rounded, or with its class's error (profiles.py)."""
 
 TypeRule = Callable[[Sequence[Type], Mapping[str, Attribute], Parameters], Type]
@@ -142,6 +142,32 @@ def _take(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters:
     return Type(str(table.dtype))
 
 
+def _carried(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
+    """A number that a loop carries from trip to trip has the type of what it starts from."""
+    if args[0].shape:
+        raise TypeRuleError(f"a loop carries numbers, not {args[0]}")
+    return args[0]
+
+
+def _trip(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
+    """A table gives the entry that belongs to a loop's trip."""
+    table = parameters[str(attributes["table"])]
+    if table.ndim != 1:
+        raise TypeRuleError(f"a loop walks along a table of one axis, not of shape {table.shape}")
+    return Type(str(table.dtype))
+
+
+def _loop(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
+    """All carried numbers, then what each is after a trip: the result is one of them."""
+    index, half = attributes["index"], len(args) // 2
+    if len(args) % 2 or not isinstance(index, int) or not 0 <= index < half:
+        raise TypeRuleError(f"result {index!r} does not exist of a loop with {len(args)} operands")
+    if args[:half] != args[half:]:
+        before, after = (", ".join(map(str, types)) for types in (args[:half], args[half:]))
+        raise TypeRuleError(f"a trip must keep the kinds that are carried: {before} became {after}")
+    return args[index]
+
+
 def _stack(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
     """n numbers of one kind give a vector of n."""
     if any(arg.shape for arg in args):
@@ -187,7 +213,7 @@ def _take_value(index: Any, table: Any) -> Any:
 
 
 def _no_definition(*_: Any, **__: Any) -> Any:
-    """Inputs, constants and parameters are given to the interpreter, not computed."""
+    """Inputs, constants, parameters and what makes up a loop are the interpreter's own."""
     raise NotImplementedError
 
 
@@ -234,6 +260,7 @@ OPS: Mapping[str, Op] = {
         _row("maximum", np.maximum, 2, kinds=NUMBERS),
         _row("floor", np.floor, 1),
         _row("sqrt", np.sqrt, 1, "sqrt"),
+        _row("power", np.power, 2, "power"),
         _row("sin", np.sin, 1, "sine"),
         _row("cos", np.cos, 1, "cosine"),
         _compare("less", np.less),
@@ -245,16 +272,23 @@ OPS: Mapping[str, Op] = {
         _row("logical_and", np.logical_and, 2, kinds=("bool",)),
         _row("logical_or", np.logical_or, 2, kinds=("bool",)),
         _row("logical_not", np.logical_not, 1, kinds=("bool",)),
+        _row("bitwise_and", np.bitwise_and, 2, kinds=("uint32",)),
         _row("bitwise_xor", np.bitwise_xor, 2, kinds=("uint32",)),
         _row("right_shift", np.right_shift, 2, kinds=("uint32",)),
         Op("select", 3, _select, np.where, "exact", elementwise=True),
         Op("convert", 1, _convert, _convert_value, "nearest", required=("dtype",), elementwise=True),
         Op("take", 1, _take, _take_value, "exact", required=("table",), parameters=("table",)),
+        Op("carried", 1, _carried, _no_definition, "exact", required=("index", "loop")),
+        Op("row", 0, _trip, _no_definition, "exact", required=("loop", "table"), parameters=("table",)),
+        Op("loop", None, _loop, _no_definition, "exact", required=("index", "loop", "trips")),
         Op("stack", None, _stack, _stack_value, "exact"),
         Op("component", 1, _component, _component_value, "exact", required=("index",)),
     )
 }
 """All operations, by name."""
+
+LOOPS = ("carried", "row", "loop")
+"""The operations that make up a loop over the rows of tables (loops.py)."""
 
 ELEMENTWISE = tuple(op for op in OPS.values() if op.elementwise)
 """The operations that work on each component alone."""

@@ -3,8 +3,9 @@
 emit_path.py fills the templates in. Names in braces: `entry`, `lanes`, `max_depth`, `tables` and `outputs` of
 the whole kernel, `value` of a number that is the same in all lanes, `mask` of a truth value, `plane` the
 number of a plane of sums, `output` and `component` the place of a plane where outputs hold several.
-`uniforms` are the texts of the numbers that all lanes share. A kernel follows `lanes` paths at once; in a
-language with vectors a value then has one component a lane.
+`uniforms` are the texts of the numbers that all lanes share, `helpers` the functions that an operation's
+template calls, by operation: a kernel without the operation lacks them. A kernel follows `lanes` paths at
+once; in a language with vectors a value then has one component a lane.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ class PathDialect(Dialect):
     splat = "{value}"
     any_lane = "{mask}"
     lane_numbers: str
+    helpers: Mapping[str, str] = {}
     uniforms: Mapping[str, str]
     scalar_float: str
     output_declaration: str

@@ -13,14 +13,14 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..refimpl.errors import CompileError
 from . import emit_path, ir, opencl_path, profiles
 from .compile import asdict_finite, sine_contract, target_named
 from .glsl_path import GLSLPath
-from .lower_scene import PASSES, PathPrograms
+from .lower_scene import MOST_UNROLLED, PASSES, PathPrograms
 from .passes import pipeline
 from .path_dialect import PathDialect
 from .profiles import Profile
@@ -63,6 +63,18 @@ SCHEDULES: Mapping[str, tuple[Callable[[int], PathDialect | None], tuple[int, ..
     "opengl": (lambda lanes: GLSLPath(), (1,)),
 }
 """By target: the dialect for a number of paths at once, and the numbers that there are."""
+
+
+UNROLLED: Mapping[str, int] = {"opengl": 128}
+"""By target, where it is not MOST_UNROLLED: most primitives of a scene that become statements each. llvmpipe
+reads a table at a loop's counter lane by lane, so a loop that Mesa does not unroll itself (it does up to some
+30 trips) is two to four times slower than statements; but it compiles the statements of 100 primitives in 1
+to 5 s, those of 300 in 9 to 60 s (`python bench/primitives.py --executors opengl`)."""
+
+
+def most_unrolled(target: str) -> int:
+    """Return the number of primitives above which a scene becomes tables and loops on a target."""
+    return UNROLLED.get(target, MOST_UNROLLED)
 
 
 def compile_path(
@@ -109,7 +121,7 @@ def compile_path(
 
 def _header(programs: PathPrograms, language: str, profile: Profile, lanes: int) -> list[str]:
     """Return the lines of the comment at the top of the source, up to the arguments."""
-    settings = [f"{key} {value}" for key, value in asdict(programs.settings).items()]
+    settings = [f"{key} {value}" for key, value in programs.settings.facts().items()]
     return [
         f"wamnet path tracer, {language}. Generated: change the compiler, not this text.",
         f"scene     {programs.scene}, digest {programs.scene_digest[:32]}",
@@ -126,7 +138,7 @@ def _identity(programs: PathPrograms, name: str, text: str) -> dict[str, Any]:
         "schema": SCHEMA,
         "digest": ir.sha256(text.encode()),
         "scene": {"name": programs.scene, "digest": programs.scene_digest},
-        "settings": asdict(programs.settings),
+        "settings": programs.settings.facts(),
         "programs": {part: ir.digest(program) for part, program in programs.parts().items()},
         "bound": None,
         "files": {name: ir.sha256(text.encode())},

@@ -5,11 +5,11 @@
    `native` calls the target's, whose promise stands in the target's dialect [`sine_contract`].
 3. The passes that turn the common program into the one that is emitted [`Profile`].
 
-Sources: OpenCL C 1.2 specification, section 7.4 (divide 2.5 ulp, sqrt 3 ulp, sin 4 ulp, full profile); GLSL
-4.60 specification, section 4.7.1 (+ - * correctly rounded, a / b 2.5 ulp for 2**-126 <= |b| <= 2**126, sqrt
-as 1.0 / inversesqrt(): 2 ulp and 2.5 ulp). GLSL 3.30 states nothing; the later text describes the same
-hardware and is assumed. GLSL leaves the rounding mode open: rounding to nearest is assumed too. OpenCL says
-it of each device, and the executor asks.
+Sources: OpenCL C 1.2 specification, section 7.4 (divide 2.5 ulp, sqrt 3 ulp, sin 4 ulp, exp2 and log2 3 ulp,
+full profile); GLSL 4.60 specification, section 4.7.1 (+ - * correctly rounded, a / b 2.5 ulp for 2**-126 <=
+|b| <= 2**126, sqrt as 1.0 / inversesqrt(): 2 ulp and 2.5 ulp, pow as exp2 and log2). GLSL 3.30 states
+nothing; the later text describes the same hardware and is assumed. GLSL leaves the rounding mode open:
+rounding to nearest is assumed too. OpenCL says it of each device, and the executor asks.
 """
 
 from __future__ import annotations
@@ -35,6 +35,15 @@ RELATIVE_ERROR: Mapping[Rounding, float] = {
     "sqrt": 5.0 * 2 * UNIT_ROUNDOFF,
 }
 """Largest relative error by class, over all targets; an ulp is at most 2 u |result|."""
+
+LOG2_RELATIVE = 3.0 * 2 * UNIT_ROUNDOFF
+"""Relative error of log2: 3 ulp; GLSL promises that outside [1/2, 2] alone."""
+
+LOG2_ABSOLUTE = 2.0**-21
+"""Absolute error of GLSL's log2 inside [1/2, 2]."""
+
+EXP2_ULPS = (3.0, 2.0)
+"""Error of exp2(x): 3 + 2 |x| ulp in GLSL, whose pow(x, y) is as good as exp2(y log2(x)); OpenCL's 3 ulp."""
 
 LARGEST_DIVISOR = 2.0**126
 """Largest |b| for which GLSL bounds the error of a / b."""
@@ -63,6 +72,11 @@ EMITTED_SINE = SineContract(
     f"emitted, odd polynomial of degree {sine.DEGREE}", sine.POLYNOMIALS[sine.DEGREE].error, sine.DOMAIN
 )
 """The sine of compiler/sine.py."""
+
+EMITTED_COSINE = SineContract(
+    f"emitted, odd polynomial of degree {sine.DEGREE}", sine.COSINE_ERROR, sine.COSINE_DOMAIN
+)
+"""The cosine of compiler/sine.py."""
 
 PROFILES: Mapping[str, Profile] = {
     profile.name: profile

@@ -6,8 +6,10 @@
 3. `x @ W.T` with a constant matrix becomes one affine node; np.clip becomes maximum and minimum; np.where a
    selection; np.take from a constant table (made one by `np.asarray(table, like=index)`) a look-up;
    `x[..., i]` a component; `x[..., None]` nothing, since a number goes with every component anyway.
-4. A Python number takes the kind of the values beside it; other kinds are never mixed.
-5. Anything else raises: the closed list of operations is what makes one definition serve every executor.
+4. A fold over the rows of constant tables (refimpl/vectors.py: fold_rows) is unrolled up to a number of rows,
+   and a loop (loops.py) above it [`Tracer`].
+5. A Python number takes the kind of the values beside it; other kinds are never mixed.
+6. Anything else raises: the closed list of operations is what makes one definition serve every executor.
 """
 
 from __future__ import annotations
@@ -21,24 +23,40 @@ import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 
+from ..refimpl import vectors
 from ..refimpl.errors import CompileError
 from .ir import DTYPES, Attribute, Builder, Gather, Node, Program, Type, attributes
 from .ops import ELEMENTWISE, OPS, TypeRuleError
 
 _UFUNCS: Mapping[Any, str] = {
     **{op.definition: op.name for op in ELEMENTWISE if isinstance(op.definition, np.ufunc)},
-    np.bitwise_and: "logical_and",
+    np.bitwise_and: "bitwise_and",
     np.bitwise_or: "logical_or",
     np.invert: "logical_not",
 }
-"""NumPy's ufuncs that are operations; `&`, `|` and `~` are those of truth values."""
+"""NumPy's ufuncs that are operations; `|` and `~` are those of truth values, `&` also that of words."""
 
 TRACEABLE = (
     *(f"np.{name}" for name in dict.fromkeys(_UFUNCS.values())),
     *("np.matmul", "np.clip", "np.where", "np.stack", "np.moveaxis(np.stack(...), 0, -1)", "np.take"),
     *("np.full_like", "np.zeros_like", "np.ones_like", "x ** 1", "x ** 2", "x.astype", "x[..., i]"),
+    "vectors.fold_rows",
+    "x ** y with a positive constant y (x >= 0)",
 )
 """The closed list, as error messages and the spec show it."""
+
+
+class Tracer(Builder):
+    """A builder that knows how many rows of a fold are unrolled at most, and counts the loops."""
+
+    def __init__(self, most_unrolled: int | None = None) -> None:
+        super().__init__()
+        self.most_unrolled = most_unrolled
+        self.loops = 0
+
+    def unrolls(self, rows: int) -> bool:
+        """Tell whether a fold over so many rows is unrolled."""
+        return self.most_unrolled is None or rows <= self.most_unrolled
 
 
 class Traced(NDArrayOperatorsMixin):
@@ -76,10 +94,14 @@ class Traced(NDArrayOperatorsMixin):
             return _power(self.builder, *operands)
         if ufunc not in _UFUNCS:
             _refuse(name)
-        return emit(self.builder, _UFUNCS[ufunc], *operands)
+        truth = ufunc is np.bitwise_and and self.type.dtype == "bool"
+        return emit(self.builder, "logical_and" if truth else _UFUNCS[ufunc], *operands)
 
     def __array_function__(self, function: Any, types: Any, args: Any, options: Any) -> Any:
         return _call(self.builder, function, args, options)
+
+    def __fold_rows__(self, step: Any, tables: Any, start: Any) -> Any:
+        return _fold_rows(self.builder, step, tables, start)
 
     def astype(self, dtype: Any) -> Traced:
         """Return the value in another kind of number."""
@@ -147,12 +169,14 @@ def trace(
     gather: Gather | None = None,
     output: str = "color",
     info: Mapping[str, str] | None = None,
+    most_unrolled: int | None = None,
 ) -> Program:
     """Return the program of `function`, called with one tracing value for each of `inputs`, in their order.
 
     A mapping that `function` returns gives several outputs by name; anything else is the one named `output`.
+    Folds over more rows than `most_unrolled` become loops; None unrolls all of them.
     """
-    builder = Builder()
+    builder = Tracer(most_unrolled)
     values = [Traced(builder, _add(builder, "input", (), name=n, type=t)) for n, t in inputs.items()]
     result = function(*values)
     results = result if isinstance(result, Mapping) else {output: result}
@@ -266,9 +290,11 @@ def _where(builder: Builder, condition: Any, a: Any, b: Any) -> Traced:
 
 
 def _power(builder: Builder, x: Any, exponent: Any) -> Traced:
-    """Turn x ** 1 and x ** 2 into what NumPy computes for them."""
+    """Turn x ** 1 and x ** 2 into what NumPy computes for them; another power must be a positive float."""
+    if isinstance(x, Traced) and isinstance(exponent, float) and exponent > 0.0:
+        return emit(builder, "power", x, exponent)
     if not isinstance(x, Traced) or not isinstance(exponent, int) or exponent not in (1, 2):
-        _refuse("a power other than x ** 1 and x ** 2")
+        _refuse("a power other than x ** 1, x ** 2 and x ** y with a positive float y")
     return x if exponent == 1 else emit(builder, "multiply", x, x)
 
 
@@ -302,9 +328,41 @@ def _take(builder: Builder, table: Any, index: Any) -> Traced:
     """np.take from a table at a traced index."""
     if not isinstance(table, Table):
         _refuse("np.take from anything but np.asarray(table, like=index)")
-    array = table.array
-    known = np.ascontiguousarray(array) if str(array.dtype) in DTYPES else _exact_float32(array)
-    return emit(builder, "take", index, table=builder.table(known))
+    return emit(builder, "take", index, table=builder.table(_known(table.array)))
+
+
+def _fold_rows(builder: Builder, step: Any, tables: Any, start: Any) -> Any:
+    """A fold over more rows than are unrolled is a loop whose body is one step."""
+    trips = len(tables[0])
+    if not isinstance(builder, Tracer) or builder.unrolls(trips):
+        return NotImplemented
+    number, builder.loops = builder.loops, builder.loops + 1
+    carried = [
+        Traced(builder, _add(builder, "carried", (_operand(builder, value),), index=i, loop=number))
+        for i, value in enumerate(start)
+    ]
+    stepped = step(tuple(carried), *(_row(builder, table, number) for table in tables))
+    if not isinstance(stepped, tuple) or len(stepped) != len(carried):
+        _refuse(f"vectors.fold_rows with a step that does not return {len(carried)} values")
+    after = [_operand(builder, v, c.type.dtype) for v, c in zip(stepped, carried, strict=True)]
+    args = (*(value.index for value in carried), *after)
+    named = {"loop": number, "trips": trips}
+    return tuple(Traced(builder, _add(builder, "loop", args, index=i, **named)) for i in range(len(carried)))
+
+
+def _row(builder: Builder, table: NDArray[Any], number: int) -> Any:
+    """Return the entry of a loop's trip: a number of (K,), a vector of (K, n), several of (K, m, n)."""
+    if table.ndim == 3:
+        return [_row(builder, table[:, i], number) for i in range(table.shape[1])]
+    if table.ndim == 2:
+        return emit(builder, "stack", *(_row(builder, table[:, i], number) for i in range(table.shape[1])))
+    name = builder.table(_known(table))
+    return Traced(builder, _add(builder, "row", (), loop=number, table=name))
+
+
+def _known(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a table in a kind of number that programs have."""
+    return np.ascontiguousarray(array) if str(array.dtype) in DTYPES else _exact_float32(array)
 
 
 _FUNCTIONS: Mapping[Any, Callable[..., Any]] = {
@@ -341,7 +399,9 @@ def _place() -> str:
     frame = sys._getframe(1)
     numpy_folder = str(Path(np.__file__).parent)
     while frame.f_back and (
-        frame.f_code.co_filename == __file__ or frame.f_code.co_filename.startswith(numpy_folder)
+        frame.f_code.co_filename == __file__
+        or frame.f_code.co_filename.startswith(numpy_folder)
+        or frame.f_code is vectors.fold_rows.__code__
     ):
         frame = frame.f_back
     path = Path(frame.f_code.co_filename)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..refimpl.errors import CompileError
 from .ir import DTYPES, Node, Program, Type
+from .loops import bodies, loop_number, split
 from .ops import OPS, TypeRuleError
 
 Rule = Callable[[Program], Iterator[str]]
@@ -104,6 +105,49 @@ def outputs_exist(program: Program) -> Iterator[str]:
             yield f"output {name!r} is %{index}; the program computes %0 to %{len(program.nodes) - 1}"
 
 
+def loops_are_whole(program: Program) -> Iterator[str]:
+    """The results of a loop agree on its operands and trips; it carries its own numbers, each once."""
+    ends: dict[int, Node] = {}
+    for index, node in enumerate(program.nodes):
+        if node.op != "loop":
+            continue
+        first = ends.setdefault(loop_number(node), node)
+        if (node.args, node["trips"]) != (first.args, first["trips"]):
+            yield f"%{index} and another result of loop {node['loop']} have other operands or trips"
+        for place, arg in enumerate(split(node)[0]):
+            found = program.nodes[arg]
+            if found.op != "carried" or (found["index"], found["loop"]) != (place, node["loop"]):
+                yield f"%{index} loop: operand {place} must be carried number {place} of loop {node['loop']}"
+
+
+def tables_are_as_long_as_loops(program: Program) -> Iterator[str]:
+    """A loop makes at least one trip, and each of its tables has a row for every trip."""
+    trips = {}
+    for index, node in enumerate(program.nodes):
+        if node.op == "loop":
+            trips[loop_number(node)] = node["trips"]
+            if type(node["trips"]) is not int or node["trips"] < 1:
+                yield f"%{index} loop makes {node['trips']!r} trips; it must make one or more"
+    for index, node in enumerate(program.nodes):
+        if node.op == "row":
+            rows = len(program.parameters[str(node["table"])])
+            made = trips.get(loop_number(node), rows)
+            if rows != made:
+                yield f"%{index} row: table {node['table']} has {rows} rows; the loop makes {made} trips"
+
+
+def loops_are_closed(program: Program) -> Iterator[str]:
+    """What a loop's body computes is seen outside as the loop's results alone, and loops do not nest."""
+    inside = bodies(program)
+    for index, node in enumerate(program.nodes):
+        if len(inside[index]) > 1 or (inside[index] and node.op == "loop"):
+            numbers = ", ".join(map(str, sorted(inside[index])))
+            yield f"%{index} {node.op} depends on trips of loops {numbers}; loops do not nest"
+    for name, index in program.outputs:
+        if inside[index]:
+            yield f"output {name!r}, %{index}, is a value of a trip; take the loop's result"
+
+
 def window_matches(program: Program) -> Iterator[str]:
     """A gathered program has one input, `window`, as long as its images and window size say."""
     if program.gather is None:
@@ -136,6 +180,9 @@ RULES: tuple[Rule, ...] = (
     short_vectors,
     inputs_once,
     outputs_exist,
+    loops_are_whole,
+    tables_are_as_long_as_loops,
+    loops_are_closed,
     window_matches,
     images_have_ranges,
 )

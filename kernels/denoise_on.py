@@ -15,6 +15,7 @@ from ..refimpl.dataset import feature_image
 from ..refimpl.denoise import Model
 from ..refimpl.frame import Frame
 from .executor import Executor, Images
+from .memory import keep_freed_memory
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ def denoise_on(
     size = (frame.height, frame.width)
     artifact = compile_program(lower(model), executor.name, profile, schedule or executor.schedule_for(size))
     executor.build(artifact, size)
+    keep_freed_memory()
     built = time.perf_counter()
     image = executor.run(artifact, images)
     seconds = time.perf_counter() - built

@@ -11,16 +11,20 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
+from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.ir import Gather, Image
 from ..compiler.path_kernel import PathArtifact
 from ..compiler.schedules import PLAIN
 from ..refimpl.errors import InputError
+
+if TYPE_CHECKING:
+    from .passes import Passes
 
 Images = Mapping[str, NDArray[np.float32]]
 T = TypeVar("T")
@@ -76,6 +80,17 @@ class Executor(ABC):
         """Return the name of the schedule that suits one picture of `size` (height, width)."""
         return self.schedule if size[0] * size[1] >= self.schedule_pixels else PLAIN
 
+    @abstractmethod
+    def _passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
+        """Return the passes of checked kernels over a picture."""
+
+    def passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
+        """Return passes over a picture of `size` (height, width), whose images stay on the device."""
+        for artifact in (encode, denoise):
+            self._check_target(artifact)
+        self.check_size(denoise, size)
+        return self._passes(encode, denoise, size)
+
     def close(self) -> None:
         """Give the device back."""
 
@@ -97,7 +112,7 @@ class Executor(ABC):
     def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
         """Refuse images of a size (height, width) that the device cannot hold."""
 
-    def _check_target(self, artifact: Artifact | PathArtifact) -> None:
+    def _check_target(self, artifact: Artifact | PathArtifact | EncodeArtifact) -> None:
         """Refuse a kernel in another language."""
         if artifact.target != self.name:
             raise InputError(

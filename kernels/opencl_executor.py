@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,12 @@ from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
+from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.path_kernel import PathArtifact
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
 from .executor import Executor, Images, Part, black, gather_of, keep
+from .passes import PICTURE, Passes
 
 DEVICE_VARIABLE = "WAMNET_OPENCL_DEVICE"
 """Environment variable that chooses a device where the caller does not."""
@@ -54,6 +57,16 @@ BUILD_OPTIONS = ("-cl-std=CL1.2",)
 """Nothing here may allow what the standard's table of errors does not."""
 
 
+@dataclass(frozen=True)
+class _Built:
+    """A kernel on the device, its weights, work items (x, y) in a group, and pixels of an item."""
+
+    kernel: Any
+    weights: Any
+    local: tuple[int, int]
+    pixels: int
+
+
 class OpenCLExecutor(Executor):
     """One OpenCL device with its queue."""
 
@@ -69,13 +82,14 @@ class OpenCLExecutor(Executor):
             pocl_cpu.name_the_processor(chosen.int_ptr)
         self._context = cl.Context([chosen])
         self._queue = cl.CommandQueue(self._context)
-        self._built: dict[str, tuple[Any, Any, tuple[int, int]]] = {}
+        self._built: dict[str, _Built] = {}
         self._paths: dict[str, Any] = {}
         self._shares = False
         if chosen.type & cl.device_type.CPU:
             self._shares = True
             self.lanes = CPU_LANES
             self.schedule = CPU_SCHEDULES.get(chosen.native_vector_width_float, "tile4")
+        self._encoders: dict[str, Any] = {}
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
         """Compile the source, upload the weights, and run once."""
@@ -86,7 +100,8 @@ class OpenCLExecutor(Executor):
         program = self._compiled(artifact.source)
         # An empty buffer is no buffer.
         weights = artifact.weights if artifact.weights.size else np.zeros(1, np.float32)
-        built = (getattr(program, artifact.entry_point), self._copied(weights), local_size)
+        kernel, pixels = getattr(program, artifact.entry_point), artifact.manifest["schedule"]["pixels"]
+        built = _Built(kernel, self._copied(weights), local_size, pixels)
         self._launch(artifact, built, black(artifact, (1, 1)))
         keep(self._built, artifact.digest, built)
 
@@ -120,26 +135,29 @@ class OpenCLExecutor(Executor):
         return x, min(wanted[1], items // x)
 
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
-        height, width = next(iter(images.values())).shape[:2]
-        try:
+        with self._told(next(iter(images.values())).shape[:2]):
             return self._launch(artifact, self._built[artifact.digest], images)
+
+    @contextmanager
+    def _told(self, size: tuple[int, ...]) -> Iterator[None]:
+        """Say of a picture of `size` (height, width) that the device does not run it."""
+        try:
+            yield
         except (cl.Error, MemoryError) as error:
             raise InputError(
                 f"size of the picture on {self.device}",
-                f"{width} x {height}",
+                f"{size[1]} x {size[0]}",
                 f"the device does not run it ({' '.join(str(error).split())})",
                 "split the picture, or use executor numpy",
             ) from None
 
-    def _launch(
-        self, artifact: Artifact, built: tuple[Any, Any, tuple[int, int]], images: Images
-    ) -> NDArray[np.float32]:
+    def _launch(self, artifact: Artifact, built: _Built, images: Images) -> NDArray[np.float32]:
         """Copy the images, run a built kernel, and copy the result back."""
         height, width = next(iter(images.values())).shape[:2]
         result = np.empty((height, width, output_channels(artifact.program)), np.float32)
         output = self._result(result)
         inputs = [self._upload(image) for image in images.values()]
-        self._enqueue(artifact, built, inputs, output, (width, height))
+        self._enqueue(built, inputs, output, (height, width))
         if self._shares:
             # Mapping waits for the kernel, and makes the array hold what the buffer does.
             _, done = cl.enqueue_map_buffer(
@@ -152,18 +170,16 @@ class OpenCLExecutor(Executor):
 
     def _enqueue(
         self,
-        artifact: Artifact,
-        built: tuple[Any, Any, tuple[int, int]],
-        inputs: list[Any],
+        built: _Built,
+        inputs: Sequence[Any],
         output: Any,
         size: tuple[int, int],
     ) -> None:
-        """Start a built kernel on images of `size` (width, height) that are on the device."""
-        kernel, weights, local_size = built
-        # Whole groups; the kernel leaves out what lies beyond the image.
-        items = (-(-size[0] // artifact.manifest["schedule"]["pixels"]), size[1])
-        groups = tuple(-(-n // local) * local for n, local in zip(items, local_size, strict=True))
-        kernel(self._queue, groups, local_size, *inputs, weights, output, *map(np.int32, size))
+        """Start a built kernel on images of `size` (height, width) that are on the device."""
+        items = (-(-size[1] // built.pixels), size[0])
+        numbers = (np.int32(size[1]), np.int32(size[0]))
+        places = _whole(items, built.local)
+        built.kernel(self._queue, places, built.local, *inputs, built.weights, output, *numbers)
 
     def kernel_seconds(
         self, artifact: Artifact, images: Images, clock: Callable[[], float] = time.perf_counter
@@ -175,7 +191,7 @@ class OpenCLExecutor(Executor):
         inputs, output = [self._upload(image) for image in images.values()], self._result(result)
         self._queue.finish()
         start = clock()
-        self._enqueue(artifact, self._built[artifact.digest], inputs, output, (width, height))
+        self._enqueue(self._built[artifact.digest], inputs, output, (height, width))
         self._queue.finish()
         return clock() - start
 
@@ -188,21 +204,33 @@ class OpenCLExecutor(Executor):
             self._trace(kernel, Part(1, 1, 0, 1, 0, 1, 0))
 
     def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
-        local = PATH_LOCAL_SIZE[min(kernel.lanes, 2)]
-        # Whole groups of whole vectors; what lies beyond the image is computed too, and left out here.
-        items = (-(-part.width // kernel.lanes), part.rows)
-        columns, rows = (-(-n // size) * size for n, size in zip(items, local, strict=True))
-        sums = np.empty((len(kernel.planes), rows, columns * kernel.lanes), np.float32)
+        sums = np.empty(sums_shape(kernel, part), np.float32)
         output = cl.Buffer(self._context, cl.mem_flags.WRITE_ONLY, sums.nbytes)
+        self._follow(kernel, part, output)
+        cl.enqueue_copy(self._queue, sums, output)
+        return sums[:, : part.rows, : part.width]
+
+    def _follow(self, kernel: PathArtifact, part: Part, output: Any) -> None:
+        """Start a built path kernel, whose sums go to a buffer of [`sums_shape`]."""
+        _, rows, stride = sums_shape(kernel, part)
         numbers = (
             *map(np.int32, (part.width, part.height, part.first_row)),
             np.uint32(part.first_sample),
             np.int32(part.samples),
             np.uint32(part.seed),
         )
+        local, columns = PATH_LOCAL_SIZE[min(kernel.lanes, 2)], stride // kernel.lanes
         self._paths[kernel.digest](self._queue, (columns, rows), local, output, *numbers)
-        cl.enqueue_copy(self._queue, sums, output)
-        return sums[:, : part.rows, : part.width]
+
+    def _passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
+        return OpenCLPasses(self, encode, denoise, size)
+
+    def _encoder(self, artifact: EncodeArtifact) -> Any:
+        """Return the built encoding kernel."""
+        known = self._encoders.get(artifact.digest)
+        function = known or getattr(self._compiled(artifact.source), artifact.entry_point)
+        keep(self._encoders, artifact.digest, function)
+        return function
 
     def _compiled(self, source: str) -> Any:
         """Return the built program, or raise with the driver's log."""
@@ -233,6 +261,89 @@ class OpenCLExecutor(Executor):
             flags = cl.mem_flags.WRITE_ONLY | cl.mem_flags.USE_HOST_PTR
             return cl.Buffer(self._context, flags, hostbuf=array)
         return cl.Buffer(self._context, cl.mem_flags.WRITE_ONLY, array.nbytes)
+
+
+class OpenCLPasses(Passes):
+    """Buffers between kernels of one queue, which runs them in order."""
+
+    def __init__(
+        self, executor: OpenCLExecutor, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]
+    ) -> None:
+        super().__init__(encode, denoise, size)
+        self._executor, self._shape = executor, (0, 0, 0)
+        self._sums: Any = None
+        names = [image.name for image in encode.images]
+        with executor._told(size):
+            self._images = {name: self._buffer(self.channels(name)) for name in (*names, PICTURE)}
+
+    def _buffer(self, channels: int) -> Any:
+        """Return a buffer for an image of the picture's size."""
+        height, width = self.size
+        flags = cl.mem_flags.READ_WRITE
+        return cl.Buffer(self._executor._context, flags, 4 * height * width * channels)
+
+    def trace(self, kernel: PathArtifact, part: Part) -> None:
+        """Start the path kernel; the sums' buffer is kept while kernels need one of its shape."""
+        executor, shape = self._executor, sums_shape(kernel, part)
+        executor.build_path(kernel)
+        with executor._told(self.size):
+            if shape != self._shape:
+                count = 4 * shape[0] * shape[1] * shape[2]
+                self._sums = cl.Buffer(executor._context, cl.mem_flags.READ_WRITE, count)
+                self._shape = shape
+            executor._follow(kernel, part, self._sums)
+
+    def encode(self, samples: int) -> None:
+        """Start the encoding kernel."""
+        executor, (height, width) = self._executor, self.size
+        _, rows, stride = self._shape
+        images = [self._images[image.name] for image in self.encoder.images]
+        numbers = map(np.int32, (width, height, stride, rows * stride, samples))
+        kernel, places = executor._encoder(self.encoder), _whole((width, height), LOCAL_SIZE)
+        with executor._told(self.size):
+            kernel(executor._queue, places, LOCAL_SIZE, self._sums, *images, *numbers)
+
+    def denoise(self) -> None:
+        """Start the denoising kernel."""
+        executor = self._executor
+        executor.build(self.denoiser, self.size)
+        images = [self._images[image.name] for image in gather_of(self.denoiser).images]
+        with executor._told(self.size):
+            executor._enqueue(executor._built[self.denoiser.digest], images, self._images[PICTURE], self.size)
+
+    def read(self, name: str) -> NDArray[np.float32]:
+        """Copy a buffer to the host."""
+        result = np.empty((*self.size, self.channels(name)), np.float32)
+        with self._executor._told(self.size):
+            cl.enqueue_copy(self._executor._queue, result, self._images[name])
+        return result
+
+    def finish(self) -> None:
+        """Wait for the queue."""
+        with self._executor._told(self.size):
+            self._executor._queue.finish()
+
+    def close(self) -> None:
+        """Release the buffers."""
+        for buffer in (self._sums, *self._images.values()):
+            if buffer is not None:
+                buffer.release()
+        self._sums, self._shape, self._images = None, (0, 0, 0), {}
+
+
+def sums_shape(kernel: PathArtifact, part: Part) -> tuple[int, int, int]:
+    """Return (planes, rows, numbers in a row) of the sums that a kernel writes for a part of an image.
+
+    They are whole groups of whole vectors; what lies beyond the part is computed too, and means nothing.
+    """
+    items = (-(-part.width // kernel.lanes), part.rows)
+    columns, rows = _whole(items, PATH_LOCAL_SIZE[min(kernel.lanes, 2)])
+    return len(kernel.planes), rows, columns * kernel.lanes
+
+
+def _whole(items: tuple[int, ...], local: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the number of work items on each axis, in whole groups; kernels leave out what is beyond."""
+    return tuple(-(-n // size) * size for n, size in zip(items, local, strict=True))
 
 
 def _choose(wanted: str) -> Any:

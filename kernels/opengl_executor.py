@@ -20,11 +20,13 @@ from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
+from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
 from ..compiler.path_kernel import PathArtifact
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import osmesa
-from .executor import Executor, Images, Part, black, keep
+from .executor import Executor, Images, Part, black, gather_of, keep
+from .passes import PICTURE, Passes
 
 CONTEXT_VARIABLE = "WAMNET_OPENGL_CONTEXT"
 """Environment variable that chooses the kind of context where the caller does not."""
@@ -101,6 +103,7 @@ class OpenGLExecutor(Executor):
             self.schedule, self.schedule_pixels = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
         self._built: dict[str, _Built] = {}
         self._paths: dict[str, _Built] = {}
+        self._encoders: dict[str, _Built] = {}
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
         """Compile the shaders, upload the weights, and draw a few pixels."""
@@ -162,15 +165,27 @@ class OpenGLExecutor(Executor):
             made.callback(target.release)
             frame = self._context.framebuffer([target])
             made.callback(frame.release)
-            for unit, (name, texture) in enumerate(textures.items()):
-                # A driver removes what the shader does not read, and its name with it.
-                if name in built.program:
-                    built.program[name].value = unit
-                texture.use(unit)
-            frame.use()
-            built.triangle.render(mode=moderngl.TRIANGLES, vertices=3)
+            self._draw(built, frame, textures)
             pixels = np.frombuffer(target.read(), np.float32).reshape(height, width, 4)
         return pixels[..., : output_channels(artifact.program)].copy()
+
+    def _draw(
+        self,
+        built: _Built,
+        frame: Any,
+        textures: Mapping[str, Any],
+        values: Mapping[str, int] | None = None,
+    ) -> None:
+        """Draw a built shader into a framebuffer, with textures and numbers under their uniforms' names."""
+        units = {name: unit for unit, name in enumerate(textures)}
+        for name, texture in textures.items():
+            texture.use(units[name])
+        for name, value in {**units, **(values or {})}.items():
+            # A driver removes what the shader does not read, and its name with it.
+            if name in built.program:
+                built.program[name].value = value
+        frame.use()
+        built.triangle.render(mode=moderngl.TRIANGLES, vertices=3)
 
     def build_path(self, kernel: PathArtifact) -> None:
         """Compile the shaders and draw one pixel: drivers finish compiling when they draw."""
@@ -184,31 +199,41 @@ class OpenGLExecutor(Executor):
             self._trace(kernel, Part(1, 1, 0, 1, 0, 1, 0))
 
     def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
-        built = self._paths[kernel.digest]
-        size, count = (part.width, part.rows), -(-len(kernel.planes) // 4)
-        self._check_texture("the sums", size, 4)
-        values = {
-            "width": part.width,
-            "height": part.height,
-            "first_row": part.first_row,
-            "first_sample": part.first_sample,
-            "samples": part.samples,
-            "seed_number": part.seed,
-        }
         with self._context, ExitStack() as made:
-            targets = [self._context.texture(size, 4, dtype="f4") for _ in range(count)]
-            frame = self._context.framebuffer(targets)
-            for thing in (*targets, frame):
-                made.callback(thing.release)
-            for name, value in values.items():
-                # A driver removes what the shader does not read, and its name with it.
-                if name in built.program:
-                    built.program[name].value = value
-            frame.use()
-            built.triangle.render(mode=moderngl.TRIANGLES, vertices=3)
+            frame, targets = self._targets(
+                "the sums", (part.rows, part.width), -(-len(kernel.planes) // 4), made
+            )
+            self._draw(self._paths[kernel.digest], frame, {}, _numbers(part))
             read = [np.frombuffer(target.read(), np.float32) for target in targets]
         pixels = np.concatenate([buffer.reshape(part.rows, part.width, 4) for buffer in read], axis=-1)
         return np.moveaxis(pixels, -1, 0)[: len(kernel.planes)]
+
+    def _targets(
+        self, name: str, size: tuple[int, int], count: int, made: ExitStack
+    ) -> tuple[Any, list[Any]]:
+        """Return a framebuffer of `size` (height, width) and its RGBA textures, which `made` gives back."""
+        self._check_texture(name, size[::-1], 4)
+        targets = []
+        for _ in range(count):
+            targets.append(self._context.texture(size[::-1], 4, dtype="f4"))
+            made.callback(targets[-1].release)
+            targets[-1].filter = (moderngl.NEAREST, moderngl.NEAREST)
+        frame = self._context.framebuffer(targets)
+        made.callback(frame.release)
+        return frame, targets
+
+    def _passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
+        return OpenGLPasses(self, encode, denoise, size)
+
+    def _encoder(self, artifact: EncodeArtifact) -> _Built:
+        """Return the built encoding shader."""
+        with self._context, ExitStack() as made:
+            known = self._encoders.get(artifact.digest)
+            built = known or _Built(*self._program(artifact.source, made), None)
+            made.pop_all()
+            for old in keep(self._encoders, artifact.digest, built):
+                old.release()
+        return built
 
     def _texture(self, name: str, array: NDArray[np.float32]) -> Any:
         """Return (H, W, C) as a float texture that is read texel by texel."""
@@ -233,7 +258,78 @@ class OpenGLExecutor(Executor):
         """Release the context and all that lives in it."""
         self._built.clear()
         self._paths.clear()
+        self._encoders.clear()
         self._context.release()
+
+
+class OpenGLPasses(Passes):
+    """Float textures between fragment passes: what one draws into, the next one reads."""
+
+    def __init__(
+        self, executor: OpenGLExecutor, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]
+    ) -> None:
+        super().__init__(encode, denoise, size)
+        self._executor = executor
+        with executor._context, ExitStack() as made:
+            self._sums = executor._targets("the pictures", size, -(-len(encode.planes) // 4), made)
+            self._encoded = executor._targets("the pictures", size, len(encode.images), made)
+            self._result = executor._targets("the pictures", size, 1, made)
+            self._made = made.pop_all()
+        names = [image.name for image in encode.images]
+        self._images = dict(zip((*names, PICTURE), self._encoded[1] + self._result[1], strict=True))
+
+    def trace(self, kernel: PathArtifact, part: Part) -> None:
+        """Draw the sums."""
+        executor = self._executor
+        executor.build_path(kernel)
+        with executor._context:
+            executor._draw(executor._paths[kernel.digest], self._sums[0], {}, _numbers(part))
+
+    def encode(self, samples: int) -> None:
+        """Draw the feature images."""
+        executor = self._executor
+        built = executor._encoder(self.encoder)
+        textures = {f"sums_{number}": texture for number, texture in enumerate(self._sums[1])}
+        with executor._context:
+            executor._draw(built, self._encoded[0], textures, {"sample_count": samples})
+
+    def denoise(self) -> None:
+        """Draw the picture."""
+        executor = self._executor
+        executor.build(self.denoiser, self.size)
+        built = executor._built[self.denoiser.digest]
+        names = [image.name for image in gather_of(self.denoiser).images]
+        textures = {"weight_texture": built.weights, **{f"image_{n}": self._images[n] for n in names}}
+        with executor._context:
+            executor._draw(built, self._result[0], textures)
+
+    def read(self, name: str) -> NDArray[np.float32]:
+        """Copy a texture to the host."""
+        with self._executor._context:
+            pixels = np.frombuffer(self._images[name].read(), np.float32).reshape(*self.size, 4)
+        return pixels[..., : self.channels(name)].copy()
+
+    def finish(self) -> None:
+        """Wait for the context."""
+        with self._executor._context:
+            self._executor._context.finish()
+
+    def close(self) -> None:
+        """Release the textures."""
+        with self._executor._context:
+            self._made.close()
+
+
+def _numbers(part: Part) -> dict[str, int]:
+    """Return the uniforms of a path kernel."""
+    return {
+        "width": part.width,
+        "height": part.height,
+        "first_row": part.first_row,
+        "first_sample": part.first_sample,
+        "samples": part.samples,
+        "seed_number": part.seed,
+    }
 
 
 def _open(kind: str) -> tuple[str, Any]:

@@ -22,13 +22,14 @@ from numpy.typing import NDArray
 
 from ..compiler.emit_path import GROUPS
 from ..compiler.lower_scene import lower_scene
-from ..compiler.path_kernel import PathArtifact, compile_path
+from ..compiler.path_kernel import PathArtifact, compile_path, most_unrolled
 from ..refimpl.errors import InputError
 from ..refimpl.frame import LAYERS, Frame
 from ..refimpl.render import Job, Render, checked_rows, render_info
 from ..refimpl.scene import Scene
 from ..refimpl.transport import Settings
 from .executor import Executor, Part
+from .memory import keep_freed_memory
 
 SAMPLES_AT_ONCE = 16
 """Most samples that are added up in float32: 15 roundings, a relative error below 1e-6."""
@@ -49,7 +50,8 @@ def compile_scene(executor: Executor, scene: Scene, job: Job, profile: str = "ie
 @lru_cache(KEPT_SCENES)
 def _compiled(scene: Scene, settings: Settings, target: str, profile: str, lanes: int) -> PathArtifact:
     """Return the kernel; it depends on nothing else."""
-    return compile_path(lower_scene(scene, settings), target, profile, lanes)
+    programs = lower_scene(scene, settings, most_unrolled(target))
+    return compile_path(programs, target, profile, lanes)
 
 
 def render_on(
@@ -70,14 +72,17 @@ def render_on(
     first, last = checked_rows(job, rows)
     kernel = compile_scene(executor, scene, job, profile)
     executor.build_path(kernel)
+    keep_freed_memory()
     totals = Totals(0, np.zeros((len(kernel.planes), last - first, job.width)))
     for parts in sample_ranges(job, (first, last)):
         sums = []
         for part in parts:
-            sums.append(executor.trace(kernel, part).astype(np.float64))
+            sums.append(executor.trace(kernel, part))
             if on_progress is not None:
                 on_progress(part.rows * part.width * part.samples)
-        totals = merge(kernel, totals, Totals(parts[0].samples, np.concatenate(sums, axis=1)))
+        totals = merge(
+            kernel, totals, Totals(parts[0].samples, np.concatenate(sums, axis=1, dtype=np.float64))
+        )
     return _render(kernel, totals, render_info(scene, job))
 
 
@@ -110,13 +115,14 @@ class Totals:
 
 
 def merge(kernel: PathArtifact, a: Totals, b: Totals) -> Totals:
-    """Return the totals over the samples of both."""
+    """Return the totals over the samples of both; a may have none."""
+    if not a.samples:
+        return b
     planes = a.planes + b.planes
-    if a.samples:
-        for names in zip(GROUPS["color"], GROUPS["deviation"], strict=True):
-            color, deviation = map(kernel.planes.index, names)
-            difference = b.planes[color] / b.samples - a.planes[color] / a.samples
-            planes[deviation] += difference**2 * (a.samples * b.samples / (a.samples + b.samples))
+    for names in zip(GROUPS["color"], GROUPS["deviation"], strict=True):
+        color, deviation = map(kernel.planes.index, names)
+        difference = b.planes[color] / b.samples - a.planes[color] / a.samples
+        planes[deviation] += difference**2 * (a.samples * b.samples / (a.samples + b.samples))
     return Totals(a.samples + b.samples, planes)
 
 

@@ -28,6 +28,7 @@ from .encoding import to_display
 from .errors import InputError
 from .frame import Frame
 from .rng import counter, random_block
+from .vectors import vector
 
 Array = NDArray[Any]
 Indices = NDArray[np.int64]
@@ -95,8 +96,10 @@ def encode_depth(values: Array, normalization: Normalization) -> Array:
 
 def encode_position(values: Array, normalization: Normalization) -> Array:
     """Scale world positions (..., 3) to [-1, 1] around position_center."""
-    centred: Array = values - np.asarray(normalization.position_center, values.dtype)
-    return np.clip(centred / normalization.position_scale, -1.0, 1.0)
+    center = normalization.position_center
+    centred: Array = vector(*(values[..., i] - center[i] for i in range(3)))
+    scaled: Array = np.clip(centred / normalization.position_scale, -1.0, 1.0)
+    return scaled
 
 
 DISPLAY_FORMULA = "sRGB of (linear radiance * 2^{exposure_stops!r}) clipped to 0 .. 1 (IEC 61966-2-1)"
@@ -252,6 +255,21 @@ def feature_image(frame: Frame, features: Sequence[str], normalization: Normaliz
     check_features(features)
     encoded = [_encoded(frame, FEATURES[name], normalization) for name in features]
     return np.concatenate(encoded, axis=-1).astype(np.float32)
+
+
+def encode_sums(
+    sums: Mapping[str, Any], samples: Any, features: Sequence[str], normalization: Normalization
+) -> dict[str, Any]:
+    """Return encoded features (..., channels) by name, from layers (..., channels) summed over the samples.
+
+    That is what a renderer's kernel holds before it is read back; may be traced. The last clip changes
+    nothing but what rounding has put outside the range that a feature promises.
+    """
+    encoded = {}
+    for feature in (FEATURES[name] for name in features):
+        values = feature.encode(sums[feature.layer] / samples, normalization)
+        encoded[feature.name] = np.clip(values, feature.low, feature.high)
+    return encoded
 
 
 def _encoded(frame: Frame, feature: Feature, normalization: Normalization) -> Array:

@@ -1,9 +1,11 @@
 """Rays against the scene's primitives: closed formulas, one function per kind, all lanes at once.
 
-1. [`build`] lays the scene out as constants of one float type [`Geometry`]: boxes are grouped by the rotation
-   that they share, so that a ray is turned once per group, and every surface gets a number (*surface id*).
-2. [`closest_hit`] asks each primitive for the distance along the ray [`room_distance`, `box_distance`,
-   `sphere_distance`, `quad_distance`] and keeps the least positive one with its id.
+1. [`build`] lays the scene out as tables of one float type, a row a primitive [`Geometry`]: boxes are
+   grouped by the rotation that they share, so that a ray is turned once per group, and every surface gets a
+   number (*surface id*). Groups of few boxes are joined, and rays turned for each box.
+2. [`closest_hit`] asks each primitive, row by row [`fold_distances`], for the distance along the ray
+   [`room_distance`, `box_distance`, `sphere_distance`, `quad_distance`] and keeps the least positive one with
+   its id.
 3. [`surface_at`] evaluates the winner once more for its normal, and looks its material up by id.
 4. [`occluded`] is the shadow ray's question: does anything stand between two points?
 5. [`spawn_origin`] lifts an origin off its surface, by an amount that follows the rounding error of a hit.
@@ -19,14 +21,16 @@ always face the ray's origin.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import chain, groupby
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from . import vectors
+from .materials import Material
 from .scene import BLACK, IDENTITY, WALLS, Box, Light, Quad, Scene, Sphere, Vector
 
 MISS = 1e30
@@ -42,16 +46,34 @@ point carries a rounding error of about 10 units of 2**-24 (distance, product, s
 back); 64 leaves a margin and is still far below what can be seen. The same in float64, so that both types
 trace the same paths."""
 
+LEAST_SHARED = 4
+"""Fewest boxes of a rotation for which rays are turned once instead of for each box: a scene of hundreds of
+rotations is then one table of boxes, not hundreds of groups. (To turn a ray costs twice a slab test.)"""
+
+
+CANCELLED = 16 * 2.0**-53
+"""A sum of products below this share of its terms' magnitudes is rounding noise: centre, rotation and
+products carry a few units of 2**-53 each. Boxes on a grid then share their slabs to the bit, and kernels
+compute each slab once: a centre of 1e-16 here and -7e-18 there would be two."""
+
 
 @dataclass(frozen=True)
 class BoxGroup:
-    """Boxes that share rotation (3, 3); per box: center in rotated axes (3,), half extent (3,)."""
+    """N boxes; per box: center in rotated axes (N, 3), half extent (N, 3).
+
+    rotation is (3, 3) where they share it (`shared`), else (N, 3, 3).
+    """
 
     rotation: Any
     rotated: bool
     first_id: int
-    centers: tuple[Any, ...]
-    half_extents: tuple[Any, ...]
+    centers: Any
+    half_extents: Any
+
+    @property
+    def shared(self) -> bool:
+        """Tell whether all boxes have one rotation."""
+        return bool(self.rotation.ndim == 2)
 
 
 @dataclass(frozen=True)
@@ -59,16 +81,17 @@ class Geometry:
     """A scene as constants of one float type. S surfaces have the ids 0 .. S-1; S itself means "nothing".
 
     Tables have a row per id (and a last row for "nothing"): reflectance and emission (S+1, 3), light (S+1,)
-    the light's index or -1. Quads and lights: corner, the two dual edges and the unit normal, (3,) each.
+    the light's index or -1. Spheres: center (N, 3), radius (N,). Quads and lights: corner, the two dual edges
+    and the unit normal, (N, 3) each.
     """
 
     dtype: Any
     room: tuple[Any, Any] | None
     room_id: int
     groups: tuple[BoxGroup, ...]
-    spheres: tuple[tuple[Any, Any], ...]
+    spheres: tuple[Any, Any]
     sphere_id: int
-    quads: tuple[tuple[Any, Any, Any, Any], ...]
+    quads: tuple[Any, Any, Any, Any]
     quad_id: int
     reflectance: Any
     emission: Any
@@ -106,7 +129,7 @@ class Surface(NamedTuple):
 def build(scene: Scene, dtype: DTypeLike = np.float32) -> Geometry:
     """Return the scene's geometry as constants; computed in float64 and then rounded to dtype."""
     walls = len(WALLS) if scene.room is not None else 0
-    boxes = sorted(scene.boxes, key=lambda box: _rotations(scene).index(box.rotation))
+    boxes = _grouped(scene)
     sphere_id = walls + len(boxes)
     quad_id = sphere_id + len(scene.spheres)
     quads: tuple[Quad | Light, ...] = scene.quads + scene.lights
@@ -121,9 +144,12 @@ def build(scene: Scene, dtype: DTypeLike = np.float32) -> Geometry:
         room=None if scene.room is None else (constant(scene.room.low), constant(scene.room.high)),
         room_id=0,
         groups=_box_groups(scene, walls, constant),
-        spheres=tuple((constant(s.center), constant(s.radius)) for s in scene.spheres),
+        spheres=(
+            _rows(constant([s.center for s in scene.spheres])),
+            constant([s.radius for s in scene.spheres]),
+        ),
         sphere_id=sphere_id,
-        quads=tuple(tuple(map(constant, _quad_constants(q))) for q in quads),  # type: ignore[misc]
+        quads=_quad_tables(quads, constant),
         quad_id=quad_id,
         reflectance=constant([r for r, _ in rows]),
         emission=constant([e for _, e in rows]),
@@ -138,23 +164,54 @@ def _rotations(scene: Scene) -> list[Any]:
     return list(dict.fromkeys(box.rotation for box in scene.boxes))
 
 
+def _grouped(scene: Scene) -> list[Box]:
+    """Return the boxes in the order of their ids: by rotation."""
+    return sorted(scene.boxes, key=lambda box: _rotations(scene).index(box.rotation))
+
+
 def _box_groups(scene: Scene, first_id: int, constant: Any) -> tuple[BoxGroup, ...]:
-    """Group the boxes by rotation, and turn their centres into the rotated axes."""
+    """Group the boxes by rotation, join small groups, and turn the centres into the rotated axes."""
+    members = [[box for box in scene.boxes if box.rotation == rotation] for rotation in _rotations(scene)]
     groups = []
-    for rotation in _rotations(scene):
-        members: list[Box] = [box for box in scene.boxes if box.rotation == rotation]
-        matrix = np.array(rotation, np.float64)
-        groups.append(
-            BoxGroup(
-                rotation=constant(matrix),
-                rotated=rotation != IDENTITY,
-                first_id=first_id,
-                centers=tuple(constant(matrix @ np.array(box.center)) for box in members),
-                half_extents=tuple(constant(box.half_extent) for box in members),
+    for joined, run in groupby(members, _joined):
+        for boxes in [list(chain(*run))] if joined else run:
+            matrices = np.array([box.rotation for box in boxes], np.float64)
+            centers = [_turned(m, np.array(b.center)) for m, b in zip(matrices, boxes, strict=True)]
+            groups.append(
+                BoxGroup(
+                    rotation=constant(matrices if joined else matrices[0]),
+                    rotated=boxes[0].rotation != IDENTITY,
+                    first_id=first_id,
+                    centers=constant(centers),
+                    half_extents=constant([box.half_extent for box in boxes]),
+                )
             )
-        )
-        first_id += len(members)
+            first_id += len(boxes)
     return tuple(groups)
+
+
+def _joined(boxes: list[Box]) -> bool:
+    """Tell whether rays are turned for each of the boxes that have a rotation, not for all at once."""
+    return len(boxes) < LEAST_SHARED and boxes[0].rotation != IDENTITY
+
+
+def _quad_tables(quads: tuple[Quad | Light, ...], constant: Any) -> tuple[Any, Any, Any, Any]:
+    """Return the tables of the quads, (N, 3) each."""
+    rows = [_quad_constants(quad) for quad in quads]
+    corner, dual_u, dual_v, normal = (_rows(constant([row[i] for row in rows])) for i in range(4))
+    return corner, dual_u, dual_v, normal
+
+
+def _rows(table: Any) -> Any:
+    """Return a table as (N, 3), also without rows."""
+    return table.reshape(-1, 3)
+
+
+def _turned(rotation: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return rotation (3, 3) times point (3,), with zeros where the terms cancel to their rounding errors."""
+    size = np.abs(rotation) @ np.abs(point)
+    turned = rotation @ point
+    return np.where(np.abs(turned) <= CANCELLED * size, 0.0, turned)
 
 
 def _quad_constants(quad: Quad | Light) -> tuple[Any, Any, Any, Any]:
@@ -175,6 +232,19 @@ def _material_rows(scene: Scene, boxes: list[Box]) -> list[tuple[Vector, Vector]
     rows += [(part.reflectance, part.emission) for part in parts]
     rows += [(BLACK, light_radiance(light)) for light in scene.lights]
     return [*rows, (BLACK, scene.background)]
+
+
+def materials_by_id(scene: Scene) -> list[tuple[Material | None, Vector]]:
+    """Return (material, centre) of each surface that reflects, in the order of ids.
+
+    The centre of what has no inside is 0.
+    """
+    rows: list[tuple[Material | None, Vector]] = []
+    if scene.room is not None:
+        rows += [(material, BLACK) for material in scene.room.materials or (None,) * len(WALLS)]
+    bodies: tuple[Box | Sphere, ...] = (*_grouped(scene), *scene.spheres)
+    rows += [(body.material, body.center) for body in bodies]
+    return [*rows, *((quad.material, BLACK) for quad in scene.quads)]
 
 
 def light_radiance(light: Light) -> Vector:
@@ -254,13 +324,21 @@ def _inverse(direction: Any) -> Any:
 # The scene
 
 
+Take = Callable[[tuple[Any, ...], Any, Any], tuple[Any, ...]]
+"""(values (...), a primitive's distance (...), its surface id) -> the values after this primitive."""
+
+
 def closest_hit(geometry: Geometry, origin: Any, direction: Any) -> Hit:
     """Return the nearest surface that rays (origin, unit direction; (..., 3)) meet; of equals the first."""
+
+    def nearer(values: tuple[Any, ...], t_new: Any, surface_new: Any) -> tuple[Any, ...]:
+        t, surface = values
+        surface = np.where(t_new < t, surface_new, surface)
+        return np.minimum(t, t_new), surface
+
     t = np.full_like(direction[..., 0], MISS)
     surface = np.full_like(direction[..., 0], geometry.nothing, dtype=np.int32)
-    for t_new, surface_new in _distances(geometry, origin, direction):
-        surface = np.where(t_new < t, np.int32(surface_new), surface)
-        t = np.minimum(t, t_new)
+    t, surface = fold_distances(geometry, origin, direction, nearer, (t, surface))
     if geometry.room is not None:
         surface = np.where(surface == geometry.room_id, _wall(geometry, origin, direction), surface)
     return Hit(t, surface)
@@ -268,25 +346,64 @@ def closest_hit(geometry: Geometry, origin: Any, direction: Any) -> Hit:
 
 def occluded(geometry: Geometry, origin: Any, direction: Any, t_max: Any) -> Any:
     """Tell (...) whether rays meet anything nearer than t_max (...)."""
+
+    def nearer(values: tuple[Any, ...], t_new: Any, _: Any) -> tuple[Any, ...]:
+        return (np.minimum(values[0], t_new),)
+
     t = np.full_like(direction[..., 0], MISS)
-    for t_new, _ in _distances(geometry, origin, direction):
-        t = np.minimum(t, t_new)
+    (t,) = fold_distances(geometry, origin, direction, nearer, (t,))
     return t < t_max
 
 
-def _distances(geometry: Geometry, origin: Any, direction: Any) -> Iterator[tuple[Any, int]]:
-    """Yield each primitive's distance (...) along the rays and its id; a room has that of its first wall."""
+def fold_distances(
+    geometry: Geometry, origin: Any, direction: Any, take: Take, values: tuple[Any, ...]
+) -> tuple[Any, ...]:
+    """Return the values after take(values, distance, surface id) for each primitive in the order of ids.
+
+    A room has the id of its first wall.
+    """
     if geometry.room is not None:
-        yield room_distance(*_room_slabs(geometry, origin, direction)), geometry.room_id
+        t_room = room_distance(*_room_slabs(geometry, origin, direction))
+        values = take(values, t_room, np.int32(geometry.room_id))
     for group in geometry.groups:
-        local_origin, local_direction = _into_group(group, origin, direction)
-        inverse = _inverse(local_direction)
-        for i, (center, half_extent) in enumerate(zip(group.centers, group.half_extents, strict=True)):
-            yield box_distance(*slabs(center, half_extent, local_origin, inverse)), group.first_id + i
-    for i, (center, radius) in enumerate(geometry.spheres):
-        yield sphere_distance(center, radius, origin, direction), geometry.sphere_id + i
-    for i, quad in enumerate(geometry.quads):
-        yield quad_distance(quad, origin, direction), geometry.quad_id + i
+        values = _fold_boxes(group, origin, direction, take, values)
+
+    def meet_sphere(values: tuple[Any, ...], center: Any, radius: Any, surface: Any) -> tuple[Any, ...]:
+        return take(values, sphere_distance(center, radius, origin, direction), surface)
+
+    def meet_quad(values: tuple[Any, ...], *row: Any) -> tuple[Any, ...]:
+        *quad, surface = row
+        return take(values, quad_distance(tuple(quad), origin, direction), surface)
+
+    values = _fold(meet_sphere, geometry.spheres, geometry.sphere_id, values)
+    return _fold(meet_quad, geometry.quads, geometry.quad_id, values)
+
+
+def _fold_boxes(
+    group: BoxGroup, origin: Any, direction: Any, take: Take, values: tuple[Any, ...]
+) -> tuple[Any, ...]:
+    """Return the values after the boxes of a group."""
+    boxes = (group.centers, group.half_extents)
+
+    def meet(values: tuple[Any, ...], ray: tuple[Any, Any], center: Any, half: Any, surface: Any) -> Any:
+        return take(values, box_distance(*slabs(center, half, *ray)), surface)
+
+    def meet_turned(values: tuple[Any, ...], rotation: Any, *box: Any) -> Any:
+        local_origin, local_direction = _into_axes(rotation, origin, direction)
+        return meet(values, (local_origin, _inverse(local_direction)), *box)
+
+    if not group.shared:
+        return _fold(meet_turned, (group.rotation, *boxes), group.first_id, values)
+    local_origin, local_direction = _into_group(group, None, origin, direction)
+    ray = local_origin, _inverse(local_direction)
+    return _fold(lambda values, *box: meet(values, ray, *box), boxes, group.first_id, values)
+
+
+def _fold(step: Any, tables: tuple[Any, ...], first_id: int, values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return the values after the rows of tables whose primitives are numbered from first_id on."""
+    ids = np.arange(first_id, first_id + len(tables[0]), dtype=np.int32)
+    folded: tuple[Any, ...] = vectors.fold_rows(step, (*tables, ids), values)
+    return folded
 
 
 def _room_slabs(geometry: Geometry, origin: Any, direction: Any) -> tuple[Any, Any]:
@@ -316,11 +433,29 @@ def _least_axis(a: Any) -> tuple[Any, Any]:
     return (a[..., 0] <= a[..., 1]) & (a[..., 0] <= a[..., 2]), a[..., 1] <= a[..., 2]
 
 
-def _into_group(group: BoxGroup, origin: Any, direction: Any) -> tuple[Any, Any]:
-    """Return rays in the axes of a group of boxes."""
+def _into_group(group: BoxGroup, index: Any, origin: Any, direction: Any) -> tuple[Any, Any]:
+    """Return rays in the axes of a group's boxes number index (...), which groups that share them ignore."""
     if not group.rotated:
         return origin, direction
-    return vectors.rotate(group.rotation, origin), vectors.rotate(group.rotation, direction)
+    if group.shared:
+        return _into_axes(group.rotation, origin, direction)
+    rows = [vectors.look_up_rows(group.rotation[:, i], index) for i in range(3)]
+    return _into_axes(rows, origin, direction)
+
+
+def _into_axes(rotation: Any, origin: Any, direction: Any) -> tuple[Any, Any]:
+    """Return rays in rotated axes."""
+    return vectors.rotate(rotation, origin), vectors.rotate(rotation, direction)
+
+
+def _out_of_group(group: BoxGroup, index: Any, normal: Any) -> Any:
+    """Return normals (..., 3) in the axes of a group's boxes number index (...) as those of the scene."""
+    if not group.rotated:
+        return normal
+    if group.shared:
+        return vectors.rotate(np.swapaxes(group.rotation, 0, 1), normal)
+    columns = [vectors.look_up_rows(group.rotation[:, :, i], index) for i in range(3)]
+    return vectors.rotate(columns, normal)
 
 
 def spawn_origin(point: Any, normal: Any, t: Any) -> Any:
@@ -346,7 +481,7 @@ def surface_at(geometry: Geometry, hit: Hit, origin: Any, direction: Any) -> Sur
     emission = vectors.look_up_rows(geometry.emission, hit.surface)
     # Lights are black behind.
     light = vectors.look_up(geometry.light, hit.surface)
-    if geometry.quads:
+    if geometry.quad_id < geometry.nothing:
         front = vectors.look_up_rows(_quad_normals(geometry), hit.surface)
         behind = vectors.look_up(geometry.one_sided, hit.surface) & (vectors.dot(front, direction) > 0.0)
         emission = vectors.choose(behind, 0.0, emission)
@@ -361,8 +496,7 @@ def choose_or_zero(condition: Any, a: Any) -> Any:
 def _quad_normals(geometry: Geometry) -> Any:
     """Return the table (S+1, 3) of the quads' own normals; zero for other surfaces."""
     table = np.zeros((geometry.nothing + 1, 3), geometry.dtype)
-    for i, quad in enumerate(geometry.quads):
-        table[geometry.quad_id + i] = quad[3]
+    table[geometry.quad_id : geometry.nothing] = geometry.quads[-1]
     return table
 
 
@@ -376,10 +510,10 @@ def _normal(geometry: Geometry, hit: Hit, point: Any, origin: Any, direction: An
     for group in geometry.groups:
         inside = (hit.surface >= group.first_id) & (hit.surface < group.first_id + len(group.centers))
         normal = vectors.choose(inside, _box_normal(group, hit, origin, direction), normal)
-    if geometry.spheres:
+    if geometry.sphere_id < geometry.quad_id:
         inside = (hit.surface >= geometry.sphere_id) & (hit.surface < geometry.quad_id)
         normal = vectors.choose(inside, _sphere_normal(geometry, hit, point, direction), normal)
-    if geometry.quads:
+    if geometry.quad_id < geometry.nothing:
         inside = (hit.surface >= geometry.quad_id) & (hit.surface < geometry.nothing)
         front = vectors.look_up_rows(_quad_normals(geometry), hit.surface)
         normal = vectors.choose(inside, _facing(front, direction), normal)
@@ -409,20 +543,20 @@ def _box_normal(group: BoxGroup, hit: Hit, origin: Any, direction: Any) -> Any:
     The winner's slabs are evaluated once more, in the same way as in [`closest_hit`], so the face is the one
     that gave the distance, also at edges.
     """
-    local_origin, local_direction = _into_group(group, origin, direction)
     index = np.minimum(np.maximum(hit.surface - np.int32(group.first_id), 0), len(group.centers) - 1)
-    center = vectors.look_up_rows(np.stack(group.centers), index)
-    half_extent = vectors.look_up_rows(np.stack(group.half_extents), index)
+    local_origin, local_direction = _into_group(group, index, origin, direction)
+    center = vectors.look_up_rows(group.centers, index)
+    half_extent = vectors.look_up_rows(group.half_extents, index)
     enter, leave = slabs(center, half_extent, local_origin, _inverse(local_direction))
     # From outside the last slab entered decides, from inside the first one left.
     face = vectors.choose(vectors.largest(enter) > 0.0, -enter, leave)
     normal = _axis_normal(*_least_axis(face), local_direction)
-    return vectors.rotate(np.swapaxes(group.rotation, 0, 1), normal) if group.rotated else normal
+    return _out_of_group(group, index, normal)
 
 
 def _sphere_normal(geometry: Geometry, hit: Hit, point: Any, direction: Any) -> Any:
     """Return the normals (..., 3) of hits on spheres, for points (..., 3) on them."""
-    index = np.minimum(np.maximum(hit.surface - np.int32(geometry.sphere_id), 0), len(geometry.spheres) - 1)
-    center = vectors.look_up_rows(np.stack([center for center, _ in geometry.spheres]), index)
-    radius = vectors.look_up(np.array([radius for _, radius in geometry.spheres], geometry.dtype), index)
+    centers, radii = geometry.spheres
+    index = np.minimum(np.maximum(hit.surface - np.int32(geometry.sphere_id), 0), len(radii) - 1)
+    center, radius = vectors.look_up_rows(centers, index), vectors.look_up(radii, index)
     return _facing((point - center) / radius[..., np.newaxis], direction)

@@ -140,7 +140,8 @@ def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: in
     """Trace one path through each pixel x, y (P,) and return its layers (P, C)."""
     dtype = world.geometry.dtype
     counters = Counters(rng.counter(job.seed), pixel_counter(x, y), rng.counter(sample))
-    path = start(basis, x.astype(dtype), y.astype(dtype), job.width, job.height, counters, dtype)
+    sampler = job.settings.sampler
+    path = start(basis, x.astype(dtype), y.astype(dtype), job.width, job.height, counters, dtype, sampler)
     direction = path.direction
     color = np.zeros((len(x), 3), dtype)
     lanes = np.arange(len(x))
@@ -166,10 +167,17 @@ def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: in
 
 
 def start(
-    basis: CameraBasis, x: Any, y: Any, width: Any, height: Any, counters: Counters, dtype: DTypeLike
+    basis: CameraBasis,
+    x: Any,
+    y: Any,
+    width: Any,
+    height: Any,
+    counters: Counters,
+    dtype: DTypeLike,
+    sampler: str = "pcg4d",
 ) -> Path:
     """Return paths that leave the camera through a random point of pixels x, y (...), in floats."""
-    u, v, _, _ = rng.uniforms(*counters, np.uint32(0), dtype)
+    u, v, _, _ = transport.SAMPLERS[sampler](*counters, np.uint32(0), dtype)
     return transport.camera_path(*camera_ray(basis, x, y, u, v, width, height))
 
 
@@ -212,5 +220,9 @@ def render_info(scene: Scene, job: Job) -> dict[str, str]:
         "scene_digest": scene_digest(scene),
         "spp": str(job.spp),
         "seed": str(job.seed),
-        "max_depth": str(job.settings.max_depth),
+        **{
+            name: str(value)
+            for name, value in job.settings.facts().items()
+            if name in ("max_depth", "sampler")
+        },
     }

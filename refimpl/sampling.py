@@ -9,6 +9,9 @@ arguments.
 2. cosine hemisphere: Malley's method, the disk lifted to the hemisphere around +z; density cos(theta) / pi.
 3. quad: uniform in area over a parallelogram.
 4. discrete: an index with given probabilities.
+5. spherical Cauchy: directions around an axis, from all alike to a narrow lobe with a wide skirt; Kato and
+   McCullagh, "Some properties of a Cauchy family on the sphere derived from the Moebius transformations",
+   Bernoulli 26(4), 2020, in the concentration k = 2 rho / (1 - rho)^2 of their rho.
 """
 
 from __future__ import annotations
@@ -115,6 +118,29 @@ def invert_discrete_sample(index: Any, cumulative: Any) -> Any:
     return upper - 0.5 * discrete_pdf(index, cumulative)
 
 
+def sample_spherical_cauchy(u0: Any, u1: Any, concentration: Any) -> Any:
+    """Map u0, u1 (...) to unit directions (..., 3) around +z, lobed by the concentration k (...) >= 0.
+
+    The share of directions with 1 - cos below v is v (1 + 2 k) / (2 (1 + k v)), which u0 inverts.
+    """
+    versine = 2.0 * u0 / (1.0 + 2.0 * concentration * (1.0 - u0))
+    sine, phi = np.sqrt(np.maximum(versine * (2.0 - versine), 0.0)), (2.0 * u1 - 1.0) * np.pi
+    return vectors.vector(sine * np.cos(phi), sine * np.sin(phi), 1.0 - versine)
+
+
+def spherical_cauchy_pdf(versine: Any, concentration: Any) -> Any:
+    """Return the density (...), in 1/sr, where 1 - cos to the axis is versine (...): the lobe's shape."""
+    spread = 1.0 + concentration * versine
+    return (1.0 + 2.0 * concentration) * (0.25 * INV_PI) / (spread * spread)
+
+
+def invert_spherical_cauchy_sample(wi: Any, concentration: Any) -> tuple[Any, Any]:
+    """Return the u0, u1 (...) that [`sample_spherical_cauchy`] maps to wi (..., 3)."""
+    versine = 1.0 - wi[..., 2]
+    u0 = versine * (1.0 + 2.0 * concentration) / (2.0 * (1.0 + concentration * versine))
+    return u0, 0.5 * (np.arctan2(wi[..., 1], wi[..., 0]) / np.pi + 1.0)
+
+
 def tangent_frame(normal: Any) -> tuple[Any, Any]:
     """Return two unit tangents (..., 3) that form a right-handed frame with the unit normal (..., 3).
 
@@ -137,4 +163,12 @@ def to_world(local: Any, normal: Any) -> Any:
         vectors.scale(tangent, local[..., 0])
         + vectors.scale(bitangent, local[..., 1])
         + vectors.scale(normal, local[..., 2])
+    )
+
+
+def to_local(world: Any, normal: Any) -> Any:
+    """Turn directions world (..., 3) into directions around +z, as [`to_world`] turns them back."""
+    tangent, bitangent = tangent_frame(normal)
+    return vectors.vector(
+        vectors.dot(world, tangent), vectors.dot(world, bitangent), vectors.dot(world, normal)
     )

@@ -1,7 +1,7 @@
 """Scenes as frozen data, and their JSON form, validated at the border.
 
-A scene has a pinhole camera, a constant background radiance, at most one room, and any number of boxes,
-spheres, quads and area lights. Lengths are in scene units, colours are linear RGB. Coordinates are
+A scene has a pinhole camera, a constant background radiance or a sky, at most one room, and any number of
+boxes, spheres, quads and area lights. Lengths are in scene units, colours are linear RGB. Coordinates are
 right-handed with y up.
 
 1. [`from_json`] reads a text, refuses what breaks a rule with the path of the value
@@ -18,11 +18,12 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from .errors import InputError
+from .materials import MATERIALS, Material
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
@@ -45,6 +46,13 @@ ROTATION_TOLERANCE = 1e-6
 LARGEST_NUMBER = 1e12
 """Largest magnitude of any number of a scene: squares of such distances are far from float32's overflow."""
 
+OMITTED: Mapping[str, bool] = {"omitted at its default": True}
+"""Mark of a field that the canonical text leaves out while it has its default: texts and digests of scenes
+that were made before the field existed stay as they are."""
+
+LARGEST_CONCENTRATION = 1e6
+"""Largest concentration of a sun's lobe: it is then 0.05 degrees wide, and float32 still resolves it."""
+
 WALLS = ("low_x", "high_x", "low_y", "high_y", "low_z", "high_z")
 """Order of a room's walls: 2 * axis + (1 at the high end). `low_y` is the floor."""
 
@@ -63,13 +71,14 @@ class Camera:
 class Room:
     """Axis-aligned box seen from inside: a wall is only there for rays that leave through it.
 
-    A camera outside therefore looks in through the near walls. `reflectances` follow the order of [`WALLS`].
-    """
+    A camera outside therefore looks in through the near walls. `reflectances` follow the order of [`WALLS`],
+    as do `materials`, of which there are six or none."""
 
     low: Vector
     high: Vector
     reflectances: tuple[Vector, Vector, Vector, Vector, Vector, Vector]
     emission: Vector = BLACK
+    materials: tuple[Material | None, ...] = field(default=(), metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -81,6 +90,7 @@ class Box:
     reflectance: Vector
     rotation: Matrix = IDENTITY
     emission: Vector = BLACK
+    material: Material | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -91,6 +101,7 @@ class Sphere:
     radius: float
     reflectance: Vector
     emission: Vector = BLACK
+    material: Material | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -102,6 +113,7 @@ class Quad:
     edge_v: Vector
     reflectance: Vector
     emission: Vector = BLACK
+    material: Material | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -120,6 +132,23 @@ class Light:
 
 
 @dataclass(frozen=True)
+class Sky:
+    """Light from infinitely far, in place of a constant background: a gradient and a soft sun.
+
+    zenith, horizon and ground are radiances straight up, level, and straight down; between them radiance is
+    linear in the height of the direction. The sun's lobe around `sun_direction` sends `sun_irradiance` (W /
+    m^2 per channel) onto a surface that faces it; `sun_concentration` k makes it narrow: half of its light
+    comes from within 1 - cos = 1 / (1 + k)."""
+
+    zenith: Vector
+    horizon: Vector
+    ground: Vector
+    sun_direction: Vector = (0.0, 1.0, 0.0)
+    sun_irradiance: Vector = BLACK
+    sun_concentration: float = 1000.0
+
+
+@dataclass(frozen=True)
 class Scene:
     """Everything that a picture depends on except its size, samples and seed."""
 
@@ -131,6 +160,7 @@ class Scene:
     quads: tuple[Quad, ...] = ()
     lights: tuple[Light, ...] = ()
     background: Vector = BLACK
+    environment: Sky | None = field(default=None, metadata=OMITTED)
     info: dict[str, str] = field(default_factory=dict, compare=False)
 
 
@@ -154,10 +184,16 @@ def scene_digest(scene: Scene) -> str:
 def _plain(value: Any) -> Any:
     """Turn dataclasses and tuples into dictionaries and lists, and every number into a float."""
     if is_dataclass(value):
-        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+        kind = {"kind": value.kind} if isinstance(value, Material) else {}
+        return {**kind, **{f.name: _plain(getattr(value, f.name)) for f in fields(value) if _told(f, value)}}
     if isinstance(value, tuple):
         return [_plain(item) for item in value]
     return float(value) if isinstance(value, int) else value
+
+
+def _told(f: Any, value: Any) -> bool:
+    """Tell whether the text mentions a field: [`OMITTED`] ones only where they differ from their default."""
+    return not (f.metadata and getattr(value, f.name) == f.default)
 
 
 # -----------------------------------------------------------------------------------------------------------
@@ -221,6 +257,8 @@ def _convert(hint: Any, value: Any, path: str) -> Any:
         if not isinstance(value, dict):
             raise InputError(path, value, "it must map texts to texts", "write {} for none")
         return {str(key): _text(item, f"{path}.{key}") for key, item in value.items()}
+    if hint is Material:
+        return _material(value, path)
     if is_dataclass(hint):
         return _build(hint, value, path)  # type: ignore[arg-type]
     arguments = get_args(hint)
@@ -235,6 +273,18 @@ def _convert(hint: Any, value: Any, path: str) -> Any:
     return tuple(
         _convert(h, item, f"{path}[{i}]") for i, (h, item) in enumerate(zip(arguments, value, strict=True))
     )
+
+
+def _material(value: Any, path: str) -> Material:
+    """Make a material from a JSON object with its `kind`."""
+    if not isinstance(value, dict):
+        raise InputError(path, value, "it must be a JSON object", 'give a kind: {"kind": "mirror"}')
+    data = dict(value)
+    kind = data.pop("kind", None)
+    if not isinstance(kind, str) or kind not in MATERIALS:
+        rule = "no material has this name" if "kind" in value else "it is required"
+        raise InputError(f"{path}.kind", repr(kind), rule, f"known are {', '.join(MATERIALS)}")
+    return _build(MATERIALS[kind], data, path)
 
 
 def _number(value: Any, path: str) -> float:
@@ -275,6 +325,8 @@ def validate(scene: Scene) -> Scene:
     _check(
         scene.background, "scene.background", _not_negative, "radiance must not be negative", "use 0 or more"
     )
+    if scene.environment is not None:
+        _check_sky(scene.environment, scene.background)
     for path, part in _parts(scene):
         _check_finite(part, path)
         if not isinstance(part, Light):
@@ -287,6 +339,7 @@ def validate(scene: Scene) -> Scene:
             )
         if isinstance(part, (Box, Sphere, Quad)):
             _check(part.reflectance, f"{path}.reflectance", _is_share, *_SHARE_RULE)
+            _check_material(part.material, f"{path}.material", has_inside=not isinstance(part, Quad))
         _CHECKS[type(part)](part, path)
     return scene
 
@@ -330,6 +383,25 @@ def _check_camera(camera: Camera) -> None:
         raise InputError(f"{path}.up", camera.up, "it must not be parallel to the view", "choose another up")
 
 
+def _check_sky(sky: Sky, background: Vector) -> None:
+    path = "scene.environment"
+    _check_finite(sky, path)
+    for name in ("zenith", "horizon", "ground", "sun_irradiance"):
+        _check(
+            getattr(sky, name), f"{path}.{name}", _not_negative, "light must not be negative", "use 0 or more"
+        )
+    if _length(sky.sun_direction) == 0.0:
+        raise InputError(
+            f"{path}.sun_direction", sky.sun_direction, "it must not be zero", "straight up is 0, 1, 0"
+        )
+    if not 0.0 <= sky.sun_concentration <= LARGEST_CONCENTRATION:
+        rule = f"it must lie in [0, {LARGEST_CONCENTRATION:g}]"
+        raise InputError(f"{path}.sun_concentration", sky.sun_concentration, rule, "1000 is a sun in haze")
+    if max(background) > 0.0:
+        rule = "an environment takes the background's place"
+        raise InputError("scene.background", background, rule, "make it 0, or remove the environment")
+
+
 def _check_room(room: Room, path: str) -> None:
     for i, (low, high) in enumerate(zip(room.low, room.high, strict=True)):
         if not low < high:
@@ -338,6 +410,21 @@ def _check_room(room: Room, path: str) -> None:
             )
     for i, reflectance in enumerate(room.reflectances):
         _check(reflectance, f"{path}.reflectances[{i}]", _is_share, *_SHARE_RULE)
+    if len(room.materials) not in (0, len(WALLS)):
+        count = f"{len(room.materials)} entries"
+        raise InputError(f"{path}.materials", count, "they must be six or none", "use null for matt walls")
+    for i, material in enumerate(room.materials):
+        _check_material(material, f"{path}.materials[{i}]", has_inside=False)
+
+
+def _check_material(material: Material | None, path: str, has_inside: bool) -> None:
+    if material is None:
+        return
+    if material.transmits and not has_inside:
+        rule = "light passes into closed bodies alone"
+        raise InputError(path, material.kind, rule, "give it to a box or a sphere; use a thin box for a pane")
+    _check_finite(material, path)
+    material.check(path)
 
 
 def _check_box(box: Box, path: str) -> None:

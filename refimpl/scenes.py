@@ -2,9 +2,9 @@
 
 `minicubes` is the kind of scene that the paper describes: a room with tinted walls, 27 mini cubes of
 different colours in a 3x3x3 frame that turns with time, two coloured area lights, soft shadows. The paper
-does not give its geometry; the numbers here are decisions (spec/scenes.md). `cornell` is a box with two
-blocks; `furnace`, `lone_light` and `empty` have answers in closed form.
-"""
+does not give its geometry; the numbers here are decisions (spec/scenes.md). `glossy` shows metal, glass and
+a mirror on a turntable. `cornell` is a box with two blocks; `furnace`, `lone_light` and `empty` have answers
+in closed form."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from itertools import product
 from typing import Any
 
 from .errors import InputError
-from .scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Vector, validate
+from .materials import Conductor, Dielectric, Mirror
+from .scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sky, Sphere, Vector, validate
 
 TURN_SECONDS = 8.0
 """Time in which the mini cubes turn once, in seconds: slow enough to follow, fast enough for a loop."""
@@ -81,6 +82,77 @@ def _turn(angle_rad: float) -> Matrix:
     return ((c, s * st, -s * ct), (0.0, ct, st), (s, -c * st, c * ct))
 
 
+def glossy(time: float = 0.0, roughness: float = 0.22, ior: float = 1.5) -> Scene:
+    """Return a turntable with balls of glass, gold and matt coral, blocks of copper and glass, and a mirror.
+
+    roughness is that of the gold ball, ior that of the glass.
+    """
+    white, red, teal = (0.74, 0.74, 0.72), (0.66, 0.28, 0.22), (0.20, 0.46, 0.46)
+    room = Room((-2.0, -2.0, -2.0), (2.0, 2.0, 2.0), (red, teal, (0.5, 0.5, 0.52), white, white, white))
+    ceiling = Light((-0.9, 1.98, -0.7), (1.6, 0.0, 0.0), (0.0, 0.0, 1.6), WARM, 60.0)
+    side = Light((1.98, -1.2, 0.2), (0.0, 0.0, 1.2), (0.0, 2.2, 0.0), COOL, 34.0)
+    angle = 2.0 * math.pi * time / TURN_SECONDS
+    turned = _about_y(angle)
+
+    def on_table(x: float, y: float, z: float) -> Vector:
+        """Return a point of the turning table, whose middle is on the floor."""
+        c, s = math.cos(angle), math.sin(angle)
+        return (c * x + s * z, y - 2.0, c * z - s * x)
+
+    table = Box((0.0, -1.95, 0.0), (1.4, 0.05, 1.4), (0.62, 0.60, 0.56), turned)
+    ball = Sphere(on_table(0.74, 0.68, 0.74), 0.57, (0.98, 0.98, 0.98), material=Dielectric(ior))
+    gold = Sphere(on_table(-0.74, 0.68, 0.74), 0.57, (1.0, 0.78, 0.34), material=Conductor(roughness))
+    coral = Sphere(on_table(0.0, 0.46, 0.0), 0.35, (0.80, 0.22, 0.16))
+    copper = Box(
+        on_table(0.76, 0.6, -0.76), (0.38, 0.49, 0.38), (0.93, 0.62, 0.50), turned, material=Conductor(0.08)
+    )
+    block = Box(
+        on_table(-0.76, 0.65, -0.76), (0.36, 0.54, 0.36), (0.86, 0.95, 0.92), turned, material=Dielectric(ior)
+    )
+    mirror = Quad(
+        (-1.6, -1.5, -1.85), (3.2, 0.0, 0.0), (0.0, 2.6, -0.12), (0.88, 0.88, 0.88), material=Mirror()
+    )
+    return Scene(
+        "glossy",
+        Camera((0.0, 1.35, 6.1), (0.0, -0.72, 0.0), vertical_fov_deg=37.0),
+        room,
+        boxes=(table, copper, block),
+        spheres=(coral, gold, ball),
+        quads=(mirror,),
+        lights=(ceiling, side),
+        info={"time": repr(time)},
+    )
+
+
+def daylight(time: float = 0.0, haze: float = 400.0) -> Scene:
+    """Return a gold ball, a glass ball and a matt block on a plain, under a sky whose sun goes round.
+
+    haze is the concentration of the sun's lobe: the lower, the softer its shadows.
+    """
+    angle = 2.0 * math.pi * time / TURN_SECONDS
+    sky = Sky(
+        (0.16, 0.30, 0.62),
+        (0.62, 0.70, 0.80),
+        (0.18, 0.16, 0.14),
+        (math.cos(angle + 0.9), 0.75, math.sin(angle + 0.9)),
+        (2.6, 2.2, 1.6),
+        haze,
+    )
+    plain = Quad((-40.0, 0.0, -40.0), (0.0, 0.0, 80.0), (80.0, 0.0, 0.0), (0.52, 0.48, 0.42))
+    block = Box((0.1, 0.46, -1.1), (0.45, 0.45, 0.45), (0.24, 0.42, 0.62), _about_y(math.radians(25.0)))
+    gold = Sphere((-0.85, 0.61, 0.1), 0.6, (1.0, 0.78, 0.34), material=Conductor(0.18))
+    glass = Sphere((0.75, 0.56, 0.35), 0.55, (0.98, 0.98, 0.98), material=Dielectric())
+    return Scene(
+        "daylight",
+        Camera((0.0, 1.5, 4.6), (0.0, 0.45, 0.0), vertical_fov_deg=36.0),
+        boxes=(block,),
+        spheres=(gold, glass),
+        quads=(plain,),
+        environment=sky,
+        info={"time": repr(time)},
+    )
+
+
 def cornell(time: float = 0.0) -> Scene:
     """Return a box with a red and a green wall, two turned blocks and one light; time changes nothing."""
     white, red, green = (0.73, 0.73, 0.73), (0.65, 0.06, 0.05), (0.12, 0.45, 0.15)
@@ -132,6 +204,8 @@ def empty(time: float = 0.0, background: float = 0.25) -> Scene:
 
 CANONICAL: dict[str, Callable[..., Scene]] = {
     "minicubes": minicubes,
+    "glossy": glossy,
+    "daylight": daylight,
     "cornell": cornell,
     "furnace": furnace,
     "lone_light": lone_light,

@@ -4,17 +4,18 @@ A path starts at the camera [`camera_path`]. At each vertex
 
 1. [`arrive`] finds the next surface [`closest_hit`] and adds what it emits, weighted against the light sample
    that could have found the same light [`emission_weight`];
-2. [`scatter`] samples a point on a light, and adds its light when nothing is in between [`direct_light`]
-   (next-event estimation);
-3. it then samples a cosine-weighted direction and multiplies the throughput beta by the reflectance (f cos /
-   pdf of a Lambertian surface is just that);
+2. [`scatter`] samples a point on a light or a direction to the sky, and adds its light when nothing is in
+   between [`direct_light`] (next-event estimation);
+3. it then samples a direction by the surface's material, and multiplies the throughput beta by f cos / pdf
+   (shading.py; for a Lambertian surface that is just the reflectance);
 4. a path ends where nothing was hit, and by Russian roulette if asked for. Drivers end it after `max_depth`
    scatterings, with the emission that the last direction meets.
 
-Both ways to find a light are combined by multiple importance sampling (Veach, "Robust Monte Carlo Methods for
-Light Transport Simulation", 1997, chapter 9) with the balance or the power heuristic; each way alone is an
-unbiased estimator as well, which the tests use. Emission of surfaces that are no lights, and of the
-background, is found by the second way alone and has weight 1.
+Both ways to find a light are combined by multiple importance sampling (Veach, "Robust Monte Carlo Methods
+for Light Transport Simulation", 1997, chapter 9) with the balance or the power heuristic; each way alone is
+an unbiased estimator as well, which the tests use. Emission of surfaces that are no lights, and of a
+constant background, is found by the second way alone and has weight 1; so has whatever a mirrored or
+refracted direction meets, since no light sample ever takes it.
 
 The functions hold no state, write nothing in place, use no mask as an index, and get their random numbers
 from (seed, pixel, sample), so that lanes are independent: a compiler can trace them as it traces the network.
@@ -23,22 +24,30 @@ Drivers loop.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike
 
-from . import intersection, rng, sampling, vectors
+from . import environment, intersection, rng, sampling, shading, sobol, vectors
+from .environment import Environment
 from .errors import InputError
 from .intersection import Geometry, Hit, Surface
+from .materials.material import SINGLE_PDF, Site
 from .scene import Scene
+from .shading import Materials
 
 HEURISTICS = {"balance": 1, "power": 2}
 """Exponent of the densities in the multiple importance sampling weight, by the heuristic's name."""
 
 STRATEGIES = ("mis", "light", "bsdf")
 """Ways to find a light: both combined, light samples alone, directions of the BSDF alone."""
+
+SAMPLERS: Mapping[str, Callable[..., rng.Block]] = {"pcg4d": rng.uniforms, "sobol": sobol.uniforms}
+"""Sources of random numbers by name: four uniform floats of (seed, pixel, sample, block). The first is the
+default: its samples are independent."""
 
 BLOCKS_PER_BOUNCE = 2
 """Blocks of four random numbers that a scattering uses; block 0 belongs to the camera."""
@@ -49,7 +58,11 @@ ROULETTE_LIMIT = 0.95
 LEAST_DENSITY = 1e-15
 """Floor of cosines and densities that divide: its inverse squared is still finite in float32."""
 
-CAMERA_PDF = 1e30
+SKY_SHARE = 0.5
+"""Share of the light samples that go to the sky where a scene has lamps too: a lamp's power and a sky's
+radiance cannot be compared without knowing the size of what they light. A half: its halving is exact."""
+
+CAMERA_PDF = SINGLE_PDF
 """Density of a camera ray's direction, in 1/sr: it is no sample, light sampling is no alternative to it, and
 the weight of what it meets is 1."""
 
@@ -68,6 +81,7 @@ class Settings:
     roulette_depth: int | None = None
     strategy: str = "mis"
     heuristic: str = "power"
+    sampler: str = "pcg4d"
 
     def __post_init__(self) -> None:
         """Refuse settings outside their rules."""
@@ -85,6 +99,13 @@ class Settings:
             raise InputError(
                 "heuristic", self.heuristic, "it is unknown", f"known are {', '.join(HEURISTICS)}"
             )
+        if self.sampler not in SAMPLERS:
+            raise InputError("sampler", self.sampler, "it is unknown", f"known are {', '.join(SAMPLERS)}")
+
+    def facts(self) -> dict[str, Any]:
+        """Return the settings by name, without the sampler where it is the default."""
+        facts = asdict(self)
+        return {key: facts[key] for key in facts if key != "sampler" or facts[key] != next(iter(SAMPLERS))}
 
 
 @dataclass(frozen=True)
@@ -109,8 +130,16 @@ class World:
     """All constants of light transport in one float type."""
 
     geometry: Geometry
+    materials: Materials
     lights: Lights | None
+    environment: Environment | None
     settings: Settings
+
+    @property
+    def samples_lights(self) -> bool:
+        """Whether lights and the sky are sampled: there is one, and a material that it can light."""
+        has_some = self.lights is not None or self.environment is not None
+        return has_some and self.settings.strategy != "bsdf" and not self.materials.single
 
 
 class Counters(NamedTuple):
@@ -138,11 +167,16 @@ def build(scene: Scene, settings: Settings, dtype: DTypeLike = np.float32) -> Wo
     """Lay out a scene as constants of one float type."""
     geometry = intersection.build(scene, dtype)
     powered = [light for light in scene.lights if light.power * sum(light.color) > 0.0]
-    return World(geometry, _build_lights(scene, dtype) if powered else None, settings)
+    sky = None if scene.environment is None else environment.build(scene.environment, dtype)
+    lights = _build_lights(scene, dtype, 1.0 if sky is None else 1.0 - SKY_SHARE) if powered else None
+    return World(geometry, shading.build(scene, dtype), lights, sky, settings)
 
 
-def _build_lights(scene: Scene, dtype: DTypeLike) -> Lights:
-    """Return the tables of the lights; a light is picked in proportion to its power times its mean colour."""
+def _build_lights(scene: Scene, dtype: DTypeLike, share: float) -> Lights:
+    """Return the tables of the lights; a light is picked in proportion to its power times its mean colour.
+
+    share is the probability that any of them is picked, and not the sky.
+    """
     lights = scene.lights
     edge_u, edge_v = (
         np.array([light.edge_u for light in lights]),
@@ -162,7 +196,7 @@ def _build_lights(scene: Scene, dtype: DTypeLike) -> Lights:
         [intersection.light_radiance(light) for light in lights],
         [1.0 / intersection.quad_area_pdf(light) for light in lights],
         cumulative,
-        sampling.discrete_pdf(np.arange(len(lights)), cumulative),
+        share * sampling.discrete_pdf(np.arange(len(lights)), cumulative),
     )
     return Lights(*(np.asarray(table, dtype) for table in tables))
 
@@ -177,6 +211,10 @@ def arrive(world: World, path: Path) -> tuple[Path, Surface, Hit]:
     """Find the next surface of paths and add what it emits; return state, surface and hit."""
     hit = intersection.closest_hit(world.geometry, path.origin, path.direction)
     surface = intersection.surface_at(world.geometry, hit, path.origin, path.direction)
+    if world.environment is not None:
+        missed = hit.surface == world.geometry.nothing
+        sky = environment.radiance(world.environment, path.direction)
+        surface = surface._replace(emission=vectors.choose(missed, sky, surface.emission))
     weight = emission_weight(world, path, hit, surface)
     radiance = path.radiance + path.beta * vectors.scale(surface.emission, weight)
     return path._replace(radiance=radiance), surface, hit
@@ -193,16 +231,21 @@ def scatter(
     block = np.uint32(1) + np.uint32(BLOCKS_PER_BOUNCE) * depth
     u_pick, u_light_0, u_light_1, u_roulette = _uniforms(world, counters, block)
     # Add light that a sampled point of a light sends here.
-    origin = intersection.spawn_origin(surface.point, surface.normal, np.where(alive, hit.t, 0.0))
-    beta, radiance = path.beta * surface.reflectance, path.radiance
-    if world.lights is not None and world.settings.strategy != "bsdf":
-        light = direct_light(world, origin, surface.normal, u_pick, u_light_0, u_light_1)
-        radiance = radiance + beta * vectors.choose(alive, light, 0.0)
-    # Sample the next direction.
-    u_direction_0, u_direction_1, _, _ = _uniforms(world, counters, block + np.uint32(1))
-    local = sampling.sample_cosine_hemisphere(u_direction_0, u_direction_1)
-    direction = sampling.to_world(local, surface.normal)
-    pdf = sampling.cosine_hemisphere_pdf(local[..., 2])
+    t = np.where(alive, hit.t, 0.0)
+    origin = intersection.spawn_origin(surface.point, surface.normal, t)
+    site = shading.site(world.materials, surface, hit, path.direction, path.beta)
+    radiance = path.radiance
+    if world.samples_lights:
+        color, light = direct_light(world, site, hit, origin, u_pick, u_light_0, u_light_1)
+        radiance = radiance + color * vectors.choose(alive, light, 0.0)
+    # Sample the next direction, and leave the surface on its side.
+    u_direction_0, u_direction_1, u_choice, _ = _uniforms(world, counters, block + np.uint32(1))
+    direction, beta, pdf, through = shading.scattered(
+        world.materials, site, hit, u_direction_0, u_direction_1, u_choice
+    )
+    if through is not None:
+        behind = intersection.spawn_origin(surface.point, -surface.normal, t)
+        origin = vectors.choose(through, behind, origin)
     # End paths that carry nothing, and some others by Russian roulette.
     alive = alive & (vectors.largest(beta) > 0.0)
     if world.settings.roulette_depth is not None:
@@ -219,27 +262,94 @@ def _roulette(first: int, beta: Any, alive: Any, u: Any, depth: Any) -> tuple[An
 
 def _uniforms(world: World, counters: Counters, block: Any) -> rng.Block:
     """Return four uniform numbers (...) of the given block in the world's float type."""
-    return rng.uniforms(counters.seed, counters.pixel, counters.sample, block, world.geometry.dtype)
+    draw = SAMPLERS[world.settings.sampler]
+    return draw(counters.seed, counters.pixel, counters.sample, block, world.geometry.dtype)
 
 
 def emission_weight(world: World, path: Path, hit: Hit, surface: Surface) -> Any:
     """Return the weight (...) of emission that a BSDF sample (or the camera) has found."""
-    if world.lights is None or world.settings.strategy == "bsdf":
+    if not world.samples_lights:
         return np.ones_like(hit.t)
-    # Only lights can be found by light sampling.
-    is_light = surface.light >= 0
     if world.settings.strategy == "light":
-        found_twice = is_light & (path.pdf < CAMERA_PDF)
+        found_twice = _sampled(world, hit, surface) & (path.pdf < CAMERA_PDF)
         return np.where(found_twice, np.zeros_like(hit.t), np.ones_like(hit.t))
-    index = np.maximum(surface.light, 0)
-    cos_light = np.abs(vectors.dot(surface.normal, path.direction))
-    distance = np.where(is_light, hit.t, 0.0)  # the square of a miss would overflow
-    pdf_light = light_pdf(world.lights, index, distance * distance, cos_light)
-    return np.where(is_light, mis_weight(world.settings, path.pdf, pdf_light), np.ones_like(hit.t))
+    weight = np.ones_like(hit.t)
+    if world.lights is not None:
+        is_light = surface.light >= 0
+        index = np.maximum(surface.light, 0)
+        cos_light = np.abs(vectors.dot(surface.normal, path.direction))
+        distance = np.where(is_light, hit.t, 0.0)  # the square of a miss would overflow
+        pdf_light = light_pdf(world.lights, index, distance * distance, cos_light)
+        weight = np.where(is_light, mis_weight(world.settings, path.pdf, pdf_light), weight)
+    if world.environment is not None:
+        missed = hit.surface == world.geometry.nothing
+        weight = np.where(
+            missed, mis_weight(world.settings, path.pdf, _sky_pdf(world, path.direction)), weight
+        )
+    return weight
 
 
-def direct_light(world: World, origin: Any, normal: Any, u_pick: Any, u0: Any, u1: Any) -> Any:
-    """Return the reflected light (..., 3), per unit of reflectance, of one point sampled on the lights."""
+def _sampled(world: World, hit: Hit, surface: Surface) -> Any:
+    """Tell (...) whether light samples could have found the same: only lights and the sky can be."""
+    if world.environment is None:
+        return surface.light >= 0
+    return (hit.surface == world.geometry.nothing) | (surface.light >= 0)
+
+
+def direct_light(
+    world: World, site: Site, hit: Hit, origin: Any, u_pick: Any, u0: Any, u1: Any
+) -> tuple[Any, Any]:
+    """Return a colour and light (..., 3); their product is what a sample of the lights or the sky adds."""
+    wi, cos_surface, cos_light, pdf, radiance, distance = _towards(world, site, origin, u_pick, u0, u1)
+    # Weight by f cos / pdf and by the heuristic, where both sides face each other and nothing is in between.
+    color, factor = shading.value(world.materials, site, hit, wi, cos_surface)
+    weight = factor / pdf
+    if world.settings.strategy == "mis":
+        other_pdf = shading.pdf(world.materials, site, hit, wi, cos_surface)
+        weight = weight * mis_weight(world.settings, pdf, other_pdf)
+    facing = (cos_surface > 0.0) & (cos_light > 0.0)
+    visible = facing & ~intersection.occluded(world.geometry, origin, wi, distance)
+    return color, vectors.scale(radiance, np.where(visible, weight, 0.0))
+
+
+class Towards(NamedTuple):
+    """A sampled way to light: unit wi (..., 3), cosines (...) at both ends, and more.
+
+    pdf (...) of wi in 1/sr, the radiance (..., 3) that comes from there, and the distance (...).
+    """
+
+    wi: Any
+    cos_surface: Any
+    cos_light: Any
+    pdf: Any
+    radiance: Any
+    distance: Any
+
+
+def _towards(world: World, site: Site, origin: Any, u_pick: Any, u0: Any, u1: Any) -> Towards:
+    """Sample a light or the sky, whichever there is; of both, one by the choice's first bit."""
+    if world.environment is None:
+        return _towards_light(world, site, origin, u_pick, u0, u1)
+    if world.lights is None:
+        return _towards_sky(world, site, u_pick, u0, u1)
+    is_sky = u_pick < SKY_SHARE
+    rest = np.where(is_sky, u_pick / SKY_SHARE, (u_pick - SKY_SHARE) / (1.0 - SKY_SHARE))
+    sky, light = (
+        _towards_sky(world, site, rest, u0, u1),
+        _towards_light(world, site, origin, rest, u0, u1),
+    )
+    return Towards(
+        vectors.choose(is_sky, sky.wi, light.wi),
+        np.where(is_sky, sky.cos_surface, light.cos_surface),
+        np.where(is_sky, sky.cos_light, light.cos_light),
+        np.where(is_sky, sky.pdf, light.pdf),
+        vectors.choose(is_sky, sky.radiance, light.radiance),
+        np.where(is_sky, sky.distance, light.distance),
+    )
+
+
+def _towards_light(world: World, site: Site, origin: Any, u_pick: Any, u0: Any, u1: Any) -> Towards:
+    """Sample a point on a light."""
     lights = world.lights
     assert lights is not None
     # Pick a light and a point on it, a little off its surface.
@@ -255,16 +365,29 @@ def direct_light(world: World, origin: Any, normal: Any, u_pick: Any, u0: Any, u
     square = np.maximum(vectors.dot(offset, offset), LEAST_SQUARE)
     distance = np.sqrt(square)
     wi = offset / distance[..., np.newaxis]
-    cos_surface = np.maximum(vectors.dot(normal, wi), 0.0)
+    cos_surface = np.maximum(vectors.dot(site.normal, wi), 0.0)
     cos_light = np.maximum(-vectors.dot(light_normal, wi), 0.0)
-    # Weight by f cos / pdf and by the heuristic, where both sides face each other and nothing is in between.
-    pdf = light_pdf(lights, index, square, cos_light)
-    weight = sampling.INV_PI * cos_surface / pdf
-    if world.settings.strategy == "mis":
-        weight = weight * mis_weight(world.settings, pdf, sampling.cosine_hemisphere_pdf(cos_surface))
-    facing = (cos_surface > 0.0) & (cos_light > 0.0)
-    visible = facing & ~intersection.occluded(world.geometry, origin, wi, distance)
-    return vectors.scale(radiance, np.where(visible, weight, 0.0))
+    return Towards(
+        wi, cos_surface, cos_light, light_pdf(lights, index, square, cos_light), radiance, distance
+    )
+
+
+def _towards_sky(world: World, site: Site, u_choice: Any, u0: Any, u1: Any) -> Towards:
+    """Sample a direction to the sky; what shines from everywhere faces everything."""
+    sky = world.environment
+    assert sky is not None
+    wi = environment.sample(sky, u_choice, u0, u1)
+    cos_surface = np.maximum(vectors.dot(site.normal, wi), 0.0)
+    far = np.full_like(cos_surface, intersection.MISS)
+    radiance = environment.radiance(sky, wi)
+    return Towards(wi, cos_surface, np.ones_like(cos_surface), _sky_pdf(world, wi), radiance, far)
+
+
+def _sky_pdf(world: World, direction: Any) -> Any:
+    """Return the density (...), in 1/sr, with which light sampling finds a direction (..., 3) to the sky."""
+    assert world.environment is not None
+    pdf = environment.pdf(world.environment, direction)
+    return pdf if world.lights is None else SKY_SHARE * pdf
 
 
 def light_pdf(lights: Lights, index: Any, square: Any, cos_light: Any) -> Any:

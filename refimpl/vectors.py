@@ -3,11 +3,12 @@
 All functions are written without state, in-place writes or masks as indices, so that they can be traced;
 dtype follows the arguments. [`vector`] keeps the components in separate planes of memory, which is why
 elementwise code on `(..., 3)` arrays is as quick as on three separate arrays; the values do not depend on
-it.
+it. A loop over the rows of constant tables is [`fold_rows`], so that it can be traced as a loop.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -74,3 +75,21 @@ def largest(a: Any) -> Any:
 def smallest(a: Any) -> Any:
     """Return the smallest component (...) of a (..., 3)."""
     return np.minimum(np.minimum(a[..., 0], a[..., 1]), a[..., 2])
+
+
+def fold_rows(step: Callable[..., tuple[Any, ...]], tables: Sequence[Any], start: tuple[Any, ...]) -> Any:
+    """Return what `start`, values (...), becomes by values = step(values, *row), row after row.
+
+    Row i holds entry i of each of the constant tables (K, ...). As with ufuncs, values of another kind than
+    NumPy's are asked first (`__fold_rows__`), and may answer NotImplemented: then they go through this loop.
+    """
+    for value in start:
+        if hasattr(value, "__fold_rows__"):
+            folded = value.__fold_rows__(step, tables, start)
+            if folded is not NotImplemented:
+                return folded
+            break
+    values = start
+    for row in zip(*tables, strict=True):
+        values = step(values, *row)
+    return values

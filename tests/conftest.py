@@ -2,9 +2,9 @@
 
 1. Hypothesis draws the same examples on every run, without a deadline: a test's result is a function of the
    code. HYPOTHESIS_PROFILE=long draws twenty times as many.
-2. `executor` runs one test body on every executor [`EXECUTORS`]. One that is missing fails its tests when
-   WAMNET_REQUIRE names it, as `make test` does; else they are skipped. Either way the summary says what was
-   missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
+2. `executor` runs one test body on every executor [`EXECUTORS`], `mitsuba` gives a peer [`PEERS`]. One that
+   is missing fails its tests when WAMNET_REQUIRE names it, as `make test` does; else they are skipped. Either
+   way the summary says what was missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
 3. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
 """
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,9 @@ import pytest
 
 EXECUTORS = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
 """Every way to run a kernel that the tests know; an OpenGL executor is named with the kind of its context."""
+
+PEERS = ("mitsuba",)
+"""Other renderers that tests compare with, under the policy of executors."""
 
 hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, database=None, print_blob=True)
 hypothesis.settings.register_profile("long", hypothesis.settings.get_profile("ci"), max_examples=2000)
@@ -32,8 +36,9 @@ _state_key = pytest.StashKey[dict[str, str]]()
 def required_executors() -> frozenset[str]:
     """Return the executors that WAMNET_REQUIRE lists, separated by commas; numpy needs no naming."""
     names = frozenset(name.strip() for name in os.environ.get("WAMNET_REQUIRE", "").split(",")) - {""}
-    if unknown := sorted(names - set(EXECUTORS)):
-        raise pytest.UsageError(f"WAMNET_REQUIRE names {unknown}: it may list only {', '.join(EXECUTORS)}")
+    known = (*EXECUTORS, *PEERS)
+    if unknown := sorted(names - set(known)):
+        raise pytest.UsageError(f"WAMNET_REQUIRE names {unknown}: it may list only {', '.join(known)}")
     return names
 
 
@@ -58,18 +63,19 @@ def executor_named(pytestconfig: pytest.Config) -> Iterator[Callable[[str], Any]
     state = pytestconfig.stash[_state_key]
 
     def open_once(name: str) -> Any:
+        kind = "peer" if name in PEERS else "executor"
         if name not in state:
             opened[name], state[name] = _open(name)
         if opened[name] is not None:
             return opened[name]
         if name in required_executors():
             way_out = "to go on without it, list what you have: make test WAMNET_REQUIRE=opencl"
-            pytest.fail(f"executor {name} is required and {state[name]}; {way_out}", pytrace=False)
-        pytest.skip(f"executor {name} is {state[name]}")
+            pytest.fail(f"{kind} {name} is required and {state[name]}; {way_out}", pytrace=False)
+        pytest.skip(f"{kind} {name} is {state[name]}")
 
     yield open_once
     for executor in opened.values():
-        if executor is not None:
+        if isinstance(executor, AbstractContextManager):
             executor.__exit__(None, None, None)
 
 
@@ -79,11 +85,25 @@ def executor(request: pytest.FixtureRequest, executor_named: Callable[[str], Any
     return executor_named(request.param)
 
 
+@pytest.fixture(scope="session")
+def mitsuba(executor_named: Callable[[str], Any]) -> Any:
+    """Give the module `mitsuba` in its scalar variant, which needs no other library."""
+    return executor_named("mitsuba")
+
+
 def _open(name: str) -> tuple[Any, str]:
-    """Return the executor and "ok (device)", or None and "MISSING: reason"."""
+    """Return the executor or peer and "ok (device)", or None and "MISSING: reason"."""
     from wamnet import kernels
     from wamnet.refimpl.errors import ExecutorUnavailable
 
+    if name in PEERS:
+        import mitsuba_scene
+
+        try:
+            peer = mitsuba_scene.open_mitsuba("scalar_rgb")
+        except ExecutorUnavailable as error:
+            return None, f"MISSING: {error}"
+        return peer, f"ok (version {peer.__version__}, {peer.variant()})"
     kind, _, context = name.partition("-")
     try:
         executor = kernels.open_executor(kind, **({"context": context} if context else {}))
@@ -110,7 +130,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     if not state:
         return
     terminalreporter.section("executors")
-    for name in EXECUTORS:
+    for name in (*EXECUTORS, *PEERS):
         text = state.get(name, "not asked for by any test that ran")
         colour = {"ok": {"green": True}, "MISSING": {"red": True, "bold": True}}.get(
             text.partition(" ")[0].rstrip(":"), {}

@@ -26,6 +26,7 @@ NEUTRAL: Mapping[str, tuple[float, bool]] = {
     "divide": (1.0, False),
     "subtract": (0.0, False),
     "add": (-0.0, True),
+    "bitwise_and": (0xFFFFFFFF, True),
     "bitwise_xor": (0, True),
     "right_shift": (0, False),
     "logical_and": (True, True),
@@ -134,7 +135,7 @@ def _selected(builder: Builder, node: Node, args: tuple[int, ...], constants: Kn
 
 def _looked_up(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
     """Return the constant of a table whose entries are all the same bits."""
-    if node.op != "take":
+    if node.op not in ("take", "row"):
         return None
     table = builder.parameters[str(node["table"])]
     same = len({entry.tobytes() for entry in table}) == 1

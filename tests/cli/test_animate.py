@@ -45,6 +45,25 @@ def test_the_pictures_are_the_references(wamnet, tmp_path) -> None:
     assert difference.max() <= 0.5 / 255 + 256 * 2.0**-23
 
 
+@pytest.mark.parametrize("name", ["opencl", "opengl"])
+@pytest.mark.parametrize("spp", [0, 2])
+def test_one_device_draws_by_one_pipeline(wamnet, tmp_path, monkeypatch, executor_named, name, spp) -> None:
+    """The pictures are those of the separate way up to one level: both round what differs by less."""
+    executor_named({"opengl": "opengl-egl"}.get(name, name))
+    devices = ("--executor", name, "--renderer", name, "--reference-spp", spp)
+    with monkeypatch.context() as patch:
+        patch.setattr(animate, "draw_apart", None)
+        assert wamnet("animate", "m.safetensors", *SHORT, *devices, "-o", "one").status == 0
+    monkeypatch.setattr(animate, "draw_frames", animate.draw_apart)
+    assert wamnet("animate", "m.safetensors", *SHORT, *devices, "-o", "apart").status == 0
+    for picture in ("00000.png", "00001.png"):
+        one, apart = (read_png(tmp_path / folder / picture) for folder in ("one", "apart"))
+        assert one.shape == apart.shape == (LABEL_PX + 14, 26 + 14 * (spp > 0), 3)
+        levels = np.abs(np.rint(255 * (one - apart)))
+        assert levels.max() <= 1
+        assert (levels > 0).mean() <= 0.01  # values within 1e-5 of a rounding limit: 255 x 2e-5 of all
+
+
 @pytest.mark.parametrize("suffix", [".gif", ".mp4"])
 def test_films(wamnet, tmp_path, suffix) -> None:
     """As many pictures of that size as the animation has; their folder is gone."""
@@ -67,18 +86,18 @@ def test_films(wamnet, tmp_path, suffix) -> None:
 def test_an_interrupted_run_goes_on(wamnet, tmp_path, monkeypatch) -> None:
     """The picture that was there is not drawn again, a damaged one is; the film has the same bytes."""
     assert wamnet("animate", "m.safetensors", *SHORT, "-o", "whole.gif").status == 0
-    draw, drawn = animate.draw_frame, []
+    write, drawn = animate.write_shot, []
 
     def once(shot, *arguments) -> None:
         if drawn:
             raise KeyboardInterrupt
         drawn.append(shot.path.name)
-        draw(shot, *arguments)
+        write(shot, *arguments)
 
-    monkeypatch.setattr(animate, "draw_frame", once)
+    monkeypatch.setattr(animate, "write_shot", once)
     assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a.gif").status == 130
     assert not (tmp_path / "a.gif").exists()
-    monkeypatch.setattr(animate, "draw_frame", draw)
+    monkeypatch.setattr(animate, "write_shot", write)
     (tmp_path / "a.gif.frames/00001.png").write_bytes(b"damaged")
     assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a.gif").out.endswith(
         "2 pictures, 1 of them made now\n"

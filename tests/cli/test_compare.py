@@ -1,4 +1,4 @@
-"""Tests of `wamnet compare`: the reference's numbers, in a table and as JSON."""
+"""Tests of `wamnet compare`: the reference's numbers, in a table and as JSON; paths, and when they fail."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import pytest
 
 from wamnet.cli import exr
 from wamnet.cli.images import write_png
+from wamnet.kernels import random_words
+from wamnet.kernels.compare_paths import QUANTITIES, Unexplained
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Frame
@@ -67,3 +69,71 @@ def test_refusals(refused, samples, tmp_path, names, text) -> None:
     exr.write_frame(tmp_path / "small.exr", Frame({"color": np.zeros((1, 2, 3))}))
     exr.write_frame(tmp_path / "depth.exr", Frame({"depth": np.zeros((12, 13, 1))}))
     assert text in refused("compare", *names)
+
+
+# ---- paths ---------------------------------------------------------------------------------------------
+
+PATHS = ("compare", "--paths", "cornell", "--executor", "numpy", "--width", 12, "--height", 9, "--spp", 2)
+
+
+def test_paths_in_tables(wamnet) -> None:
+    """Counts by depth, quantities by depth, the generator and Welch's test."""
+    outcome = wamnet(*PATHS, "--max-depth", 2, "--set", "time=2")
+    assert outcome.status == 0, outcome.err
+    lines = outcome.out.splitlines()
+    for word in ("depth", "paths", "undecided", "different", "unexplained", "parted", "moved"):
+        assert word in lines[2]
+    assert sum(line.split()[:2] == [str(d), "108"] for d, line in enumerate(lines[4:7])) >= 1
+    assert all(quantity in outcome.out for quantity in QUANTITIES)
+    assert "random numbers: 108 of 108 paths have the reference's, to the bit" in outcome.out
+    assert "picture: 8 against 2 spp" in outcome.out
+    assert lines[-1] == "passed"
+
+
+def test_paths_as_json(wamnet) -> None:
+    outcome = wamnet(*PATHS, "--max-depth", 1, "--json", "--seed", 7, "--sample", 3)
+    assert outcome.status == 0, outcome.err
+    data = json.loads(outcome.out)
+    assert data["paths"]["view"] == {"width": 12, "height": 9, "sample": 3, "seed": 7}
+    assert [depth["depth"] for depth in data["paths"]["depths"]] == [0, 1]
+    assert set(data["paths"]["depths"][1]["gaps"]) == set(QUANTITIES)
+    assert data["paths"]["passed"]
+    assert data["image"]["passed"]
+    assert data["image"]["spp"] == [8, 2]
+
+
+def test_paths_that_differ_end_with_status_1(wamnet, monkeypatch) -> None:
+    monkeypatch.setattr(random_words, "wrong_words", lambda *_: 5)
+    outcome = wamnet(*PATHS, "--max-depth", 0)
+    assert outcome.status == 1
+    assert "random numbers: 103 of 108 paths" in outcome.out
+    assert outcome.out.splitlines()[-1] == "FAILED: the kernel is not the reference"
+    assert wamnet(*PATHS, "--max-depth", 0, "--json").status == 1
+
+
+def test_unexplained_components_in_words() -> None:
+    text = str(Unexplained(2, 3, 4, "point_x", 1.5, 1.0, 1.25))
+    assert text == "pixel (3, 4), depth 2, point_x: expected 1.125, got 1.5, bound 0.125"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ((), "wamnet compare is incomplete: it needs IMAGE and REFERENCE, or --paths SCENE; see wamnet"),
+        (("a.exr",), "wamnet compare is incomplete: it needs IMAGE and REFERENCE, or --paths SCENE"),
+        (("a.exr", "b.exr", "--width", 64), "argument is --width: it has no meaning without --paths SCENE;"),
+        (("a.exr", "b.exr", "--set", "a=1"), "argument is --set: it has no meaning without --paths SCENE"),
+        (("a.exr", "--paths", "empty"), "argument is IMAGE: it has no meaning with --paths; leave it out"),
+        (("--paths", "empty", "--exposure", 0), "argument is --exposure: it has no meaning with --paths"),
+        (("--paths", "nowhere"), "scene is nowhere: no canonical scene"),
+        (("--paths", "empty", "--width", 0), "width is 0: it must be an integer from 1 to 65536"),
+        (("--paths", "empty", "--max-depth", -1), "max_depth is -1: it counts scatterings"),
+        (
+            ("--paths", "empty", "--executor", "numpy", "--spp", 1),
+            "spp is 1: Welch's test needs the variance",
+        ),
+    ],
+)
+def test_refusals_of_paths(refused, arguments, text) -> None:
+    """What has no meaning is named, and nothing is left out in silence."""
+    assert text in refused("compare", *arguments)

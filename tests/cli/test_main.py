@@ -18,6 +18,7 @@ from wamnet.compiler.compile import TARGETS
 from wamnet.kernels import EXECUTORS
 from wamnet.refimpl.errors import TrainingError
 from wamnet.refimpl.train import PRESETS
+from wamnet.refimpl.transport import SAMPLERS
 
 COMMANDS = (
     "render",
@@ -65,6 +66,7 @@ def test_choices_equal_the_registries() -> None:
     """Help texts list choices without importing what is chosen from."""
     assert [name.value for name in options.ExecutorName] == list(EXECUTORS)
     assert {name.value for name in options.Preset} == set(PRESETS)
+    assert [name.value for name in options.Sampler] == list(SAMPLERS)
     assert {module.compile_model.__globals__["EXECUTOR_OF"][target] for target in options.Target} <= set(
         TARGETS
     )

@@ -28,6 +28,14 @@ def test_the_frame_is_the_references(wamnet, tmp_path) -> None:
     assert got.info["spp"] == "2"
 
 
+def test_the_sampler_is_passed_on(wamnet, tmp_path) -> None:
+    assert wamnet("render", "furnace", "--width", 2, "--height", 2, "--sampler", "sobol").status == 0
+    want = render(canonical("furnace"), Job(2, 2, 1, 0, Settings(sampler="sobol"))).frame
+    got = exr.read_frame(tmp_path / "furnace.exr")
+    assert all((got[name] == values).all() for name, values in want.layers.items())
+    assert got.info["sampler"] == "sobol"
+
+
 def test_double_precision_and_parameters(wamnet, tmp_path) -> None:
     """A furnace is uniform: float64 in the file is float64 rounded to float32."""
     arguments = [

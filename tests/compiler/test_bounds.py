@@ -79,6 +79,87 @@ def test_sqrt_of_what_may_be_negative_has_no_bound():
     assert np.isfinite(enclosed("sqrt", [around(0.0, 0.0)]).error)
 
 
+def powered(base, exponent):
+    """Return the rule's enclosure of a power."""
+    node = trace(lambda x: x**0.5, {"x": Type()}).nodes[-1]
+    return bounds.RULES["power"](bounds.Context(node, {}, EMITTED_SINE), [base, exponent])
+
+
+@given(
+    x=st.floats(2.0**-8, 100, width=32), y=st.floats(0.125, 3), shift=shifts, sign=st.sampled_from([-1, 1])
+)
+def test_power_bounds_what_every_standard_allows(x, y, shift, sign):
+    """exp2(y log2(x)), each with the error that GLSL 4.60 allows it, to one side and to the other."""
+    error = 2.0**-12
+    found = powered(around(x + shift * error, error), around(y, 0.0))
+    wanted = (x + shift * error) ** y
+    logarithm = np.log2(x) + sign * (2.0**-21 if 0.5 <= x <= 2 else 3 * 2.0**-23 * abs(np.log2(x)))
+    product = y * logarithm * (1 + sign * np.sign(logarithm) * 2.0**-24)
+    assert abs(2**product * (1 + sign * (3 + 2 * abs(product)) * 2.0**-23) - wanted) <= found.error
+
+
+@given(x=st.floats(0.25, 4), y=st.floats(0.125, 3), at=st.floats(0, 1))
+def test_power_of_a_range(x, y, at):
+    """From x to 2 x and y to y + 1; 2^-40 of float64's rounding is added to every range (PRO-9)."""
+    base, exponent = ([a, b, 0.0] for a, b in ((x, 2 * x), (y, y + 1)))
+    found = powered(bounds.Enclosure(*map(np.float64, base)), bounds.Enclosure(*map(np.float64, exponent)))
+    value = (x + at * x) ** (y + at)
+    assert found.low * (1 - 2.0**-40) <= value <= found.high * (1 + 2.0**-40)
+
+
+def test_power_of_an_exact_number_has_its_own_error_alone():
+    """0.5^(1/2.4): 2^-21 / 2.4 + 2^-24 / 2.4 in the exponent, times ln 2, and 3 + 2 / 2.4 ulp of 2^-23."""
+    found, value = powered(around(0.5, 0.0), around(1 / 2.4, 0.0)), 0.5 ** (1 / 2.4)
+    own = (2.0**-21 + 2.0**-24) / 2.4 * np.log(2) + (3 + 2 / 2.4) * 2.0**-23
+    assert abs(found.error / value - own) <= 1e-5 * own
+
+
+def test_power_of_what_may_be_zero_has_no_bound():
+    assert powered(around(1e-9, 1e-8), around(0.5, 0.0)).error == np.inf
+    assert powered(around(0.0, 0.0), around(0.5, 0.0)).error == np.inf
+    assert np.isfinite(powered(around(1e-9, 0.0), around(0.5, 0.0)).error)
+
+
+ends = st.sampled_from([-1.0, -0.5, 0.0, 1.0])
+"""How much of its error a number is off by: the ends are what a rule must think of."""
+
+DECISIONS = {
+    "less": lambda a, b: a < b,
+    "less_equal": lambda a, b: a <= b,
+    "greater": lambda a, b: a > b,
+    "greater_equal": lambda a, b: a >= b,
+}
+"""The comparisons that have a rule."""
+
+
+@pytest.mark.parametrize("op", DECISIONS)
+@given(
+    a=st.integers(-3, 3),
+    b=st.integers(-3, 3),
+    errors=st.tuples(st.sampled_from([0.0, 0.5, 2.0]), st.sampled_from([0.0, 1.0])),
+    at=st.tuples(ends, ends),
+)
+def test_decisions_that_are_sure_are_right_and_others_cost_the_distance(op, a, b, errors, at):
+    """A selection between 10 and 3 by numbers that are off by their errors."""
+    operands = [around(float(a), errors[0]), around(float(b), errors[1])]
+    decided = enclosed(op, operands)
+    compare = DECISIONS[op]
+    reference = compare(a, b)
+    kernel = compare(a + at[0] * errors[0], b + at[1] * errors[1])
+    assert decided.low <= reference <= decided.high
+    assert abs(float(kernel) - float(reference)) <= decided.error
+    node = trace(lambda x: np.where(x > 0.0, x, -x), {"x": Type()}).nodes[-1]
+    chosen = bounds.RULES["select"](
+        bounds.Context(node, {}, EMITTED_SINE), [decided, around(10.0, 0.25), around(3.0, 0.125)]
+    )
+    values = {True: (10.0, 0.25), False: (3.0, 0.125)}
+    assert chosen.low <= values[reference][0] <= chosen.high
+    (seen, own), wanted = values[kernel], values[reference][0]
+    assert abs(seen - wanted) + own <= chosen.error
+    if abs(a - b) > errors[0] + errors[1]:
+        assert chosen.error == values[reference][1]
+
+
 def test_divide_by_what_may_be_zero_has_no_bound():
     assert enclosed("divide", [around(1.0, 0.0), around(1e-9, 1e-8)]).error == np.inf
 

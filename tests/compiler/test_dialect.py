@@ -16,7 +16,7 @@ from wamnet.compiler.ops import ELEMENTWISE, OPS
 @pytest.mark.parametrize("dialect", [OpenCL, GLSL])
 def test_every_elementwise_operation_has_a_template(dialect):
     names = {name.partition(".")[0] for name in dialect.operations}
-    assert names == {"take", *(op.name for op in ELEMENTWISE)}
+    assert names == {"take", "row", *(op.name for op in ELEMENTWISE)}
     assert set(OPS) >= names
 
 

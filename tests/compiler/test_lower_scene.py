@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.interpret import interpret
-from wamnet.compiler.lower_scene import LAYERS, PATH, SURFACE, lower_scene, names
+from wamnet.compiler.loops import loops as loops_of
+from wamnet.compiler.lower_scene import LAYERS, PATH, SURFACE, lower_scene, names, primitives
 from wamnet.refimpl import render as R
 from wamnet.refimpl import rng, scenes, transport
 from wamnet.refimpl.camera import camera_basis
+from wamnet.refimpl.materials import Conductor, Dielectric, Lambertian, Mirror
 from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
 from wamnet.refimpl.transport import Settings
 
@@ -35,11 +37,33 @@ EVERYTHING = Scene(
 )
 """One of each kind of primitive and two of most, axis-parallel and turned."""
 
-SCENES = {**{name: scenes.canonical(name) for name in scenes.CANONICAL}, "everything": EVERYTHING}
+MATERIALS = replace(
+    EVERYTHING,
+    room=replace(EVERYTHING.room, materials=(Mirror(), None, Conductor(0.5), None, None, None)),
+    boxes=tuple(
+        replace(b, material=m)
+        for b, m in zip(EVERYTHING.boxes, (Dielectric(1.5), Dielectric(1.3), Conductor(0.1)), strict=True)
+    ),
+    spheres=tuple(replace(ball, material=Dielectric(1.8)) for ball in EVERYTHING.spheres),
+)
+"""Every kind of material, on every kind of surface that takes it, with different numbers."""
+
+DAY = replace(
+    EVERYTHING, room=None, background=(0.0, 0.0, 0.0), environment=scenes.canonical("daylight").environment
+)
+"""Lamps under a sky."""
+
+SCENES = {
+    **{name: scenes.canonical(name) for name in scenes.CANONICAL},
+    "everything": EVERYTHING,
+    "materials": MATERIALS,
+    "day": DAY,
+}
 SETTINGS = [
     Settings(max_depth=3),
     Settings(max_depth=2, roulette_depth=1, heuristic="balance"),
     Settings(max_depth=2, strategy="light"),
+    Settings(max_depth=1, sampler="sobol"),
     Settings(max_depth=2, strategy="bsdf"),
 ]
 
@@ -54,17 +78,33 @@ def components(values, *tuples):
     }
 
 
-@pytest.mark.parametrize("settings", SETTINGS, ids=lambda s: f"{s.strategy}-{s.roulette_depth}")
+@pytest.mark.parametrize("settings", SETTINGS, ids=lambda s: f"{s.strategy}-{s.roulette_depth}-{s.sampler}")
 @pytest.mark.parametrize("name", SCENES)
 def test_programs_give_the_reference_s_bits(name, settings):
     """All programs at each depth, on the reference's own states, in float32, the same sine in both."""
-    scene = SCENES[name]
-    programs = lower_scene(scene, settings)
+    follow(SCENES[name], settings, None)
+
+
+@pytest.mark.parametrize("name", ["minicubes", "everything"])
+def test_loops_give_the_reference_s_bits(name):
+    """As above, with every table of two primitives and more as a loop."""
+    programs = follow(SCENES[name], Settings(max_depth=2), 0)
+    loops = {"minicubes": [27, 2], "everything": [2, 2, 3]}[name]
+    for program, results in ((programs.arrive, 2), (programs.scatter, 1)):
+        found = [node["trips"] for node in program.nodes if node.op == "loop"]
+        assert found == [trips for trips in loops for _ in range(results)]
+
+
+def follow(scene, settings, most_unrolled):
+    """Check all programs of a scene, and return them."""
+    programs = lower_scene(scene, settings, most_unrolled)
     world = transport.build(scene, settings, np.float32)
     y, x = np.divmod(np.arange(16 * 12), 16)
     counters = transport.Counters(rng.counter(7), R.pixel_counter(x, y), rng.counter(3))
     basis = camera_basis(scene.camera, np.float32)
-    path = R.start(basis, *(a.astype(np.float32) for a in (x, y)), 16, 12, counters, np.float32)
+    path = R.start(
+        basis, *(a.astype(np.float32) for a in (x, y)), 16, 12, counters, np.float32, settings.sampler
+    )
     given = {"x": x.astype(np.uint32), "y": y.astype(np.uint32), "width": 16, "height": 12}
     given |= {"seed": counters.seed, "sample_number": counters.sample}
     check(interpret(programs.start, given), {**components(PATH, path), "pixel": counters.pixel})
@@ -88,6 +128,7 @@ def test_programs_give_the_reference_s_bits(name, settings):
             given["depth"] = rng.counter(depth)
             path, alive = transport.scatter(world, path, surface, hit, given["depth"], counters)
             check(interpret(programs.scatter, given), {**components(PATH, path), "alive": alive})
+    return programs
 
 
 def check(found, expected):
@@ -128,6 +169,29 @@ def test_a_rotation_that_boxes_share_is_applied_once(count):
     assert from_input(arrive, "multiply", "origin") == 7
 
 
+@pytest.mark.parametrize("most_unrolled", [0, 20, None])
+def test_a_rotation_that_boxes_share_is_outside_of_their_loop(most_unrolled):
+    """The same seven products: none of them depends on the row."""
+    arrive = lower_scene(room_with(boxes=boxes(20, TURNED)), Settings(), most_unrolled).arrive
+    assert ops(arrive, "loop") == (2 if most_unrolled == 0 else 0)
+    inside = loops_of(arrive)[1]
+    for prefix in ("direction", "origin"):
+        assert from_input(arrive, "multiply", prefix) == 7
+    read = [arrive.nodes[arg] for i in inside for arg in arrive.nodes[i].args]
+    assert not [node for node in read if node.op == "input"]
+
+
+def test_the_number_of_primitives_decides_on_loops():
+    """The room is no row; a table of one row is no loop."""
+    scene = room_with(boxes=boxes(20, TURNED), lights=(LIGHT,))
+    assert primitives(scene) == 21
+    assert ops(lower_scene(scene, Settings(), 21).arrive, "loop") == 0
+    assert ops(lower_scene(scene, Settings(), 20).arrive, "loop") == 2
+    assert {str(n["trips"]) for n in lower_scene(scene, Settings(), 0).arrive.nodes if n.op == "loop"} == {
+        "20"
+    }
+
+
 def test_boxes_that_are_parallel_to_the_axes_are_not_rotated():
     arrive = lower_scene(room_with(boxes=boxes(5)), Settings()).arrive
     assert from_input(arrive, "multiply", "direction") == from_input(arrive, "multiply", "origin") == 0
@@ -143,6 +207,43 @@ def test_what_a_scene_lacks_is_in_no_program():
     assert ops(plain["scatter"], "reciprocal") == 0
     assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings(strategy="bsdf")).scatter, "sqrt") == 1
     assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings()).scatter, "sqrt") == 2
+
+
+def test_a_sky_is_sampled_where_there_is_one():
+    """Numbers: two for the direction, two and a choice for the sky."""
+    scene = replace(SCENES["daylight"], spheres=(), environment=SCENES["daylight"].environment)
+    assert ops(lower_scene(scene, Settings()).scatter, "convert") == 5
+    assert ops(lower_scene(scene, Settings(strategy="bsdf")).scatter, "convert") == 2
+    single = replace(scene, boxes=(), quads=(), spheres=SCENES["daylight"].spheres[1:])
+    assert ops(lower_scene(single, Settings()).scatter, "convert") == 1
+
+
+@pytest.mark.parametrize("material", [Lambertian(), Mirror(), Conductor(0.3)])
+def test_one_material_needs_no_selection(material):
+    """With one kind and one number nothing depends on which surface was hit, but that there is one."""
+    walls = replace(SCENES["furnace"].room, materials=(material,) * 6)
+    scatter = lower_scene(replace(room_with(lights=(LIGHT,)), room=walls), Settings()).scatter
+    index = next(
+        i for i, node in enumerate(scatter.nodes) if node.op == "input" and node["name"] == "surface"
+    )
+    users = [node for node in scatter.nodes if index in node.args]
+    # Two questions: is there a surface to gather light at, is the distance that of a hit? One node, by its
+    # value.
+    assert [user.op for user in users] == ["less"]
+    assert ops(scatter, "take") == 0
+
+
+def test_a_second_material_is_selected_by_surface():
+    walls = SCENES["furnace"].room
+    one, two = (
+        lower_scene(
+            replace(room_with(), room=replace(walls, materials=(material,) * 3 + (None,) * 3)), Settings()
+        )
+        for material in (None, Mirror())
+    )
+    # Three components of the direction, and the density; the throughput is the same.
+    assert ops(two.scatter, "select") - ops(one.scatter, "select") >= 4
+    assert one.scatter == lower_scene(room_with(), Settings()).scatter
 
 
 @pytest.mark.parametrize(

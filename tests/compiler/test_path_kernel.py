@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -13,6 +14,7 @@ from wamnet.compiler.lower_scene import lower_scene
 from wamnet.compiler.path_kernel import SCHEDULES, compile_path
 from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.scene import Sphere
 from wamnet.refimpl.transport import Settings
 
 
@@ -34,6 +36,16 @@ def kernel(name="furnace", target="opencl", profile="ieee", lanes=16, settings=N
 def test_golden_source(golden, name, target, profile, lanes):
     made = kernel(name, target, profile, lanes)
     golden(f"path.{name}.{profile}.{lanes}.{made.source_name}", made.source)
+
+
+@pytest.mark.parametrize(("target", "lanes"), [("opencl", 16), ("opengl", 1), ("numpy", 1)])
+def test_golden_source_of_a_loop(golden, target, lanes):
+    """Three spheres in the furnace: a table and a loop in the text, in two programs if there is a light."""
+    spheres = tuple(Sphere((0.3 * i, 0.1, 0.2 - i), 0.1 + 0.1 * i, (0.2, 0.3 * i, 0.1)) for i in range(3))
+    scene = replace(scenes.canonical("furnace"), name="spheres", spheres=spheres)
+    programs = lower_scene(scene, Settings(max_depth=1), most_unrolled=0)
+    made = compile_path(programs, target, "native", lanes, groups=("color",))
+    golden(f"path.spheres.native.{lanes}.{made.source_name}", made.source)
 
 
 def test_golden_manifest(golden):

@@ -28,7 +28,93 @@ def constant(value):
     return Node("constant", (), Type(), attributes(value=value))
 
 
+NUMBER = Type()
+A = np.arange(3, dtype=np.float32)
+
+
+def loop(*changed, outputs=(("sum", 4),), more=()):
+    """Return the sum of a table's entries and x, with some nodes changed: (index, node)."""
+    nodes = [
+        Node("input", (), NUMBER, attributes(name="x", type=NUMBER)),
+        Node("carried", (0,), NUMBER, attributes(index=0, loop=0)),
+        Node("row", (), NUMBER, attributes(loop=0, table="T0")),
+        Node("add", (1, 2), NUMBER),
+        result(),
+        *more,
+    ]
+    for index, node in changed:
+        nodes[index] = node
+    return Program(tuple(nodes), outputs, {"T0": A})
+
+
+def result(args=(1, 3), index=0, number=0, trips=3, kind=NUMBER):
+    return Node("loop", args, kind, attributes(index=index, loop=number, trips=trips))
+
+
+LOOPS = [
+    ("types_follow", loop((4, result((1, 3, 3)))), "result 0 does not exist of a loop with 3 operands"),
+    ("types_follow", loop((4, result(index=1))), "result 1 does not exist of a loop with 2 operands"),
+    (
+        "types_follow",
+        loop((3, Node("less", (1, 2), Type("bool")))),
+        "a trip must keep the kinds that are carried: float32 became bool",
+    ),
+    (
+        "types_follow",
+        replace(loop(), parameters={"T0": np.ones((3, 2), np.float32)}),
+        r"a loop walks along a table of one axis, not of shape \(3, 2\)",
+    ),
+    (
+        "types_follow",
+        plus(Node("carried", (0,), V3, attributes(index=0, loop=0))),
+        r"a loop carries numbers, not float32\[3\]",
+    ),
+    ("loops_are_whole", loop((4, result((0, 3)))), "%4 loop: operand 0 must be carried number 0 of loop 0"),
+    ("loops_are_whole", loop((4, result(number=1))), "operand 0 must be carried number 0 of loop 1"),
+    (
+        "loops_are_whole",
+        loop(more=(result((1, 1)),)),
+        "%5 and another result of loop 0 have other operands or trips",
+    ),
+    ("loops_are_whole", loop(more=(result(trips=2),)), "have other operands or trips"),
+    ("tables_are_as_long_as_loops", loop((4, result(trips=0))), "%4 loop makes 0 trips; it must make one"),
+    (
+        "tables_are_as_long_as_loops",
+        loop((4, result(trips=4))),
+        "%2 row: table T0 has 3 rows; the loop makes 4 trips",
+    ),
+    ("loops_are_closed", loop(outputs=(("a", 3),)), "output 'a', %3, is a value of a trip; take the loop's"),
+    ("loops_are_closed", loop(outputs=(("a", 1),)), "output 'a', %1, is a value of a trip"),
+    (
+        "loops_are_closed",
+        loop(more=(Node("carried", (3,), NUMBER, attributes(index=0, loop=1)),)),
+        "%5 carried depends on trips of loops 0, 1; loops do not nest",
+    ),
+    (
+        "loops_are_closed",
+        loop(
+            more=(
+                Node("carried", (0,), NUMBER, attributes(index=0, loop=1)),
+                Node("add", (5, 3), NUMBER),
+            )
+        ),
+        "%6 add depends on trips of loops 0, 1",
+    ),
+    (
+        "loops_are_closed",
+        loop(
+            more=(
+                Node("carried", (0,), NUMBER, attributes(index=0, loop=1)),
+                result((5, 3), number=1),
+            )
+        ),
+        "%6 loop depends on trips of loops 0; loops do not nest",
+    ),
+]
+"""What a loop must not be."""
+
 CASES = [
+    *LOOPS,
     (
         "known_operations",
         plus(Node("exp", (1,), V3)),
@@ -143,3 +229,4 @@ def test_every_rule_has_a_case():
 
 def test_well_formed_program_passes():
     assert verify(GOOD) is GOOD
+    verify(loop())

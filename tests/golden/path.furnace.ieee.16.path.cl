@@ -14,6 +14,13 @@
  */
 #define LANES 16
 #define MAX_DEPTH 3u /* scatterings of a path */
+/* The largest integer up to x: one of 2^23 or more is an integer itself. */
+float16 floor_float16(float16 x)
+{
+    float16 near = convert_float16(convert_int16(x));
+    float16 below = near > x ? near - 1.0f : near;
+    return (as_int16(x) & 0x7fffffff) < 0x4b000000 ? below : x;
+}
 
 __kernel void wamnet_trace(
     __global float *restrict sums,
@@ -177,9 +184,9 @@ __kernel void wamnet_trace(
 
             /* arrive: the next surface */
             {
-                float16 t16 = fabs(direction_x);
-                float16 t17 = fabs(direction_y);
-                float16 t18 = fabs(direction_z);
+                float16 t16 = as_float16(as_int16(direction_x) & 0x7fffffff);
+                float16 t17 = as_float16(as_int16(direction_y) & 0x7fffffff);
+                float16 t18 = as_float16(as_int16(direction_z) & 0x7fffffff);
                 int16 t19 = t16 < (float16)(1e-15f);
                 int16 t20 = t17 < (float16)(1e-15f);
                 int16 t21 = t18 < (float16)(1e-15f);
@@ -201,26 +208,26 @@ __kernel void wamnet_trace(
                 float16 t39 = t36 * t33;
                 float16 t40 = t37 * t34;
                 float16 t41 = t38 * t35;
-                float16 t42 = fabs(t33);
-                float16 t43 = fabs(t34);
-                float16 t44 = fabs(t35);
+                float16 t42 = as_float16(as_int16(t33) & 0x7fffffff);
+                float16 t43 = as_float16(as_int16(t34) & 0x7fffffff);
+                float16 t44 = as_float16(as_int16(t35) & 0x7fffffff);
                 float16 t46 = t39 - t42;
                 float16 t47 = t40 - t43;
                 float16 t48 = t41 - t44;
                 float16 t49 = t39 + t42;
                 float16 t50 = t40 + t43;
                 float16 t51 = t41 + t44;
-                float16 t52 = max(t46, t47);
-                float16 t53 = max(t52, t48);
-                float16 t54 = min(t49, t50);
-                float16 t55 = min(t54, t51);
+                float16 t52 = t46 < t47 ? t47 : t46;
+                float16 t53 = t52 < t48 ? t48 : t52;
+                float16 t54 = t50 < t49 ? t50 : t49;
+                float16 t55 = t51 < t54 ? t51 : t54;
                 int16 t56 = t53 <= t55;
                 int16 t57 = t55 > (float16)(0.0f);
                 int16 t58 = t56 && t57;
                 float16 t59 = t58 ? t55 : (float16)(1.00000002e+30f);
                 int16 t60 = t59 < (float16)(1.00000002e+30f);
                 int16 t62 = t60 ? (int16)(0) : (int16)(6);
-                float16 t63 = min((float16)(1.00000002e+30f), t59);
+                float16 t63 = t59 < (float16)(1.00000002e+30f) ? t59 : (float16)(1.00000002e+30f);
                 int16 t64 = t62 == (int16)(0);
                 int16 t65 = direction_x > (float16)(0.0f);
                 int16 t67 = t65 ? (int16)(1) : (int16)(0);
@@ -326,11 +333,11 @@ __kernel void wamnet_trace(
                 uint16 t45 = t43 >> (uint16)(16u);
                 uint16 t46 = t43 ^ t45;
                 float16 t50 = t29 ? t : (float16)(0.0f);
-                float16 t51 = fabs(point_x);
-                float16 t52 = fabs(point_y);
-                float16 t53 = fabs(point_z);
-                float16 t54 = max(t51, t52);
-                float16 t55 = max(t54, t53);
+                float16 t51 = as_float16(as_int16(point_x) & 0x7fffffff);
+                float16 t52 = as_float16(as_int16(point_y) & 0x7fffffff);
+                float16 t53 = as_float16(as_int16(point_z) & 0x7fffffff);
+                float16 t54 = t51 < t52 ? t52 : t51;
+                float16 t55 = t54 < t53 ? t53 : t54;
                 float16 t56 = t55 + t50;
                 float16 t58 = (float16)(3.81469727e-06f) * t56;
                 float16 t59 = normal_x * t58;
@@ -371,8 +378,8 @@ __kernel void wamnet_trace(
                 float16 t96 = t94 - (float16)(1.0f);
                 float16 t97 = (float16)(2.0f) * t92;
                 float16 t98 = t97 - (float16)(1.0f);
-                float16 t99 = fabs(t96);
-                float16 t100 = fabs(t98);
+                float16 t99 = as_float16(as_int16(t96) & 0x7fffffff);
+                float16 t100 = as_float16(as_int16(t98) & 0x7fffffff);
                 int16 t101 = t99 > t100;
                 float16 t102 = t101 ? t96 : t98;
                 float16 t103 = t101 ? t98 : t96;
@@ -384,7 +391,7 @@ __kernel void wamnet_trace(
                 float16 t112 = t101 ? t109 : t111;
                 float16 t114 = t112 * (float16)(0.318309873f);
                 float16 t115 = t114 + (float16)(1.0f);
-                float16 t116 = floor(t115);
+                float16 t116 = floor_float16(t115);
                 float16 t118 = t116 - (float16)(0.5f);
                 float16 t120 = t118 * (float16)(3.14160156f);
                 float16 t121 = t112 - t120;
@@ -393,7 +400,7 @@ __kernel void wamnet_trace(
                 float16 t126 = t118 * (float16)(-1.74122761e-09f);
                 float16 t127 = t124 - t126;
                 float16 t128 = (float16)(0.5f) * t116;
-                float16 t129 = floor(t128);
+                float16 t129 = floor_float16(t128);
                 float16 t130 = (float16)(2.0f) * t129;
                 float16 t131 = t116 - t130;
                 float16 t132 = (float16)(2.0f) * t131;
@@ -411,11 +418,11 @@ __kernel void wamnet_trace(
                 float16 t149 = t127 * t148;
                 float16 t150 = t127 + t149;
                 float16 t151 = t133 * t150;
-                float16 t152 = min(t151, (float16)(1.0f));
-                float16 t154 = max(t152, (float16)(-1.0f));
+                float16 t152 = (float16)(1.0f) < t151 ? (float16)(1.0f) : t151;
+                float16 t154 = t152 < (float16)(-1.0f) ? (float16)(-1.0f) : t152;
                 float16 t155 = t102 * t154;
                 float16 t156 = t114 + (float16)(0.5f);
-                float16 t157 = floor(t156);
+                float16 t157 = floor_float16(t156);
                 float16 t158 = t157 * (float16)(3.14160156f);
                 float16 t159 = t112 - t158;
                 float16 t160 = t157 * (float16)(-8.9071691e-06f);
@@ -423,7 +430,7 @@ __kernel void wamnet_trace(
                 float16 t162 = t157 * (float16)(-1.74122761e-09f);
                 float16 t163 = t161 - t162;
                 float16 t164 = (float16)(0.5f) * t157;
-                float16 t165 = floor(t164);
+                float16 t165 = floor_float16(t164);
                 float16 t166 = (float16)(2.0f) * t165;
                 float16 t167 = t157 - t166;
                 float16 t168 = (float16)(2.0f) * t167;
@@ -441,14 +448,14 @@ __kernel void wamnet_trace(
                 float16 t180 = t163 * t179;
                 float16 t181 = t163 + t180;
                 float16 t182 = t169 * t181;
-                float16 t183 = min(t182, (float16)(1.0f));
-                float16 t184 = max(t183, (float16)(-1.0f));
+                float16 t183 = (float16)(1.0f) < t182 ? (float16)(1.0f) : t182;
+                float16 t184 = t183 < (float16)(-1.0f) ? (float16)(-1.0f) : t183;
                 float16 t185 = t102 * t184;
                 float16 t186 = t155 * t155;
                 float16 t187 = (float16)(1.0f) - t186;
                 float16 t188 = t185 * t185;
                 float16 t189 = t187 - t188;
-                float16 t190 = max((float16)(0.0f), t189);
+                float16 t190 = (float16)(0.0f) < t189 ? t189 : (float16)(0.0f);
                 float16 t191 = sqrt(t190);
                 int16 t192 = normal_z < (float16)(0.0f);
                 float16 t193 = t192 ? (float16)(-1.0f) : (float16)(1.0f);
@@ -482,10 +489,10 @@ __kernel void wamnet_trace(
                 float16 t221 = t215 + t218;
                 float16 t222 = t216 + t219;
                 float16 t223 = t217 + t220;
-                float16 t224 = max(t191, (float16)(0.0f));
+                float16 t224 = t191 < (float16)(0.0f) ? (float16)(0.0f) : t191;
                 float16 t225 = t224 * (float16)(0.318309873f);
-                float16 t226 = max(t65, t66);
-                float16 t227 = max(t226, t67);
+                float16 t226 = t65 < t66 ? t66 : t65;
+                float16 t227 = t226 < t67 ? t67 : t226;
                 int16 t228 = t227 > (float16)(0.0f);
                 int16 t229 = t29 && t228;
                 origin_x = t62;

@@ -1,4 +1,4 @@
-"""Path kernels against the reference: path by path, pixel by pixel, and as estimators."""
+"""Path kernels against the reference, pixel by pixel; test_compare_paths.py compares their paths."""
 
 from __future__ import annotations
 
@@ -7,18 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import stats
-from statistical import SIGNIFICANCE, assert_all_plausible, welch_p
 
-from wamnet.compiler import ir
-from wamnet.compiler.emit_path import END, FRAME_GROUPS
+from wamnet.compiler.emit_path import FRAME_GROUPS
 from wamnet.compiler.lower_scene import lower_scene
 from wamnet.compiler.path_kernel import SCHEDULES, compile_path
 from wamnet.kernels.executor import Part
 from wamnet.kernels.render_on import compile_scene, render_on
-from wamnet.refimpl import frame, rng, scenes, transport
+from wamnet.refimpl import frame, scenes
 from wamnet.refimpl import render as R
-from wamnet.refimpl.camera import camera_basis
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.transport import Settings
 
@@ -34,95 +30,6 @@ def scene(name):
     return scenes.canonical(name, **({"time": 1.3} if name == "minicubes" else {}))
 
 
-# ---- path by path --------------------------------------------------------------------------------------
-
-
-def reference_paths(name, depths):
-    """Yield, for each depth, alive, hit, surface and state of all paths (P,) of the reference, in float32."""
-    world = transport.build(scene(name), Settings(max_depth=depths), np.float32)
-    y, x = np.divmod(np.arange(WIDTH * HEIGHT), WIDTH)
-    counters = transport.Counters(rng.counter(SEED), R.pixel_counter(x, y), rng.counter(0))
-    basis = camera_basis(scene(name).camera, np.float32)
-    path = R.start(basis, *(a.astype(np.float32) for a in (x, y)), WIDTH, HEIGHT, counters, np.float32)
-    alive = np.ones(len(x), bool)
-    # Paths that have ended are computed on.
-    with np.errstate(all="ignore"):
-        for depth in range(depths):
-            path, surface, hit = transport.arrive(world, path)
-            yield alive, hit, surface, path
-            path, going = transport.scatter(world, path, surface, hit, rng.counter(depth), counters)
-            alive = alive & going
-
-
-def kernel_paths(executor, name, depth):
-    """Return the state of all paths (P,) after `depth` scatterings and one more arrival, by plane."""
-    programs = lower_scene(scene(name), Settings(max_depth=depth))
-    kernel = compile_path(programs, executor.name, "ieee", executor.lanes, tuple(END))
-    sums = executor.trace(kernel, Part(WIDTH, HEIGHT, 0, HEIGHT, 0, 1, SEED))
-    return dict(zip(kernel.planes, sums.reshape(len(kernel.planes), -1), strict=True))
-
-
-def last(found, name, ends="xyz"):
-    return np.stack([found[f"last_{name}_{end}"] for end in ends], axis=-1)
-
-
-def farthest(a, b):
-    return np.abs(a - b).max(axis=-1)
-
-
-@pytest.mark.parametrize("name", scenes.CANONICAL)
-def test_paths_are_those_of_the_reference(executor, name):
-    """Vertices, directions and throughputs agree within a bound until a decision falls differently.
-
-    Where a ray of length t and coordinates up to s meets a plane at an angle of cosine c, an error e of its
-    origin, d of its direction and 64 u s of the arithmetic (spec/intersection.md) move the hit by at most
-    (e + d t + 64 u s) / c. Lifting the origin adds 64 u s. A sampled direction has z = sqrt(1 - x^2 - y^2)
-    from x, y with errors of 8 u, sine included: 32 u / z with the rotation. A throughput is a product.
-    """
-    same = np.ones(WIDTH * HEIGHT, bool)
-    e_origin, e_direction = 0.0, 16 * U
-    flips = 0
-    for depth, (alive, hit, surface, path) in enumerate(reference_paths(name, 4)):
-        found = kernel_paths(executor, name, depth)
-        # A path whose decision differs is another path from there on.
-        decided = (found["alive"] > 0) == alive
-        decided &= ~alive | (found["last_surface"] == hit.surface)
-        flips += np.sum(same & ~decided)
-        same &= decided
-        followed = same & alive
-        met = followed & (surface.light < 0) & (np.abs(surface.normal).max(axis=-1) > 0)
-        assert np.all((farthest(last(found, "direction"), path.direction) <= e_direction)[followed])
-        error = farthest(last(found, "beta", "rgb"), path.beta)
-        assert np.all(error[followed] <= 4 * U * depth)  # products of reflectances below 1
-        with np.errstate(all="ignore"):
-            cosine = np.abs(np.sum(surface.normal * path.direction, axis=-1))
-            size = np.abs(path.origin).max(axis=-1) + hit.t
-            e_point = (e_origin + e_direction * hit.t + 64 * U * size) / cosine
-        assert np.all((farthest(last(found, "point"), surface.point) <= e_point)[met])
-        e_origin = e_point + 64 * U * size
-        e_direction = next_direction_error(name, depth, surface)
-    assert flips <= 0.01 * WIDTH * HEIGHT  # a path in a hundred passes an edge by less than rounding
-    assert same.mean() >= 0.99
-
-
-def next_direction_error(name, depth, surface):
-    """Return the bound of the error of the direction in which paths leave their surfaces."""
-    *_, (_, _, _, following) = reference_paths(name, depth + 2)
-    z = np.sum(surface.normal * following.direction, axis=-1)
-    return 32 * U / np.maximum(z, 2.0**-12)
-
-
-def test_a_wrong_kernel_s_paths_are_caught(executor_named):
-    """The test above can fail: an origin lifted 64 times as far is 4,000 u off, times coordinates below 1."""
-    executor, part = executor_named("opencl"), Part(16, 16, 0, 16, 0, 1, 0)
-    programs = lower_scene(scene("furnace"), Settings(max_depth=1))
-    right = compile_path(programs, "opencl", lanes=executor.lanes, groups=("last_point",))
-    source = right.source.replace("3.81469727e-06f", "2.44140625e-04f")
-    assert source != right.source
-    wrong = replace(right, source=source, manifest={**right.manifest, "digest": ir.sha256(source.encode())})
-    assert np.abs(executor.trace(right, part) - executor.trace(wrong, part)).max() >= 1000 * U
-
-
 # ---- pixel by pixel ------------------------------------------------------------------------------------
 
 
@@ -130,8 +37,9 @@ def test_a_wrong_kernel_s_paths_are_caught(executor_named):
 def test_image_is_the_reference_s(executor, name):
     """Two samples a pixel: at least 99 pixels in 100 have every layer to 1e-5 of the layer's size.
 
-    1e-5 is 168 u: a distance with 64 u s of error (above), twice, and rounding of sums. A path that falls on
-    the other side of a decision changes its pixel wholly.
+    1e-5 is 168 u: a distance with 64 u s of error (spec/intersection.md), twice, and rounding of sums. A path
+    that falls on the other side of a decision changes its pixel wholly. Curved mirrors and glass multiply
+    errors, by up to 2 t / r a bounce, but what they show is smooth but for edges.
     """
     job = R.Job(WIDTH, HEIGHT, 2, SEED, Settings(max_depth=4))
     expected, found = R.render(scene(name), job), render_on(executor, scene(name), job)
@@ -152,6 +60,7 @@ def test_image_is_the_reference_s(executor, name):
         Settings(max_depth=0),
         Settings(max_depth=3, roulette_depth=1),
         Settings(max_depth=2, strategy="light"),
+        Settings(max_depth=2, sampler="sobol"),
         Settings(max_depth=2, strategy="bsdf", heuristic="balance"),
     ],
 )
@@ -221,27 +130,6 @@ def test_samples_are_numbered_on(executor):
     ]
     assert np.all(np.abs((halves[0] + halves[1]) / 2 - whole) <= 10 * U * whole)
     assert not np.array_equal(*halves)
-
-
-# ---- as an estimator -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["minicubes", "cornell", "lone_light"])
-def test_kernel_estimates_the_reference_s_image(executor_named, name):
-    """Other seeds, so other paths: Welch's test on every pixel, and on the whole image as one number."""
-    executor = executor_named("opencl")
-    counts = (1024, 256)
-    a = render_on(executor, scene(name), R.Job(16, 12, counts[0], 1))
-    b = R.render(scene(name), R.Job(16, 12, counts[1], 2))
-    means = [r.frame["color"].astype(np.float64).mean(axis=-1).ravel() for r in (a, b)]
-    # The variance of the channels' mean is at most the mean of their variances.
-    variances = [r.color_variance.mean(axis=-1).ravel() for r in (a, b)]
-    noisy = (variances[0] > 1e-6) & (variances[1] > 1e-6)
-    assert noisy.sum() > 50
-    arguments = [x[noisy] for pair in zip(means, variances, strict=True) for x in pair]
-    assert_all_plausible(welch_p(*arguments[:2], counts[0], *arguments[2:], counts[1]))
-    error = np.sqrt(sum(v.mean() / n for v, n in zip(variances, counts, strict=True)) / means[0].size)
-    assert 2 * stats.norm.sf(abs(means[0].mean() - means[1].mean()) / error) >= SIGNIFICANCE
 
 
 # ---- refusals ------------------------------------------------------------------------------------------

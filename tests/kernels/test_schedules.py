@@ -109,7 +109,7 @@ FAULTS = {
     "pixel": ("row[p * 3 + i]", "row[i]"),
     "columns": ("clamp(left + dx, 0, width - 1)", "clamp(left + dx, 1, width - 1)"),
     "rows": ("clamp(top + dy, 0, height - 1)", "clamp(top + dy, 1, height - 1)"),
-    "place": ("y * width + x + p)", "y * width + x + p / 2)"),
+    "place": ("y * width + x + p)", "y * width + x + (p ^ 1))"),
     "block": ("weights) + block", "weights) + 0 * block"),
     "bias": ("[block * 2 + 1]", "[block * 2 + 0]"),
     "lanes": ("* LANES + i]", "* LANES + i / 2]"),

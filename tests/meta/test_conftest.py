@@ -32,7 +32,7 @@ def test_it(executor):
 
 @pytest.fixture
 def run(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch):
-    """Give a function that runs STUB under the real conftest with a given WAMNET_REQUIRE."""
+    """Give a function that runs STUB, or the file made since, under a given WAMNET_REQUIRE."""
     pytester.makeconftest((Path(__file__).parents[1] / "conftest.py").read_text())
     pytester.makepyfile(STUB)
 
@@ -41,6 +41,19 @@ def run(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch):
         return pytester.runpytest_subprocess("-p", "no:cacheprovider", *options)
 
     return run_with
+
+
+@pytest.mark.parametrize(("require", "outcome"), [("", "skipped"), ("mitsuba", "errors")])
+def test_missing_peer_has_the_same_policy(run, pytester, monkeypatch, require, outcome):
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2] / "bench"))
+    pytester.makepyfile(
+        'import sys\nsys.modules["mitsuba"] = None\ndef test_it(mitsuba):\n    assert mitsuba\n'
+    )
+    result = run(require)
+    result.assert_outcomes(**{outcome: 1})
+    result.stdout.fnmatch_lines(["mitsuba: MISSING: mitsuba: the package is not installed; pip install *"])
+    if require:
+        result.stdout.fnmatch_lines(["peer mitsuba is required and MISSING: mitsuba: the package *"])
 
 
 @pytest.mark.parametrize("options", [(), ("-n", "1")])

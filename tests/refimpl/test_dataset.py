@@ -169,6 +169,25 @@ def test_features_by_hand() -> None:
         assert dataset.feature_image(frame, (name,), scales)[0, 0].tolist() == values
 
 
+def test_sums_are_encoded_as_their_means_are() -> None:
+    """Sums over 4 samples, which divide exactly; in float64, so that feature_image rounds alone."""
+    frame = frame_of(5, 4)
+    scales = Normalization(0.5, 1.5, (0.1, -0.2, 0.3), 1.5)
+    sums = {name: 4.0 * values.astype(np.float64) for name, values in frame.layers.items()}
+    encoded = dataset.encode_sums(sums, 4.0, tuple(FEATURES), scales)
+    assert list(encoded) == list(FEATURES)
+    for name, values in encoded.items():
+        assert np.array_equal(values.astype(np.float32), dataset.feature_image(frame, (name,), scales))
+
+
+def test_sums_stay_in_the_range_that_a_feature_promises() -> None:
+    """In float32 1.055 x 1 - 0.055 and its like may pass 1: the last clip is what keeps them."""
+    sums = {name: np.full((1, layer.channels), 3e38, np.float32) for name, layer in LAYERS.items()}
+    for name, values in dataset.encode_sums(sums, np.float32(1), tuple(FEATURES), Normalization()).items():
+        assert values.dtype == np.float32
+        assert values.max() <= FEATURES[name].high
+
+
 def test_features_do_not_depend_on_the_frames_float_type() -> None:
     narrow = frame_of(3, 3)
     wide = Frame({name: values.astype(np.float64) for name, values in narrow.layers.items()})

@@ -29,7 +29,7 @@ def uniforms(count: int = SAMPLES, seed: int = 11):
 def test_every_sampler_comes_as_a_triad():
     names = {name for name, _ in inspect.getmembers(sampling, inspect.isfunction)}
     kinds = {name.removeprefix("sample_") for name in names if name.startswith("sample_")}
-    assert kinds == {"concentric_disk", "cosine_hemisphere", "quad", "discrete"}
+    assert kinds == {"concentric_disk", "cosine_hemisphere", "quad", "discrete", "spherical_cauchy"}
     for kind in kinds:
         assert f"{kind}_pdf" in names, f"add {kind}_pdf"
         assert f"invert_{kind}_sample" in names, f"add invert_{kind}_sample"
@@ -100,6 +100,36 @@ def test_hemisphere_chi_square():
     observed, _, _ = np.histogram2d(wi[:, 2], np.arctan2(wi[:, 1], wi[:, 0]), bins=(cosines, angles))
     share = [integrate.quad(sampling.cosine_hemisphere_pdf, a, b)[0] for a, b in pairwise(cosines)]
     assert chi_square_p(observed, np.outer(share, np.diff(angles)) * SAMPLES) >= SIGNIFICANCE
+
+
+@given(UNIT, UNIT, st.sampled_from([0.0, 1.0, 100.0, 1e6]))
+def test_spherical_cauchy_round_trip(u0, u1, concentration):
+    """1 - z loses the digits of a small 1 - cos: an ulp of 1, times du0 / d(1 - cos) <= (1 + 2 k) / 2. Where
+    the sine is small too, the azimuth loses them.
+    """
+    wi = sampling.sample_spherical_cauchy(np.float64(u0), np.float64(u1), concentration)
+    assert abs(vectors.dot(wi, wi) - 1.0) <= 16 * 2.0**-52
+    v0, v1 = sampling.invert_spherical_cauchy_sample(wi, concentration)
+    assert abs(v0 - u0) <= ROUND_TRIP + (1.0 + 2.0 * concentration) * 2.0**-52
+    if wi[0] ** 2 + wi[1] ** 2 > 0.0:
+        assert abs(v1 - u1) <= ROUND_TRIP
+
+
+@pytest.mark.parametrize("concentration", [0.0, 3.0, 500.0])
+def test_spherical_cauchy_chi_square(concentration):
+    """Cells in (1 - cos, phi), finer near the axis: expected share is the integral of the pdf, by
+    quadrature.
+    """
+    wi = sampling.sample_spherical_cauchy(*uniforms()[:2], concentration)
+    edges, angles = 2.0 * np.linspace(0, 1, 17) ** 3, np.linspace(-np.pi, np.pi, 33)
+    observed, _, _ = np.histogram2d(1.0 - wi[:, 2], np.arctan2(wi[:, 1], wi[:, 0]), bins=(edges, angles))
+    share = [
+        integrate.quad(sampling.spherical_cauchy_pdf, a, b, args=(concentration,))[0]
+        for a, b in pairwise(edges)
+    ]
+    expected = np.outer(share, np.diff(angles))
+    assert expected.sum() == pytest.approx(1.0, rel=1e-9)  # quad's own estimate of its error
+    assert chi_square_p(observed, expected * SAMPLES) >= sidak(SIGNIFICANCE, 3)
 
 
 def test_quad_chi_square():

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from wamnet.refimpl import scene as S
 from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.materials import Conductor, Dielectric, Lambertian, Mirror
 
 GREY = (0.5, 0.5, 0.5)
 EVERYTHING = S.Scene(
@@ -26,14 +27,42 @@ EVERYTHING = S.Scene(
 )
 
 
+DIGEST = "2f2ce480f6526cb81867dd6597947c678f6e9bf39a174ce3574acdafcc590165"
+"""Digest of EVERYTHING, computed before scenes had materials."""
+
+MATERIALS = replace(
+    EVERYTHING,
+    room=replace(EVERYTHING.room, materials=(Mirror(), None, Conductor(0.5), Lambertian(), None, None)),
+    boxes=(replace(EVERYTHING.boxes[0], material=Dielectric(1.33)),),
+    spheres=(replace(EVERYTHING.spheres[0], material=Conductor()),),
+    quads=(replace(EVERYTHING.quads[0], material=Mirror()),),
+)
+DAY = replace(EVERYTHING, background=S.BLACK, environment=S.Sky(GREY, GREY, GREY))
+
+
 @pytest.mark.parametrize(
-    "scene", [EVERYTHING, *(make() for make in scenes.CANONICAL.values())], ids=lambda s: s.name
+    "scene",
+    [EVERYTHING, MATERIALS, DAY, *(make() for make in scenes.CANONICAL.values())],
+    ids=lambda s: s.name,
 )
 def test_json_round_trip(scene):
     again = S.from_json(S.to_json(scene))
     assert again == scene
     assert S.to_json(again) == S.to_json(scene)
     assert S.scene_digest(again) == S.scene_digest(scene)
+
+
+def test_materials_are_in_the_text_only_where_there_are_some():
+    """Texts and digests of scenes without materials are those of the time before there were any."""
+    assert "material" not in S.to_json(EVERYTHING)
+    assert "environment" not in S.to_json(EVERYTHING)
+    assert S.scene_digest(EVERYTHING) == DIGEST
+    text = json.loads(S.to_json(MATERIALS))
+    assert text["boxes"][0]["material"] == {"kind": "dielectric", "ior": 1.33}
+    assert text["quads"][0]["material"] == {"kind": "mirror"}
+    assert text["room"]["materials"][:2] == [{"kind": "mirror"}, None]
+    default = replace(EVERYTHING, spheres=(replace(EVERYTHING.spheres[0], material=Lambertian()),))
+    assert S.scene_digest(default) != S.scene_digest(EVERYTHING)
 
 
 @given(st.lists(st.floats(-1e6, 1e6, width=64), min_size=3, max_size=3).map(tuple))
@@ -108,6 +137,47 @@ REFUSALS = [
     ("spheres.0.radius", 0, r"scene.spheres\[0\].radius is 0.0: it must be positive"),
     ("quads.0.edge_v", [1, 0, 0], r"scene.quads\[0\].edge_v is .*: the edges must span an area"),
     ("lights.0.color", [-1, 0, 0], r"scene.lights\[0\].color is .*: a colour must not be negative"),
+    (
+        "boxes.0.material",
+        "glass",
+        r"scene.boxes\[0\].material is glass: it must be a JSON object; give a kind",
+    ),
+    (
+        "boxes.0.material",
+        {"ior": 2},
+        r"scene.boxes\[0\].material.kind is None: it is required; known are lam",
+    ),
+    (
+        "boxes.0.material",
+        {"kind": "wood"},
+        r"material.kind is 'wood': no material has this name; known are lamb",
+    ),
+    (
+        "boxes.0.material",
+        {"kind": "mirror", "ior": 2},
+        r"material.ior is 2: Mirror has no such key; known are",
+    ),
+    (
+        "boxes.0.material",
+        {"kind": "dielectric", "ior": 0.5},
+        r"material.ior is 0.5: an index of refraction must",
+    ),
+    (
+        "spheres.0.material",
+        {"kind": "conductor", "roughness": 0},
+        r"roughness is 0.0: a roughness must lie in",
+    ),
+    (
+        "quads.0.material",
+        {"kind": "dielectric"},
+        r"scene.quads\[0\].material is dielectric: light passes into c",
+    ),
+    ("room.materials", [None] * 5, r"scene.room.materials is 5 entries: they must be six or none; use null"),
+    (
+        "room.materials",
+        [{"kind": "dielectric"}] + [None] * 5,
+        r"materials\[0\] is dielectric: light passes into",
+    ),
     ("lights.0.power", -1, r"scene.lights\[0\].power is -1.0: power must not be negative"),
 ]
 
@@ -116,6 +186,43 @@ REFUSALS = [
 def test_refuses(path, value, message):
     with pytest.raises(InputError, match=message):
         S.from_json(changed(path, value))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"zenith": (0.0, -1.0, 0.0)},
+            r"environment.zenith is .*: light must not be negative; use 0 or more",
+        ),
+        (
+            {"sun_irradiance": (0.0, -1.0, 0.0)},
+            r"environment.sun_irradiance is .*: light must not be negative",
+        ),
+        (
+            {"sun_direction": (0.0, 0.0, 0.0)},
+            r"environment.sun_direction is .*: it must not be zero; straight up",
+        ),
+        (
+            {"sun_concentration": -1.0},
+            r"environment.sun_concentration is -1.0: it must lie in \[0, 1e\+06\]; 1000 is",
+        ),
+        (
+            {"sun_concentration": float("nan")},
+            r"environment.sun_concentration is nan: all numbers must be finite",
+        ),
+    ],
+)
+def test_refuses_a_sky(change, message):
+    with pytest.raises(InputError, match=message):
+        S.validate(replace(DAY, environment=replace(DAY.environment, **change)))
+
+
+def test_refuses_a_sky_before_a_background():
+    with pytest.raises(
+        InputError, match=r"scene.background is .*: an environment takes the background's place; m"
+    ):
+        S.validate(replace(DAY, background=GREY))
 
 
 @pytest.mark.parametrize("text", ["", "{", "[1]", '"x"', "NaN", "[" * 100_000])

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from itertools import combinations
+
 import pytest
 
 from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.materials import Conductor, Dielectric
 
 
 def test_unknown_canonical_scene_lists_the_known_ones():
-    with pytest.raises(
-        InputError, match=r"scene is teapot: .* known are minicubes, cornell, furnace, lone_light, empty"
-    ):
+    known = ", ".join(scenes.CANONICAL)
+    with pytest.raises(InputError, match=f"scene is teapot: .* known are {known}"):
         scenes.canonical("teapot")
     with pytest.raises(
         InputError, match="parameter size is 3: minicubes has none such; known are time, warm, cool"
@@ -40,3 +43,31 @@ def test_minicubes_come_back_after_a_turn_and_differ_in_between():
     start, half, turn = (scenes.minicubes(time=t).boxes[0].center for t in (0.0, 4.0, scenes.TURN_SECONDS))
     assert start == pytest.approx(turn, abs=1e-14)  # cos and sin of 2 pi: some ulps of 1
     assert max(abs(a - b) for a, b in zip(start, half, strict=True)) > 0.5
+
+
+@pytest.mark.parametrize("time", [0.0, 0.9, 2.1, 5.0])
+def test_glossy_turns_inside_its_room_and_no_bodies_meet(time):
+    """The bodies stand on the table without touching it, and none reaches into another: spheres around them
+    differ.
+    """
+    scene = scenes.glossy(time=time)
+    table, *blocks = scene.boxes
+    around = [(s.center, s.radius) for s in scene.spheres]
+    around += [(b.center, math.hypot(b.half_extent[0], b.half_extent[2])) for b in blocks]
+    for (a, r), (b, q) in combinations(around, 2):
+        assert math.dist(a, b) > r + q
+    for center, radius in around:
+        assert math.hypot(center[0], center[2]) + radius < 2.0
+    top = table.center[1] + table.half_extent[1]
+    assert min(s.center[1] - s.radius for s in scene.spheres) > top
+    assert min(b.center[1] - b.half_extent[1] for b in blocks) > top
+
+
+def test_glossy_has_every_material_and_its_parameters():
+    scene = scenes.canonical("glossy", roughness=0.5, ior=1.7)
+    materials = [part.material for part in (*scene.boxes, *scene.spheres, *scene.quads)]
+    assert {m.kind for m in materials if m} == {"conductor", "dielectric", "mirror"}
+    assert {m.ior for m in materials if isinstance(m, Dielectric)} == {1.7}
+    assert 0.5 in {m.roughness for m in materials if isinstance(m, Conductor)}
+    with pytest.raises(InputError, match=r"scene.boxes\[2\].material.ior is 5: an index of refraction"):
+        scenes.canonical("glossy", ior=5)

@@ -5,7 +5,7 @@ verdict does not change from run to run; the significance says how lucky the see
 comparisons, each is held to the level that Sidak's correction gives [`sidak`], so that the chance of any
 false alarm stays at the stated one. Follows Nori's and Mitsuba's habit of testing samplers and renderers by
 hypothesis tests, and Jung, Hanika and Dachsbacher, "Detecting Bias in Monte Carlo Renderers using Welch's
-t-test", JCGT 9(2), 2020.
+t-test", JCGT 9(2), 2020. SciPy's distributions are the oracle of kernels/welch.py, which does without.
 """
 
 from __future__ import annotations
@@ -13,16 +13,13 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
+from wamnet.kernels.welch import sidak as sidak
+
 SIGNIFICANCE = 0.01
 """Chance of a false alarm of one test function, over all its comparisons."""
 
 LEAST_EXPECTED = 5.0
 """Cells of a chi-square test with a lower expected count are pooled: the usual rule for its approximation."""
-
-
-def sidak(significance: float, comparisons: int) -> float:
-    """Return the level of each of several comparisons that together have the given significance."""
-    return float(-np.expm1(np.log1p(-significance) / comparisons))
 
 
 def chi_square_p(observed: np.ndarray, expected: np.ndarray) -> float:

@@ -1,0 +1,279 @@
+"""A scene for Mitsuba 3, the peer of the benchmarks: the same picture from another renderer.
+
+1. [`open_mitsuba`] imports Mitsuba in one of its variants and adds the sensor of step 4.
+2. [`export`] turns a scene into Mitsuba's dictionary, shape by shape; [`check`] refuses what has no
+   counterpart.
+3. Transport is Mitsuba's integrator `path`: light samples and BSDF samples combined by the power heuristic,
+   as in refimpl/transport.py, without Russian roulette. It counts edges of a path where wamnet counts
+   scatterings: `max_depth` is one more. Reflectances and radiances are taken as they are (linear RGB).
+4. A room's wall is only there for rays that leave through it; Mitsuba's walls are there for all. Within a
+   room that holds everything, both are the same for all rays but those of a camera outside. The sensor of
+   [`_sensor_class`] moves their origins to where they enter the room; all else is Mitsuba's own pinhole
+   camera. No surface is added and no path gets longer, so that the peer's speed is its own.
+5. [`render`] gives the mean colours as wamnet's frames have them: rows from the top, one-pixel box filter.
+
+Mitsuba: Jakob et al., "Mitsuba 3 renderer", https://mitsuba-renderer.org, its documentation of plugins.
+"""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+from typing import Any
+
+import numpy as np
+
+from wamnet.refimpl.errors import ExecutorUnavailable, InputError
+from wamnet.refimpl.intersection import light_radiance
+from wamnet.refimpl.scene import Box, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.transport import Settings
+
+LEAST_LLVM = 16
+"""First version of LLVM that compiles Dr.Jit's code for AVX-512; earlier ones end the process."""
+
+ENTRY_OFFSET = 1e-4
+"""How far behind the entry into the room a ray starts, in the distance to it: float32 rounds to 6e-8 of the
+distance, and the slice that is lost is thinner than anything in the scenes."""
+
+BACK_TO_BACK = 1e-4
+"""Distance of the two sides of a quad that emits, in its shorter edge: Mitsuba's lights emit to one side."""
+
+
+def open_mitsuba(variant: str) -> Any:
+    """Return the module `mitsuba`, set to a variant: scalar_rgb, or llvm_ad_rgb, which needs LLVM."""
+    try:
+        mi = importlib.import_module("mitsuba")
+    except ImportError:
+        raise ExecutorUnavailable(
+            "mitsuba: the package is not installed; pip install 'wamnet[bench]'"
+        ) from None
+    if variant.startswith("llvm"):
+        _check_llvm()
+    mi.set_variant(variant)
+    mi.register_sensor("wamnet_inside", _sensor_class(mi))
+    return mi
+
+
+def _check_llvm() -> None:
+    """Refuse a libLLVM that is missing or too old, before it ends the process."""
+    version = importlib.import_module("drjit").detail.llvm_version()[0]
+    if version < LEAST_LLVM:
+        found = f"LLVM {version}" if version > 0 else "none"
+        raise ExecutorUnavailable(
+            f"mitsuba: its LLVM variant needs libLLVM {LEAST_LLVM} or newer and finds {found}; apt-get "
+            "install libllvm19, or name the library's file in DRJIT_LIBLLVM_PATH"
+        )
+
+
+# ---- the scene ---------------------------------------------------------------------------------------------
+
+
+def check(scene: Scene, settings: Settings) -> None:
+    """Refuse a scene or settings that Mitsuba would show differently."""
+    if settings.roulette_depth is not None or settings.strategy != "mis" or settings.heuristic != "power":
+        rule = "the peer combines both strategies by the power heuristic, without roulette"
+        raise InputError("settings", settings, rule, "use the default ones but for max_depth")
+    materials = [part.material for part in (*scene.boxes, *scene.spheres, *scene.quads)]
+    materials += scene.room.materials if scene.room is not None else ()
+    if any(material is not None for material in materials):
+        rule = "only matt surfaces are exported"
+        raise InputError("scene with materials", scene.name, rule, "compare a scene without")
+    if scene.environment is not None:
+        rule = "no sky is exported"
+        raise InputError("scene with a sky", scene.name, rule, "compare a scene without")
+    parts: tuple[Box | Sphere | Quad | Light, ...] = (
+        *scene.boxes,
+        *scene.spheres,
+        *scene.quads,
+        *scene.lights,
+    )
+    for part in parts:
+        if scene.room is not None and not _holds(scene.room, part):
+            rule = "in a room that is seen from outside nothing may reach out of it"
+            raise InputError("primitive", part, rule, "make the room larger, or leave it out")
+        if isinstance(part, (Box, Sphere)) and _surrounds(part, scene.camera.position):
+            raise InputError(
+                "camera inside", part, "Mitsuba shows solids from outside", "move the camera out"
+            )
+
+
+def _holds(room: Room, part: Box | Sphere | Quad | Light) -> bool:
+    """Tell whether a primitive lies within the room, but for rounding."""
+    low, high = _extent(part)
+    slack = 1e-6 * (np.array(room.high) - room.low)
+    return bool(np.all(low >= room.low - slack) and np.all(high <= room.high + slack))
+
+
+def _within(room: Room, point: Any) -> bool:
+    """Tell whether a point (3,) lies in the room."""
+    return bool(np.all(np.array(point) >= room.low) and np.all(np.array(point) <= room.high))
+
+
+def _extent(part: Box | Sphere | Quad | Light) -> tuple[Any, Any]:
+    """Return the least and the greatest corner (3,) of a primitive."""
+    if isinstance(part, (Box, Sphere)):
+        reach = part.radius if isinstance(part, Sphere) else np.abs(part.rotation).T @ part.half_extent
+        return part.center - np.asarray(reach), part.center + np.asarray(reach)
+    edges = np.array([part.edge_u, part.edge_v])
+    corners = np.array([part.corner + np.array(ab) @ edges for ab in itertools.product((0, 1), repeat=2)])
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def _surrounds(part: Box | Sphere, point: Any) -> bool:
+    """Tell whether a point (3,) lies inside a solid."""
+    offset = np.array(point) - part.center
+    if isinstance(part, Sphere):
+        return bool(np.linalg.norm(offset) <= part.radius)
+    return bool(np.all(np.abs(np.array(part.rotation) @ offset) <= part.half_extent))
+
+
+def export(mi: Any, scene: Scene, width: int, height: int, settings: Settings) -> dict[str, Any]:
+    """Return the scene as a dictionary for `mitsuba.load_dict`."""
+    check(scene, settings)
+    path = {"type": "path", "max_depth": settings.max_depth + 1, "rr_depth": settings.max_depth + 2}
+    made = {"type": "scene", "integrator": path, "sensor": _sensor(mi, scene, width, height)}
+    for wall, (corner, edge_u, edge_v) in enumerate(_walls(scene.room) if scene.room else ()):
+        assert scene.room is not None
+        look = _look(scene.room.reflectances[wall], scene.room.emission)
+        made[f"wall_{wall}"] = _rectangle(mi, corner, edge_u, edge_v, look)
+    for i, box in enumerate(scene.boxes):
+        axes = np.array(box.rotation).T * box.half_extent
+        look = _look(box.reflectance, box.emission)
+        made[f"box_{i}"] = {"type": "cube", "to_world": _matrix(mi, axes, box.center), **look}
+    for i, ball in enumerate(scene.spheres):
+        place = {"center": list(ball.center), "radius": ball.radius}
+        made[f"sphere_{i}"] = {"type": "sphere", **place, **_look(ball.reflectance, ball.emission)}
+    for i, quad in enumerate(scene.quads):
+        made |= _two_sided(mi, f"quad_{i}", quad)
+    for i, light in enumerate(scene.lights):
+        look = _look((0.0, 0.0, 0.0), light_radiance(light))
+        made[f"light_{i}"] = _rectangle(mi, light.corner, light.edge_u, light.edge_v, look)
+    if any(scene.background):
+        made["background"] = {"type": "constant", "radiance": _rgb(scene.background)}
+    return made
+
+
+def _walls(room: Room) -> list[tuple[Any, Any, Any]]:
+    """Return corner and edges (3,) of the walls, in the order of WALLS, whose normals point inwards."""
+    low, edges = np.array(room.low), np.diag(np.subtract(room.high, room.low))
+    walls = []
+    for axis in range(3):
+        u, v = edges[(axis + 1) % 3], edges[(axis + 2) % 3]
+        walls += [(low, u, v), (low + edges[axis], v, u)]
+    return walls
+
+
+def _two_sided(mi: Any, name: str, quad: Quad) -> dict[str, Any]:
+    """Return the shape of a quad that reflects on both sides, or two shapes if it emits on both."""
+    if not any(quad.emission):
+        look = {"bsdf": {"type": "twosided", "nested": _look(quad.reflectance)["bsdf"]}}
+        return {name: _rectangle(mi, quad.corner, quad.edge_u, quad.edge_v, look)}
+    u, v = np.array(quad.edge_u), np.array(quad.edge_v)
+    normal = np.cross(u, v)
+    apart = normal / np.linalg.norm(normal) * (0.5 * BACK_TO_BACK * min(np.linalg.norm(u), np.linalg.norm(v)))
+    look = _look(quad.reflectance, quad.emission)
+    return {
+        f"{name}_front": _rectangle(mi, quad.corner + apart, u, v, look),
+        f"{name}_back": _rectangle(mi, quad.corner - apart, v, u, look),
+    }
+
+
+def _rectangle(mi: Any, corner: Any, edge_u: Any, edge_v: Any, look: dict[str, Any]) -> dict[str, Any]:
+    """Return a parallelogram that faces the side of edge_u x edge_v; Mitsuba's spans [-1, 1]^2 at z = 0."""
+    u, v = 0.5 * np.array(edge_u), 0.5 * np.array(edge_v)
+    normal = np.cross(u, v)
+    axes = np.stack([u, v, normal / np.linalg.norm(normal)], axis=1)
+    return {"type": "rectangle", "to_world": _matrix(mi, axes, np.array(corner) + u + v), **look}
+
+
+def _look(reflectance: Any, emission: Any = (0.0, 0.0, 0.0)) -> dict[str, Any]:
+    """Return a shape's material and, if it emits, its emitter."""
+    look: dict[str, Any] = {"bsdf": {"type": "diffuse", "reflectance": _rgb(reflectance)}}
+    if any(emission):
+        look["emitter"] = {"type": "area", "radiance": _rgb(emission)}
+    return look
+
+
+def _rgb(color: Any) -> dict[str, Any]:
+    """Return linear RGB as Mitsuba's variants *_rgb take it: unchanged."""
+    return {"type": "rgb", "value": [float(c) for c in color]}
+
+
+def _matrix(mi: Any, axes: Any, origin: Any) -> Any:
+    """Return the map from local coordinates to axes (3, 3; columns) at origin (3,)."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = axes, origin
+    return mi.ScalarTransform4f(matrix)
+
+
+# ---- the camera --------------------------------------------------------------------------------------------
+
+
+def _sensor(mi: Any, scene: Scene, width: int, height: int) -> dict[str, Any]:
+    """Return the camera; outside a room, the one whose rays start inside."""
+    camera = scene.camera
+    film = {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb"}
+    parts = {
+        "film": {**film, "component_format": "float32", "rfilter": {"type": "box"}},
+        "sampler": {"type": "independent"},
+    }
+    place = {"origin": list(camera.position), "target": list(camera.look_at), "up": list(camera.up)}
+    pinhole = {
+        "type": "perspective",
+        "fov_axis": "y",
+        "fov": camera.vertical_fov_deg,
+        "near_clip": 1e-6,
+        "to_world": mi.ScalarTransform4f().look_at(**place),
+        **parts,
+    }
+    if scene.room is None or _within(scene.room, camera.position):
+        return pinhole
+    room = {f"{end}_{k}": getattr(scene.room, end)[i] for end in ("low", "high") for i, k in enumerate("xyz")}
+    return {"type": "wamnet_inside", "pinhole": pinhole, **room, **parts}
+
+
+def _sensor_class(mi: Any) -> Any:
+    """Return the class of the sensor whose rays start where those of a pinhole camera enter a room."""
+    dr = importlib.import_module("drjit")
+
+    class Inside(mi.Sensor):  # type: ignore[misc]
+        """The rays of the sensor `pinhole`, from their entry into the room low_x .. high_z on."""
+
+        def __init__(self, given: Any) -> None:
+            super().__init__(given)
+            self.pinhole = given["pinhole"]
+            self.low, self.high = (
+                mi.Point3f(*(given[f"{end}_{k}"] for k in "xyz")) for end in ("low", "high")
+            )
+
+        def _enter(self, ray: Any) -> Any:
+            """Return the ray from its entry on; a ray that misses the room, or starts in it, as it is."""
+            a, b = (self.low - ray.o) / ray.d, (self.high - ray.o) / ray.d
+            near, far = dr.max(dr.minimum(a, b)), dr.min(dr.maximum(a, b))
+            t = dr.select((near <= far) & (near > 0.0), near * (1.0 + ENTRY_OFFSET), 0.0)
+            ray.o = ray(t)
+            return ray
+
+        def sample_ray(self, *sample: Any, **named: Any) -> Any:
+            ray, weight = self.pinhole.sample_ray(*sample, **named)
+            return self._enter(ray), weight
+
+        def sample_ray_differential(self, *sample: Any, **named: Any) -> Any:
+            ray, weight = self.sample_ray(*sample, **named)
+            return mi.RayDifferential3f(ray), weight
+
+        def traverse(self, visitor: Any) -> None:
+            """Nothing here is to be changed or differentiated."""
+
+        def to_string(self) -> str:
+            return "Inside[]"
+
+    return Inside
+
+
+# ---- the picture -------------------------------------------------------------------------------------------
+
+
+def render(mi: Any, loaded: Any, spp: int, seed: int) -> Any:
+    """Return the mean colours (H, W, 3), rows from the top, of a loaded scene; waits until they are there."""
+    return np.array(mi.render(loaded, spp=spp, seed=seed))

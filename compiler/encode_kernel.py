@@ -1,0 +1,195 @@
+"""Compile the encoding of features for a target: passes, source, artifact.
+
+1. Trace the encoding of the features [`lower_encode.lower_encode`], and run the passes of the profile.
+2. Emit one statement an operation between the loads of the planes and the stores of the channels [`_emit`].
+3. Put both together with a manifest [`compile_encode`].
+
+Colour may have any size before it is clipped, so there is no bound over all sums; at given sums the rules of
+bounds.py give one for every channel of every pixel [`error_at`].
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..refimpl.dataset import FEATURES, Normalization
+from ..refimpl.errors import CompileError
+from . import bounds, ir, profiles
+from .compile import sine_contract, target_named
+from .encode_dialect import ENCODE_DIALECTS, EncodeDialect
+from .ir import Image, Program
+from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
+from .passes import pipeline
+
+SCHEMA = "wamnet-encode-kernel-1"
+"""Name and version of the manifest's form; described in spec/pipeline.md."""
+
+
+@dataclass(frozen=True)
+class EncodeArtifact:
+    """A compiled encoding; `program` is what was emitted, from `planes` of sums it makes `images`."""
+
+    target: str
+    profile: str
+    entry_point: str
+    source: str
+    source_name: str
+    program: Program
+    planes: tuple[str, ...]
+    images: tuple[Image, ...]
+    manifest: Mapping[str, Any]
+
+    @property
+    def digest(self) -> str:
+        """Return the hash that names this artifact: of its source."""
+        return str(self.manifest["digest"])
+
+    def contents(self) -> Mapping[str, bytes]:
+        """Return the files besides the manifest, by name."""
+        return {self.source_name: self.source.encode()}
+
+
+def compile_encode(
+    features: Sequence[str],
+    normalization: Normalization,
+    target: str,
+    profile: str = "ieee",
+    planes: Sequence[str] | None = None,
+) -> EncodeArtifact:
+    """Return the kernel that turns sums over samples into the encoded images of features.
+
+    `planes` are those that the sums have, in order; by default the features' own alone.
+    """
+    chosen, promised = target_named(target), profiles.profile_named(profile)
+    program = pipeline.run(lower_encode(features, normalization), promised.passes)
+    planes = tuple(planes or planes_of(features))
+    lacking = set(planes_of(features)) - set(planes)
+    if lacking:
+        raise CompileError(
+            f"the sums have no planes {', '.join(sorted(lacking))}: the features {', '.join(features)} are "
+            "made of them; let the path kernel add them up"
+        )
+    known = [FEATURES[name] for name in features]
+    images = tuple(Image(f.name, f.channels, f.low, f.high, f.encoding(normalization)) for f in known)
+    dialect = ENCODE_DIALECTS.get(target)
+    arguments = dialect.encode_arguments if dialect else chosen.schedules[0].arguments
+    arguments = arguments.format(planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
+    header = _header(program, images, dialect.language if dialect else chosen.language, arguments)
+    if dialect is None:
+        text = "".join(f"# {line}".rstrip() + "\n" for line in header) + ir.text(program)
+        entry = chosen.entry
+    else:
+        bounded = promised.sine is not None
+        text, entry = _emit(program, dialect, planes, images, header, bounded), dialect.entry
+    name = f"encode{chosen.suffix}"
+    manifest = {
+        "schema": SCHEMA,
+        "digest": ir.sha256(text.encode()),
+        "program": ir.digest(program),
+        "target": target,
+        "language": chosen.language,
+        "entry_point": entry,
+        "profile": {"name": promised.name, "text": promised.text},
+        "passes": [*PASSES, *promised.passes],
+        "planes": list(planes),
+        "images": [asdict(image) for image in images],
+        "arguments": arguments,
+        "bound": None,
+        "files": {name: ir.sha256(text.encode())},
+    }
+    return EncodeArtifact(target, profile, entry, text, name, program, planes, images, manifest)
+
+
+def error_at(
+    artifact: EncodeArtifact, sums: Mapping[str, Any], samples: int
+) -> dict[str, NDArray[np.float64]]:
+    """Return the bound (H, W, C) of each image's error against float64, at planes of sums (H, W) by name."""
+    names = planes_of([image.name for image in artifact.images])
+    inputs = {name: np.asarray(sums[name], np.float64) for name in names}
+    inputs[SAMPLES] = np.full(inputs[names[0]].shape, float(samples))
+    contract = sine_contract(artifact.profile, artifact.target)
+    boxes = {name: (value, value) for name, value in inputs.items()}
+    found = bounds.enclose(artifact.program, boxes, contract)
+    errors = {name: found[index].read for name, index in artifact.program.outputs}
+    return {
+        image.name: np.stack([errors[channel_name(image.name, c)] for c in range(image.channels)], axis=-1)
+        for image in artifact.images
+    }
+
+
+def _header(program: Program, images: Sequence[Image], language: str, arguments: str) -> list[str]:
+    """Return the lines of the comment at the top of the source."""
+    described = [f"{i.name}: {i.channels} channels in {i.range_text}, {i.encoding}" for i in images]
+    first, *others = arguments.split("\n")
+    return [
+        f"wamnet encoding of features, {language}. Generated: change the compiler, not this text.",
+        f"program   {ir.digest(program)[:32]}",
+        f"images    {described[0]}",
+        *(f"          {line}" for line in described[1:]),
+        "bound     at given sums: see the rules for each operation",
+        f"arguments {first}",
+        *(f"          {line}" for line in others),
+    ]
+
+
+def _emit(
+    program: Program,
+    dialect: EncodeDialect,
+    planes: Sequence[str],
+    images: Sequence[Image],
+    header: Sequence[str],
+    bounded: bool,
+) -> str:
+    """Return the kernel's source; `header` are the lines of the comment at its top.
+
+    `bounded`: the language must keep the order of operations, on which bounds rest.
+    """
+    lines = []
+    for name in planes_of([image.name for image in images]):
+        number = planes.index(name)
+        buffer, component = divmod(number, dialect.planes_per_input)
+        lines.append(dialect.load.format(plane=number, name=name, buffer=buffer, component=component))
+    texts = _statements(program, dialect, lines)
+    outputs = dict(program.outputs)
+    for image in images:
+        for channel in range(image.channels):
+            value = texts[outputs[channel_name(image.name, channel)]]
+            store = dialect.image_store
+            place = {"image": image.name, "channels": image.channels, "channel": channel}
+            lines.append(store.format(value=value, **place))
+    declared = [
+        dialect.output_declaration.format(image=image.name, location=location)
+        for location, image in enumerate(images)
+    ]
+    inputs = range(-(-len(planes) // dialect.planes_per_input))
+    begin = dialect.encode_begin.format(
+        entry=dialect.entry,
+        inputs="\n".join(dialect.input_declaration.format(buffer=buffer) for buffer in inputs),
+        outputs=dialect.output_separator.join(declared),
+        unordered=dialect.unordered[bounded],
+    )
+    comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
+    body = [f"    {line}" for line in lines]
+    return "\n".join([*comment, begin, *body, dialect.encode_end.format()]) + "\n"
+
+
+def _statements(program: Program, dialect: EncodeDialect, lines: list[str]) -> list[str]:
+    """Write one statement for each operation; return the text of each value."""
+    texts: list[str] = []
+    for index, node in enumerate(program.nodes):
+        if node.op == "input":
+            texts.append(str(node["name"]))
+        elif node.op == "constant":
+            texts.append(dialect.constant(node))
+        else:
+            kind = program.nodes[node.args[-1]].type.dtype
+            expression = dialect.expression(node, kind, [texts[arg] for arg in node.args])
+            lines.append(f"{dialect.variable(node.type.dtype)} t{index} = {expression};")
+            texts.append(f"t{index}")
+    return texts

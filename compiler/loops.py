@@ -1,0 +1,71 @@
+"""Loops in a program: which nodes are a loop's body, by what they depend on.
+
+A loop number l over the rows of constant tables is made of three kinds of nodes (ops.py):
+
+1. `carried` {index, loop}: a number that goes from trip to trip; its operand is what it starts from.
+2. `row` {loop, table}: the table's entry of the trip, the same in all lanes.
+3. `loop` {index, loop, trips}: carried number `index` after all trips; its operands are all carried numbers,
+   and then what each of them becomes in a trip.
+
+The body is what depends on a carried number or a row [`bodies`]. What does not is computed once, before the
+loop, wherever it was written: nothing has to be hoisted, and passes that copy node by node need not know of
+loops. Those that execute or print a program walk through it and meet each loop where its first result stands
+[`loops`]. Loops do not nest, and a body's values are seen from outside as results alone; the verifier sees to
+both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .ir import Node, Program
+
+
+def bodies(program: Program) -> Sequence[frozenset[int]]:
+    """Return, for each node, the loops in whose bodies it is: none or one in a verified program."""
+    inside: list[frozenset[int]] = []
+    for node in program.nodes:
+        found = frozenset[int]().union(*(inside[arg] for arg in node.args))
+        if node.op in ("carried", "row"):
+            found |= {loop_number(node)}
+        inside.append(found - {loop_number(node)} if node.op == "loop" else found)
+    return inside
+
+
+def loop_number(node: Node) -> int:
+    """Return the number of the loop to which a node belongs."""
+    return int(node["loop"])  # type: ignore[arg-type]
+
+
+def split(node: Node) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return a loop's carried numbers, and what they become in a trip, as indices."""
+    half = len(node.args) // 2
+    return node.args[:half], node.args[half:]
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop as a walk through the nodes meets it: at the first of its results."""
+
+    number: int
+    trips: int
+    carried: tuple[int, ...]
+    after: tuple[int, ...]
+    body: tuple[int, ...]
+
+
+def loops(program: Program) -> tuple[dict[int, Loop], frozenset[int]]:
+    """Return the loops by the index of their first results, and the indices of all nodes in bodies.
+
+    Carried numbers, which are there before the first trip, are in no body.
+    """
+    inside = bodies(program)
+    kept = [i for i, node in enumerate(program.nodes) if inside[i] and node.op != "carried"]
+    found: dict[int, Loop] = {}
+    for index, node in enumerate(program.nodes):
+        if node.op == "loop" and loop_number(node) not in {loop.number for loop in found.values()}:
+            number = loop_number(node)
+            body = tuple(i for i in kept if number in inside[i] and i < index)
+            found[index] = Loop(number, int(node["trips"]), *split(node), body)  # type: ignore[arg-type]
+    return found, frozenset(kept)

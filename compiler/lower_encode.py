@@ -1,0 +1,69 @@
+"""From features to the program that encodes a pixel: trace the reference's own encodings [`lower_encode`].
+
+It stands between a path kernel, which leaves sums over the samples, plane by plane, and a denoiser's kernel,
+which reads encoded feature images. Its inputs are the planes by name, and `samples`; its outputs the channels
+of the images, `color_0` and so on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..refimpl import vectors
+from ..refimpl.dataset import FEATURES, Normalization, check_features, check_normalization, encode_sums
+from .emit_path import GROUPS
+from .ir import Program, Type
+from .passes import pipeline
+from .trace import trace
+from .verify import verify
+
+PASSES = ("scalarize", "fold", "eliminate_dead")
+"""What the program goes through: numbers in place of vectors, constants in float64, rounded when emitted."""
+
+SAMPLES = "samples"
+"""The input beside the planes: how many samples they are sums of."""
+
+
+def layers_of(features: Sequence[str]) -> tuple[str, ...]:
+    """Return the layers that features are made of: the groups of planes that a path kernel has to add up."""
+    check_features(features)
+    return tuple(FEATURES[name].layer for name in features)
+
+
+def planes_of(features: Sequence[str]) -> tuple[str, ...]:
+    """Return the planes that features are made of, in the order in which a path kernel writes them."""
+    return tuple(plane for layer in layers_of(features) for plane in GROUPS[layer])
+
+
+def channel_name(feature: str, channel: int) -> str:
+    """Return the name of the output that is a channel of a feature's image."""
+    return f"{feature}_{channel}"
+
+
+def lower_encode(features: Sequence[str], normalization: Normalization) -> Program:
+    """Return the program that turns a pixel's sums into its encoded features."""
+    check_normalization(normalization)
+    inputs = (*planes_of(features), SAMPLES)
+
+    def encode(*numbers: Any) -> dict[str, Any]:
+        given = dict(zip(inputs, numbers, strict=True))
+        sums = {layer: _joined([given[plane] for plane in GROUPS[layer]]) for layer in layers_of(features)}
+        return _channels(encode_sums(sums, given[SAMPLES], features, normalization))
+
+    program = trace(encode, dict.fromkeys(inputs, Type()))
+    return pipeline.run(verify(program, "traced encoding"), PASSES)
+
+
+def _joined(numbers: Sequence[Any]) -> Any:
+    """Join a layer's channels; a single one stays a number."""
+    return vectors.vector(*numbers) if len(numbers) == 3 else numbers[0]
+
+
+def _channels(encoded: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the channels of encoded features by name."""
+    return {
+        channel_name(name, channel): value[..., channel] if FEATURES[name].channels > 1 else value
+        for name, value in encoded.items()
+        for channel in range(FEATURES[name].channels)
+    }

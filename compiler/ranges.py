@@ -1,0 +1,557 @@
+"""What an executor may compute: for each value of a program, in each lane, an interval that holds it.
+
+1. A value has a range [low, high] that holds what every executor computes that keeps the promises of an
+   `Arithmetic`; inputs are exact, so their ranges are points [`Range`].
+2. Each operation has a rule: from the ranges of its operands to its own [`RULES`]. Rounding to nearest is
+   monotone, so the ends of a sum, rounded, are the ends of the rounded sums, and what is computed exactly
+   stays a point [`_nearest`]. Functions that the target only approximates widen the ends by their promise.
+3. A decision is certain where the ranges of what is compared do not overlap; else it is *undecided*: false
+   and true, and a selection by it has a range that holds both branches [`_compare`, `_select`]. Truth values
+   are ordered, false before true, which makes "and" and "or" Kleene's three-valued ones.
+4. Beside its range a value knows whether an undecided decision has a say in it [`Range.sure`]: a box behind
+   the nearest surface may be undecided, and the distance is sure all the same.
+5. Beside it goes the float32 reference's own value (`plain`). Evaluated `guided`, decisions that are
+   undecided fall as the reference's, which gives the range of the executors that decide as it does.
+6. No finite range: an infinity, and NaN after it, may be there. Decisions on it are undecided.
+
+The rules run in float64. Its rounding, 2**-53 of each result, is covered by widening ends by 2**-51 before
+they are rounded [`SLACK`]. Interval arithmetic: Moore, "Interval Analysis", 1966, chapter 3; rounding and
+fused operations: IEEE 754-2008, sections 4.3 and 5.4.1; Kleene's logic: Kleene, "Introduction to
+Metamathematics", 1952, section 64.
+
+The programs evaluated are those before `expand_sine`: a sine is one node, with its contract. Single steps of
+a path have useful ranges; a whole path has none, since each bounce multiplies an error by distance over size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..refimpl.errors import CompileError
+from .bounds import OUTWARD, power_error, sine_range
+from .interpret import apply, element
+from .ir import Node, Program
+from .loops import Loop, loops
+from .ops import LOOPS
+from .profiles import (
+    EMITTED_COSINE,
+    EMITTED_SINE,
+    FLUSH,
+    LARGEST_DIVISOR,
+    RELATIVE_ERROR,
+    SineContract,
+)
+
+SLACK = 2.0**-51
+"""Relative widening of an end: float64's rounding of an operation, and of the widening, twice."""
+
+SINE_SLACK = 2.0**-38
+"""Absolute widening of a sine's ends: float64's sine, and pi / 2 added to arguments of [`SLACK_DOMAIN`]."""
+
+SLACK_DOMAIN = 2.0**14
+"""Largest argument of a sine, in radians, that has a range: adding pi / 2 in float64 is off by 2**-39."""
+
+
+@dataclass(frozen=True)
+class Arithmetic:
+    """What executors promise. `division` and `root`: relative error, None: correctly rounded.
+
+    `fused`: a sum may take a product that it reads unrounded.
+    """
+
+    text: str
+    division: float | None
+    root: float | None
+    fused: bool
+    sine: SineContract
+    cosine: SineContract
+
+
+PROMISED = Arithmetic(
+    "round to nearest, fused multiply-add allowed, a / b to 2.5 ulp, sqrt to 5 ulp, emitted sine and cosine",
+    RELATIVE_ERROR["divide"],
+    RELATIVE_ERROR["sqrt"],
+    True,
+    EMITTED_SINE,
+    EMITTED_COSINE,
+)
+"""Profile `ieee` (profiles.py): what every target is held to, in the order that the program has."""
+
+CORRECT = Arithmetic(
+    "every operation correctly rounded, nothing fused", None, None, False, EMITTED_SINE, EMITTED_COSINE
+)
+"""IEEE 754 without freedom. On programs after `expand_sine` all ranges are points: equality to the bit."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """Ranges over lanes (...): ends in float64, integers and truth values in their own kind.
+
+    `plain` (...) is the float32 reference's value. `sure` (...) says that no undecided decision has a say.
+    `product` holds the ends before rounding where the value is a product.
+    """
+
+    low: Any
+    high: Any
+    plain: Any
+    sure: Any = np.True_
+    product: tuple[Any, Any] | None = None
+
+    @property
+    def point(self) -> Any:
+        """Return where (...) there is one value only."""
+        return self.low == self.high
+
+    @property
+    def known(self) -> Any:
+        """Return where (...) the range is finite."""
+        return np.isfinite(self.low) & np.isfinite(self.high)
+
+    def holds(self, found: Any) -> Any:
+        """Return where (...) a value found lies in the range; NaN does nowhere."""
+        return (self.low <= found) & (found <= self.high)
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a rule may look at beside its operands: node, tables, promises, the reference's result.
+
+    `plain` (...) is what the reference computes; `guided` says that undecided decisions fall as there.
+    """
+
+    node: Node
+    parameters: Mapping[str, Any]
+    arithmetic: Arithmetic
+    plain: Any
+    guided: bool
+
+
+Rule = Callable[[Context, list[Range]], Range]
+
+
+def evaluate(
+    program: Program, inputs: Mapping[str, Any], arithmetic: Arithmetic = PROMISED, guided: bool = False
+) -> dict[str, Range]:
+    """Return the range of each output for inputs (...), exact numbers or ranges by name."""
+    run = _Run(program, inputs, arithmetic, guided, [None] * len(program.nodes))
+    ends, in_bodies = loops(program)
+    unread = _last_reads(program, in_bodies)
+    # Numbers that are too large or no numbers are recognised by their value [`_whole`].
+    with np.errstate(all="ignore"):
+        for index in range(len(program.nodes)):
+            if index in ends:
+                run.loop(ends[index])
+            if index not in in_bodies:
+                run.found[index] = run.node(index)
+            for done in unread[index]:
+                run.found[done] = None
+    return {name: run.found[index] for name, index in program.outputs}
+
+
+def _last_reads(program: Program, in_bodies: frozenset[int]) -> list[list[int]]:
+    """Return, for each node, the nodes that it is the last to read: their arrays can be forgotten.
+
+    What a loop reads is kept: it is read again in the next trip.
+    """
+    last: dict[int, int] = {}
+    for index, node in enumerate(program.nodes):
+        last.update(dict.fromkeys(node.args, index))
+    kept = {index for _, index in program.outputs}
+    for index, node in enumerate(program.nodes):
+        if index in in_bodies or node.op in LOOPS:
+            kept |= {index, *node.args}
+    forgotten: list[list[int]] = [[] for _ in program.nodes]
+    for read, reader in last.items():
+        if read not in kept:
+            forgotten[reader].append(read)
+    return forgotten
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A walk through a program; `found` holds the ranges of its nodes so far."""
+
+    program: Program
+    inputs: Mapping[str, Any]
+    arithmetic: Arithmetic
+    guided: bool
+    found: list[Any]
+
+    def loop(self, loop: Loop) -> None:
+        """Make the trips of a loop, as interpret.py does; the carried numbers are then its results."""
+        for trip in range(loop.trips):
+            for index in loop.body:
+                self.found[index] = self.node(index, trip)
+            after = [self.found[index] for index in loop.after]
+            for index, found in zip(loop.carried, after, strict=True):
+                self.found[index] = found
+
+    def node(self, index: int, trip: int = 0) -> Range:
+        """Return the range of one node."""
+        node, parameters = self.program.nodes[index], self.program.parameters
+        operands = [self.found[arg] for arg in node.args]
+        if node.op == "input":
+            return _given(self.inputs[str(node["name"])], node.type.dtype)
+        if node.op == "constant":
+            return _given(np.asarray(node["value"]), node.type.dtype)
+        if node.op == "row":
+            return _given(parameters[str(node["table"])][trip], node.type.dtype)
+        if node.op == "carried":
+            return operands[0]  # type: ignore[no-any-return]
+        if node.op == "loop":
+            return operands[int(node["index"])]  # type: ignore[no-any-return,arg-type]
+        if node.op not in RULES or node.type.shape:
+            raise CompileError(
+                f"operation {node.op!r} giving {node.type} has no rule for ranges; there are rules for "
+                f"numbers and for: {', '.join(RULES)}; add one to RULES of compiler/ranges.py"
+            )
+        plain = apply(node, [o.plain for o in operands], parameters, np.dtype(np.float32))
+        return RULES[node.op](Context(node, parameters, self.arithmetic, plain, self.guided), operands)
+
+
+def _given(value: Any, dtype: str) -> Range:
+    """Return the point of an exact number, or a range that is given."""
+    if isinstance(value, Range):
+        return value
+    plain = np.asarray(value).astype(element(dtype, np.dtype(np.float32)), copy=False)
+    if dtype != "float32":
+        return Range(plain, plain, plain)
+    return Range(*_flushed(plain.astype(np.float64), plain.astype(np.float64)), plain)
+
+
+# ---- ends -------------------------------------------------------------------------------------------------
+
+
+def _wider(low: Any, high: Any, relative: Any = 0.0) -> tuple[Any, Any]:
+    """Return ends moved outward, relative to their size, by the given amount and float64's rounding."""
+    return low - (relative + SLACK) * np.abs(low), high + (relative + SLACK) * np.abs(high)
+
+
+def _nearest(low: Any, high: Any) -> tuple[Any, Any]:
+    """Return the ends of all numbers of [low, high] rounded to float32; ties may fall on either side."""
+    low, high = (end.astype(np.float32).astype(np.float64) for end in _wider(low, high))
+    return low, high
+
+
+def _made(context: Context, low: Any, high: Any, sure: Any, product: Any = None) -> Range:
+    """Return a range of floats: zero is in it where a number may be flushed; without end if not finite."""
+    low, high = _whole(*_flushed(low, high))
+    return Range(low, high, context.plain, (sure & np.isfinite(low)) | (low == high), product)
+
+
+def _flushed(low: Any, high: Any) -> tuple[Any, Any]:
+    """Return ends with 0 between them where a number between them may be flushed."""
+    small = (low <= FLUSH) & (high >= -FLUSH)
+    return np.where(small, np.minimum(low, 0.0), low), np.where(small, np.maximum(high, 0.0), high)
+
+
+def _whole(low: Any, high: Any) -> tuple[Any, Any]:
+    """Return (-inf, inf) for ends that are not both finite."""
+    finite = np.isfinite(low) & np.isfinite(high)
+    return np.where(finite, low, -np.inf), np.where(finite, high, np.inf)
+
+
+def _all_sure(operands: list[Range]) -> Any:
+    """Return where (...) all operands are sure, and finite: what may be NaN follows no rule."""
+    sure: Any = np.True_
+    for operand in operands:
+        sure = sure & operand.sure & operand.known
+    return sure
+
+
+def _decided(context: Context, low: Any, high: Any, sure: Any) -> Range:
+    """Return the range of a whole number or truth value; guided, an undecided one is the reference's."""
+    point = low == high
+    if context.guided:
+        low, high = np.where(point, low, context.plain), np.where(point, high, context.plain)
+    return Range(low, high, context.plain, sure | point)
+
+
+# ---- arithmetic -------------------------------------------------------------------------------------------
+
+
+def _numbers(real: Rule) -> Rule:
+    """Return the rule of an operation on floats or integers: integers are computed exactly."""
+
+    def rule(context: Context, operands: list[Range]) -> Range:
+        return (real if context.node.type.dtype == "float32" else _integers)(context, operands)
+
+    return rule
+
+
+def _integers(context: Context, operands: list[Range]) -> Range:
+    """Exact for points, modulo 2**32; else every integer of the kind."""
+    limits = np.iinfo(context.node.type.dtype)
+    exact = [
+        apply(context.node, [getattr(o, end) for o in operands], {}, np.dtype(np.float32))
+        for end in ("low", "high")
+    ]
+    points = np.logical_and.reduce(np.broadcast_arrays(*(o.point for o in operands)))
+    low = np.where(points, exact[0], exact[0].dtype.type(limits.min))
+    high = np.where(points, exact[1], exact[1].dtype.type(limits.max))
+    return _decided(context, low, high, _all_sure(operands))
+
+
+def _add(context: Context, operands: list[Range]) -> Range:
+    """[a + c, b + d], rounded; products may come unrounded."""
+    a, b = (_read(context, operand) for operand in operands)
+    return _made(context, *_nearest(a[0] + b[0], a[1] + b[1]), _all_sure(operands))
+
+
+def _subtract(context: Context, operands: list[Range]) -> Range:
+    """[a - d, b - c], rounded; products may come unrounded."""
+    a, b = (_read(context, operand) for operand in operands)
+    return _made(context, *_nearest(a[0] - b[1], a[1] - b[0]), _all_sure(operands))
+
+
+def _read(context: Context, operand: Range) -> tuple[Any, Any]:
+    """Return the ends of what a sum may read: with fusing, a product before or after its rounding."""
+    if operand.product is None or not context.arithmetic.fused:
+        return operand.low, operand.high
+    return np.minimum(operand.low, operand.product[0]), np.maximum(operand.high, operand.product[1])
+
+
+def _multiply(context: Context, operands: list[Range]) -> Range:
+    """The least and the largest product of ends; a square is not negative."""
+    a, b = operands
+    low, high = _corners(a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high)
+    if context.node.args[0] == context.node.args[1]:
+        low = np.where((a.low <= 0) & (a.high >= 0), 0.0, low)
+    return _made(context, *_nearest(low, high), _all_sure(operands), _whole(*_wider(low, high)))
+
+
+def _corners(*values: Any) -> tuple[Any, Any]:
+    """Return the least and the largest of four; NaN if one is."""
+    a, b, c, d = values
+    return np.minimum(np.minimum(a, b), np.minimum(c, d)), np.maximum(np.maximum(a, b), np.maximum(c, d))
+
+
+def _divide(context: Context, operands: list[Range]) -> Range:
+    """The least and the largest quotient of ends, and the promise; none where b may be 0, or huge."""
+    a, b = operands
+    allowed = (b.low > 0) | (b.high < 0)
+    if context.arithmetic.division is not None:
+        allowed = allowed & (np.maximum(np.abs(b.low), np.abs(b.high)) <= LARGEST_DIVISOR)
+    low, high = _corners(a.low / b.low, a.low / b.high, a.high / b.low, a.high / b.high)
+    low, high = _approximate(low, high, context.arithmetic.division)
+    low, high = np.where(allowed, low, -np.inf), np.where(allowed, high, np.inf)
+    return _made(context, low, high, _all_sure(operands) & allowed)
+
+
+def _approximate(low: Any, high: Any, relative: float | None) -> tuple[Any, Any]:
+    """Return ends rounded, or moved outward by the promised error."""
+    return _nearest(low, high) if relative is None else _wider(low, high, relative)
+
+
+def _reciprocal(context: Context, operands: list[Range]) -> Range:
+    """1 / a."""
+    one = np.float64(1.0)
+    return _divide(context, [Range(one, one, one), operands[0]])
+
+
+def _sqrt(context: Context, operands: list[Range]) -> Range:
+    """Monotone, and the promise; none where the operand may be negative."""
+    (a,) = operands
+    low, high = np.sqrt(np.maximum(a.low, 0.0)), np.sqrt(np.maximum(a.high, 0.0))
+    low, high = _approximate(low, high, context.arithmetic.root)
+    low, high = np.where(a.low >= 0, low, -np.inf), np.where(a.low >= 0, high, np.inf)
+    return _made(context, low, high, _all_sure(operands) & (a.low >= 0))
+
+
+def _power(context: Context, operands: list[Range]) -> Range:
+    """Monotone in both, so of the powers of ends, and the promise; none where x may be 0 or below."""
+    x, y = operands
+    low, high = _corners(x.low**y.low, x.low**y.high, x.high**y.low, x.high**y.high)
+    exponent = np.maximum(np.abs(y.low), np.abs(y.high))
+    logarithm = np.maximum(np.abs(np.log2(x.low)), np.abs(np.log2(x.high)))
+    # Float64's own logarithms and powers are right to a few of its units: far below 2**-20 of the promise.
+    low, high = _wider(low, high, power_error(exponent, logarithm) * (1 + OUTWARD))
+    low, high = np.where(x.low > 0, low, -np.inf), np.where(x.low > 0, high, np.inf)
+    return _made(context, low, high, _all_sure(operands) & (x.low > 0))
+
+
+def _sin(context: Context, operands: list[Range]) -> Range:
+    """The sine's range between both arguments, and the contract's error on its domain."""
+    return _wave(context, operands[0], 0.0, context.arithmetic.sine)
+
+
+def _cos(context: Context, operands: list[Range]) -> Range:
+    """cos(x) = sin(x + pi / 2)."""
+    return _wave(context, operands[0], np.pi / 2, context.arithmetic.cosine)
+
+
+def _wave(context: Context, a: Range, shift: float, contract: SineContract) -> Range:
+    """Return the range of sin(a + shift), computed as a contract promises."""
+    own = np.inf if contract.error is None else contract.error + SINE_SLACK
+    domain = min(contract.domain, SLACK_DOMAIN)
+    inside = (np.maximum(np.abs(a.low), np.abs(a.high)) <= domain) & np.isfinite(own)
+    low, high = sine_range(np.asarray(a.low) + shift, np.asarray(a.high) + shift)
+    low, high = np.where(inside, low - own, -np.inf), np.where(inside, high + own, np.inf)
+    return _made(context, low, high, _all_sure([a]) & inside)
+
+
+# ---- exact operations -------------------------------------------------------------------------------------
+
+
+def _negative(context: Context, operands: list[Range]) -> Range:
+    """Exact; a product that is negated may be fused still."""
+    (a,) = operands
+    product = None if a.product is None else (-a.product[1], -a.product[0])
+    return Range(-a.high, -a.low, context.plain, a.sure, product)
+
+
+def _absolute(context: Context, operands: list[Range]) -> Range:
+    """Exact."""
+    (a,) = operands
+    ends = np.abs(a.low), np.abs(a.high)
+    low = np.where((a.low <= 0) & (a.high >= 0), 0.0, np.minimum(*ends))
+    return Range(*_whole(low, np.maximum(*ends)), context.plain, a.sure)
+
+
+def _minimum(context: Context, operands: list[Range]) -> Range:
+    """Exact; only one that may be the least has a say."""
+    a, b = operands
+    sure = (a.sure & (b.sure | (a.high <= b.low))) | (b.sure & (b.high <= a.low))
+    return _chosen(context, operands, np.minimum(a.low, b.low), np.minimum(a.high, b.high), sure)
+
+
+def _maximum(context: Context, operands: list[Range]) -> Range:
+    """Exact; only one that may be the largest has a say."""
+    a, b = operands
+    sure = (a.sure & (b.sure | (a.low >= b.high))) | (b.sure & (b.low >= a.high))
+    return _chosen(context, operands, np.maximum(a.low, b.low), np.maximum(a.high, b.high), sure)
+
+
+def _chosen(context: Context, operands: list[Range], low: Any, high: Any, sure: Any) -> Range:
+    """Return the range of the least or largest; beside NaN either operand may come out."""
+    known = operands[0].known & operands[1].known
+    if context.node.type.dtype == "float32":
+        low, high = np.where(known, low, -np.inf), np.where(known, high, np.inf)
+    return Range(low, high, context.plain, (sure & known) | (low == high))
+
+
+def _floor(context: Context, operands: list[Range]) -> Range:
+    """Monotone; two whole numbers in the range are a decision."""
+    (a,) = operands
+    low, high = np.floor(a.low), np.floor(a.high)
+    return _decided(context, low, high, a.sure & (low == high))
+
+
+def _convert(context: Context, operands: list[Range]) -> Range:
+    """To float: rounded. To an integer: cut off, which is a decision; outside its range it may be any."""
+    (a,), target = operands, context.node.type.dtype
+    if target == "float32":
+        low, high = (np.asarray(end).astype(np.float64) for end in (a.low, a.high))
+        return _made(context, *_nearest(low, high), _all_sure(operands))
+    limits = np.iinfo(target)
+    low, high = (np.trunc(np.asarray(end).astype(np.float64)) for end in (a.low, a.high))
+    inside = (low >= limits.min) & (high <= limits.max)
+    kind = np.dtype(target).type
+    low, high = (np.where(inside, end, 0).astype(np.int64).astype(target) for end in (low, high))
+    low, high = np.where(inside, low, kind(limits.min)), np.where(inside, high, kind(limits.max))
+    return _decided(context, low, high, a.sure & (low == high))
+
+
+def _take(context: Context, operands: list[Range]) -> Range:
+    """The entry at a known index; else from the table's least to its largest."""
+    (index,) = operands
+    table = context.parameters[str(context.node["table"])]
+    wide = table.astype(np.float64) if table.dtype == np.float32 else table
+    last = len(table) - 1
+    at = np.clip(index.low, 0, last)
+    safe = index.point & (index.low == at)
+    low, high = np.where(safe, wide[at], wide.min()), np.where(safe, wide[at], wide.max())
+    return Range(low, high, context.plain, index.sure | (low == high))
+
+
+# ---- decisions --------------------------------------------------------------------------------------------
+
+
+def _compare(certain: Callable[[Range, Range], tuple[Any, Any]]) -> Rule:
+    """Return the rule of a comparison from where it is certainly true, and certainly false."""
+
+    def rule(context: Context, operands: list[Range]) -> Range:
+        a, b = operands
+        true, false = certain(a, b)
+        known = a.known & b.known
+        # False and true are the ends of what is not certain.
+        return _decided(context, true & known, ~(false & known), False)
+
+    return rule
+
+
+def _select(context: Context, operands: list[Range]) -> Range:
+    """The branch that is chosen, or the hull of both."""
+    condition, a, b = operands
+    low = np.where(condition.low, a.low, np.where(condition.high, np.minimum(a.low, b.low), b.low))
+    high = np.where(condition.low, a.high, np.where(condition.high, np.maximum(a.high, b.high), b.high))
+    sure = np.where(condition.low, a.sure, ~condition.high & b.sure)
+    return Range(low, high, context.plain, sure | (low == high))
+
+
+def _and(context: Context, operands: list[Range]) -> Range:
+    """Kleene's: false if one is false."""
+    a, b = operands
+    return _decided(context, a.low & b.low, a.high & b.high, False)
+
+
+def _or(context: Context, operands: list[Range]) -> Range:
+    """Kleene's: true if one is true."""
+    a, b = operands
+    return _decided(context, a.low | b.low, a.high | b.high, False)
+
+
+def _not(context: Context, operands: list[Range]) -> Range:
+    """Kleene's."""
+    (a,) = operands
+    return _decided(context, ~a.high, ~a.low, False)
+
+
+RULES: Mapping[str, Rule] = {
+    "add": _numbers(_add),
+    "subtract": _numbers(_subtract),
+    "multiply": _numbers(_multiply),
+    "divide": _divide,
+    "reciprocal": _reciprocal,
+    "negative": _negative,
+    "absolute": _absolute,
+    "minimum": _minimum,
+    "maximum": _maximum,
+    "floor": _floor,
+    "sqrt": _sqrt,
+    "power": _power,
+    "sin": _sin,
+    "cos": _cos,
+    "less": _compare(lambda a, b: (a.high < b.low, a.low >= b.high)),
+    "less_equal": _compare(lambda a, b: (a.high <= b.low, a.low > b.high)),
+    "greater": _compare(lambda a, b: (a.low > b.high, a.high <= b.low)),
+    "greater_equal": _compare(lambda a, b: (a.low >= b.high, a.high < b.low)),
+    "equal": _compare(lambda a, b: (_one_point(a, b), (a.high < b.low) | (a.low > b.high))),
+    "not_equal": _compare(lambda a, b: ((a.high < b.low) | (a.low > b.high), _one_point(a, b))),
+    "logical_and": _and,
+    "logical_or": _or,
+    "logical_not": _not,
+    "bitwise_xor": _integers,
+    "bitwise_and": _integers,
+    "right_shift": _integers,
+    "select": _select,
+    "convert": _convert,
+    "take": _take,
+}
+"""One rule an operation; inputs, constants and what makes up a loop are the walk's own [`_Run`]. Vectors are
+taken apart before, by `scalarize`."""
+
+
+def _one_point(a: Range, b: Range) -> Any:
+    """Return where (...) both are the same single number."""
+    return a.point & b.point & (a.low == b.low)
+
+
+def where(condition: Any, a: Range, b: Range) -> Range:
+    """Return ranges (...): a where the condition (...) holds, else b."""
+    pairs = (a.low, b.low), (a.high, b.high), (a.plain, b.plain), (a.sure, b.sure)
+    return Range(*(np.where(condition, first, second) for first, second in pairs))

@@ -1,0 +1,63 @@
+"""The three passes of a pipeline on one device: what each executor provides for kernels/pipeline.py.
+
+    path kernel -> sums -> encoding kernel -> feature images -> denoising kernel -> picture
+
+Sums, images and picture are made once for a size and stay on the device; [`Passes.read`] alone copies
+anything to the host. Passes are ordered: each sees what the one before it has written.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiler.artifact import Artifact
+from ..compiler.encode_kernel import EncodeArtifact
+from ..compiler.path_kernel import PathArtifact
+from .executor import Part
+
+PICTURE = "picture"
+"""Name under which the result is read."""
+
+
+class Passes(ABC):
+    """Kernels with their images on a device; a context manager that gives the images back."""
+
+    def __init__(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> None:
+        self.encoder, self.denoiser, self.size = encode, denoise, size
+
+    @abstractmethod
+    def trace(self, kernel: PathArtifact, part: Part) -> None:
+        """Leave the sums of a part that is the whole picture, by a kernel with the encoder's planes."""
+
+    @abstractmethod
+    def encode(self, samples: int) -> None:
+        """Turn sums over so many samples into feature images."""
+
+    @abstractmethod
+    def denoise(self) -> None:
+        """Turn feature images into the picture."""
+
+    @abstractmethod
+    def read(self, name: str) -> NDArray[np.float32]:
+        """Copy an image to the host, (H, W, C): a feature by name, or the result, [`PICTURE`]."""
+
+    def finish(self) -> None:
+        """Wait until all passes that were started have ended; reading waits by itself."""
+
+    def close(self) -> None:
+        """Give the images back."""
+
+    def channels(self, name: str) -> int:
+        """Return the number of channels of a feature's image, or of the picture."""
+        counts = {image.name: image.channels for image in self.encoder.images}
+        return 3 if name == PICTURE else counts[name]
+
+    def __enter__(self) -> Any:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,80 @@
+"""Light from infinitely far: a sky that is a function of direction, with a soft sun.
+
+1. [`radiance`]: three colours, blended linearly in the height y of the direction (zenith above, ground below,
+   horizon between), and a sun whose radiance has the shape of a spherical Cauchy density (sampling.py).
+2. [`sample`] draws a direction towards the sun's lobe or, for the sky, from all directions alike; in which
+   proportion follows from their light [`build`]. Both are one density with two concentrations.
+3. [`pdf`] is the mixture's density, for multiple importance sampling.
+
+The lobe is rational: exponentials, powers and tables are not among the operations that all executors have in
+common, and a table of an image of the sky would be read at random by every path of a work item. Its wide
+skirt looks like the glow around a sun in haze."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from . import sampling, vectors
+from .scene import Sky
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A sky as constants of one float type: colours and the sun's unit direction (3,), numbers ().
+
+    sun_share is the probability with which a sample is drawn for the sun.
+    """
+
+    zenith: Any
+    horizon: Any
+    ground: Any
+    sun: Any
+    irradiance: Any
+    concentration: Any
+    sun_share: Any
+
+
+def build(sky: Sky, dtype: DTypeLike) -> Environment:
+    """Return the sky's constants; they are computed in float64 and then rounded to dtype.
+
+    The sky's light, summed over all directions, is pi (zenith + 2 horizon + ground); the sun's is its
+    irradiance. Samples are shared out in proportion, by the sums of the channels.
+    """
+    everywhere = np.pi * (sum(sky.zenith) + 2.0 * sum(sky.horizon) + sum(sky.ground))
+    total = sum(sky.sun_irradiance) + everywhere
+    share = sum(sky.sun_irradiance) / total if total > 0.0 else 0.0
+    sun = vectors.normalize(np.array(sky.sun_direction, np.float64))
+    parts = (sky.zenith, sky.horizon, sky.ground, sun, sky.sun_irradiance, sky.sun_concentration, share)
+    return Environment(*(np.asarray(part, dtype) for part in parts))
+
+
+def radiance(sky: Environment, direction: Any) -> Any:
+    """Return the radiance (..., 3) that comes from unit directions (..., 3)."""
+    height = direction[..., 1]
+    pole = vectors.choose(height > 0.0, sky.zenith, sky.ground)
+    gradient = sky.horizon + vectors.scale(pole - sky.horizon, np.abs(height))
+    glow = sampling.spherical_cauchy_pdf(_versine(sky, direction), sky.concentration)
+    return gradient + glow[..., np.newaxis] * sky.irradiance
+
+
+def sample(sky: Environment, u_choice: Any, u0: Any, u1: Any) -> Any:
+    """Map u_choice, u0, u1 (...) to unit directions (..., 3), towards the sun or from anywhere."""
+    concentration = np.where(u_choice < sky.sun_share, sky.concentration, np.zeros_like(u0))
+    local = sampling.sample_spherical_cauchy(u0, u1, concentration)
+    return sampling.to_world(local, np.zeros_like(local) + sky.sun)
+
+
+def pdf(sky: Environment, direction: Any) -> Any:
+    """Return the density (...), in 1/sr, with which [`sample`] finds directions (..., 3)."""
+    lobe = sampling.spherical_cauchy_pdf(_versine(sky, direction), sky.concentration)
+    return sky.sun_share * lobe + (1.0 - sky.sun_share) * (0.25 * sampling.INV_PI)
+
+
+def _versine(sky: Environment, direction: Any) -> Any:
+    """Return 1 - cos (...) of the angle to the sun: half the squared chord, which keeps its digits near 0."""
+    chord = direction - sky.sun
+    return 0.5 * vectors.dot(chord, chord)

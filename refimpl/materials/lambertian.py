@@ -1,0 +1,39 @@
+"""Lambertian reflection: the same radiance into all directions, f = reflectance / pi.
+
+1. [`Lambertian.sample`] draws a cosine-weighted direction; f cos / pdf is then the reflectance itself.
+2. [`Lambertian.value`] and [`Lambertian.pdf`] are both cos / pi, times the reflectance in the first.
+
+Lambert, "Photometria", 1760; Malley's method for the directions (sampling.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from .. import sampling
+from .material import Material, Scattered, Site
+
+
+@dataclass(frozen=True)
+class Lambertian(Material):
+    """A matt surface; it is what surfaces without a material are."""
+
+    kind = "lambertian"
+
+    @staticmethod
+    def sample(site: Site, u0: Any, u1: Any, u_choice: Any) -> Scattered:
+        """Return cosine-weighted directions around the normal."""
+        local = sampling.sample_cosine_hemisphere(u0, u1)
+        direction = sampling.to_world(local, site.normal)
+        return Scattered(direction, site.tinted, sampling.cosine_hemisphere_pdf(local[..., 2]), None)
+
+    @staticmethod
+    def value(site: Site, wi: Any, cos_surface: Any) -> tuple[Any, Any]:
+        """Return beta * reflectance, and cos / pi."""
+        return site.tinted, sampling.INV_PI * cos_surface
+
+    @staticmethod
+    def pdf(site: Site, wi: Any, cos_surface: Any) -> Any:
+        """Return cos / pi."""
+        return sampling.cosine_hemisphere_pdf(cos_surface)

@@ -1,0 +1,127 @@
+"""The materials of a scene at a vertex: each kind that the scene has is computed, the surface's own is kept.
+
+1. [`build`] finds the kinds of material that the scene has, and lays out which surface is of which kind, and
+   each kind's numbers, as tables by surface id [`Materials`].
+2. [`site`] gathers what the materials ask for at a vertex.
+3. [`scattered`], [`value`] and [`pdf`] ask every kind, and select by the surface's id. With one kind there is
+   nothing to select.
+
+Inside and outside: boxes and spheres are convex, so a normal points out of the body where it points away from
+the centre. The normal itself faces the path, so that tells on which side the path is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from . import intersection, vectors
+from .intersection import Hit, Surface
+from .materials import Lambertian, Material, Scattered, Site
+from .scene import Scene
+
+
+@dataclass(frozen=True)
+class Materials:
+    """The kinds of material of a scene, and tables by surface id (S+1,), one for each kind.
+
+    is_kind tells who is of the kind; parameters are the kind's numbers, or None where it has none. centers
+    (S+1, 3) are those of bodies that light passes into, or None where there are none.
+    """
+
+    kinds: tuple[type[Material], ...]
+    is_kind: tuple[Any, ...]
+    parameters: tuple[Any, ...]
+    centers: Any
+
+    @property
+    def single(self) -> bool:
+        """Whether all kinds scatter into single directions, which no light sample meets."""
+        return all(kind.single for kind in self.kinds)
+
+
+def build(scene: Scene, dtype: DTypeLike) -> Materials:
+    """Lay out the materials of a scene; surfaces without one are Lambertian."""
+    rows = [(material or Lambertian(), center) for material, center in intersection.materials_by_id(scene)]
+    found = [material for material, _ in rows] or [Lambertian()]
+    kinds = tuple(dict.fromkeys(type(material) for material in found))
+    # Lights and "nothing" reflect nothing: any kind will do for them, the first one takes no selection.
+    owners = [type(material) for material, _ in rows] + [kinds[0]] * (len(scene.lights) + 1)
+    bodies = [center for material, center in rows if material.transmits]
+    centers = [center if material.transmits else bodies[0] for material, center in rows] if bodies else []
+    return Materials(
+        kinds,
+        tuple(np.array([owner is kind for owner in owners]) for kind in kinds),
+        tuple(_parameters(kind, found, len(owners), dtype) for kind in kinds),
+        np.asarray(centers + bodies[:1] * (len(scene.lights) + 1), dtype) if bodies else None,
+    )
+
+
+def _parameters(kind: type[Material], found: list[Material], count: int, dtype: DTypeLike) -> Any:
+    """Return the numbers (S+1,) of one kind; surfaces of other kinds repeat its first one."""
+    given = [material.parameter for material in found if isinstance(material, kind)]
+    if given[0] is None:
+        return None
+    rows = [material.parameter if isinstance(material, kind) else given[0] for material in found]
+    return np.asarray(rows + given[:1] * (count - len(rows)), dtype)
+
+
+def site(materials: Materials, surface: Surface, hit: Hit, direction: Any, beta: Any) -> Site:
+    """Return the vertices where rays of the given direction (..., 3) and throughput beta (..., 3) arrived."""
+    tinted = beta * surface.reflectance
+    outside = None
+    if materials.centers is not None:
+        from_center = surface.point - vectors.look_up_rows(materials.centers, hit.surface)
+        outside = vectors.dot(surface.normal, from_center) > 0.0
+    return Site(-direction, surface.normal, outside, surface.reflectance, beta, tinted, None)
+
+
+def scattered(materials: Materials, at: Site, hit: Hit, u0: Any, u1: Any, u_choice: Any) -> Scattered:
+    """Return how paths go on, each by the material of its surface, for three uniform numbers (...)."""
+    first, others = _ask(materials, at, hit, lambda kind, own: kind.sample(own, u0, u1, u_choice))
+    direction, beta, pdf, through = first
+    for is_kind, other in others:
+        direction = vectors.choose(is_kind, other.direction, direction)
+        beta = vectors.choose(is_kind, other.beta, beta)
+        pdf = np.where(is_kind, other.pdf, pdf)
+        if through is not None or other.through is not None:
+            through = np.where(is_kind, _or_nobody(other.through), _or_nobody(through))
+    return Scattered(direction, beta, pdf, through)
+
+
+def value(materials: Materials, at: Site, hit: Hit, wi: Any, cos_surface: Any) -> tuple[Any, Any]:
+    """Return a colour (..., 3) and a factor (...) whose product is beta f cos for light from wi (..., 3)."""
+    (color, factor), others = _ask(materials, at, hit, lambda kind, own: kind.value(own, wi, cos_surface))
+    for is_kind, (other_color, other_factor) in others:
+        color = vectors.choose(is_kind, other_color, color)
+        factor = np.where(is_kind, other_factor, factor)
+    return color, factor
+
+
+def pdf(materials: Materials, at: Site, hit: Hit, wi: Any, cos_surface: Any) -> Any:
+    """Return the density (...), in 1/sr, with which [`scattered`] finds wi (..., 3)."""
+    density, others = _ask(materials, at, hit, lambda kind, own: kind.pdf(own, wi, cos_surface))
+    for is_kind, other in others:
+        density = np.where(is_kind, other, density)
+    return density
+
+
+def _ask(
+    materials: Materials, at: Site, hit: Hit, question: Callable[[type[Material], Site], Any]
+) -> tuple[Any, list[tuple[Any, Any]]]:
+    """Return the first kind's answer, and (who is of the kind, answer) of the others."""
+    answers = []
+    for kind, parameters in zip(materials.kinds, materials.parameters, strict=True):
+        own = None if parameters is None else vectors.look_up(parameters, hit.surface)
+        answers.append(question(kind, at._replace(parameter=own)))
+    others = zip(materials.is_kind[1:], answers[1:], strict=True)
+    return answers[0], [(vectors.look_up(is_kind, hit.surface), answer) for is_kind, answer in others]
+
+
+def _or_nobody(through: Any) -> Any:
+    """Return who passes through: nobody, where a material says nothing."""
+    return False if through is None else through

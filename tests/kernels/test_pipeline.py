@@ -1,0 +1,343 @@
+"""The pipeline against the separate way, with a bound computed for each pixel, and what it reads back."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wamnet.compiler import bounds, ir
+from wamnet.compiler.compile import analysed, sine_contract
+from wamnet.compiler.encode_kernel import error_at
+from wamnet.compiler.lower import lower
+from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
+from wamnet.kernels.executor import Part
+from wamnet.refimpl import dataset, scenes
+from wamnet.refimpl.denoise import Model
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.render import Job
+from wamnet.refimpl.transport import Settings
+
+SCALES = dataset.Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
+SETTINGS = Settings(max_depth=3)
+ALL = tuple(dataset.FEATURES)
+
+CASES = {
+    "minicubes, all features": ("minicubes", ALL, 4, "clamp", (13, 37), 1),
+    "cornell, colour and normal": ("cornell", ("color", "normal"), 5, "zero", (9, 17), 3),
+    "lone light, odd order": ("lone_light", ("depth", "normal", "color"), 3, "clamp", (7, 1), 2),
+    "empty, one pixel": ("empty", ("color", "direction"), 2, "zero", (1, 1), 1),
+    "furnace, many samples": ("furnace", ("albedo", "color"), 1, "zero", (5, 33), 16),
+}
+"""Scene, features, window, border, (height, width) and samples."""
+
+
+def scene(name, time=1.3):
+    """Return a canonical scene; the mini cubes are turned."""
+    return scenes.canonical(name, **({"time": time} if name == "minicubes" else {}))
+
+
+@pytest.fixture(scope="module")
+def model_of(kit):
+    """Give a function that returns a small model whose pictures lie within 0.5 +- 0.45."""
+
+    def make(features, size, border):
+        window = dataset.Window(size, border)
+        network = kit.network([dataset.n_inputs(features, window), 8, 3], (3.0, 3.0))
+        return Model(network, features, window, SCALES)
+
+    return make
+
+
+def traced(executor, pipeline, size, samples, seed):
+    """Return the sums (H, W) by plane that the pipeline's own path kernel leaves."""
+    part = Part(size[1], size[0], 0, size[0], 0, samples, seed)
+    return dict(zip(pipeline.path.planes, executor.trace(pipeline.path, part), strict=True))
+
+
+def frame_of(sums, samples, features):
+    """Return the frame that render_on makes of sums: means in float64, rounded once."""
+    layers = {}
+    for name in features:
+        planes = [plane for plane in sums if plane == name or plane.startswith(f"{name}_")]
+        means = [sums[plane].astype(np.float64) / samples for plane in planes]
+        layers[name] = np.stack(means, axis=-1).astype(np.float32)
+    return Frame(layers)
+
+
+def difference_bound(model, executor, images, errors):
+    """Return how far (H, W, 3) two runs of the denoiser may be apart: on `images`, and on others.
+
+    Images (H, W, C) are off by `errors`. The network's float64 value lies in a range over the box of both,
+    and each run is off by its error over that box.
+    """
+    program = analysed(lower(model))
+    ends = []
+    for sign in (-1, 1):
+        moved = [images[name].astype(np.float64) + sign * errors[name] for name in model.features]
+        joined = np.concatenate(moved, axis=-1)
+        ends.append(dataset.all_windows(dataset.pad(joined, model.window), model.window))
+    found = bounds.enclose(program, {"window": tuple(ends)}, sine_contract("ieee", executor.name))
+    (_, index) = program.outputs[0]
+    return found[index].high - found[index].low + 2 * found[index].read
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_pipeline_is_the_separate_way(executor, model_of, case):
+    """Feature images within the encoding's bound of the float64 ones, and the picture within what that costs.
+
+    The float64 ones are made from means that were rounded to float32, and are rounded: twice the bound, which
+    has a division and a product with larger errors, holds for both.
+    """
+    name, features, window, border, size, samples = CASES[case]
+    model = model_of(features, window, border)
+    with Pipeline(executor, scene(name), model, size, settings=SETTINGS) as pipeline:
+        found = pipeline.run(seed=3, spp=samples)
+        images = {feature: pipeline.image(feature) for feature in features}
+        sums = traced(executor, pipeline, size, samples, 3)
+        errors = error_at(pipeline.encode, sums, samples)
+    assert found.shape == (*size, 3)
+    assert found.dtype == np.float32
+    frame = frame_of(sums, samples, features)
+    wanted = {n: dataset.feature_image(frame, (n,), SCALES) for n in features}
+    for feature in features:
+        errors[feature] = 2 * errors[feature] + 2.0**-24 * np.abs(wanted[feature])
+        assert images[feature].shape == wanted[feature].shape
+        assert np.all(np.abs(images[feature].astype(np.float64) - wanted[feature]) <= errors[feature])
+    separate = denoise_on(executor, model, frame).image.astype(np.float64)
+    bound = difference_bound(model, executor, wanted, errors)
+    assert np.all(np.abs(found - separate) <= bound)
+    assert bound.max() <= 1e-3  # a bound this small tells colours apart; 2^-8 would be one level of a PNG
+
+
+@pytest.mark.parametrize("case", ["minicubes, all features", "cornell, colour and normal"])
+def test_the_whole_separate_way(executor, model_of, case):
+    """With the path kernel that writes all planes: where all pixels of a window are the same paths."""
+    name, features, size, border, shape, samples = CASES[case]
+    model, job = model_of(features, size, border), Job(*shape[::-1], samples, 3, SETTINGS)
+    with Pipeline(executor, scene(name), model, shape, settings=SETTINGS) as pipeline:
+        found = pipeline.run(seed=3, spp=samples)
+        sums = traced(executor, pipeline, shape, samples, 3)
+        errors = error_at(pipeline.encode, sums, samples)
+    frame = render_on(executor, scene(name), job).frame
+    separate = denoise_on(executor, model, frame).image.astype(np.float64)
+    wanted = {n: dataset.feature_image(frame, (n,), SCALES) for n in features}
+    own = frame_of(sums, samples, features)
+    # Compilers may contract two kernels differently; pixels whose numbers differ are left out.
+    other = np.any([np.any(own[n] != frame[n], axis=-1) for n in features], axis=0)
+    whole = ~dataset.all_windows(dataset.pad(other[..., None], model.window), model.window).any(axis=-1)
+    assert whole.mean() >= 0.9  # on processors all are the same
+    errors = {n: 2 * errors[n] + 2.0**-24 * np.abs(wanted[n]) for n in features}
+    assert np.all((np.abs(found - separate) <= difference_bound(model, executor, wanted, errors))[whole])
+
+
+def test_the_definition_is_the_composition(executor_named, model_of):
+    """On the interpreter the picture is what its kernels give one after another, to the bit."""
+    executor, model, size = executor_named("numpy"), model_of(ALL, 4, "clamp"), (11, 23)
+    with Pipeline(executor, scene("cornell"), model, size, settings=SETTINGS) as pipeline:
+        found = pipeline.run(5, 2)
+        images = {name: pipeline.image(name) for name in model.features}
+        assert np.array_equal(found, executor.run(pipeline.denoise, images))
+
+
+# ---- faults: each must be seen by the bound -----------------------------------------------------------
+
+
+FAULTS = {
+    "no division by the samples": ("(float)sample_count", "1.0f"),
+    "another exponent": ("0.416666657f", "0.4545f"),
+    "rows that are too long": ("(size_t)y * (size_t)row_stride", "(size_t)y * (size_t)(row_stride + 1)"),
+    "one plane too far": ("sums[3 * plane", "sums[4 * plane"),
+}
+"""What may go wrong in an encoding kernel: a text of its source and what stands there instead."""
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_wrong_encoding_is_caught(executor_named, model_of, fault):
+    executor, (name, features, size, border, shape, samples) = executor_named("opencl"), CASES[list(CASES)[1]]
+    model = model_of(features, size, border)
+    with Pipeline(executor, scene(name), model, shape, settings=SETTINGS) as pipeline:
+        right = pipeline.run(3, samples)
+        sums = traced(executor, pipeline, shape, samples, 3)
+        wanted = {n: pipeline.image(n) for n in features}
+        errors = {n: 2 * e for n, e in error_at(pipeline.encode, sums, samples).items()}
+        old, new = FAULTS[fault]
+        assert old in pipeline.encode.source
+        source = pipeline.encode.source.replace(old, new)
+        manifest = {**pipeline.encode.manifest, "digest": ir.sha256(source.encode())}
+        pipeline.passes.encoder = replace(pipeline.encode, source=source, manifest=manifest)
+        wrong = pipeline.run(3, samples)
+    assert np.any(np.abs(wrong - right) > difference_bound(model, executor, wanted, errors))
+
+
+# ---- what stays on the device --------------------------------------------------------------------------
+
+
+def test_nothing_is_read_back_or_uploaded_in_between_on_opencl(executor_named, model_of, monkeypatch):
+    executor, model = executor_named("opencl"), model_of(ALL, 3, "clamp")
+    module, copied, uploaded = sys.modules[type(executor).__module__], [], []
+    with Pipeline(executor, scene("cornell"), model, (9, 21), settings=SETTINGS) as pipeline:
+        pipeline.run()
+        real_copy, real_buffer = module.cl.enqueue_copy, module.cl.Buffer
+
+        def copy(queue, target, source):
+            copied.append(target.shape)
+            return real_copy(queue, target, source)
+
+        def buffer(context, flags, *arguments, **options):
+            uploaded.append((arguments, options))
+            return real_buffer(context, flags, *arguments, **options)
+
+        monkeypatch.setattr(module.cl, "enqueue_copy", copy)
+        monkeypatch.setattr(module.cl, "Buffer", buffer)
+        pipeline.draw(1)
+        pipeline.passes.finish()
+        assert (copied, uploaded) == ([], [])
+        pipeline.picture()
+        assert copied == [(9, 21, 3)]
+        pipeline.image("depth")
+        assert copied == [(9, 21, 3), (9, 21, 1)]
+        assert uploaded == []
+
+
+@pytest.mark.parametrize("name", ["opengl-egl", "opengl-osmesa"])
+def test_nothing_is_read_back_or_uploaded_in_between_on_opengl(executor_named, model_of, monkeypatch, name):
+    executor, model = executor_named(name), model_of(ALL, 3, "clamp")
+    module, read, made = sys.modules[type(executor).__module__], [], []
+    with Pipeline(executor, scene("cornell"), model, (9, 21), settings=SETTINGS) as pipeline:
+        pipeline.run()
+        kind, context = module.moderngl.Texture, module.moderngl.Context
+        real_read, real_texture = kind.read, context.texture
+
+        def record(self, *arguments, **options):
+            read.append(self.size)
+            return real_read(self, *arguments, **options)
+
+        def texture(self, *arguments, **options):
+            made.append(arguments)
+            return real_texture(self, *arguments, **options)
+
+        monkeypatch.setattr(kind, "read", record)
+        monkeypatch.setattr(context, "texture", texture)
+        pipeline.draw(1)
+        pipeline.passes.finish()
+        assert (read, made) == ([], [])
+        pipeline.picture()
+        assert read == [(21, 9)]
+        pipeline.image("depth")
+        assert read == [(21, 9)] * 2
+        assert made == []
+
+
+# ---- its life ------------------------------------------------------------------------------------------
+
+
+def test_another_time_compiles_paths_alone(executor, model_of, monkeypatch):
+    """The picture of another time is that of a pipeline made for it; encoding and denoiser stay built."""
+    model, size = model_of(("color", "normal"), 3, "clamp"), (8, 12)
+    with Pipeline(executor, scene("minicubes", 2.0), model, size, settings=SETTINGS) as pipeline:
+        wanted = pipeline.run(4)
+    with Pipeline(executor, scene("minicubes", 1.0), model, size, settings=SETTINGS) as pipeline:
+        other = pipeline.run(4)
+        kernels = pipeline.encode, pipeline.denoise
+        pipeline.set_scene(scene("minicubes", 2.0))
+        assert np.array_equal(pipeline.run(4), wanted)
+        assert kernels == (pipeline.encode, pipeline.denoise)
+    assert np.abs(other - wanted).max() > 1e-3
+
+
+def test_seed_samples_and_first_sample(executor, model_of):
+    """Two samples are those of one and the next: their encoded mean lies between."""
+    model = model_of(("normal", "color"), 1, "clamp")
+    with Pipeline(executor, scene("cornell"), model, (6, 7), settings=SETTINGS) as pipeline:
+        pipeline.draw(1)
+        one = pipeline.image("normal")
+        pipeline.draw(1, first_sample=1)
+        two = pipeline.image("normal")
+        pipeline.draw(1, spp=2)
+        assert np.all(np.abs(pipeline.image("normal") - (one + two) / 2) <= 8 * 2.0**-24)
+        colour = pipeline.image("color")
+        pipeline.draw(2, spp=2)
+        assert not np.array_equal(pipeline.image("color"), colour)
+
+
+def test_features_that_are_only_shown(executor, model_of):
+    model = model_of(("normal",), 3, "zero")
+    frame = render_on(executor, scene("lone_light"), Job(11, 5, 1, 2, SETTINGS)).frame
+    with Pipeline(executor, scene("lone_light"), model, (5, 11), settings=SETTINGS, show=("color",)) as shown:
+        found = shown.run(2)
+        wanted = dataset.feature_image(frame, ("color",), SCALES)
+        assert np.abs(shown.image("color") - wanted).max() <= 2.0**-18  # 37 u of the power, and some more
+    assert np.array_equal(found, denoise_on(executor, model, frame).image)
+
+
+def test_the_kernel_of_whole_frames(executor, model_of):
+    """The same picture as by a kernel that writes what is needed alone, here where nothing is contracted."""
+    model, size = model_of(("depth", "color"), 3, "zero"), (7, 19)
+    kinds = {}
+    for whole in (False, True):
+        with Pipeline(executor, scene("cornell"), model, size, settings=SETTINGS, whole=whole) as pipeline:
+            kinds[whole] = pipeline.path.planes, pipeline.run(3, 2)
+    assert len(kinds[False][0]) == 4
+    assert set(kinds[True][0]) > set(kinds[False][0])
+    same = np.all(np.abs(kinds[True][1] - kinds[False][1]) <= 1e-5, axis=-1)  # 168 u: rounding, not faults
+    assert same.mean() >= 0.9
+
+
+def test_a_kernel_that_fell_out_is_built_again(executor_named, model_of, monkeypatch):
+    executor, model = executor_named("opengl-egl"), model_of(("color",), 2, "clamp")
+    with Pipeline(executor, scene("empty"), model, (4, 4), settings=SETTINGS) as pipeline:
+        before = pipeline.run(1)
+        monkeypatch.setattr(sys.modules[Part.__module__], "KEPT_KERNELS", 1)
+        with Pipeline(executor, scene("cornell"), model_of(("normal",), 2, "clamp"), (4, 4)) as other:
+            other.run(1)
+        assert pipeline.encode.digest not in executor._encoders
+        assert np.array_equal(pipeline.run(1), before)
+
+
+# ---- refusals ------------------------------------------------------------------------------------------
+
+
+def test_refusals(executor, model_of):
+    model = model_of(("color",), 1, "clamp")
+    with Pipeline(executor, scene("empty"), model, (2, 3)) as pipeline:
+        with pytest.raises(
+            InputError, match="pipeline is nothing drawn: an image is read after it was drawn"
+        ):
+            pipeline.picture()
+        with pytest.raises(InputError, match="feature image is normal: there are color; name it in show="):
+            pipeline.image("normal")
+        with pytest.raises(InputError, match="spp is 17: a pipeline adds up in float32: at most 16"):
+            pipeline.draw(spp=17)
+        with pytest.raises(InputError, match="seed is -1: it must be an integer"):
+            pipeline.draw(seed=-1)
+    with pytest.raises(InputError, match="width is 0: it must be an integer"):
+        Pipeline(executor, scene("empty"), model, (2, 0))
+    with pytest.raises(InputError, match="feature name is heat: not a known feature"):
+        Pipeline(executor, scene("empty"), model, (2, 2), show=("heat",))
+
+
+def test_kernels_in_another_language_are_refused(executor, model_of):
+    model = model_of(("color",), 1, "clamp")
+    other = {"numpy": "opencl", "opencl": "numpy", "opengl": "numpy"}[executor.name]
+    with (
+        open_executor(other) as elsewhere,
+        Pipeline(elsewhere, scene("empty"), model, (2, 2)) as pipeline,
+        pytest.raises(InputError, match=f"artifact for executor '{executor.name}': target is {other}"),
+    ):
+        executor.passes(pipeline.encode, pipeline.denoise, (2, 2))
+
+
+def test_too_large_a_picture_is_refused(executor_named, model_of):
+    model = model_of(("color",), 1, "clamp")
+    with pytest.raises(
+        InputError, match=r"texture for the pictures is 65536 x 1 with 4 channels: this OpenGL"
+    ):
+        Pipeline(executor_named("opengl-egl"), scene("empty"), model, (1, 65536))
+    with pytest.raises(
+        InputError, match=r"size of the picture on .* is 65536 x 65536 with 3 channels: one im"
+    ):
+        Pipeline(executor_named("opencl"), scene("empty"), model, (65536, 65536))

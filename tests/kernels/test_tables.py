@@ -1,0 +1,191 @@
+"""Many primitives as tables and loops: the unrolled kernel's image, to the bit, and the reference's."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wamnet.compiler.ir import Type
+from wamnet.compiler.lower_scene import MOST_UNROLLED, lower_scene, primitives
+from wamnet.compiler.path_kernel import UNROLLED, compile_path, most_unrolled
+from wamnet.compiler.trace import trace
+from wamnet.compiler.verify import verify
+from wamnet.kernels.executor import Part
+from wamnet.kernels.render_on import compile_scene, render_on
+from wamnet.refimpl import render as R
+from wamnet.refimpl import vectors
+from wamnet.refimpl.scene import IDENTITY, Box, Camera, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.transport import Settings
+
+U = 2.0**-24
+"""Unit roundoff of float32."""
+
+SETTINGS = Settings(max_depth=2)
+LOOP = re.compile(r"for \(int i = 0; i < (\d+); \+\+i\) {")
+"""A loop over the rows of tables, in OpenCL C and in GLSL."""
+
+LIGHT = Light((-0.3, 0.99, -0.3), (0.6, 0.0, 0.0), (0.0, 0.0, 0.6), (1.0, 0.9, 0.8), 3.0)
+CLOSED = Room((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), ((0.6, 0.7, 0.8),) * 6)
+
+
+def turned(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return ((c, 0.0, -s), (0.0, 1.0, 0.0), (s, 0.0, c))
+
+
+def box(random, rotation):
+    return Box(place(random), tuple(random.uniform(0.05, 0.2, 3)), color(random), rotation)
+
+
+def place(random):
+    return tuple(random.uniform(-0.7, 0.7, 3))
+
+
+def color(random):
+    return tuple(random.uniform(0.2, 0.9, 3))
+
+
+MAKERS = {
+    "shared": lambda random, i: box(random, turned(0.4)),
+    "parallel": lambda random, i: box(random, IDENTITY),
+    "turned": lambda random, i: box(random, turned(0.13 * i + 0.1)),
+    "sphere": lambda random, i: Sphere(place(random), random.uniform(0.05, 0.2), color(random)),
+    "quad": lambda random, i: Quad(place(random), (0.3, 0.1, 0.0), (0.0, 0.2, 0.3), color(random)),
+}
+"""One primitive of each kind that has a loop of its own."""
+
+
+def crowd(*counts, lights=(LIGHT,), **parts):
+    """Return a scene with so many primitives of the named kinds: ("sphere", 3), ..."""
+    random = np.random.default_rng(7)
+    made = [MAKERS[kind](random, i) for kind, count in counts for i in range(count)]
+    kinds = {"boxes": Box, "spheres": Sphere, "quads": Quad}
+    found = {name: tuple(p for p in made if isinstance(p, kind)) for name, kind in kinds.items()}
+    camera = Camera((0.0, 0.1, 0.95), (0.0, 0.0, 0.0), vertical_fov_deg=80.0)
+    return Scene("crowd", camera, CLOSED, lights=lights, **{**found, **parts})
+
+
+EVERY_KIND = crowd(*((kind, 6) for kind in MAKERS), lights=(LIGHT, replace(LIGHT, corner=(-0.9, 0.9, -0.9))))
+SINGLES = {kind: crowd((kind, 5)) for kind in MAKERS}
+SCENES = {
+    **SINGLES,
+    "mixture": EVERY_KIND,
+    "one of each kind": crowd(*((kind, 1) for kind in MAKERS)),
+    "no light, no room": replace(EVERY_KIND, lights=(), room=None, background=(0.4, 0.5, 0.6)),
+}
+
+
+def sums(executor, scene, most, size=(24, 16), samples=2):
+    """Return the kernel's text and its sums (planes, rows, width)."""
+    programs = lower_scene(scene, SETTINGS, most)
+    kernel = compile_path(programs, executor.name, lanes=executor.lanes)
+    return kernel.source, executor.trace(kernel, Part(*size, 0, size[1], 0, samples, 3))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_loop_computes_what_statements_compute(executor, name):
+    """The same operations in the same order, one a statement: no compiler contracts them, no bit differs."""
+    (unrolled, expected), (looped, found) = (sums(executor, SCENES[name], most) for most in (None, 0))
+    assert unrolled != looped or name == "one of each kind"
+    assert np.isfinite(expected).all()
+    assert expected[0].std() > 0
+    assert np.array_equal(found, expected)
+
+
+@pytest.mark.parametrize("more", [-1, 0, 1])
+def test_loops_begin_above_the_threshold(executor, more):
+    """Below and at it a statement for each primitive, above it none; the image is the reference's either way.
+
+    99 pixels in 100 to 1e-5 of the layer's size (168 u: a distance with 64 u s of error, twice, and sums), as
+    in test_paths.py.
+    """
+    most = most_unrolled(executor.name)
+    scene = crowd(("shared", most // 2), ("turned", 5), ("quad", most - most // 2 - 5 - 1 + more))
+    assert primitives(scene) == most + more
+    job = R.Job(24, 16, 1, 3, SETTINGS)
+    kernel = compile_scene(executor, scene, job)
+    trips = [most // 2, 5, most - most // 2 - 5 + more]  # quads and lights are one table
+    if executor.name == "numpy":
+        assert [int(n) for n in re.findall(r"trips=(\d+)}", kernel.source)] == (
+            # Two numbers are carried to the next surface, one by shadow rays.
+            [t for t in trips for _ in range(2)] + trips if more > 0 else []
+        )
+    else:
+        assert [int(n) for n in LOOP.findall(kernel.source)] == (trips * 2 if more > 0 else [])
+    expected, found = R.render(scene, job).frame, render_on(executor, scene, job).frame
+    for layer, values in expected.layers.items():
+        size = np.abs(values).max(axis=-1, keepdims=True) + np.abs(values).mean()
+        near = np.abs(found[layer] - values) <= 168 * U * size
+        assert near.all(axis=-1).mean() >= 0.99, layer
+
+
+def test_thresholds():
+    """Lower bounds of what is known to be worth it: the canonical scenes are statements on every target."""
+    assert MOST_UNROLLED == most_unrolled("opencl") == most_unrolled("numpy") == 32
+    assert most_unrolled("opengl") == UNROLLED["opengl"] == 128
+
+
+def carried_about(surface):
+    """Return three numbers after a fold: two trade places, one is what the last row makes of it."""
+    rows = (np.array([0.5, -2.0, 4.0], np.float32), np.array([7, 1, 3], np.int32))
+
+    def step(values, number, integer):
+        a, b, same, _ = values
+        return b + number, a, same, number * same + integer.astype(np.float32)
+
+    return vectors.fold_rows(step, rows, (surface, surface * 0.5, surface * 2.0, surface))
+
+
+def test_numbers_that_trade_places(executor):
+    """A loop of our own in the place of the first hit's layers; halves and small integers are exact."""
+    programs = lower_scene(crowd(), Settings(max_depth=0))
+    names = ("albedo_r", "albedo_g", "albedo_b", "depth")
+
+    def look(surface):
+        return dict(zip(names, carried_about(surface.astype(np.float32)), strict=True))
+
+    program = trace(look, {"surface": Type("int32")}, most_unrolled=0)
+    programs = replace(programs, look=verify(program))
+    kernel = compile_path(
+        programs, executor.name, lanes=executor.lanes, groups=("albedo", "depth", "last_surface")
+    )
+    *found, surface = executor.trace(kernel, Part(24, 16, 0, 16, 0, 1, 3))
+    assert len(np.unique(surface)) >= 4
+    for values, expected in zip(found, carried_about(surface), strict=True):
+        assert np.array_equal(values, expected)
+
+
+def coincident(first):
+    """Return five boxes that are one box, with the reflectances of different ones, and quads in one face."""
+    boxes = [Box((0.0, 0.0, 0.0), (0.4, 0.3, 0.2), (0.1 * (i + 1), 0.5, 0.5), turned(0.3)) for i in range(5)]
+    boxes = boxes[first:] + boxes[:first]
+    spheres = tuple(Sphere((0.6, 0.5, 0.1), 0.2, (0.5, 0.1 * (i + 1), 0.5)) for i in range(4))
+    corner, edges = (-0.8, -0.9, 0.2), ((0.5, 0.0, 0.0), (0.0, 0.5, 0.0))
+    quads = tuple(Quad(corner, *edges, (0.5, 0.5, 0.1 * (i + 1))) for i in range(4))
+    return crowd(boxes=tuple(boxes), spheres=spheres, quads=quads)
+
+
+@pytest.mark.parametrize("first", [0, 2])
+def test_of_coincident_faces_the_first_listed_wins(executor, first):
+    scene = coincident(first)
+    source, found = sums(executor, scene, 0, samples=1)
+    assert ("loop" if executor.name == "numpy" else "int i") in source
+    albedo = np.moveaxis(found[6:9], 0, -1).reshape(-1, 3)
+    walls = np.float32(CLOSED.reflectances[0])
+    seen = {tuple(color) for color in albedo[np.any(albedo != walls, axis=-1)].tolist()}
+    listed = (scene.boxes[0], scene.spheres[0], scene.quads[0])
+    assert seen - {(0.0, 0.0, 0.0)} == {tuple(np.float32(p.reflectance).tolist()) for p in listed}
+
+
+def test_a_wrong_loop_is_caught(executor_named):
+    """The tests above can fail: a loop that leaves out its last row loses a primitive."""
+    executor = executor_named("opencl")
+    kernel = compile_path(lower_scene(SINGLES["sphere"], SETTINGS, 0), "opencl", lanes=executor.lanes)
+    part = Part(24, 16, 0, 16, 0, 2, 3)
+    source = LOOP.sub("for (int i = 0; i < 4; ++i) {", kernel.source, count=1)
+    assert source != kernel.source
+    wrong = replace(kernel, source=source, manifest={**kernel.manifest, "digest": "wrong"})
+    assert not np.array_equal(executor.trace(kernel, part), executor.trace(wrong, part))

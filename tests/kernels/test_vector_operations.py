@@ -1,0 +1,58 @@
+"""Operators in place of functions on vectors of paths: what NumPy computes, on every length of vector."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wamnet.compiler.ir import Node, Type
+from wamnet.compiler.lower_scene import lower_scene
+from wamnet.compiler.ops import OPS
+from wamnet.compiler.path_kernel import SCHEDULES, compile_path
+from wamnet.refimpl import scenes
+from wamnet.refimpl.transport import Settings
+
+EDGES = [0.0, -0.0, 0.25, -0.25, 1.0, -1.0, 2.5, -2.5, 1e30, -1e30, 2.0**23 - 0.5, 0.5 - 2.0**23, 2.0**31]
+"""Numbers where a floor by cutting off, or a comparison in place of a function, could go wrong."""
+
+
+@pytest.mark.parametrize("lanes", SCHEDULES["opencl"][1][1:])
+@pytest.mark.parametrize("operation", ["absolute", "floor", "minimum", "maximum"])
+def test_operators_on_vectors_compute_what_numpy_computes(executor_named, lanes, operation):
+    """All pairs of the edges; equal to the bit, but for the sign of zero, which comparisons do not see."""
+    context = executor_named("opencl")._context
+    dialect = SCHEDULES["opencl"][0](lanes)
+    arity = OPS[operation].arity
+    a, b = (part.ravel().astype(np.float32) for part in np.meshgrid(EDGES, EDGES))
+    a, b = (np.resize(part, -(-len(a) // lanes) * lanes) for part in (a, b))
+    found = on_vectors(context, dialect, operation, arity, a, b)
+    assert np.array_equal(found, OPS[operation].definition(*(a, b)[:arity]))
+
+
+def on_vectors(context, dialect, operation, arity, a, b):
+    """Return the dialect's operation on arrays of whole vectors."""
+    cl = pytest.importorskip("pyopencl")
+    n, real = dialect.lanes, dialect.types["float32"]
+    value = dialect.expression(Node(operation, (), Type()), "float32", ["x", "y"][:arity])
+    source = f"""{dialect.helpers.get(operation, "")}
+    __kernel void run(__global const float *a, __global const float *b, __global float *c)
+    {{
+        size_t i = get_global_id(0);
+        {real} x = vload{n}(i, a);
+        {real} y = vload{n}(i, b);
+        {real} z = {value};
+        vstore{n}(z, i, c);
+    }}"""
+    flags, result = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR, np.empty_like(a)
+    buffers = [cl.Buffer(context, flags, hostbuf=part) for part in (a, b)]
+    output = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, result.nbytes)
+    with cl.CommandQueue(context) as queue:
+        cl.Program(context, source).build().run(queue, (len(a) // n,), None, *buffers, output)
+        cl.enqueue_copy(queue, result, output)
+    return result
+
+
+def test_a_kernel_without_floor_lacks_its_function():
+    assert "floor" in compile_path(lower_scene(scenes.furnace(), Settings()), "opencl", lanes=16).source
+    source = compile_path(lower_scene(scenes.furnace(), Settings()), "opencl", "native", lanes=16).source
+    assert "floor" not in source

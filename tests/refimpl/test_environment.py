@@ -1,0 +1,180 @@
+"""The sky: its sampling against its density, light that it sends in closed form, and agreement of all
+strategies."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import integrate
+from statistical import SIGNIFICANCE, assert_all_plausible, chi_square_p, sidak, welch_p, z_p
+from vertices import uniforms
+
+from wamnet.refimpl import environment, scenes, transport, vectors
+from wamnet.refimpl import render as R
+from wamnet.refimpl.scene import Camera, Light, Quad, Scene, Sky, Sphere
+from wamnet.refimpl.transport import Settings
+
+SAMPLES = 1 << 16
+GREY = (0.5, 0.5, 0.5)
+WHITE = Sky((1.0,) * 3, (1.0,) * 3, (1.0,) * 3)
+SKY = Sky((0.2, 0.3, 0.6), (0.7, 0.7, 0.7), (0.2, 0.1, 0.1), (1.0, 2.0, -1.0), (2.0, 1.0, 0.5), 20.0)
+PLANE = Quad((-500.0, 0.0, -500.0), (0.0, 0.0, 1000.0), (1000.0, 0.0, 0.0), GREY)
+DOWN = Camera((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0)
+
+
+def built(sky, dtype=np.float64):
+    return environment.build(sky, dtype)
+
+
+def around(sky, points=48):
+    """Return directions (P, 3) and weights (P,) of a quadrature over the sphere around the sun, fine near it.
+
+    Two Gauss rules in 1 - cos (up to 0.1 and beyond) and one on each side of the horizon's azimuth are not
+    needed: the gradient's corner at the horizon costs some 1e-5 with 48 x 96 points.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    parts = []
+    for low, high in ((0.0, 0.02), (0.02, 0.2), (0.2, 2.0)):
+        versine = low + 0.5 * (high - low) * (nodes + 1)
+        phi = (np.arange(2 * points) + 0.5) * np.pi / points
+        v, p = np.meshgrid(versine, phi, indexing="ij")
+        sine = np.sqrt(v * (2 - v))
+        local = np.stack([sine * np.cos(p), sine * np.sin(p), 1 - v], axis=-1).reshape(-1, 3)
+        sun = np.broadcast_to(built(sky).sun, local.shape)
+        world = environment.sampling.to_world(local, sun)
+        parts.append((world, np.repeat(weights, 2 * points) * 0.5 * (high - low) * np.pi / points))
+    return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
+
+
+@pytest.mark.parametrize("concentration", [0.0, 20.0, 1000.0])
+def test_directions_chi_square(concentration):
+    """Cells of direction in (height, azimuth about y); their share by counting a fine grid of the density.
+
+    The grid has 24 x 24 points a cell by Gauss's rule; the sun's lobe of k = 1000 is 0.05 wide, a quarter of
+    a cell."""
+    sky = built(replace(SKY, sun_concentration=concentration))
+    found = environment.sample(sky, *uniforms(SAMPLES)[:3])
+    heights, angles = np.linspace(-1, 1, 17), np.linspace(-np.pi, np.pi, 33)
+    observed, _, _ = np.histogram2d(found[:, 1], np.arctan2(found[:, 2], found[:, 0]), bins=(heights, angles))
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    y, phi = np.meshgrid(
+        (heights[:-1, None] + (nodes + 1) / 16).ravel(),
+        (angles[:-1, None] + (nodes + 1) * np.pi / 32).ravel(),
+        indexing="ij",
+    )
+    sine = np.sqrt(1 - y * y)
+    pdf = environment.pdf(sky, np.stack([sine * np.cos(phi), y, sine * np.sin(phi)], axis=-1))
+    share = np.einsum("aibj,i,j->ab", pdf.reshape(16, 24, 32, 24), weights, weights) / 16 * np.pi / 32
+    assert share.sum() == pytest.approx(1.0, abs=1e-3)
+    assert chi_square_p(observed, share * SAMPLES) >= sidak(SIGNIFICANCE, 3)
+
+
+def test_light_of_all_directions_is_what_the_shares_assume():
+    """Quadrature of the radiance: pi (zenith + 2 horizon + ground) and the sun's irradiance, per channel."""
+    directions, weights = around(SKY)
+    total = weights @ environment.radiance(built(SKY), directions)
+    everywhere = np.pi * (np.array(SKY.zenith) + 2 * np.array(SKY.horizon) + np.array(SKY.ground))
+    assert total == pytest.approx(everywhere + SKY.sun_irradiance, rel=1e-3)
+    assert weights @ environment.pdf(built(SKY), directions) == pytest.approx(1.0, abs=1e-6)
+    expected = sum(SKY.sun_irradiance) / sum(everywhere + SKY.sun_irradiance)
+    assert built(SKY).sun_share == pytest.approx(expected, rel=1e-12)
+
+
+def test_half_of_the_sun_s_light_is_near():
+    """1 - cos is below 1 / (1 + k) for half of the samples of a sky that is all sun: a binomial z-test."""
+    black = replace(SKY, zenith=(0.0,) * 3, horizon=(0.0,) * 3, ground=(0.0,) * 3)
+    sky = built(black)
+    assert sky.sun_share == 1.0
+    cosine = vectors.dot(environment.sample(sky, *uniforms(SAMPLES)[:3]), sky.sun)
+    p = z_p(np.array(np.mean(1.0 - cosine < 1.0 / 21.0) - 0.5), np.array(0.5 / np.sqrt(SAMPLES)))
+    assert p >= SIGNIFICANCE
+
+
+def test_a_black_sky_is_black():
+    sky = built(Sky((0.0,) * 3, (0.0,) * 3, (0.0,) * 3))
+    assert sky.sun_share == 0.0
+    assert np.all(environment.radiance(sky, np.eye(3)) == 0.0)
+    assert np.all(np.isfinite(environment.sample(sky, *uniforms(64)[:3])))
+
+
+def plane_radiance(sky, camera=DOWN, **settings):
+    """Return mean and standard error of the radiance of a plane that faces up."""
+    scene = Scene("plane", camera, quads=(PLANE,), environment=sky)
+    result = R.render(scene, R.Job(32, 32, 16, 3, Settings(max_depth=1, **settings), "float64"))
+    error = np.sqrt(result.color_variance.reshape(-1, 3).mean(axis=0) / (32 * 32 * 16))
+    return result.frame["color"].reshape(-1, 3).mean(axis=0), error
+
+
+@pytest.mark.parametrize("strategy", transport.STRATEGIES)
+@pytest.mark.parametrize("concentration", [0.0, 50.0])
+def test_plane_under_the_sky(strategy, concentration):
+    """reflectance / pi times the irradiance; z-test per channel.
+
+    The sky: the integral of (h + (z - h) y) y over the upper half is 2 pi (h / 2 + (z - h) / 3). The sun,
+    straight up: the integral of its lobe times y, by quadrature of one variable."""
+    up = replace(SKY, sun_direction=(0.0, 3.0, 0.0), sun_concentration=concentration)
+    zenith, horizon = np.array(up.zenith), np.array(up.horizon)
+    lobe = integrate.quad(
+        lambda y: y * (1 + 2 * concentration) / (2 * (1 + concentration * (1 - y)) ** 2), 0.0, 1.0
+    )[0]
+    irradiance = 2 * np.pi * (horizon / 2 + (zenith - horizon) / 3) + lobe * np.array(up.sun_irradiance)
+    mean, error = plane_radiance(up, strategy=strategy)
+    assert_all_plausible(z_p(mean - 0.5 / np.pi * irradiance, error))
+
+
+@pytest.mark.parametrize("strategy", transport.STRATEGIES)
+def test_white_furnace(strategy):
+    """A matt plane of reflectance 1/2 under a white sky: 1/2, as under the background 1."""
+    mean, error = plane_radiance(WHITE, strategy=strategy)
+    assert_all_plausible(z_p(mean - 0.5, np.maximum(error, 1e-12)))
+
+
+def test_camera_sees_the_sky_itself():
+    """Where nothing is hit a pixel has the sky's radiance, in every strategy: to the bit, one sample each."""
+    scene = Scene("sky", Camera((0.0, 0.0, 0.0), (0.0, 0.1, -1.0), vertical_fov_deg=90.0), environment=SKY)
+    for strategy in transport.STRATEGIES:
+        frame = R.render(scene, R.Job(9, 9, 1, 1, Settings(strategy=strategy))).frame
+        expected = environment.radiance(built(SKY, np.float32), frame["direction"])
+        assert np.array_equal(frame["color"], expected)
+        assert np.all(frame["albedo"] == 0.0)
+
+
+@pytest.mark.parametrize(
+    ("strategy", "heuristic"), [("light", "power"), ("bsdf", "power"), ("mis", "balance")]
+)
+@pytest.mark.parametrize("lit", [False, True])
+def test_strategies_agree(strategy, heuristic, lit):
+    """The sky alone, and the sky beside a lamp: all ways to find light estimate the same image (Welch)."""
+    lamp = Light((-0.5, 2.0, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0), 4.0)
+    ball = Sphere((0.0, 0.6, 0.0), 0.6, (0.8, 0.4, 0.4))
+    scene = Scene("day", Camera((0.0, 1.0, 3.5), (0.0, 0.4, 0.0)), quads=(PLANE,), spheres=(ball,))
+    scene = replace(scene, environment=SKY, lights=(lamp,) if lit else ())
+    counts = (128, 256)
+    a = R.render(scene, R.Job(8, 8, counts[0], 1, Settings(max_depth=2)))
+    b = R.render(scene, R.Job(8, 8, counts[1], 2, Settings(2, None, strategy, heuristic)))
+    means = [r.frame["color"].astype(np.float64).mean(-1).ravel() for r in (a, b)]
+    variances = [r.color_variance.mean(-1).ravel() for r in (a, b)]
+    noisy = (variances[0] > 1e-12) & (variances[1] > 1e-12)
+    assert noisy.sum() > 30
+    parts = [x[noisy] for pair in zip(means, variances, strict=True) for x in pair]
+    assert_all_plausible(welch_p(*parts[:2], counts[0], *parts[2:], counts[1]))
+    error = np.sqrt(sum(v.mean() / n for v, n in zip(variances, counts, strict=True)) / 64)
+    assert abs(means[0].mean() - means[1].mean()) <= 2.576 * error  # the image's mean, at significance 0.01
+
+
+def test_a_wrong_density_is_caught(monkeypatch):
+    """The test above can fail: a density of the sky that is a tenth too large is found."""
+    right = environment.pdf
+    monkeypatch.setattr(environment, "pdf", lambda *arguments: 1.1 * right(*arguments))
+    mean, error = plane_radiance(WHITE, strategy="light")
+    with pytest.raises(AssertionError):
+        assert_all_plausible(z_p(mean - 0.5, error))
+
+
+def test_daylight_has_a_sky_and_no_lamp():
+    scene = scenes.canonical("daylight", time=1.0)
+    assert scene.environment is not None
+    assert not scene.lights
+    assert scene.environment != scenes.canonical("daylight", time=3.0).environment

@@ -1,0 +1,180 @@
+"""Several materials in a scene: each surface has its own, inside is told from outside, and energy is kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from statistical import assert_all_plausible, welch_p
+from vertices import uniforms
+
+from wamnet.refimpl import render as R
+from wamnet.refimpl import rng, scenes, shading, transport
+from wamnet.refimpl.camera import camera_basis
+from wamnet.refimpl.materials import MATERIALS, Conductor, Dielectric, Lambertian, Mirror
+from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.transport import Settings
+
+GREY = (0.5, 0.6, 0.7)
+LIGHT = Light((-1.0, 1.9, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), (1.0, 0.9, 0.8), 30.0)
+WALLS = (Mirror(), Conductor(0.5), None, Lambertian(), None, Conductor(0.2))
+ALL = Scene(
+    "all",
+    Camera((0.2, 0.5, 1.8), (0.0, 0.0, 0.0), vertical_fov_deg=80.0),
+    Room((-2.0,) * 3, (2.0,) * 3, (GREY,) * 6, materials=WALLS),
+    boxes=(
+        Box((-1.0, -0.5, 0.0), (0.4, 0.5, 0.4), GREY, material=Dielectric(1.5)),
+        Box((1.0, -0.5, 0.0), (0.4, 0.5, 0.4), GREY, ((0.8, 0.0, -0.6), (0.0, 1.0, 0.0), (0.6, 0.0, 0.8))),
+    ),
+    spheres=(
+        Sphere((0.0, 0.5, 0.0), 0.4, GREY, material=Dielectric(1.8)),
+        Sphere((0.0, -0.8, 0.3), 0.4, GREY, material=Conductor(0.1)),
+    ),
+    quads=(Quad((-2.0, -1.0, -1.5), (0.5, 0.0, 2.0), (2.0, 0.1, 0.0), GREY, material=Mirror()),),
+    lights=(LIGHT,),
+)
+"""Surfaces of every kind of material, two numbers each."""
+
+
+def arrived(scene, size=24, depths=1, dtype=np.float32):
+    """Yield world, path, surface, hit and counters at each vertex of one path a pixel."""
+    world = transport.build(scene, Settings(max_depth=depths), dtype)
+    y, x = np.divmod(np.arange(size * size), size)
+    counters = transport.Counters(rng.counter(3), R.pixel_counter(x, y), rng.counter(0))
+    basis = camera_basis(scene.camera, dtype)
+    path = R.start(basis, x.astype(dtype), y.astype(dtype), size, size, counters, dtype)
+    for depth in range(depths):
+        path, surface, hit = transport.arrive(world, path)
+        yield world, path, surface, hit
+        path, _ = transport.scatter(world, path, surface, hit, rng.counter(depth), counters)
+
+
+def test_every_surface_has_its_own_material():
+    """What the selection gives are the bits of the surface's material alone, with its own number."""
+    numbers = uniforms(24 * 24, dtype=np.float32)[:3]
+    owners = [material or Lambertian() for material, _ in shading.intersection.materials_by_id(ALL)]
+    for world, path, surface, hit in arrived(ALL, depths=3):
+        at = shading.site(world.materials, surface, hit, path.direction, path.beta)
+        found = shading.scattered(world.materials, at, hit, *numbers)
+        wi, cosine = surface.normal, np.full_like(hit.t, 0.5)
+        color, factor = shading.value(world.materials, at, hit, wi, cosine)
+        density = shading.pdf(world.materials, at, hit, wi, cosine)
+        seen = set()
+        for i, material in enumerate(owners):
+            lanes = np.flatnonzero(hit.surface == i)
+            number = None if material.parameter is None else np.float32(material.parameter)
+            own = at._replace(parameter=np.full_like(hit.t, 0.0 if number is None else number))
+            own = type(own)(*(part[lanes] for part in own))
+            expected = material.sample(own, *(u[lanes] for u in numbers))
+            for a, b in zip(found[:3], expected[:3], strict=True):
+                assert np.array_equal(a[lanes], b)
+            passes = np.zeros(len(lanes), bool) if expected.through is None else expected.through
+            assert np.array_equal(found.through[lanes], passes)
+            expected_color, expected_factor = material.value(own, wi[lanes], cosine[lanes])
+            assert np.array_equal(
+                color[lanes] * factor[lanes, None], expected_color * expected_factor[:, None]
+            )
+            assert np.array_equal(density[lanes], material.pdf(own, wi[lanes], cosine[lanes]))
+            seen |= {material.kind} if len(lanes) else set()
+        assert seen == set(MATERIALS)
+
+
+def kinds(scene):
+    return [kind.kind for kind in shading.build(scene, np.float32).kinds]
+
+
+def test_only_kinds_that_surfaces_have():
+    """Lights reflect nothing, so they ask for no material."""
+    ball = Sphere((0.0, 0.0, 0.0), 1.0, GREY, material=Mirror())
+    scene = Scene("ball", Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0)), spheres=(ball,), lights=(LIGHT,))
+    assert kinds(scene) == ["mirror"]
+    assert kinds(replace(scene, spheres=())) == ["lambertian"]
+    assert kinds(scenes.canonical("minicubes")) == ["lambertian"]
+    assert kinds(scenes.canonical("glossy")) == ["lambertian", "conductor", "dielectric", "mirror"]
+    built = shading.build(replace(scene, spheres=(replace(ball, material=Conductor(0.3)),) * 3), np.float32)
+    assert np.array_equal(built.parameters[0], np.full(5, 0.3, np.float32))
+    assert built.centers is None
+
+
+def test_lights_are_sampled_where_they_can_be_met():
+    ball = Sphere((0.0, 0.0, 0.0), 1.0, GREY, material=Mirror())
+    scene = Scene("ball", Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0)), spheres=(ball,), lights=(LIGHT,))
+    assert not transport.build(scene, Settings()).samples_lights
+    rough = replace(scene, spheres=(replace(ball, material=Conductor()),))
+    assert transport.build(rough, Settings()).samples_lights
+    assert not transport.build(rough, Settings(strategy="bsdf")).samples_lights
+
+
+@pytest.mark.parametrize("inside", [False, True])
+@pytest.mark.parametrize("body", [ALL.boxes[0], replace(ALL.boxes[1], material=Dielectric()), ALL.spheres[0]])
+def test_inside_and_outside(body, inside):
+    """A camera in a body's centre meets its surface from inside, one beside it from outside."""
+    x, y, z = body.center
+    camera = Camera((x, y, z) if inside else (x, y, z + 1.5), (x, y, z - 1.0), vertical_fov_deg=30.0)
+    parts = {"spheres" if isinstance(body, Sphere) else "boxes": (body,)}
+    ((world, path, surface, hit),) = arrived(Scene("one", camera, **parts))
+    at = shading.site(world.materials, surface, hit, path.direction, path.beta)
+    met = hit.surface == 0
+    assert met.sum() > 50
+    assert np.all(at.outside[met] != inside)
+
+
+def test_paths_that_pass_go_on_behind_the_surface():
+    """A ray that enters a glass body starts inside it: it meets the same body next, from inside."""
+    one = Scene(
+        "one", Camera((0.0, 0.5, 2.0), (0.0, 0.5, 0.0), vertical_fov_deg=15.0), spheres=ALL.spheres[:1]
+    )
+    (_, _, front, first), (world, path, surface, hit) = arrived(one, depths=2)
+    entered = (first.surface == 0) & (np.sum(front.normal * path.direction, axis=-1) < 0.0)
+    assert entered.sum() > 300
+    assert np.all(hit.surface[entered] == 0)
+    at = shading.site(world.materials, surface, hit, path.direction, path.beta)
+    assert not np.any(at.outside[entered])
+
+
+def test_throughput_never_grows():
+    """Whatever the materials, beta stays in [0, 1] (rounding of a weight: 16 u a scattering), directions are
+    unit.
+    """
+    for depth, (_, path, _, _) in enumerate(arrived(ALL, depths=8)):
+        assert np.all(path.beta >= 0.0)
+        assert np.all(path.beta <= 1.0 + 16 * depth * 2.0**-24)
+        assert np.all(np.isfinite(path.radiance))
+        assert np.max(np.abs(np.sum(path.direction**2, -1) - 1.0)) <= 40 * np.finfo(np.float32).eps
+
+
+@pytest.mark.parametrize(
+    ("strategy", "heuristic"), [("light", "power"), ("bsdf", "power"), ("mis", "balance")]
+)
+def test_strategies_agree(strategy, heuristic):
+    """All ways to find a light estimate the same image of rough metal and matt walls: Welch's test per pixel.
+
+    Glass and mirrors are left out: light that they send to matt walls comes in rare bright paths, and the
+    mean of 256 of them is far from normal. What they weigh is tested exactly, in the tests of each."""
+    metal = Conductor(0.4)
+    scene = replace(
+        ALL,
+        room=replace(ALL.room, materials=(None, Conductor(0.6), metal, None, metal, None)),
+        boxes=ALL.boxes[1:],
+        spheres=tuple(replace(ball, material=metal) for ball in ALL.spheres),
+        quads=(),
+    )
+    counts, settings = (256, 512), Settings(max_depth=3, strategy=strategy, heuristic=heuristic)
+    a = R.render(scene, R.Job(7, 7, counts[0], 1, Settings(max_depth=3)))
+    b = R.render(scene, R.Job(7, 7, counts[1], 2, settings))
+    means = [r.frame["color"].astype(np.float64).mean(-1).ravel() for r in (a, b)]
+    variances = [r.color_variance.mean(-1).ravel() for r in (a, b)]
+    assert_all_plausible(welch_p(means[0], variances[0], counts[0], means[1], variances[1], counts[1]))
+    error = np.sqrt(sum(v.mean() / n for v, n in zip(variances, counts, strict=True)) / 49)
+    assert abs(means[0].mean() - means[1].mean()) <= 2.576 * error  # the image's mean, at significance 0.01
+
+
+def test_a_wrong_density_is_caught(monkeypatch):
+    """The test above can fail: a density of the lobe that is four times too small makes light count twice in
+    part.
+    """
+    right = Conductor.pdf
+    monkeypatch.setattr(Conductor, "pdf", staticmethod(lambda *arguments: 0.25 * right(*arguments)))
+    with pytest.raises(AssertionError):
+        test_strategies_agree("light", "power")

@@ -55,6 +55,9 @@ CROP = 48
 MATRIX = 4096
 """Rows and columns of the matrices whose product is the machine's rate."""
 
+PAUSE_S = 0.3
+"""Seconds before a measurement: threads of OpenMP and OpenBLAS spin for a while after their last work."""
+
 WAYS = ("opencl:plain", "opencl:vector16", "opencl:tile16", "torch", "torch.compile")
 """What is measured by default: what takes less than a few seconds a frame."""
 
@@ -159,7 +162,8 @@ def _product() -> Any:
 
 
 def _seconds(clock: Clock, function: Callable[[], Any]) -> float:
-    """Return the time that a function takes by a clock."""
+    """Return the time that a function takes by a clock, after a pause."""
+    time.sleep(PAUSE_S)
     start = clock()
     function()
     return clock() - start
@@ -198,7 +202,10 @@ def _torch(compiled: bool, model: Model, images: Images, crop: Images) -> Way:
     kernels = [kernel.to(memory_format=torch.channels_last) for kernel in kernels]
     omegas = (model.siren.omega_0_first, *[model.siren.omega_0_hidden] * len(others))
 
-    def network(x: Any) -> Any:
+    margins = (window // 2, window - 1 - window // 2) * 2
+
+    def network(images: Sequence[Any]) -> Any:
+        x = torch.nn.functional.pad(torch.cat(images, dim=1), margins, mode="replicate")
         for number, (kernel, bias) in enumerate(zip(kernels, biases, strict=True)):
             x = torch.nn.functional.conv2d(x, kernel, bias)
             if number < len(others):
@@ -208,12 +215,10 @@ def _torch(compiled: bool, model: Model, images: Images, crop: Images) -> Way:
     function = torch.compile(network) if compiled else network
 
     def run(given: Images) -> NDArray[np.float32]:
-        joined = np.concatenate(list(given.values()), axis=-1)
-        padded = dataset.pad(joined, model.window)
         with torch.inference_mode():
             # A view of rows with interleaved channels is PyTorch's channels-last order.
-            x = torch.from_numpy(padded).permute(2, 0, 1)[None]
-            result: NDArray[np.float32] = function(x)[0].permute(1, 2, 0).numpy()
+            images = [torch.from_numpy(image).permute(2, 0, 1)[None] for image in given.values()]
+            result: NDArray[np.float32] = function(images)[0].permute(1, 2, 0).numpy()
         return result
 
     start = time.perf_counter()

@@ -6,7 +6,7 @@
 3. A group of elementwise operations is a function on `vec4`, called for each of a layer's.
 
 For a renderer on a processor (Mesa's llvmpipe) a constant is an operand, while every other read of a weight
-is a chain of checks and gathers: measured, a weight in a texture costs 28 times as much, one in a uniform
+is a chain of checks and gathers: measured, a weight in a texture costs 23 times as much, one in a uniform
 block 5 times. The price is paid once, when the driver compiles, in proportion to the number of weights
 [`LARGEST_WEIGHTS`].
 """

@@ -63,6 +63,7 @@ def compile_model(
         int | None,
         typer.Option(help="Paths that a work item follows: 16 suit CPUs, 1 GPUs.", show_default="1"),
     ] = None,
+    schedule: options.Schedule = None,
 ) -> None:
     """Compile a model, or a scene, to a kernel: source, weights, and a manifest with its interface.
 
@@ -71,10 +72,14 @@ def compile_model(
     """
     from ..compiler.compile import compile_program
     from ..compiler.lower import lower
+    from ..compiler.schedules import PLAIN
 
     folder, name = output or Path(target.value), EXECUTOR_OF[target]
     kernel: Files
     if is_scene(model):
+        if schedule is not None:
+            rule = f"{model} is a scene, whose kernels have one schedule"
+            raise InputError("--schedule", schedule, rule, "leave it out, or name a model")
         check_folder(folder, name, of_scene=True)
         kernel = _compiled_scene(model, name, profile, time, parameters or [], max_depth, lanes)
     else:
@@ -84,9 +89,11 @@ def compile_model(
                 rule = f"{model} is no scene: neither a canonical one nor a .json file"
                 raise InputError(option, value, rule, "leave it out, or name a scene")
         check_folder(folder, name)
-        kernel = compile_program(lower(load_model(Path(model))), name, profile)
+        kernel = compile_program(lower(load_model(Path(model))), name, profile, schedule or PLAIN)
     for path in write_kernel(kernel, folder):
         say(str(path))
+    if reason := kernel.manifest.get("schedule", {}).get("reason"):
+        say(f"schedule plain, not {schedule}: {reason}")
 
 
 def is_scene(name: str) -> bool:

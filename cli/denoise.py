@@ -43,8 +43,12 @@ def denoise(
         Path, typer.Option("-o", "--output", metavar="FILE", help="Linear colour (.exr) or picture (.png).")
     ] = Path("denoised.png"),
     executor: options.Executor = ExecutorName.numpy,
+    schedule: options.Schedule = None,
 ) -> None:
-    """Denoise a frame with a trained model."""
+    """Denoise a frame with a trained model.
+
+    The kernel's schedule is the one that suits the device, unless another is named.
+    """
     from ..kernels import denoise_on, open_executor
     from . import exr
 
@@ -54,9 +58,10 @@ def denoise(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )
     with open_executor(executor.value) as runner:
-        result = denoise_on(runner, network, noisy)
+        result = denoise_on(runner, network, noisy, schedule=schedule)
     write_denoised(output, result.image, network, noisy)
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")
+    say(f"schedule {result.schedule}")
     say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation")
 
 
@@ -76,15 +81,17 @@ def write_denoised(path: Path, encoded: Any, model: Model, noisy: Frame) -> None
 def executors() -> None:
     """List what can run a kernel here, or what is missing for it."""
     found = [probe(name.value) for name in ExecutorName]
-    table("Executors", ("name", "state", "device, or what is missing"), found, texts=3)
+    heads = ("name", "state", "schedule", "device, or what is missing")
+    table("Executors", heads, found, texts=4)
 
 
-def probe(name: str) -> tuple[str, str, str]:
-    """Return an executor's name, whether it works here, and its device or the reason why not."""
+def probe(name: str) -> tuple[str, str, str, str]:
+    """Return an executor's name, whether it works here, its schedule, and its device or why it does not."""
     from ..kernels import open_executor
 
     try:
         with open_executor(name) as executor:
-            return name, "ready", executor.device
+            least = f" from {executor.schedule_pixels} pixels on" if executor.schedule_pixels else ""
+            return name, "ready", executor.schedule + least, executor.device
     except ExecutorUnavailable as error:
-        return name, "missing", str(error)
+        return name, "missing", "", str(error)

@@ -114,6 +114,15 @@ Trainer = Annotated[
         "--executor", help="What trains: the reference, or its step compiled, which is much faster."
     ),
 ]
+Schedule = Annotated[
+    str | None,
+    typer.Option(
+        "--schedule",
+        metavar="NAME",
+        help="Order of the kernel's work: [bold]plain[/] is made to be read, others to be fast.",
+        show_default=False,
+    ),
+]
 Seed = Annotated[int, typer.Option("--seed", help="Any other number gives other random numbers.")]
 Time = Annotated[
     float | None,

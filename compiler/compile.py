@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from decimal import ROUND_CEILING, Decimal
 from typing import Any
@@ -20,16 +20,18 @@ from typing import Any
 import numpy as np
 
 from ..refimpl.errors import CompileError
-from . import artifact, bounds, ir, profiles
+from . import artifact, bounds, ir, profiles, schedules
 from .artifact import Artifact
 from .dialect import Dialect
-from .emit import emit, kernel_gather, output_channels, private_bytes
+from .emit import kernel_gather, output_channels
 from .glsl import GLSL
+from .glsl_inlined import GLSL_LADDER
 from .ir import OUTPUT_ENCODING, Program
 from .opencl import OpenCL
+from .opencl_tiled import OPENCL_LADDER
 from .passes import pipeline
 from .profiles import Profile, SineContract
-from .weights import layout, pack
+from .schedules import PLAIN, Pick, Plain, Printed, Schedule, pick
 
 
 @dataclass(frozen=True)
@@ -40,27 +42,20 @@ class Target:
     language: str
     suffix: str
     entry: str
-    arguments: str
     native_sine: SineContract
-    emit: Callable[[Program, Sequence[str], bool], str]
+    schedules: tuple[Schedule, ...]
 
 
-def _dialect_target(dialect: Dialect) -> Target:
-    """Return the target whose source a dialect makes."""
+def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
+    """Return the target whose source a dialect makes, with its schedules besides the plain one."""
     return Target(
         dialect.target,
         dialect.language,
         dialect.suffix,
         dialect.entry,
-        dialect.arguments,
         dialect.native_sine,
-        lambda program, header, bounded: emit(program, dialect, header, bounded),
+        (Plain(dialect), *ladder),
     )
-
-
-def _printed(program: Program, header: Sequence[str], bounded: bool) -> str:
-    """Return the program as text, which is all that the interpreter needs."""
-    return "".join(f"# {line}".rstrip() + "\n" for line in header) + ir.text(program)
 
 
 TARGETS: Mapping[str, Target] = {
@@ -71,12 +66,11 @@ TARGETS: Mapping[str, Target] = {
             "wamnet IR",
             ".ir.txt",
             "program",
-            "the program's inputs and parameters, by name",
             SineContract("np.sin, whose documentation promises nothing", None),
-            _printed,
+            (Printed(),),
         ),
-        _dialect_target(OpenCL()),
-        _dialect_target(GLSL()),
+        _dialect_target(OpenCL(), *OPENCL_LADDER),
+        _dialect_target(GLSL(), *GLSL_LADDER),
     )
 }
 """All targets, by the name of the executor that runs them."""
@@ -163,19 +157,23 @@ def target_named(name: str) -> Target:
     return TARGETS[name]
 
 
-def compile_program(program: Program, target: str, profile: str = "ieee") -> Artifact:
-    """Return the kernel of a program that reads a window and writes one output."""
+def compile_program(program: Program, target: str, profile: str = "ieee", schedule: str = PLAIN) -> Artifact:
+    """Return the kernel of a program that reads a window and writes one output.
+
+    A schedule that cannot hold the program gives way to the plain one; the manifest says so.
+    """
     chosen, promised = target_named(target), profiles.profile_named(profile)
     kernel_gather(program)
     common = analysed(program)
     bound = bound_over_images(common, profile, target)
     emitted = pipeline.run(common, promised.passes)
-    header = _header(common, chosen, promised, bound) + _weight_lines(emitted)
-    source = chosen.emit(emitted, header, bound.output is not None)
-    return _assemble(common, emitted, chosen, promised, bound, source)
+    picked = pick(chosen.schedules, schedule, emitted)
+    header = _header(common, chosen, promised, bound, picked) + _weight_lines(emitted, picked.schedule)
+    source = picked.schedule.emit(emitted, header, bound.output is not None)
+    return _assemble(common, emitted, chosen, promised, bound, picked, source)
 
 
-def _header(program: Program, target: Target, profile: Profile, bound: Bound) -> list[str]:
+def _header(program: Program, target: Target, profile: Profile, bound: Bound, picked: Pick) -> list[str]:
     """Return the lines of the comment at the top of the source."""
     gather, channels = kernel_gather(program), output_channels(program)
     images = [
@@ -183,7 +181,7 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound) ->
         for i in gather.images
     ]
     encoding = dict(program.info).get(OUTPUT_ENCODING)
-    arguments = target.arguments.format(channels=channels).split("\n")
+    arguments = picked.schedule.arguments.format(channels=channels).split("\n")
     size = gather.window.size
     return [
         f"wamnet denoiser, {target.language}. Generated: change the compiler, not this text.",
@@ -196,15 +194,17 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound) ->
         f"profile   {profile.name}: {profile.text}",
         f"sine      {sine_contract(profile.name, target.name).text}",
         f"bound     {_bound_text(bound)}",
+        *([] if picked.schedule.name == PLAIN else [f"schedule  {schedules.text(picked.manifest())}"]),
         f"arguments {arguments[0]}",
         *(f"          {line}" for line in arguments[1:]),
     ]
 
 
-def _weight_lines(program: Program) -> list[str]:
+def _weight_lines(program: Program, schedule: Schedule) -> list[str]:
     """Return the lines of the header that say where each parameter lies, wrapped."""
-    slots = [f"{s.name} ({' x '.join(map(str, s.shape))}) at {s.offset}" for s in layout(program).values()]
-    text = f"{', '.join(slots) or 'none'}; matrices input-major: D_in x D_out, in C order"
+    places = schedule.layout(program).values()
+    slots = [f"{s.name} ({' x '.join(map(str, s.shape))}) at {s.offset}" for s in places]
+    text = f"{', '.join(slots) or 'none'}; {schedule.order}"
     return textwrap.wrap(text, 98, initial_indent="weights   ", subsequent_indent=" " * 10)
 
 
@@ -226,11 +226,18 @@ def round_up(value: float, digits: int = 3) -> float:
 
 
 def _assemble(
-    common: Program, emitted: Program, target: Target, profile: Profile, bound: Bound, source: str
+    common: Program,
+    emitted: Program,
+    target: Target,
+    profile: Profile,
+    bound: Bound,
+    picked: Pick,
+    source: str,
 ) -> Artifact:
     """Return the artifact with its manifest."""
-    gather, weights = kernel_gather(emitted), pack(emitted)
-    raw, slots = weights.astype("<f4").tobytes(), layout(emitted).values()
+    gather, schedule = kernel_gather(emitted), picked.schedule
+    weights, slots = schedule.pack(emitted), schedule.layout(emitted).values()
+    raw = weights.astype("<f4").tobytes()
     source_name = f"denoise{target.suffix}"
     manifest: dict[str, Any] = {
         "schema": artifact.SCHEMA,
@@ -249,7 +256,7 @@ def _assemble(
             "channels": output_channels(emitted),
             "encoding": dict(emitted.info).get(OUTPUT_ENCODING, ""),
         },
-        "arguments": target.arguments.format(channels=output_channels(emitted)),
+        "arguments": schedule.arguments.format(channels=output_channels(emitted)),
         "bound": {
             "output": bound.output and [round_up(error) for error in bound.output],
             "against": "float64 reference, same float32 weights and images",
@@ -260,8 +267,13 @@ def _assemble(
             source_name: ir.sha256(source.encode()),
             artifact.WEIGHTS_NAME: ir.sha256(raw),
         },
-        "private_bytes": private_bytes(emitted),
-        "weights": {"count": int(weights.size), "layout": [asdict(slot) for slot in slots]},
+        "private_bytes": schedule.private_bytes(emitted),
+        "schedule": picked.manifest(),
+        "weights": {
+            "count": int(weights.size),
+            "layout": [asdict(slot) for slot in slots],
+            "order": schedule.order,
+        },
     }
     manifest = json.loads(json.dumps(manifest, allow_nan=False))
     return Artifact(target.name, profile.name, target.entry, source, source_name, emitted, weights, manifest)

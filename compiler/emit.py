@@ -31,34 +31,38 @@ BORDERS: Mapping[str, tuple[str, str]] = {
 """By border rule: a statement before the channels are read, and one's value; no read leaves the image."""
 
 
-def emit(program: Program, dialect: Dialect, header: Sequence[str], bounded: bool) -> str:
+def emit(
+    program: Program, dialect: Dialect, header: Sequence[str], bounded: bool, body: Body | None = None
+) -> str:
     """Return the kernel's source; `header` are the lines of the comment at its top.
 
     `bounded`: an error bound is stated, and the language must keep the order of operations that it rests on.
+    `body`: another schedule's.
     """
     gather = kernel_gather(program)
     _check_channels(program, dialect)
+    body = body or Body(program, dialect, gather)
     images = [dialect.image_declaration.format(image=i.name, channels=i.channels) for i in gather.images]
-    defines = (
-        f"#define WINDOW_SIZE {gather.window.size}\n"
-        f"#define WINDOW_CENTRE {gather.window.size // 2} /* the tap that lies on the pixel itself */"
-    )
+    defines = [
+        f"#define WINDOW_SIZE {gather.window.size}",
+        f"#define WINDOW_CENTRE {gather.window.size // 2} /* the tap that lies on the pixel itself */",
+        *body.defines(),
+    ]
     declared = [dialect.table_declaration(name, array) for name, array in tables(program).items()]
     begin = dialect.begin.format(
-        defines="\n".join([defines, *declared]),
+        defines="\n".join([*defines, *declared]),
         entry=dialect.entry,
         images=dialect.image_separator.join(images),
         image=gather.images[0].name,
         unordered=dialect.unordered[bounded],
     )
     comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
-    body = _Body(program, dialect, gather).text()
-    return "\n".join([*comment, begin, *body, dialect.end.format()]) + "\n"
+    return "\n".join([*comment, begin, *body.text(), dialect.end.format()]) + "\n"
 
 
 def private_bytes(program: Program) -> int:
     """Return the bytes of the arrays that a kernel declares for each pixel."""
-    body = _Body(program, Dialect(), kernel_gather(program))
+    body = Body(program, Dialect(), kernel_gather(program))
     shapes = [program.nodes[index].type.shape for index in body.group_of if body.declares(index)]
     return sum(4 * shape[0] for shape in shapes)
 
@@ -122,8 +126,8 @@ def _plus(*terms: str | int) -> str:
 
 
 @dataclass
-class _Body:
-    """The statements of one kernel."""
+class Body:
+    """The statements of one kernel; other schedules override how values are kept and affine maps computed."""
 
     program: Program
     dialect: Dialect
@@ -137,12 +141,20 @@ class _Body:
         self.readers = users(self.program)
         self.group_of = {index: number for number, group in enumerate(self.groups) for index in group}
 
+    def defines(self) -> list[str]:
+        """Return the lines that stand below the window's."""
+        return []
+
     def text(self) -> list[str]:
         """Return the lines between the kernel's braces."""
+        self._prepare()
         for group in self.groups:
             self._group(group)
         self._outputs()
         return self.lines
+
+    def _prepare(self) -> None:
+        """Write what stands before the first value."""
 
     # ---- groups ------------------------------------------------------------------------------------------
 
@@ -196,14 +208,14 @@ class _Body:
         if shape:
             self._comment(f"{span}: elementwise on {shape[0]} numbers")
             for index in filter(self._is_array, group):
-                self._line(f"{self._type(index)} v{index}[{shape[0]}];")
+                self._line(self._declaration(index))
         statements = []
         for index in group:
             kind = self.dialect.variable(self.program.nodes[index].type.dtype)
             statements.append(f"{kind} t{index} = {self._expression(index, lane)};")
             if shape and self._is_array(index):
-                statements.append(f"v{index}[i] = t{index};")
-        self._nest([f"for (int i = 0; i < {shape[0]}; ++i) {{"] if shape else [], statements)
+                statements.append(f"{self._element(index, 'i')} = t{index};")
+        self._nest([f"for (int i = 0; i < {self._count(shape[0])}; ++i) {{"] if shape else [], statements)
 
     def _expression(self, index: int, lane: str) -> str:
         """Return the right side of an elementwise node or a component."""
@@ -257,7 +269,19 @@ class _Body:
             return self._weight(_plus(self.slots[str(node["name"])].offset, lane))
         if not node.type.shape or self.group_of[index] == group:
             return f"t{index}"
+        return self._element(index, lane)
+
+    def _element(self, index: int, lane: str) -> str:
+        """Return the text of an element of the array of a value."""
         return f"v{index}[{lane}]"
+
+    def _count(self, numbers: int) -> str:
+        """Return the text of the number of elements in the array of a vector of `numbers`."""
+        return str(numbers)
+
+    def _declaration(self, index: int) -> str:
+        """Return the declaration of the array of a value."""
+        return f"{self._type(index)} v{index}[{self.program.nodes[index].type.shape[0]}];"
 
     def declares(self, index: int) -> bool:
         """Return whether the kernel has an array for this value."""
@@ -281,7 +305,7 @@ class _Body:
     def _declare(self, index: int, comment: str) -> None:
         """Write a comment and the declaration of an array."""
         self._comment(comment)
-        self._line(f"{self._type(index)} v{index}[{self.program.nodes[index].type.shape[0]}];")
+        self._line(self._declaration(index))
 
     def _type(self, index: int) -> str:
         """Return the type of a value's numbers."""

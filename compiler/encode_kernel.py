@@ -78,7 +78,7 @@ def compile_encode(
     known = [FEATURES[name] for name in features]
     images = tuple(Image(f.name, f.channels, f.low, f.high, f.encoding(normalization)) for f in known)
     dialect = ENCODE_DIALECTS.get(target)
-    arguments = dialect.encode_arguments if dialect else chosen.arguments
+    arguments = dialect.encode_arguments if dialect else chosen.schedules[0].arguments
     arguments = arguments.format(planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
     header = _header(program, images, dialect.language if dialect else chosen.language, arguments)
     if dialect is None:

@@ -94,7 +94,7 @@ def compile_path(
     emitted, dialect = _passed(programs, promised.passes), make(lanes)
     planes = tuple(emit_path.planes(groups))
     header = _header(programs, dialect.language if dialect else chosen.language, promised, lanes)
-    arguments = dialect.path_arguments if dialect else chosen.arguments
+    arguments = dialect.path_arguments if dialect else chosen.schedules[0].arguments
     arguments = arguments.format(lanes=lanes, planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
     if dialect is None:
         text, suffix, entry = _printed(emitted, header), chosen.suffix, chosen.entry

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiler import schedules
 from ..compiler.compile import compile_program
 from ..compiler.lower import lower
 from ..refimpl.dataset import feature_image
 from ..refimpl.denoise import Model
 from ..refimpl.frame import Frame
 from .executor import Executor, Images
+from .memory import keep_freed_memory
 
 
 @dataclass(frozen=True)
@@ -22,12 +24,14 @@ class RunResult:
 
     `seconds_compile`: tracing, passes, bound, emission, the driver's compilation and one run on a few pixels.
     `seconds_run`: images to the device, the kernel, the result back; not the encoding of the features.
+    `schedule`: what was picked, and why, where it is not what was asked for.
     """
 
     image: NDArray[np.float32]
     seconds_compile: float
     seconds_run: float
     device: str
+    schedule: str
 
 
 def images_of(model: Model, frame: Frame) -> Images:
@@ -35,12 +39,18 @@ def images_of(model: Model, frame: Frame) -> Images:
     return {name: feature_image(frame, (name,), model.normalization) for name in model.features}
 
 
-def denoise_on(executor: Executor, model: Model, frame: Frame, profile: str = "ieee") -> RunResult:
-    """Return the denoised frame and the times."""
+def denoise_on(
+    executor: Executor, model: Model, frame: Frame, profile: str = "ieee", schedule: str | None = None
+) -> RunResult:
+    """Return the denoised frame and the times; without a `schedule`, the one that suits device and size."""
     images = images_of(model, frame)
     start = time.perf_counter()
-    artifact = compile_program(lower(model), executor.name, profile)
-    executor.build(artifact, (frame.height, frame.width))
+    size = (frame.height, frame.width)
+    artifact = compile_program(lower(model), executor.name, profile, schedule or executor.schedule_for(size))
+    executor.build(artifact, size)
+    keep_freed_memory()
     built = time.perf_counter()
     image = executor.run(artifact, images)
-    return RunResult(image, built - start, time.perf_counter() - built, executor.device)
+    seconds = time.perf_counter() - built
+    picked = schedules.text(artifact.manifest["schedule"])
+    return RunResult(image, built - start, seconds, executor.device, picked)

@@ -20,6 +20,7 @@ from ..compiler.artifact import Artifact
 from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.ir import Gather, Image
 from ..compiler.path_kernel import PathArtifact
+from ..compiler.schedules import PLAIN
 from ..compiler.step_kernel import StepKernel
 from ..refimpl.errors import InputError
 
@@ -49,12 +50,16 @@ class Part:
 class Executor(ABC):
     """A device that is open; a context manager that closes it. `name` is its target, `device` a text.
 
-    `lanes` is the number of paths that its path kernels should follow at once.
+    `lanes` is the number of paths that its path kernels should follow at once, `schedule` the name of the
+    schedule that suits a denoiser on it, for pictures of at least `schedule_pixels`: smaller ones are done
+    with the plain kernel before the other is compiled.
     """
 
     name: str
     device: str
     lanes: int = 1
+    schedule: str = PLAIN
+    schedule_pixels: int = 0
 
     @abstractmethod
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
@@ -71,6 +76,10 @@ class Executor(ABC):
     @abstractmethod
     def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
         """Return the sums (planes, rows, width) of a part."""
+
+    def schedule_for(self, size: tuple[int, int]) -> str:
+        """Return the name of the schedule that suits one picture of `size` (height, width)."""
+        return self.schedule if size[0] * size[1] >= self.schedule_pixels else PLAIN
 
     @abstractmethod
     def _passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
@@ -162,22 +171,23 @@ def checked(artifact: Artifact, inputs: Images) -> Images:
                 f"must be float32 of shape (height, width, {image.channels}), all images of one size",
                 "encode the frame's features (refimpl.dataset.feature_image)",
             )
-        if not np.isfinite(array).all():
-            y, x, _ = np.argwhere(~np.isfinite(array))[0]
-            raise InputError(
-                f"image {image.name!r} at row {y}, column {x}",
-                array[y, x].tolist(),
-                "all numbers must be finite",
-                "mend or mask the frame first",
-            )
         _check_range(image, array)
     return {image.name: np.ascontiguousarray(inputs[image.name]) for image in wanted}
 
 
 def _check_range(image: Image, array: NDArray[np.float32]) -> None:
-    """Refuse numbers outside the range on which the kernel's bound rests."""
+    """Refuse numbers outside the range on which the kernel's bound rests, and what is no number."""
+    # NaN among the numbers makes both NaN, and fails.
     if image.low <= float(array.min()) and float(array.max()) <= image.high:
         return
+    if not np.isfinite(array).all():
+        y, x, _ = np.argwhere(~np.isfinite(array))[0]
+        raise InputError(
+            f"image {image.name!r} at row {y}, column {x}",
+            array[y, x].tolist(),
+            "all numbers must be finite",
+            "mend or mask the frame first",
+        )
     # In float64: a Python number would be rounded to the array's float32 first.
     outside = (array < np.float64(image.low)) | (array > np.float64(image.high))
     y, x, _ = np.argwhere(outside)[0]

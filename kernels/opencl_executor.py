@@ -8,8 +8,10 @@ the standard's.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,6 +35,13 @@ DEVICE_VARIABLE = "WAMNET_OPENCL_DEVICE"
 LOCAL_SIZE = (16, 4)
 """Work items (x, y) in a group: one size for all images, so that PoCL compiles a kernel once."""
 
+TILE_LOCAL_SIZE = (1, 1)
+"""The same for kernels whose items compute several pixels: they are groups by themselves, and need no second
+loop around them."""
+
+CPU_SCHEDULES = {16: "tile16", 8: "tile8"}
+"""Schedule of a denoiser by the floats in a vector register of a processor; others have registers of 4."""
+
 STACK_BYTES = 2**20
 """Most bytes of a group's arrays on a processor: half the smallest stack that glibc gives a thread."""
 
@@ -50,6 +59,16 @@ BUILD_OPTIONS = ("-cl-std=CL1.2",)
 """Nothing here may allow what the standard's table of errors does not."""
 
 
+@dataclass(frozen=True)
+class _Built:
+    """A kernel on the device, its weights, work items (x, y) in a group, and pixels of an item."""
+
+    kernel: Any
+    weights: Any
+    local: tuple[int, int]
+    pixels: int
+
+
 class OpenCLExecutor(Executor):
     """One OpenCL device with its queue."""
 
@@ -65,10 +84,14 @@ class OpenCLExecutor(Executor):
             pocl_cpu.name_the_processor(chosen.int_ptr)
         self._context = cl.Context([chosen])
         self._queue = cl.CommandQueue(self._context)
-        self._built: dict[str, tuple[Any, Any, tuple[int, int]]] = {}
+        self._built: dict[str, _Built] = {}
         self._paths: dict[str, Any] = {}
+        self._shares = False
+        if chosen.type & cl.device_type.CPU:
+            self._shares = True
+            self.lanes = CPU_LANES
+            self.schedule = CPU_SCHEDULES.get(chosen.native_vector_width_float, "tile4")
         self._encoders: dict[str, Any] = {}
-        self.lanes = CPU_LANES if chosen.type & cl.device_type.CPU else 1
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
         """Compile the source, upload the weights, and run once."""
@@ -79,7 +102,8 @@ class OpenCLExecutor(Executor):
         program = self._compiled(artifact.source)
         # An empty buffer is no buffer.
         weights = artifact.weights if artifact.weights.size else np.zeros(1, np.float32)
-        built = (getattr(program, artifact.entry_point), self._upload(weights), local_size)
+        kernel, pixels = getattr(program, artifact.entry_point), artifact.manifest["schedule"]["pixels"]
+        built = _Built(kernel, self._copied(weights), local_size, pixels)
         self._launch(artifact, built, black(artifact, (1, 1)))
         keep(self._built, artifact.digest, built)
 
@@ -108,8 +132,9 @@ class OpenCLExecutor(Executor):
                 f"{width} numbers): at most {STACK_BYTES} fit a processor's stack; use narrower layers, or a "
                 "GPU, or executor numpy"
             )
-        x = min(LOCAL_SIZE[0], items)
-        return x, min(LOCAL_SIZE[1], items // x)
+        wanted = LOCAL_SIZE if artifact.manifest["schedule"]["pixels"] == 1 else TILE_LOCAL_SIZE
+        x = min(wanted[0], items)
+        return x, min(wanted[1], items // x)
 
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
         with self._told(next(iter(images.values())).shape[:2]):
@@ -128,29 +153,49 @@ class OpenCLExecutor(Executor):
                 "split the picture, or use executor numpy",
             ) from None
 
-    def _launch(
-        self, artifact: Artifact, built: tuple[Any, Any, tuple[int, int]], images: Images
-    ) -> NDArray[np.float32]:
+    def _launch(self, artifact: Artifact, built: _Built, images: Images) -> NDArray[np.float32]:
         """Copy the images, run a built kernel, and copy the result back."""
         height, width = next(iter(images.values())).shape[:2]
         result = np.empty((height, width, output_channels(artifact.program)), np.float32)
-        output = cl.Buffer(self._context, cl.mem_flags.WRITE_ONLY, result.nbytes)
+        output = self._result(result)
         inputs = [self._upload(image) for image in images.values()]
         self._enqueue(built, inputs, output, (height, width))
-        cl.enqueue_copy(self._queue, result, output)
+        if self._shares:
+            # Mapping waits for the kernel, and makes the array hold what the buffer does.
+            _, done = cl.enqueue_map_buffer(
+                self._queue, output, cl.map_flags.READ, 0, result.shape, result.dtype, is_blocking=True
+            )
+            done.wait()
+        else:
+            cl.enqueue_copy(self._queue, result, output)
         return result
 
     def _enqueue(
         self,
-        built: tuple[Any, Any, tuple[int, int]],
+        built: _Built,
         inputs: Sequence[Any],
         output: Any,
         size: tuple[int, int],
     ) -> None:
         """Start a built kernel on images of `size` (height, width) that are on the device."""
-        kernel, weights, local = built
+        items = (-(-size[1] // built.pixels), size[0])
         numbers = (np.int32(size[1]), np.int32(size[0]))
-        kernel(self._queue, _whole(size[::-1], local), local, *inputs, weights, output, *numbers)
+        places = _whole(items, built.local)
+        built.kernel(self._queue, places, built.local, *inputs, built.weights, output, *numbers)
+
+    def kernel_seconds(
+        self, artifact: Artifact, images: Images, clock: Callable[[], float] = time.perf_counter
+    ) -> float:
+        """Return the time of the kernel of a built artifact alone: images and result stay on the device."""
+        height, width = next(iter(images.values())).shape[:2]
+        # Memory that is written before the clock starts: the system gives it when it is first touched.
+        result = np.full((height, width, output_channels(artifact.program)), 0, np.float32)
+        inputs, output = [self._upload(image) for image in images.values()], self._result(result)
+        self._queue.finish()
+        start = clock()
+        self._enqueue(self._built[artifact.digest], inputs, output, (height, width))
+        self._queue.finish()
+        return clock() - start
 
     def build_path(self, kernel: PathArtifact) -> None:
         """Compile the source, and follow one path: PoCL compiles when a kernel is first enqueued."""
@@ -212,9 +257,23 @@ class OpenCLExecutor(Executor):
         return program
 
     def _upload(self, array: NDArray[np.float32]) -> Any:
-        """Return a device buffer with the array's content."""
-        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
+        """Return a device buffer with the array's content; on a processor, the array's own memory."""
+        if not self._shares:
+            return self._copied(array)
+        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
         return cl.Buffer(self._context, flags, hostbuf=np.ascontiguousarray(array))
+
+    def _copied(self, array: NDArray[np.float32]) -> Any:
+        """Return a device buffer with a copy of an array, at an address that suits vectors."""
+        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
+        return cl.Buffer(self._context, flags, hostbuf=array)
+
+    def _result(self, array: NDArray[np.float32]) -> Any:
+        """Return a device buffer for an array of results; on a processor, the array's own memory."""
+        if self._shares:
+            flags = cl.mem_flags.WRITE_ONLY | cl.mem_flags.USE_HOST_PTR
+            return cl.Buffer(self._context, flags, hostbuf=array)
+        return cl.Buffer(self._context, cl.mem_flags.WRITE_ONLY, array.nbytes)
 
 
 class OpenCLPasses(Passes):

@@ -69,7 +69,7 @@ class Pipeline:
         self.encode = compile_encode(
             self._features, model.normalization, executor.name, profile, self.path.planes
         )
-        self.denoise = compile_program(lower(model), executor.name, profile)
+        self.denoise = compile_program(lower(model), executor.name, profile, executor.schedule_for(size))
         self._drawn = False
         self.passes = executor.passes(self.encode, self.denoise, size)
 

@@ -41,6 +41,7 @@ def test_the_picture_is_the_executors(wamnet, here, picture) -> None:
     assert outcome.status == 0
     assert outcome.out.startswith("denoised.png: 13x12 pixels on numpy (NumPy ")
     assert " s, after " in outcome.out
+    assert "schedule plain: one operation after another" in outcome.out
     assert (encoding.to_8bit(read_png(here / "denoised.png")) == encoding.to_8bit(picture)).all()
     assert wamnet("denoise", "model.safetensors", "noisy.exr", "-o", "d.exr").status == 0
     frame = exr.read_frame(here / "d.exr")
@@ -107,6 +108,30 @@ def test_refusals_of_compiling_a_scene(wamnet, refused, here) -> None:
     )
 
 
+def test_a_schedule_by_name(wamnet, refused, here) -> None:
+    """The kernel's manifest names it; unknown ones, and ones for scenes, are refused."""
+    opencl = ["--target", "opencl", "-o", "kernel"]
+    outcome = wamnet("compile", "model.safetensors", *opencl, "--schedule", "tile8")
+    assert outcome.status == 0
+    assert "schedule" not in outcome.out
+    assert json.loads((here / "kernel/manifest.json").read_text())["schedule"]["name"] == "tile8"
+    line = refused("compile", "model.safetensors", *opencl, "--schedule", "fast")
+    assert "schedule 'fast' does not exist for this target; there are: plain, vector16, tile16" in line
+    line = refused("denoise", "model.safetensors", "noisy.exr", "--schedule", "tile8")
+    assert "schedule 'tile8' does not exist for this target; there are: plain" in line
+    line = refused("compile", "cornell", *opencl, "--schedule", "tile8")
+    assert "--schedule is tile8: cornell is a scene, whose kernels have one schedule" in line
+
+
+def test_a_schedule_that_does_not_hold_the_model(wamnet, here, monkeypatch) -> None:
+    """The plain kernel is written, and the reason is said."""
+    monkeypatch.setattr("wamnet.compiler.emit_tiled.LARGEST_PRIVATE", 100)
+    outcome = wamnet("compile", "model.safetensors", "--target", "opencl", "--schedule", "tile8")
+    assert outcome.status == 0
+    assert "schedule plain, not tile8: its arrays take" in outcome.out
+    assert json.loads((here / "opencl/manifest.json").read_text())["schedule"]["name"] == "plain"
+
+
 def test_refusals_of_compile(refused, here) -> None:
     """No model; another kind of file; no such profile or target; a file in the folder's place."""
     target = ["--target", "glsl"]
@@ -160,7 +185,7 @@ def test_a_missing_executor(refused, here, monkeypatch) -> None:
 
 def test_the_list_of_executors(wamnet, monkeypatch) -> None:
     """NumPy is always ready; what is missing says why."""
-    assert denoise.probe("numpy")[:2] == ("numpy", "ready")
+    assert denoise.probe("numpy")[:3] == ("numpy", "ready", "plain")
     monkeypatch.setattr(
         "wamnet.kernels.open_executor", lambda name: open_executor(name) if name == "numpy" else missing(name)
     )

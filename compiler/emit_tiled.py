@@ -1,0 +1,302 @@
+"""The tiled schedule: a work item computes a row of pixels, and keeps their sums in vector registers.
+
+1. The images around the pixels are copied to a patch of the work item's own; the border rule is applied
+   there, and the loops that follow know no border [`TiledBody._prepare`].
+2. The numbers of a layer stand side by side in vectors of `lanes`, the last one filled up with neurons whose
+   weights are 0: nothing reads them.
+3. An affine map works on blocks of `vectors` vectors: all pixels' sums of a block are in registers while the
+   inputs pass by, each weight is loaded once for all pixels, each input is one number for all lanes. With
+   14 pixels and 2 vectors there are 28 independent sums for 3 loads a step and input: arithmetic units, not
+   loads, set the pace (the register tile of K. Goto and R. van de Geijn, Anatomy of High-Performance Matrix
+   Multiplication, 2008, section 4).
+4. Weights lie in the order in which the loops need them [`Tiled.layout`].
+5. Elementwise operations run on vectors, one after another; layers meet in arrays of the work item's own.
+
+What the schedule does not hold, it names [`Tiled.refusal`].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import weights
+from .dialect import Dialect
+from .emit import BORDERS, Body, emit, kernel_gather
+from .ir import Gather, Node, Program
+from .ops import OPS
+from .schedules import Schedule
+from .weights import Slot
+
+LARGEST_PRIVATE = 2**19
+"""Most bytes of arrays in a work item: a quarter of the smallest stack that glibc gives a thread."""
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """How n numbers fill vectors: `count` blocks of `vectors` vectors."""
+
+    vectors: int
+    count: int
+
+    @property
+    def total(self) -> int:
+        """Return the number of vectors."""
+        return self.vectors * self.count
+
+
+def refused_by_vectors(program: Program, dialect: Dialect) -> str:
+    """Return why the values of a program cannot all be vectors of this dialect, or nothing."""
+    for index, node in enumerate(program.nodes):
+        if node.op in ("constant", "parameter", "input", "affine"):
+            continue
+        if not OPS[node.op].elementwise or node.op not in dialect.operations:
+            return f"%{index} is {node.op}, which has no form on vectors"
+        if node.type.dtype != "float32" or not node.type.shape:
+            return f"%{index} is {node.type}: vectors hold float32[n]"
+    output = program.nodes[program.outputs[0][1]]
+    if any(node.op != "affine" for node in _readers_of_window(program)):
+        return "something besides an affine map reads the window"
+    if output.op in ("constant", "parameter", "input"):
+        return "the output is not computed"
+    return ""
+
+
+class Tiled(Schedule):
+    """A tile of `pixels` x `vectors` vectors of `lanes` numbers."""
+
+    order = (
+        "vectors filled up with zeros; matrices block by block of neurons: blocks x D_in x neurons; the rows "
+        "of one that reads the window go image by image, then tap by tap in rows, then channel by channel"
+    )
+
+    def __init__(self, name: str, idea: str, dialect: Dialect, lanes: int, pixels: int, vectors: int) -> None:
+        self.name, self.idea, self.dialect = name, idea, dialect
+        self.lanes, self.pixels, self.vectors = lanes, pixels, vectors
+        self.arguments = dialect.arguments.replace("{pixels}", str(pixels)).replace("{bytes}", str(4 * lanes))
+
+    def blocks(self, numbers: int) -> Blocks:
+        """Return how so many numbers fill vectors."""
+        count = -(-numbers // self.lanes)
+        vectors = min(self.vectors, count)
+        return Blocks(vectors, -(-count // vectors))
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        if reason := refused_by_vectors(program, self.dialect):
+            return reason
+        used = _readers_of_window(program)
+        if _matrices(used) & _matrices(node for node in program.nodes if node not in used):
+            return "a matrix is applied to the window and to a layer, which need it in two orders"
+        if (found := self.private_bytes(program)) > LARGEST_PRIVATE:
+            return f"its arrays take {found} bytes a work item, of at most {LARGEST_PRIVATE}"
+        return ""
+
+    def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
+        """Return the kernel's source."""
+        return emit(program, self.dialect, header, bounded, self._body(program))
+
+    def private_bytes(self, program: Program) -> int:
+        """Return the bytes of the patches and of the arrays of a work item."""
+        gather, body = kernel_gather(program), self._body(program)
+        patch = gather.window.size * (gather.window.size + self.pixels - 1) * gather.channels
+        shapes = [program.nodes[index].type.shape for index in body.group_of if body.declares(index)]
+        numbers = sum(self.blocks(shape[0]).total * self.lanes * self.pixels for shape in shapes)
+        return 4 * (patch + numbers)
+
+    def layout(self, program: Program) -> Mapping[str, Slot]:
+        """Return where each weight lies."""
+        slots: dict[str, Slot] = {}
+        offset = 0
+        for name, array in weights.weights(program).items():
+            blocks = self.blocks(array.shape[0])
+            shape: tuple[int, ...] = (blocks.total * self.lanes,)
+            if array.ndim == 2:
+                shape = (blocks.count, array.shape[1], blocks.vectors * self.lanes)
+            slots[name] = Slot(name, shape, offset)
+            offset += int(np.prod(shape))
+        return slots
+
+    def pack(self, program: Program) -> NDArray[np.float32]:
+        """Return the weights (count,) as `layout` places them."""
+        gather, windowed = kernel_gather(program), _matrices(_readers_of_window(program))
+        pieces = [np.zeros(0, np.float32)]
+        for name, slot in self.layout(program).items():
+            rows = np.atleast_2d(program.parameters[name].T)  # (D_in, D_out), or (1, D_out)
+            if name in windowed:
+                rows = rows[_image_by_image(gather)]
+            blocks = self.blocks(rows.shape[1])
+            filled = np.zeros((len(rows), blocks.total * self.lanes), np.float32)
+            filled[:, : rows.shape[1]] = rows
+            by_block = filled.reshape(len(rows), blocks.count, -1).transpose(1, 0, 2)
+            pieces.append(by_block.reshape(slot.shape).ravel())
+        return np.concatenate(pieces)
+
+    def _body(self, program: Program) -> TiledBody:
+        """Return the writer of the kernel's statements."""
+        return TiledBody(program, self.dialect, kernel_gather(program), tile=self)
+
+
+def _readers_of_window(program: Program) -> list[Node]:
+    """Return the nodes that read the window."""
+    inputs = {index for index, node in enumerate(program.nodes) if node.op == "input"}
+    return [node for node in program.nodes if inputs & set(node.args)]
+
+
+def _matrices(nodes: Iterable[Node]) -> set[str]:
+    """Return the names of the matrices that affine maps among these nodes apply."""
+    return {str(node["weight"]) for node in nodes if node.op == "affine"}
+
+
+def _image_by_image(gather: Gather) -> NDArray[np.intp]:
+    """Return the window's indices (n_inputs,): image by image, in each tap by tap, channel by channel."""
+    taps = np.arange(gather.n_inputs).reshape(-1, gather.channels)
+    ends = np.cumsum([image.channels for image in gather.images])[:-1]
+    return np.concatenate([part.ravel() for part in np.split(taps, ends, axis=1)])
+
+
+@dataclass
+class TiledBody(Body):
+    """The statements of a tiled kernel."""
+
+    tile: Tiled = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.slots = self.tile.layout(self.program)
+
+    def defines(self) -> list[str]:
+        """Return the sizes of the tile and of the patch."""
+        tile = self.tile
+        return [
+            f"#define PIXELS {tile.pixels} /* neighbours in a row that a work item computes */",
+            f"#define LANES {tile.lanes} /* numbers in a vector */",
+            "#define PATCH_WIDTH (WINDOW_SIZE + PIXELS - 1) /* columns that all windows touch */",
+        ]
+
+    def _prepare(self) -> None:
+        """Write the copies of the images around the pixels, under the border rule."""
+        self._comment("the images around the pixels: what lies beyond the border is filled in here")
+        for image in self.gather.images:
+            self._line(f"float patch_{image.name}[WINDOW_SIZE * PATCH_WIDTH * {image.channels}];")
+        self._line("int left = x - WINDOW_CENTRE;")
+        self._line("int top = y - WINDOW_CENTRE;")
+        columns = "left >= 0 && left + PATCH_WIDTH <= width"
+        self._line(f"bool within = {columns} && top >= 0 && top + WINDOW_SIZE <= height;")
+        self._open("for (int dy = 0; dy < WINDOW_SIZE; ++dy) {")
+        self._line("int row = clamp(top + dy, 0, height - 1);")
+        for image in self.gather.images:
+            self._copy(image.name, image.channels)
+        self._close()
+
+    def _copy(self, name: str, channels: int) -> None:
+        """Write the copy of a row of the patch: at once inside the image, else pixel by pixel."""
+        before, value = BORDERS[self.gather.window.border]
+        pixel = self.dialect.pixel.format(image=name, channels=channels)
+        self._line(f"float *to_{name} = patch_{name} + dy * PATCH_WIDTH * {channels};")
+        self._open("if (within) {")
+        source = f"image_{name}[(row * width + left) * {channels} + i]"
+        loop = f"for (int i = 0; i < PATCH_WIDTH * {channels}; ++i) {{"
+        self._nest([loop], [f"to_{name}[i] = {source};"])
+        self._close()
+        self._open("else {")
+        self._open("for (int dx = 0; dx < PATCH_WIDTH; ++dx) {")
+        self._line("int column = clamp(left + dx, 0, width - 1);")
+        if before:
+            self._line(before)
+        loop = f"for (int c = 0; c < {channels}; ++c) {{"
+        self._nest([loop], [f"to_{name}[dx * {channels} + c] = {value.format(pixel=pixel)};"])
+        self._close()
+        self._close()
+
+    def _affine(self, index: int, node: Node) -> None:
+        """Write v = W x + b for all pixels, block by block."""
+        numbers, source = node.type.shape[0], self.program.nodes[node.args[0]]
+        blocks, weight = self.tile.blocks(numbers), self.slots[str(node["weight"])]
+        n_in = weight.shape[1]
+        self._declare(index, f"%{index}: affine map {node['weight']} from {n_in} to {numbers}")
+        self._open(f"for (int block = 0; block < {blocks.count}; ++block) {{" if blocks.count > 1 else "{")
+        each = range(blocks.vectors)
+        start = f" + block * {n_in * blocks.vectors}" if blocks.count > 1 else ""
+        self._line(f"__global const vector *w = {self._vectors(weight.offset)}{start};")
+        self._line(f"vector sum[PIXELS][{blocks.vectors}];")
+        bias = node.get("bias")
+        at = f"block * {blocks.vectors} + " if blocks.count > 1 else ""
+        starts = [self._bias(str(bias), f"{at}{j}") if bias else "(vector)(0.0f)" for j in each]
+        self._pixels([f"sum[p][{j}] = {start};" for j, start in zip(each, starts, strict=True)])
+        if source.op == "input":
+            for image in self.gather.images:
+                self._open("for (int dy = 0; dy < WINDOW_SIZE; ++dy) {")
+                patch = f"patch_{image.name} + dy * PATCH_WIDTH * {image.channels}"
+                self._line(f"const float *row = {patch};")
+                self._multiply(blocks, f"WINDOW_SIZE * {image.channels}", f"row[p * {image.channels} + i]")
+                self._close()
+        else:
+            held = self.tile.blocks(source.type.shape[0]).total
+            self._multiply(blocks, str(n_in), f"v{node.args[0]}.number[p * {held} * LANES + i]")
+        self._pixels([f"v{index}.all[p * {blocks.total} + {at}{j}] = sum[p][{j}];" for j in each])
+        self._close()
+
+    def _multiply(self, blocks: Blocks, inputs: str, value: str) -> None:
+        """Write the loop over inputs: each one's row of a block of weights, times its value at each pixel."""
+        each = range(blocks.vectors)
+        self._open(f"for (int i = 0; i < {inputs}; ++i) {{")
+        for j in each:
+            self._line(f"vector w{j} = w[{j}];")
+        self._line(f"w += {blocks.vectors};")
+        self._pixels([f"float value = {value};", *(f"sum[p][{j}] += w{j} * value;" for j in each)])
+        self._close()
+
+    def _pixels(self, lines: list[str]) -> None:
+        """Write a loop over pixels that keeps each pixel's sums in registers of their own."""
+        self._line("#pragma unroll")
+        self._nest(["for (int p = 0; p < PIXELS; ++p) {"], lines)
+
+    def _outputs(self) -> None:
+        """Write the only output of each pixel that lies in the image."""
+        name, index = self.program.outputs[0]
+        channels = self.program.nodes[index].type.shape[0]
+        held = self.tile.blocks(channels).total
+        self._comment(f"output {name}")
+        value = f"v{index}.number[p * {held} * LANES + i]"
+        line = self.dialect.store.format(channels=channels, i="i", value=value)
+        loops = [
+            "for (int p = 0; p < PIXELS && x + p < width; ++p) {",
+            f"for (int i = 0; i < {channels}; ++i) {{",
+        ]
+        self._nest(loops, [line])
+
+    # ---- values ------------------------------------------------------------------------------------------
+
+    def _read(self, index: int, lane: str, group: int | None = None) -> str:
+        """Return the text of vector `lane` of a value, read inside `group`."""
+        node = self.program.nodes[index]
+        if node.op == "parameter":
+            blocks = self.tile.blocks(node.type.shape[0])
+            return self._bias(str(node["name"]), f"{lane} % {blocks.total}")
+        return super()._read(index, lane, group)
+
+    def _bias(self, name: str, index: str) -> str:
+        """Return the text of one vector of a parameter that is a vector."""
+        return f"{self._vectors(self.slots[name].offset)}[{index}]"
+
+    def _vectors(self, offset: int) -> str:
+        """Return the text of the weights from `offset` on, as vectors."""
+        start = f"(weights + {offset})" if offset else "weights"
+        return f"((__global const vector *){start})"
+
+    def _element(self, index: int, lane: str) -> str:
+        """Return the text of a vector of the array of a value."""
+        return f"v{index}.all[{lane}]"
+
+    def _count(self, numbers: int) -> str:
+        """Return the text of the number of vectors of all pixels."""
+        return f"PIXELS * {self.tile.blocks(numbers).total}"
+
+    def _declaration(self, index: int) -> str:
+        """Return the declaration of an array of vectors that can be read number by number."""
+        count = self._count(self.program.nodes[index].type.shape[0])
+        return f"union {{ vector all[{count}]; float number[{count} * LANES]; }} v{index};"

@@ -1,0 +1,79 @@
+"""OpenCL C 1.2 for the tiled schedule [emit_tiled.py], and the ladder of schedules for processors.
+
+Operators stand in place of functions on vectors: PoCL's library may be compiled for another processor than
+the kernel, LLVM then inlines none of its functions, and each call saves all vector registers. `floor` is one
+instruction that no operator means; clang has a name for it, and other compilers get the function.
+"""
+
+from __future__ import annotations
+
+from .emit_tiled import Tiled
+from .opencl import OpenCL
+
+BEGIN = """\
+{defines}
+typedef float@lanes@ vector;
+#define MINIMUM(a, b) ((vector)(b) < (vector)(a) ? (vector)(b) : (vector)(a))
+#define MAXIMUM(a, b) ((vector)(b) > (vector)(a) ? (vector)(b) : (vector)(a))
+#ifdef __has_builtin
+#if __has_builtin(__builtin_elementwise_floor)
+#define FLOOR(a) __builtin_elementwise_floor(a)
+#endif
+#endif
+#ifndef FLOOR
+#define FLOOR(a) floor(a)
+#endif
+__kernel void {entry}(
+{images},
+    __global const float *restrict weights,
+    __global float *restrict result,
+    int width,
+    int height)
+{{
+    int x = (int)get_global_id(0) * PIXELS;
+    int y = (int)get_global_id(1);
+    if (x >= width || y >= height) {{
+        return;
+    }}"""
+"""What stands before the statements; `@lanes@` is the length of a vector."""
+
+
+class OpenCLTiled(OpenCL):
+    """The dialect's table for vectors of `lanes` floats."""
+
+    store = "result[(y * width + x + p) * {channels} + {i}] = {value};"
+    arguments = (
+        "each image: width * height * channels floats, rows from the top, channels interleaved;\n"
+        "weights, at an address that is a multiple of {bytes}; result: width * height * {channels} floats\n"
+        "in the order of the images, encoded as `output` says; width; height.\n"
+        "Global size: at least (ceil(width / {pixels}), height)"
+    )
+
+    def __init__(self, lanes: int) -> None:
+        self.begin = BEGIN.replace("@lanes@", str(lanes))
+        self.types = {"float32": "vector"}
+        self.operations = {
+            **{name: OpenCL.operations[name] for name in KEPT},
+            "absolute": f"as_float{lanes}(as_int{lanes}({{0}}) & 0x7fffffff)",
+            "minimum": "MINIMUM({0}, {1})",
+            "maximum": "MAXIMUM({0}, {1})",
+            "floor": "FLOOR({0})",
+        }
+
+
+KEPT = ("add", "subtract", "multiply", "divide", "negative", "reciprocal", "sqrt", "sin", "cos")
+"""Operations that are written for a vector as they are for a number."""
+
+
+def _tiled(name: str, lanes: int, pixels: int, idea: str) -> Tiled:
+    """Return a rung of the ladder: two vectors of neurons at once."""
+    return Tiled(name, idea, OpenCLTiled(lanes), lanes, pixels, vectors=2)
+
+
+OPENCL_LADDER = (
+    _tiled("vector16", 16, 1, "a layer's neurons side by side in vectors of 16, one pixel after another"),
+    _tiled("tile16", 16, 14, "14 pixels share each weight: 28 vectors of 16 sums stay in registers"),
+    _tiled("tile8", 8, 6, "the same for 16 registers of 8 numbers: 6 pixels, 12 vectors of sums"),
+    _tiled("tile4", 4, 6, "the same for 16 registers of 4 numbers: 6 pixels, 12 vectors of sums"),
+)
+"""The schedules for processors besides the plain one; AVX-512, AVX2 and SSE or NEON have those registers."""

@@ -1,0 +1,164 @@
+"""Schedules: what each holds, what it says when it does not, and where the tiled ones put the weights."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.compiler import schedules
+from wamnet.compiler.compile import TARGETS, compile_program
+from wamnet.compiler.emit_inlined import LARGEST_WEIGHTS
+from wamnet.compiler.emit_tiled import LARGEST_PRIVATE
+from wamnet.compiler.ir import Gather, Image, Type
+from wamnet.compiler.opencl_tiled import OPENCL_LADDER
+from wamnet.compiler.trace import trace
+from wamnet.refimpl import siren
+from wamnet.refimpl.dataset import Window
+from wamnet.refimpl.denoise import denoise_pixel
+from wamnet.refimpl.errors import CompileError
+
+
+def gathered(function, channels=(3,), size=1, border="clamp"):
+    images = tuple(Image(f"i{number}", count, -1.0, 1.0) for number, count in enumerate(channels))
+    gather = Gather(Window(size, border), images)
+    return trace(function, {"window": Type(shape=(gather.n_inputs,))}, gather)
+
+
+def rounded(d_out, d_in, seed=1):
+    """Return a matrix of multiples of 1/64, which no platform rounds differently."""
+    return np.random.default_rng(seed).integers(-32, 32, (d_out, d_in)).astype(np.float32) / 64
+
+
+def small(border="zero"):
+    first, second = rounded(5, 4 * 3), rounded(2, 5, 2)
+    function = lambda x: np.clip(np.sin(x @ first.T + rounded(5, 1)[:, 0]) @ second.T, 0.0, 1.0)  # noqa: E731
+    return gathered(function, (2, 1), 2, border)
+
+
+@pytest.mark.parametrize(("name", "border"), [("vector16", "clamp"), ("tile16", "zero")])
+def test_golden_tiles(golden, name, border):
+    golden(f"{name}.denoise.cl", compile_program(small(border), "opencl", "ieee", name).source)
+
+
+def test_golden_inlined(golden):
+    golden("inlined.denoise.frag", compile_program(small(), "opengl", "ieee", "inlined").source)
+
+
+def test_inlined_weights_are_in_the_source_alone():
+    found = compile_program(small(), "opengl", "ieee", "inlined")
+    assert found.weights.size == found.manifest["weights"]["count"] == 0
+    assert found.manifest["weights"]["layout"] == []
+    assert "weight_texture" not in found.source
+    assert found.manifest["arguments"] in found.source.replace("\n *           ", "\n")
+
+
+def test_too_many_weights_to_inline_are_plain():
+    program = gathered(lambda x: np.sin(x @ rounded(16000, 3).T) @ rounded(2, 16000).T)
+    found = compile_program(program, "opengl", "ieee", "inlined").manifest["schedule"]
+    assert (found["name"], found["asked"]) == ("plain", "inlined")
+    assert found["reason"].startswith(f"it has 80000 weights, of at most {LARGEST_WEIGHTS}:")
+
+
+def test_the_manifest_says_what_was_picked():
+    found = compile_program(small(), "opencl", "ieee", "tile8").manifest
+    assert found["schedule"]["name"] == "tile8"
+    assert found["schedule"]["pixels"] == 6
+    assert "block by block" in found["weights"]["order"]
+    assert schedules.text(found["schedule"]).startswith("tile8: the same for 16 registers of 8 numbers")
+    plain = compile_program(small(), "opencl").manifest
+    assert plain["schedule"] == {"name": "plain", "idea": OPENCL_PLAIN.idea, "pixels": 1}
+    assert plain["bound"] == found["bound"]
+
+
+OPENCL_PLAIN = TARGETS["opencl"].schedules[0]
+"""The first rung."""
+
+
+def test_unknown_schedule_is_told_with_the_known_ones():
+    known = "plain, vector16, tile16, tile8, tile4"
+    with pytest.raises(CompileError, match=f"schedule 'tile3' does not exist for this target; .*: {known}$"):
+        compile_program(small(), "opencl", schedule="tile3")
+    with pytest.raises(CompileError, match=r"schedule 'tile16' does not exist .*: plain"):
+        compile_program(small(), "numpy", schedule="tile16")
+
+
+W = rounded(3, 3)
+"""A square matrix, which fits the window and a layer."""
+
+SHARED = gathered(lambda x: np.sin(x @ W.T) @ W.T)
+"""A program that applies one matrix to the window and to a layer."""
+
+REFUSED = {
+    "component": (gathered(lambda x: x[..., 0] * 2.0), "%1 is component, which has no form on vectors"),
+    "select": (gathered(lambda x: np.where(x @ W.T < 0.5, x, 2.0)), "%3 is less, which has no form"),
+    "window": (gathered(lambda x: x * 2.0), "something besides an affine map reads the window"),
+    "output": (gathered(lambda x: x), "the output is not computed"),
+    "shared": (SHARED, "a matrix is applied to the window and to a layer, which need it in two orders"),
+    "private": (
+        gathered(lambda x: np.sin(x @ rounded(12000, 3).T) @ rounded(1, 12000).T),
+        rf"its arrays take \d+ bytes a work item, of at most {LARGEST_PRIVATE}",
+    ),
+}
+"""Programs that the tiled schedule does not hold, and the reason."""
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case):
+    program, reason = REFUSED[case]
+    found, plain = (compile_program(program, "opencl", "ieee", name) for name in ("tile16", "plain"))
+    assert found.manifest["schedule"]["name"] == "plain"
+    assert found.manifest["schedule"]["asked"] == "tile16"
+    assert re.match(reason, found.manifest["schedule"]["reason"])
+    assert re.search(rf"\(not tile16: {reason}", schedules.text(found.manifest["schedule"]))
+    assert found.source == plain.source
+
+
+@given(
+    schedule=st.sampled_from(OPENCL_LADDER),
+    channels=st.lists(st.integers(1, 4), min_size=1, max_size=3),
+    size=st.integers(1, 3),
+    hidden=st.integers(1, 70),
+)
+def test_every_weight_lies_where_the_kernel_reads_it(schedule, channels, size, hidden):
+    """Read the array as the kernel's loops do, and compare with the matrices; the rest must be 0."""
+    network = siren.init((size * size * sum(channels), hidden, 3), 3.0, 3.0, seed=1, dtype=np.float32)
+    program = gathered(lambda x: denoise_pixel(network, x), channels, size)
+    packed, used = schedule.pack(program), 0
+    window = [
+        (dy * size + dx) * sum(channels) + sum(channels[:image]) + c
+        for image, count in enumerate(channels)
+        for dy in range(size)
+        for dx in range(size)
+        for c in range(count)
+    ]
+    for name, slot in schedule.layout(program).items():
+        assert slot.offset % schedule.lanes == 0
+        array = program.parameters[name]
+        stored = packed[slot.offset :][: np.prod(slot.shape)].reshape(slot.shape)
+        if array.ndim == 2:
+            inputs = window if array.shape == network.weights[0].shape else range(array.shape[1])
+            width = slot.shape[2]
+            found = np.array(
+                [
+                    [stored[j // width, i, j % width] for i in range(len(inputs))]
+                    for j in range(array.shape[0])
+                ]
+            )
+            assert np.array_equal(found, array[:, inputs])
+        else:
+            assert np.array_equal(stored[: array.size], array)
+        used += array.size - np.count_nonzero(array == 0)
+    assert np.count_nonzero(packed) == used
+
+
+def test_private_bytes_of_a_tile_are_those_of_its_arrays():
+    artifact = compile_program(small(), "opencl", "ieee", "tile16")
+    sizes = {"PIXELS": 14, "LANES": 16, "WINDOW_SIZE": 2, "PATCH_WIDTH": 15}
+    arrays = re.findall(r"(?:float patch_\w+|float number)\[([^]]+)\];", artifact.source)
+    numbers = [np.prod([sizes.get(word) or int(word) for word in text.split(" * ")]) for text in arrays]
+    assert len(numbers) == 2 + 4
+    assert artifact.manifest["private_bytes"] == 4 * sum(numbers)

@@ -1,0 +1,137 @@
+/*
+ * wamnet denoiser, GLSL 3.30, fragment shader. Generated: change the compiler, not this text.
+ * program   f57520577fed32a74017101934ae7668
+ * images    i0: 2 channels in [-1.0, 1.0]
+ *           i1: 1 channels in [-1.0, 1.0]
+ * window    2 x 2 pixels, the pixel itself is tap 1
+ * border    zero
+ * output    2 channels
+ * profile   ieee: any order of summation, fused multiply-add allowed, emitted sine
+ * sine      emitted, odd polynomial of degree 11
+ * bound     |output - float64 reference| <= 4.05e-06 for all images in these ranges
+ * schedule  inlined: all loops unrolled, every weight a constant of the source
+ * arguments each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel
+ *           row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the
+ *           bottom, or the window stands on its head;
+ *           result: a float colour buffer of width x height, row 0 again the top row; no sRGB conversion by
+ *           the target, the values are encoded already. Draw one triangle that covers it
+ * weights   none; every weight is a constant of the source
+ */
+#version 330 core
+#extension GL_ARB_gpu_shader5 : enable
+#if defined(GL_ARB_gpu_shader5) || __VERSION__ >= 400
+#define PRECISE precise
+#else
+#error the error bound needs `precise`: GL_ARB_gpu_shader5, or #version 400
+#endif
+uniform sampler2D image_i0;
+uniform sampler2D image_i1;
+layout(location = 0) out vec4 result;
+#define WINDOW_SIZE 2
+#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
+vec2 tap_i0(ivec2 at)
+{
+    ivec2 nearest = clamp(at, ivec2(0), textureSize(image_i0, 0) - 1);
+    vec2 texel = texelFetch(image_i0, nearest, 0).rg;
+    return at == nearest ? texel : vec2(0.0f);
+}
+float tap_i1(ivec2 at)
+{
+    ivec2 nearest = clamp(at, ivec2(0), textureSize(image_i1, 0) - 1);
+    float texel = texelFetch(image_i1, nearest, 0).r;
+    return at == nearest ? texel : float(0.0f);
+}
+void elementwise_3(vec4 v1, out vec4 v44)
+{
+    PRECISE vec4 t3 = v1 * 0.318309873f;
+    PRECISE vec4 t5 = t3 + 0.5f;
+    PRECISE vec4 t6 = floor(t5);
+    PRECISE vec4 t8 = t6 * 3.14160156f;
+    PRECISE vec4 t9 = v1 - t8;
+    PRECISE vec4 t11 = t6 * (-8.9071691e-06f);
+    PRECISE vec4 t12 = t9 - t11;
+    PRECISE vec4 t14 = t6 * (-1.74122761e-09f);
+    PRECISE vec4 t15 = t12 - t14;
+    PRECISE vec4 t16 = 0.5f * t6;
+    PRECISE vec4 t17 = floor(t16);
+    PRECISE vec4 t19 = 2.0f * t17;
+    PRECISE vec4 t20 = t6 - t19;
+    PRECISE vec4 t21 = 2.0f * t20;
+    PRECISE vec4 t23 = 1.0f - t21;
+    PRECISE vec4 t24 = t15 * t15;
+    PRECISE vec4 t26 = t24 * (-2.51969414e-08f);
+    PRECISE vec4 t28 = t26 + 2.76094511e-06f;
+    PRECISE vec4 t29 = t24 * t28;
+    PRECISE vec4 t31 = t29 + (-0.000198427704f);
+    PRECISE vec4 t32 = t24 * t31;
+    PRECISE vec4 t34 = t32 + 0.00833334867f;
+    PRECISE vec4 t35 = t24 * t34;
+    PRECISE vec4 t37 = t35 + (-0.166666672f);
+    PRECISE vec4 t38 = t24 * t37;
+    PRECISE vec4 t39 = t15 * t38;
+    PRECISE vec4 t40 = t15 + t39;
+    PRECISE vec4 t41 = t23 * t40;
+    PRECISE vec4 t42 = min(vec4(t41), vec4(1.0f));
+    PRECISE vec4 t44 = max(vec4(t42), vec4((-1.0f)));
+    v44 = t44;
+}
+void elementwise_47(vec4 v45, out vec4 v48)
+{
+    PRECISE vec4 t47 = max(vec4(v45), vec4(0.0f));
+    PRECISE vec4 t48 = min(vec4(t47), vec4(1.0f));
+    v48 = t48;
+}
+void main()
+{
+    int x = int(gl_FragCoord.x);
+    int y = int(gl_FragCoord.y);
+    result = vec4(0.0, 0.0, 0.0, 1.0);
+
+    /* %1: affine map W0 from 12 to 5 */
+    vec4 v1_0 = vec4(-0.03125f, 0.0f, 0.25f, 0.4375f);
+    vec4 v1_1 = vec4(-0.46875f, 0.0f, 0.0f, 0.0f);
+    vec2 i0_1;
+    float i1_1;
+    i0_1 = tap_i0(ivec2(x, y) + ivec2(-1, -1));
+    v1_0 += mat2x4(-0.03125f, -0.234375f, 0.3125f, 0.390625f, 0.0f, 0.3125f, -0.171875f, -0.296875f) * i0_1;
+    v1_1 += mat2x4(0.234375f, 0.0f, 0.0f, 0.0f, 0.453125f, 0.0f, 0.0f, 0.0f) * i0_1;
+    i1_1 = tap_i1(ivec2(x, y) + ivec2(-1, -1));
+    v1_0 += vec4(0.25f, -0.25f, -0.0625f, 0.0f) * i1_1;
+    v1_1 += vec4(-0.421875f, 0.0f, 0.0f, 0.0f) * i1_1;
+    i0_1 = tap_i0(ivec2(x, y) + ivec2(0, -1));
+    v1_0 += mat2x4(0.4375f, -0.09375f, 0.28125f, -0.25f, -0.46875f, 0.140625f, -0.390625f, -0.484375f) * i0_1;
+    v1_1 += mat2x4(0.21875f, 0.0f, 0.0f, 0.0f, -0.21875f, 0.0f, 0.0f, 0.0f) * i0_1;
+    i1_1 = tap_i1(ivec2(x, y) + ivec2(0, -1));
+    v1_0 += vec4(-0.359375f, 0.046875f, -0.203125f, 0.25f) * i1_1;
+    v1_1 += vec4(0.03125f, 0.0f, 0.0f, 0.0f) * i1_1;
+    i0_1 = tap_i0(ivec2(x, y) + ivec2(-1, 0));
+    v1_0 += mat2x4(0.3125f, -0.421875f, -0.390625f, -0.453125f, 0.4375f, -0.484375f, -0.046875f, -0.234375f) * i0_1;
+    v1_1 += mat2x4(0.421875f, 0.0f, 0.0f, 0.0f, -0.234375f, 0.0f, 0.0f, 0.0f) * i0_1;
+    i1_1 = tap_i1(ivec2(x, y) + ivec2(-1, 0));
+    v1_0 += vec4(-0.265625f, 0.359375f, 0.46875f, -0.015625f) * i1_1;
+    v1_1 += vec4(0.21875f, 0.0f, 0.0f, 0.0f) * i1_1;
+    i0_1 = tap_i0(ivec2(x, y) + ivec2(0, 0));
+    v1_0 += mat2x4(-0.203125f, 0.25f, -0.375f, -0.015625f, 0.359375f, 0.328125f, -0.125f, -0.390625f) * i0_1;
+    v1_1 += mat2x4(-0.34375f, 0.0f, 0.0f, 0.0f, -0.1875f, 0.0f, 0.0f, 0.0f) * i0_1;
+    i1_1 = tap_i1(ivec2(x, y) + ivec2(0, 0));
+    v1_0 += vec4(-0.078125f, 0.03125f, -0.109375f, 0.46875f) * i1_1;
+    v1_1 += vec4(0.46875f, 0.0f, 0.0f, 0.0f) * i1_1;
+
+    /* %3 to %44: elementwise on 5 numbers */
+    vec4 v44_0;
+    elementwise_3(v1_0, v44_0);
+    vec4 v44_1;
+    elementwise_3(v1_1, v44_1);
+
+    /* %45: affine map W1 from 5 to 2 */
+    vec4 v45_0 = vec4(0.0f);
+    v45_0 += mat4x4(0.328125f, 0.3125f, 0.0f, 0.0f, -0.25f, -0.0625f, 0.0f, 0.0f, -0.40625f, -0.421875f, 0.0f, 0.0f, -0.203125f, -0.171875f, 0.0f, 0.0f) * v44_0.xyzw;
+    v45_0 += vec4(-0.09375f, 0.09375f, 0.0f, 0.0f) * v44_1.x;
+
+    /* %47 to %48: elementwise on 2 numbers */
+    vec4 v48_0;
+    elementwise_47(v45_0, v48_0);
+
+    /* output color */
+    result.xy = v48_0.xy;
+}

@@ -1,0 +1,168 @@
+"""Every schedule against the float64 reference: shapes, sizes, borders, work groups, and planted faults."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wamnet.compiler.compile import TARGETS, compile_program
+from wamnet.compiler.lower import lower
+from wamnet.kernels import denoise_on, opencl_executor
+from wamnet.refimpl import dataset, denoise, frame
+
+EXAMPLES = max(settings.default.max_examples // 10, 1)
+"""Each example compiles a kernel, up to a second: a tenth of what other tests draw."""
+
+LADDER = [(t.name, s.name) for t in TARGETS.values() for s in t.schedules[1:]]
+"""All schedules besides the plain ones, with their targets."""
+
+
+LARGEST = {"inlined": (3, 10)}
+"""Largest window and layer by schedule: Mesa compiles two thousand weights a second. The other schedules'
+layers may have more neurons than a block."""
+
+
+@st.composite
+def cases(draw, largest):
+    """Draw (widths, channels, window size, border, image shape, seed)."""
+    channels = draw(st.sampled_from([{"a": 3}, {"a": 3, "b": 1}, {"a": 1, "b": 4, "c": 2}]))
+    size = draw(st.integers(1, largest[0]))
+    hidden = draw(st.lists(st.integers(1, largest[1]), min_size=0, max_size=3))
+    return {
+        "widths": [size * size * sum(channels.values()), *hidden, draw(st.integers(1, 4))],
+        "channels": channels,
+        "size": size,
+        "border": draw(st.sampled_from(["clamp", "zero"])),
+        "shape": draw(st.tuples(st.integers(1, 17), st.integers(1, 45))),
+        "seed": draw(st.integers(0, 2**32 - 1)),
+    }
+
+
+def images_of(case):
+    random = np.random.default_rng(case["seed"])
+    return {
+        name: random.uniform(-2, 2, (*case["shape"], n)).astype(np.float32)
+        for name, n in case["channels"].items()
+    }
+
+
+def executor_of(executor_named, target):
+    return executor_named({"opengl": "opengl-egl"}.get(target, target))
+
+
+@pytest.mark.parametrize(("target", "schedule"), LADDER)
+@settings(max_examples=EXAMPLES)
+@given(data=st.data(), group=st.tuples(st.integers(1, 5), st.integers(1, 4)))
+def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, group):
+    case = data.draw(cases(LARGEST.get(schedule, (12, 70))))
+    executor = executor_of(executor_named, target)
+    network = kit.network(case["widths"], (9.0, 3.0), case["seed"])
+    program = kit.denoiser(network, case["channels"], case["size"], case["border"])
+    artifact = compile_program(program, target, "ieee", schedule)
+    assert artifact.manifest["schedule"]["name"] == schedule
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("LOCAL_SIZE", "TILE_LOCAL_SIZE"):
+            patch.setattr(opencl_executor, name, group)
+        executor._built.clear()
+        assert kit.excess(executor, program, images_of(case), artifact) <= 1
+    executor._built.clear()
+
+
+@pytest.mark.parametrize(("target", "schedule"), LADDER)
+@pytest.mark.parametrize("border", ["clamp", "zero"])
+def test_the_paper_s_network(executor_named, kit, target, schedule, border):
+    size = LARGEST.get(schedule, (12,))[0]  # the paper's is 12
+    network = kit.network([6 * size * size, 32, 32, 32, 32, 3], (3.0, 3.0))
+    program = kit.denoiser(network, {"color": 3, "normal": 3}, size, border)
+    random = np.random.default_rng(5)
+    images = {name: random.uniform(-1, 1, (13, 31, 3)).astype(np.float32) for name in ("color", "normal")}
+    artifact = compile_program(program, target, "ieee", schedule)
+    assert kit.excess(executor_of(executor_named, target), program, images, artifact) <= 1
+
+
+def elementwise(x):
+    """Return operations on vectors that a network does not have: each has words of its own."""
+    first, second = (np.linspace(-0.5, 0.5, 20 * n, dtype=np.float32).reshape(n, 20) for n in (17, 2))
+    h = x @ first[:, :12].T
+    h = (
+        np.absolute(h)
+        + np.sqrt(np.absolute(h) + 1.0) / (np.maximum(h, -h) + 2.0)
+        - np.reciprocal(h * h + 1.0)
+    )
+    h = -np.floor(h) * np.linspace(0.5, 1.0, 17, dtype=np.float32) + np.minimum(h, 0.25)
+    return h @ second[:, :17].T
+
+
+@pytest.mark.parametrize(("target", "schedule"), LADDER)
+def test_every_operation_on_vectors(executor_named, kit, target, schedule):
+    """Away from whole numbers, where floor may fall to either side, the bound is finite."""
+    program = kit.program(elementwise, {"a": 3}, 2)
+    artifact = compile_program(program, target, "ieee", schedule)
+    assert artifact.manifest["schedule"]["name"] == schedule
+    images = {"a": np.random.default_rng(3).uniform(-2, 2, (5, 19, 3)).astype(np.float32)}
+    assert kit.excess(executor_of(executor_named, target), program, images, artifact) <= 1
+
+
+FAULTS = {
+    "pixel": ("row[p * 3 + i]", "row[i]"),
+    "columns": ("clamp(left + dx, 0, width - 1)", "clamp(left + dx, 1, width - 1)"),
+    "rows": ("clamp(top + dy, 0, height - 1)", "clamp(top + dy, 1, height - 1)"),
+    "place": ("y * width + x + p)", "y * width + x + (p ^ 1))"),
+    "block": ("weights) + block", "weights) + 0 * block"),
+    "bias": ("[block * 2 + 1]", "[block * 2 + 0]"),
+    "lanes": ("* LANES + i]", "* LANES + i / 2]"),
+}
+"""Pieces of a tiled kernel, and what makes it wrong; none leaves an array."""
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("schedule", ["tile16", "tile4"])
+def test_a_wrong_tile_is_caught(executor_named, kit, schedule, fault):
+    executor = executor_named("opencl")
+    program = kit.denoiser(kit.network([48, 70, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
+    images = {"a": np.random.default_rng(8).uniform(-2, 2, (9, 34, 3)).astype(np.float32)}
+    artifact = compile_program(program, "opencl", "ieee", schedule)
+    assert kit.excess(executor, program, images, artifact) <= 1
+    assert kit.excess(executor, program, images, kit.with_source(artifact, *FAULTS[fault])) > 1
+
+
+INLINED_FAULTS = {
+    "tap": ("ivec2(x, y) + ivec2(-2, 1)", "ivec2(x, y) + ivec2(-1, 1)"),
+    "border": ("clamp(at, ivec2(0)", "clamp(at, ivec2(1)"),
+    "vector": ("v1_1 += mat3x4", "v1_0 += mat3x4"),
+    "omega": ("= 3.0f * v1", "= 2.0f * v1"),
+    "components": ("v46_1.x;", "v46_0.x;"),
+}
+"""Pieces of an inlined kernel, and what makes it wrong."""
+
+
+@pytest.mark.parametrize("fault", INLINED_FAULTS)
+def test_a_wrong_inlined_kernel_is_caught(executor_named, kit, fault):
+    executor = executor_named("opengl-egl")
+    program = kit.denoiser(kit.network([48, 5, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
+    images = {"a": np.random.default_rng(8).uniform(-2, 2, (6, 7, 3)).astype(np.float32)}
+    artifact = compile_program(program, "opengl", "ieee", "inlined")
+    assert kit.excess(executor, program, images, artifact) <= 1
+    assert kit.excess(executor, program, images, kit.with_source(artifact, *INLINED_FAULTS[fault])) > 1
+
+
+def test_the_time_of_a_kernel_alone(executor_named, kit):
+    executor = executor_named("opencl")
+    artifact = compile_program(kit.program(lambda x: x * 1.625, {"a": 1}), "opencl")
+    executor.build(artifact)
+    assert executor.kernel_seconds(artifact, {"a": np.ones((2, 3, 1), np.float32)}) > 0
+
+
+def test_the_device_s_schedule_is_taken_and_told(executor, kit):
+    network = kit.network([54, 8, 3], (3.0, 3.0))
+    model = denoise.Model(network, ("color", "normal"), dataset.Window(3, "zero"), dataset.Normalization())
+    noisy = frame.Frame({name: np.zeros((3, 4, 3), np.float32) for name in ("color", "normal")})
+    assert denoise_on(executor, model, noisy).schedule.startswith(f"{executor.schedule_for((3, 4))}: ")
+    asked = denoise_on(executor, model, noisy, schedule="plain")
+    assert asked.schedule.startswith("plain: one ")
+    artifact = compile_program(lower(model), executor.name, "ieee", executor.schedule)
+    assert artifact.manifest["schedule"]["name"] == executor.schedule == executor.schedule_for((2000, 2000))
+    if executor.schedule_pixels:
+        assert executor.schedule_for((1, executor.schedule_pixels - 1)) == "plain"

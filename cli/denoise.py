@@ -22,7 +22,9 @@ DENOISE_EXAMPLES = """Examples:
 
 wamnet denoise model.safetensors noisy.exr -o denoised.png
 
-wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr"""
+wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr
+
+wamnet denoise small.safetensors noisy.exr --executor opencl --rank 16"""
 """Shown below the help of `wamnet denoise`."""
 
 EXECUTORS_EXAMPLES = """Example:
@@ -44,6 +46,7 @@ def denoise(
     ] = Path("denoised.png"),
     executor: options.Executor = ExecutorName.numpy,
     schedule: options.Schedule = None,
+    rank: options.CutRank = 0,
 ) -> None:
     """Denoise a frame with a trained model.
 
@@ -58,10 +61,12 @@ def denoise(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )
     with open_executor(executor.value) as runner:
-        result = denoise_on(runner, network, noisy, schedule=schedule)
+        result = denoise_on(runner, network, noisy, schedule=schedule, rank=rank)
     write_denoised(output, result.image, network, noisy)
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")
     say(f"schedule {result.schedule}")
+    if rank:
+        say(result.cut)
     say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation")
 
 

@@ -27,7 +27,10 @@ SCHEMA = "wamnet-artifact-1"
 
 @dataclass(frozen=True)
 class Artifact:
-    """A compiled kernel; `program` is what was emitted, after all passes."""
+    """A compiled kernel; `program` is what was emitted, after all passes.
+
+    `before`: the kernel that writes the only image of this one, of a first layer in two passes [factor.py].
+    """
 
     target: str
     profile: str
@@ -37,16 +40,27 @@ class Artifact:
     program: Program
     weights: NDArray[np.float32]
     manifest: Mapping[str, Any]
+    before: Artifact | None = None
 
     @property
     def digest(self) -> str:
         """Return the hash that names this artifact: of source and weights."""
         return str(self.manifest["digest"])
 
+    @property
+    def kernels(self) -> tuple[Artifact, ...]:
+        """Return what is run, in this order: one kernel, or two passes."""
+        return (self.before, self) if self.before else (self,)
+
     def contents(self) -> Mapping[str, bytes]:
         """Return the files besides the manifest, by name."""
-        return {self.source_name: self.source.encode(), WEIGHTS_NAME: weight_bytes(self)}
+        own = {self.source_name: self.source.encode(), WEIGHTS_NAME: weight_bytes(self)}
+        first = self.before.contents() if self.before else {}
+        return {**{f"{FIRST_PASS}{name}": data for name, data in first.items()}, **own}
 
+
+FIRST_PASS = "horizontal."
+"""What the names of the first pass's files begin with."""
 
 WEIGHTS_NAME = "weights.bin"
 """File of the weights: little-endian float32, nothing else."""

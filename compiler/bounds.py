@@ -444,11 +444,18 @@ def enclose(
     inputs: Mapping[str, tuple[Any, Any]],
     sine: SineContract,
     cosine: SineContract | None = None,
+    known: Mapping[int, Enclosure] | None = None,
 ) -> list[Enclosure]:
-    """Return the enclosure of every node for inputs in the given boxes (low, high), each (..., n)."""
+    """Return the enclosure of every node for inputs in the given boxes (low, high), each (..., n).
+
+    `known`: those of nodes by index, whose rule is not asked.
+    """
     parameters = {name: array.astype(np.float64) for name, array in program.parameters.items()}
     found: list[Enclosure] = []
-    for node in program.nodes:
+    for index, node in enumerate(program.nodes):
+        if known and index in known:
+            found.append(known[index])
+            continue
         if node.op == "input":
             low, high = (np.asarray(end, np.float64) for end in inputs[str(node["name"])])
             found.append(Enclosure(low, high, np.zeros_like(low)))
@@ -483,7 +490,7 @@ def _outward(e: Enclosure) -> Enclosure:
 def window_box(gather: Gather) -> tuple[Array, Array]:
     """Return the smallest and largest window vectors (n,); a zero border adds 0 to each range."""
     outside = [0.0] if gather.window.border == "zero" else []
-    taps = gather.window.size**2
+    taps = gather.rows * gather.columns
     low = [min([image.low, *outside]) for image in gather.images for _ in range(image.channels)]
     high = [max([image.high, *outside]) for image in gather.images for _ in range(image.channels)]
     return np.tile(np.array(low), taps), np.tile(np.array(high), taps)

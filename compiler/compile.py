@@ -13,7 +13,7 @@ import json
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
@@ -24,19 +24,26 @@ from . import artifact, bounds, ir, profiles, schedules
 from .artifact import Artifact
 from .dialect import Dialect
 from .emit import kernel_gather, output_channels
+from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
 from .glsl_inlined import GLSL_LADDER
-from .ir import OUTPUT_ENCODING, Program
+from .ir import OUTPUT_ENCODING, Gather, Program
 from .opencl import OpenCL
 from .opencl_tiled import OPENCL_LADDER
 from .passes import pipeline
 from .profiles import Profile, SineContract
 from .schedules import PLAIN, Pick, Plain, Printed, Schedule, pick
 
+MOST_IN_TEXTURE = 4
+"""Channels of a texture."""
+
 
 @dataclass(frozen=True)
 class Target:
-    """Something that runs kernels: how its source is made, and what its own sine promises."""
+    """Something that runs kernels: how its source is made, and what its own sine promises.
+
+    `chains`: a kernel may read what another one wrote, with any number of channels.
+    """
 
     name: str
     language: str
@@ -44,6 +51,7 @@ class Target:
     entry: str
     native_sine: SineContract
     schedules: tuple[Schedule, ...]
+    chains: bool = True
 
 
 def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
@@ -55,6 +63,7 @@ def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
         dialect.entry,
         dialect.native_sine,
         (Plain(dialect), *ladder),
+        chains=dialect.max_output_channels > MOST_IN_TEXTURE,
     )
 
 
@@ -105,10 +114,16 @@ def sine_contract(profile: str, target: str) -> SineContract:
     return profiles.profile_named(profile).sine or target_named(target).native_sine
 
 
-def bound_over_images(program: Program, profile: str, target: str) -> Bound:
-    """Return the bound of an analysed program over all that its images can hold, or refuse it."""
+def bound_over_images(program: Program, profile: str, target: str, cut: Cut | None = None) -> Bound:
+    """Return the bound of an analysed program over all that its images can hold, or refuse it.
+
+    `cut`: it is run as these two passes.
+    """
     contract = sine_contract(profile, target)
-    found = bounds.enclose(program, {"window": bounds.window_box(kernel_gather(program))}, contract)
+    if cut:
+        found = over_images(cut, contract)
+    else:
+        found = bounds.enclose(program, {"window": bounds.window_box(kernel_gather(program))}, contract)
     if profiles.profile_named(profile).sine is not None:
         _check_sizes(program, found)
     sines = [index for index, node in enumerate(program.nodes) if node.op == "sin"]
@@ -157,18 +172,79 @@ def target_named(name: str) -> Target:
     return TARGETS[name]
 
 
-def compile_program(program: Program, target: str, profile: str = "ieee", schedule: str = PLAIN) -> Artifact:
+def compile_program(
+    program: Program, target: str, profile: str = "ieee", schedule: str = PLAIN, rank: int = 0
+) -> Artifact:
     """Return the kernel of a program that reads a window and writes one output.
 
-    A schedule that cannot hold the program gives way to the plain one; the manifest says so.
+    A schedule that cannot hold the program gives way to the plain one; the manifest says so. With a `rank`
+    the first layer is cut to it, and there are two kernels [factor.py].
     """
-    chosen, promised = target_named(target), profiles.profile_named(profile)
+    chosen = target_named(target)
     kernel_gather(program)
     common = analysed(program)
-    bound = bound_over_images(common, profile, target)
+    if not rank:
+        return _compiled(common, chosen, profile, schedule, bound_over_images(common, profile, target))
+    if not chosen.chains:
+        raise CompileError(
+            f"rank {rank}: the image between both passes has as many channels, and {chosen.language} "
+            f"writes at most {MOST_IN_TEXTURE}; use executor opencl or numpy, or leave out the rank"
+        )
+    cut = factor(common, rank)
+    bound = bound_over_images(common, profile, target, cut)
+    alone = bound_over_images(cut.horizontal, profile, target)
+    notes = (
+        f"pass      1 of 2: sums along the rows, of a first layer of rank {rank}",
+        f"pass      2 of 2: sums along the columns of the first pass's image, and the layers after it; the\n"
+        f"          bound is that of both passes, against program {ir.digest(common)[:32]}",
+    )
+    before = _compiled(cut.horizontal, chosen, profile, schedule, alone, notes[0].split("\n"))
+    found = _compiled(cut.vertical, chosen, profile, schedule, bound, notes[1].split("\n"))
+    return _joined(before, found, _report(cut, profile, target))
+
+
+def _report(cut: Cut, profile: str, target: str) -> Mapping[str, Any]:
+    """Return what a manifest says about a cut: its own error in the layer, and that of rounding alone."""
+    weights = left(cut)
+    low, high = bounds.window_box(kernel_gather(cut.whole))
+    largest = np.maximum(np.abs(low), np.abs(high))
+    whole = np.abs(cut.whole.parameters[str(cut.whole.nodes[cut.layer]["weight"])].astype(np.float64))
+    layer, reach = (round_up(float((w @ largest).max())) for w in (weights, whole))
+    found = over_images(cut, sine_contract(profile, target), of_cut=False)
+    rounding = bounds.output_errors(cut.whole, found)[cut.whole.outputs[0][0]]
+    finite = bool(np.isfinite(rounding).all())
+    return {
+        "rank": cut.rank,
+        "program": ir.digest(cut.whole),
+        "cut": {"first_layer": layer, "of": reach, "against": "the first layer's sums, before its sine"},
+        "rounding": {
+            "output": [round_up(float(error)) for error in rounding] if finite else None,
+            "against": "float64 reference with the weights that the factors' product is",
+        },
+    }
+
+
+def _joined(before: Artifact, found: Artifact, report: Mapping[str, Any]) -> Artifact:
+    """Return both passes as one artifact, whose manifest holds the first one's."""
+    digest = ir.sha256(f"{before.digest} {found.digest}".encode())
+    factored = {**report, HORIZONTAL: before.manifest}
+    files = {f"{artifact.FIRST_PASS}{name}": value for name, value in before.manifest["files"].items()}
+    files = {**files, **found.manifest["files"]}
+    bound = {**found.manifest["bound"], "against": "float64 reference of the program that was cut"}
+    own = {"digest": digest, "files": files, "bound": bound, "factored": factored}
+    manifest = {**found.manifest, **own}
+    return replace(found, manifest=manifest, before=before)
+
+
+def _compiled(
+    common: Program, chosen: Target, profile: str, schedule: str, bound: Bound, notes: Sequence[str] = ()
+) -> Artifact:
+    """Return the kernel of an analysed program; `notes` are further lines of its header."""
+    promised = profiles.profile_named(profile)
     emitted = pipeline.run(common, promised.passes)
     picked = pick(chosen.schedules, schedule, emitted)
-    header = _header(common, chosen, promised, bound, picked) + _weight_lines(emitted, picked.schedule)
+    header = [*_header(common, chosen, promised, bound, picked), *notes]
+    header += _weight_lines(emitted, picked.schedule)
     source = picked.schedule.emit(emitted, header, bound.output is not None)
     return _assemble(common, emitted, chosen, promised, bound, picked, source)
 
@@ -182,13 +258,14 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound, pi
     ]
     encoding = dict(program.info).get(OUTPUT_ENCODING)
     arguments = picked.schedule.arguments.format(channels=channels).split("\n")
-    size = gather.window.size
+    rows, columns = gather.rows, gather.columns
+    tap = f"{rows // 2}" if rows == columns else f"({rows // 2}, {columns // 2})"
     return [
         f"wamnet denoiser, {target.language}. Generated: change the compiler, not this text.",
         f"program   {ir.digest(program)[:32]}",
         f"images    {images[0]}",
         *(f"          {line}" for line in images[1:]),
-        f"window    {size} x {size} pixels, the pixel itself is tap {size // 2}",
+        f"window    {rows} x {columns} pixels, the pixel itself is tap {tap}",
         f"border    {gather.window.border}",
         f"output    {channels} channels" + (f", {encoding}" if encoding else ""),
         f"profile   {profile.name}: {profile.text}",
@@ -249,7 +326,7 @@ def _assemble(
         "profile": {"name": profile.name, "text": profile.text},
         "sine": asdict_finite(sine_contract(profile.name, target.name)),
         "passes": [*pipeline.COMMON, *profile.passes],
-        "window": {**asdict(gather.window), "centre": gather.window.size // 2},
+        "window": _window(gather),
         "images": [asdict(image) for image in gather.images],
         "output": {
             "name": emitted.outputs[0][0],
@@ -277,6 +354,12 @@ def _assemble(
     }
     manifest = json.loads(json.dumps(manifest, allow_nan=False))
     return Artifact(target.name, profile.name, target.entry, source, source_name, emitted, weights, manifest)
+
+
+def _window(gather: Gather) -> dict[str, Any]:
+    """Return what a manifest says about the window; of one along an axis also its rows and columns."""
+    oblong = {} if gather.rows == gather.columns else {"rows": gather.rows, "columns": gather.columns}
+    return {**asdict(gather.window), "centre": gather.window.size // 2, **oblong}
 
 
 def _info_value(name: str, text: str) -> Any:

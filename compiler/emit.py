@@ -24,11 +24,44 @@ from .weights import layout, tables
 BORDERS: Mapping[str, tuple[str, str]] = {
     "clamp": ("", "{pixel}"),
     "zero": (
-        "bool inside = row == y + dy - WINDOW_CENTRE && column == x + dx - WINDOW_CENTRE;",
+        "bool inside = row == y + dy - {sides.row} && column == x + dx - {sides.column};",
         "inside ? {pixel} : 0.0f",
     ),
 }
 """By border rule: a statement before the channels are read, and one's value; no read leaves the image."""
+
+
+@dataclass(frozen=True)
+class Sides:
+    """What a kernel calls the rows and columns of its window, and the place of the pixel itself in it."""
+
+    rows: str
+    columns: str
+    row: str
+    column: str
+
+
+SQUARE = Sides("WINDOW_SIZE", "WINDOW_SIZE", "WINDOW_CENTRE", "WINDOW_CENTRE")
+"""The names in a kernel whose window is as high as wide."""
+
+OBLONG = Sides("WINDOW_ROWS", "WINDOW_COLUMNS", "CENTRE_ROW", "CENTRE_COLUMN")
+"""The names in a kernel whose window reaches along one axis."""
+
+
+def sides(gather: Gather) -> Sides:
+    """Return the names of a kernel's window."""
+    return SQUARE if gather.axes == (0, 1) else OBLONG
+
+
+def _window_defines(gather: Gather) -> list[str]:
+    """Return the lines that give the window's names their values."""
+    names, pixel = sides(gather), "/* the tap that lies on the pixel itself */"
+    rows = [f"#define {names.rows} {gather.rows}"]
+    columns = [f"#define {names.columns} {gather.columns}"]
+    centres = [f"#define {names.row} {gather.rows // 2} {pixel}"]
+    if names is SQUARE:
+        return rows + centres
+    return [*rows, *columns, *centres, f"#define {names.column} {gather.columns // 2}"]
 
 
 def emit(
@@ -43,11 +76,7 @@ def emit(
     _check_channels(program, dialect)
     body = body or Body(program, dialect, gather)
     images = [dialect.image_declaration.format(image=i.name, channels=i.channels) for i in gather.images]
-    defines = [
-        f"#define WINDOW_SIZE {gather.window.size}",
-        f"#define WINDOW_CENTRE {gather.window.size // 2} /* the tap that lies on the pixel itself */",
-        *body.defines(),
-    ]
+    defines = [*_window_defines(gather), *body.defines()]
     declared = [dialect.table_declaration(name, array) for name, array in tables(program).items()]
     begin = dialect.begin.format(
         defines="\n".join([*defines, *declared]),
@@ -139,6 +168,7 @@ class Body:
         self.groups = schedule(self.program)
         self.slots = layout(self.program)
         self.readers = users(self.program)
+        self.sides = sides(self.gather)
         self.group_of = {index: number for number, group in enumerate(self.groups) for index in group}
 
     def defines(self) -> list[str]:
@@ -241,14 +271,14 @@ class Body:
 
     def _over_window(self, body: Callable[[str], list[str]]) -> None:
         """Write the loops over taps and channels that set `value`; `body` takes the index into the window."""
-        before, value = BORDERS[self.gather.window.border]
-        self._open("for (int dy = 0; dy < WINDOW_SIZE; ++dy) {")
-        self._line("int row = clamp(y + dy - WINDOW_CENTRE, 0, height - 1);")
-        self._open("for (int dx = 0; dx < WINDOW_SIZE; ++dx) {")
-        self._line("int column = clamp(x + dx - WINDOW_CENTRE, 0, width - 1);")
+        (before, value), names = BORDERS[self.gather.window.border], self.sides
+        self._open(f"for (int dy = 0; dy < {names.rows}; ++dy) {{")
+        self._line(f"int row = clamp(y + dy - {names.row}, 0, height - 1);")
+        self._open(f"for (int dx = 0; dx < {names.columns}; ++dx) {{")
+        self._line(f"int column = clamp(x + dx - {names.column}, 0, width - 1);")
         if before:
-            self._line(before)
-        self._line(f"int tap = (dy * WINDOW_SIZE + dx) * {self.gather.channels};")
+            self._line(before.format(sides=names))
+        self._line(f"int tap = (dy * {names.columns} + dx) * {self.gather.channels};")
         first = 0
         for image in self.gather.images:
             pixel = self.dialect.pixel.format(image=image.name, channels=image.channels)

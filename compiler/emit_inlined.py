@@ -168,11 +168,12 @@ class InlinedBody(Body):
 
     def _windowed(self, index: int, matrix: NDArray[np.float32]) -> None:
         """Write the products of all taps."""
-        window, first = self.gather.window, 0
+        gather, first = self.gather, 0
         for image in self.gather.images:
             self._line(f"{_vector(image.channels)} {image.name}_{index};")
-        for tap in range(window.size * window.size):
-            dy, dx = (offset - window.size // 2 for offset in divmod(tap, window.size))
+        for tap in range(gather.rows * gather.columns):
+            row, column = divmod(tap, gather.columns)
+            dy, dx = row - gather.rows // 2, column - gather.columns // 2
             for image in self.gather.images:
                 name = f"{image.name}_{index}"
                 self._line(f"{name} = tap_{image.name}(ivec2(x, y) + ivec2({dx}, {dy}));")

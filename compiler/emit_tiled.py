@@ -102,7 +102,7 @@ class Tiled(Schedule):
     def private_bytes(self, program: Program) -> int:
         """Return the bytes of the patches and of the arrays of a work item."""
         gather, body = kernel_gather(program), self._body(program)
-        patch = gather.window.size * (gather.window.size + self.pixels - 1) * gather.channels
+        patch = gather.rows * (gather.columns + self.pixels - 1) * gather.channels
         shapes = [program.nodes[index].type.shape for index in body.group_of if body.declares(index)]
         numbers = sum(self.blocks(shape[0]).total * self.lanes * self.pixels for shape in shapes)
         return 4 * (patch + numbers)
@@ -174,19 +174,20 @@ class TiledBody(Body):
         return [
             f"#define PIXELS {tile.pixels} /* neighbours in a row that a work item computes */",
             f"#define LANES {tile.lanes} /* numbers in a vector */",
-            "#define PATCH_WIDTH (WINDOW_SIZE + PIXELS - 1) /* columns that all windows touch */",
+            f"#define PATCH_WIDTH ({self.sides.columns} + PIXELS - 1) /* columns that all windows touch */",
         ]
 
     def _prepare(self) -> None:
         """Write the copies of the images around the pixels, under the border rule."""
         self._comment("the images around the pixels: what lies beyond the border is filled in here")
+        names = self.sides
         for image in self.gather.images:
-            self._line(f"float patch_{image.name}[WINDOW_SIZE * PATCH_WIDTH * {image.channels}];")
-        self._line("int left = x - WINDOW_CENTRE;")
-        self._line("int top = y - WINDOW_CENTRE;")
+            self._line(f"float patch_{image.name}[{names.rows} * PATCH_WIDTH * {image.channels}];")
+        self._line(f"int left = x - {names.column};")
+        self._line(f"int top = y - {names.row};")
         columns = "left >= 0 && left + PATCH_WIDTH <= width"
-        self._line(f"bool within = {columns} && top >= 0 && top + WINDOW_SIZE <= height;")
-        self._open("for (int dy = 0; dy < WINDOW_SIZE; ++dy) {")
+        self._line(f"bool within = {columns} && top >= 0 && top + {names.rows} <= height;")
+        self._open(f"for (int dy = 0; dy < {names.rows}; ++dy) {{")
         self._line("int row = clamp(top + dy, 0, height - 1);")
         for image in self.gather.images:
             self._copy(image.name, image.channels)
@@ -206,7 +207,7 @@ class TiledBody(Body):
         self._open("for (int dx = 0; dx < PATCH_WIDTH; ++dx) {")
         self._line("int column = clamp(left + dx, 0, width - 1);")
         if before:
-            self._line(before)
+            self._line(before.format(sides=self.sides))
         loop = f"for (int c = 0; c < {channels}; ++c) {{"
         self._nest([loop], [f"to_{name}[dx * {channels} + c] = {value.format(pixel=pixel)};"])
         self._close()
@@ -229,10 +230,12 @@ class TiledBody(Body):
         self._pixels([f"sum[p][{j}] = {start};" for j, start in zip(each, starts, strict=True)])
         if source.op == "input":
             for image in self.gather.images:
-                self._open("for (int dy = 0; dy < WINDOW_SIZE; ++dy) {")
+                self._open(f"for (int dy = 0; dy < {self.sides.rows}; ++dy) {{")
                 patch = f"patch_{image.name} + dy * PATCH_WIDTH * {image.channels}"
                 self._line(f"const float *row = {patch};")
-                self._multiply(blocks, f"WINDOW_SIZE * {image.channels}", f"row[p * {image.channels} + i]")
+                self._multiply(
+                    blocks, f"{self.sides.columns} * {image.channels}", f"row[p * {image.channels} + i]"
+                )
                 self._close()
         else:
             held = self.tile.blocks(source.type.shape[0]).total

@@ -83,10 +83,24 @@ class Image:
 
 @dataclass(frozen=True)
 class Gather:
-    """The program's input `window` holds, for each tap (dy, dx) in C order, the channels of all `images`."""
+    """The program's input `window` holds, for each tap (dy, dx) in C order, the channels of all `images`.
+
+    `axes` are those along which the window reaches: both, or one, 0 (a column of pixels) or 1 (a row).
+    """
 
     window: Window
     images: tuple[Image, ...]
+    axes: tuple[int, ...] = (0, 1)
+
+    @property
+    def rows(self) -> int:
+        """Return the rows of taps."""
+        return self.window.size if 0 in self.axes else 1
+
+    @property
+    def columns(self) -> int:
+        """Return the columns of taps."""
+        return self.window.size if 1 in self.axes else 1
 
     @property
     def channels(self) -> int:
@@ -96,7 +110,7 @@ class Gather:
     @property
     def n_inputs(self) -> int:
         """Return the length of the window vector."""
-        return self.window.size * self.window.size * self.channels
+        return self.rows * self.columns * self.channels
 
 
 @dataclass(frozen=True)
@@ -150,8 +164,8 @@ def text(program: Program) -> str:
     """Return the program as text: one line a node, the same bytes for the same program."""
     lines = ["program"]
     if program.gather is not None:
-        window = program.gather.window
-        lines.append(f"  window {window.size}x{window.size}, border {window.border}")
+        taps, border = f"{program.gather.rows}x{program.gather.columns}", program.gather.window.border
+        lines.append(f"  window {taps}, border {border}")
         lines += [f"  image {i.name}: {i.channels} in {i.range_text}" for i in program.gather.images]
     lines += [f"  %{index} = {_line(node)}" for index, node in enumerate(program.nodes)]
     lines += [f"  output {name} = %{index}" for name, index in program.outputs]

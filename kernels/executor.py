@@ -151,9 +151,14 @@ def gather_of(artifact: Artifact) -> Gather:
     return gather
 
 
+def images_of(artifact: Artifact) -> tuple[Image, ...]:
+    """Return the images that a caller gives: those of the first kernel."""
+    return gather_of(artifact.kernels[0]).images
+
+
 def checked(artifact: Artifact, inputs: Images) -> Images:
     """Return the images in the kernel's order, contiguous, or say what is wrong with them."""
-    wanted = gather_of(artifact).images
+    wanted = images_of(artifact)
     if sorted(inputs) != sorted(image.name for image in wanted):
         raise InputError(
             "images for the kernel",
@@ -201,4 +206,4 @@ def _check_range(image: Image, array: NDArray[np.float32]) -> None:
 
 def black(artifact: Artifact, size: tuple[int, int]) -> Images:
     """Return black images of `size` (height, width), for the run that makes drivers finish compiling."""
-    return {i.name: np.zeros((*size, i.channels), np.float32) for i in gather_of(artifact).images}
+    return {i.name: np.zeros((*size, i.channels), np.float32) for i in images_of(artifact)}

@@ -20,7 +20,7 @@ from ..compiler.lower_encode import SAMPLES, channel_name
 from ..compiler.lower_scene import PathPrograms
 from ..compiler.path_kernel import PathArtifact
 from ..refimpl import dataset
-from .executor import Executor, Images, Part, gather_of
+from .executor import Executor, Images, Part, gather_of, images_of
 from .passes import PICTURE, Passes
 
 BLOCK_NUMBERS = 2**22
@@ -64,16 +64,24 @@ class NumpyExecutor(Executor):
         return NumpyPasses(self, encode, denoise, size)
 
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
-        gather = gather_of(artifact)
         image = np.concatenate(list(images.values()), axis=-1)
+        # What one pass returns is the image of the next.
+        for kernel in artifact.kernels:
+            image = self._run_kernel(kernel, image)
+        return image
+
+    def _run_kernel(self, artifact: Artifact, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the output (H, W, C) of one kernel for its images, joined."""
+        gather = gather_of(artifact)
         height, width, _ = image.shape
-        padded = dataset.pad(image, gather.window)
+        padded = dataset.pad(image, gather.window, gather.axes)
         rows = max(1, BLOCK_NUMBERS // (width * gather.n_inputs))
         result = np.empty((height, width, output_channels(artifact.program)), np.float32)
         for top in range(0, height, rows):
             bottom = min(top + rows, height)
             # These rows and the margin around them are all that their pixels see.
-            windows = dataset.all_windows(padded[top : bottom + gather.window.size - 1], gather.window)
+            strip = padded[top : bottom + gather.rows - 1]
+            windows = dataset.all_windows(strip, gather.window, gather.axes)
             (value,) = interpret(artifact.program, {"window": windows}).values()
             result[top:bottom] = np.reshape(value, (bottom - top, width, -1)) if np.ndim(value) > 1 else value
         return result
@@ -104,7 +112,7 @@ class NumpyPasses(Passes):
 
     def denoise(self) -> None:
         """Interpret the denoiser on the images that it reads."""
-        wanted = {image.name: self._images[image.name] for image in gather_of(self.denoiser).images}
+        wanted = {image.name: self._images[image.name] for image in images_of(self.denoiser)}
         self._images[PICTURE] = self._executor.run(self.denoiser, wanted)
 
     def read(self, name: str) -> NDArray[np.float32]:

@@ -25,7 +25,7 @@ from ..compiler.path_kernel import PathArtifact
 from ..compiler.step_kernel import StepKernel
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import Executor, Images, Part, black, gather_of, keep
+from .executor import Executor, Images, Part, black, images_of, keep
 from .opencl_trainer import OpenCLTrainer
 from .passes import PICTURE, Passes
 
@@ -92,9 +92,25 @@ class OpenCLExecutor(Executor):
             self.lanes = CPU_LANES
             self.schedule = CPU_SCHEDULES.get(chosen.native_vector_width_float, "tile4")
         self._encoders: dict[str, Any] = {}
+        self._kept: Any = None
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
-        """Compile the source, upload the weights, and run once."""
+        """Compile the sources, upload the weights, and run once."""
+        new = [kernel.digest for kernel in artifact.kernels if kernel.digest not in self._built]
+        for kernel in artifact.kernels:
+            self._build(kernel)
+        if not new:
+            return
+        try:
+            # PoCL compiles when a kernel is first enqueued.
+            self._launch(artifact, black(artifact, (1, 1)))
+        except BaseException:
+            for digest in new:
+                self._built.pop(digest, None)
+            raise
+
+    def _build(self, artifact: Artifact) -> None:
+        """Compile one kernel and upload its weights; again costs nothing."""
         if artifact.digest in self._built:
             keep(self._built, artifact.digest, self._built[artifact.digest])
             return
@@ -104,13 +120,13 @@ class OpenCLExecutor(Executor):
         weights = artifact.weights if artifact.weights.size else np.zeros(1, np.float32)
         kernel, pixels = getattr(program, artifact.entry_point), artifact.manifest["schedule"]["pixels"]
         built = _Built(kernel, self._copied(weights), local_size, pixels)
-        self._launch(artifact, built, black(artifact, (1, 1)))
         keep(self._built, artifact.digest, built)
 
     def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
         """Refuse images that are no single buffer of the device, or whose indices `int` does not hold."""
         height, width = size
-        most = max(output_channels(artifact.program), *(i.channels for i in gather_of(artifact).images))
+        written = [output_channels(kernel.program) for kernel in artifact.kernels]
+        most = max(*written, *(i.channels for i in images_of(artifact)))
         count, largest = height * width * most, self._device.max_mem_alloc_size
         if count >= INDEX_LIMIT or 4 * count > largest:
             raise InputError(
@@ -138,7 +154,7 @@ class OpenCLExecutor(Executor):
 
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
         with self._told(next(iter(images.values())).shape[:2]):
-            return self._launch(artifact, self._built[artifact.digest], images)
+            return self._launch(artifact, images)
 
     @contextmanager
     def _told(self, size: tuple[int, ...]) -> Iterator[None]:
@@ -153,13 +169,13 @@ class OpenCLExecutor(Executor):
                 "split the picture, or use executor numpy",
             ) from None
 
-    def _launch(self, artifact: Artifact, built: _Built, images: Images) -> NDArray[np.float32]:
-        """Copy the images, run a built kernel, and copy the result back."""
+    def _launch(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
+        """Copy the images, run the built kernels, and copy the result back."""
         height, width = next(iter(images.values())).shape[:2]
         result = np.empty((height, width, output_channels(artifact.program)), np.float32)
         output = self._result(result)
         inputs = [self._upload(image) for image in images.values()]
-        self._enqueue(built, inputs, output, (height, width))
+        self._start(artifact, inputs, output, (height, width))
         if self._shares:
             # Mapping waits for the kernel, and makes the array hold what the buffer does.
             _, done = cl.enqueue_map_buffer(
@@ -169,6 +185,21 @@ class OpenCLExecutor(Executor):
         else:
             cl.enqueue_copy(self._queue, result, output)
         return result
+
+    def _start(self, artifact: Artifact, inputs: Sequence[Any], output: Any, size: tuple[int, int]) -> None:
+        """Start the built kernels of an artifact one after another; what they hand on stays on the device."""
+        *first, last = artifact.kernels
+        for kernel in first:
+            between = self._between(4 * size[0] * size[1] * output_channels(kernel.program))
+            self._enqueue(self._built[kernel.digest], inputs, between, size)
+            inputs = [between]
+        self._enqueue(self._built[last.digest], inputs, output, size)
+
+    def _between(self, count: int) -> Any:
+        """Return a buffer of so many bytes for an image between two passes; the last one is kept."""
+        if self._kept is None or self._kept.size != count:
+            self._kept = cl.Buffer(self._context, cl.mem_flags.READ_WRITE, count)
+        return self._kept
 
     def _enqueue(
         self,
@@ -186,14 +217,14 @@ class OpenCLExecutor(Executor):
     def kernel_seconds(
         self, artifact: Artifact, images: Images, clock: Callable[[], float] = time.perf_counter
     ) -> float:
-        """Return the time of the kernel of a built artifact alone: images and result stay on the device."""
+        """Return the time of a built artifact's kernels alone: images and result stay on the device."""
         height, width = next(iter(images.values())).shape[:2]
         # Memory that is written before the clock starts: the system gives it when it is first touched.
         result = np.full((height, width, output_channels(artifact.program)), 0, np.float32)
         inputs, output = [self._upload(image) for image in images.values()], self._result(result)
         self._queue.finish()
         start = clock()
-        self._enqueue(self._built[artifact.digest], inputs, output, (height, width))
+        self._start(artifact, inputs, output, (height, width))
         self._queue.finish()
         return clock() - start
 
@@ -320,9 +351,9 @@ class OpenCLPasses(Passes):
         """Start the denoising kernel."""
         executor = self._executor
         executor.build(self.denoiser, self.size)
-        images = [self._images[image.name] for image in gather_of(self.denoiser).images]
+        images = [self._images[image.name] for image in images_of(self.denoiser)]
         with executor._told(self.size):
-            executor._enqueue(executor._built[self.denoiser.digest], images, self._images[PICTURE], self.size)
+            executor._start(self.denoiser, images, self._images[PICTURE], self.size)
 
     def read(self, name: str) -> NDArray[np.float32]:
         """Copy a buffer to the host."""

@@ -25,7 +25,7 @@ from ..compiler.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
 from ..compiler.path_kernel import PathArtifact
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import osmesa
-from .executor import Executor, Images, Part, black, gather_of, keep
+from .executor import Executor, Images, Part, black, images_of, keep
 from .passes import PICTURE, Passes
 
 CONTEXT_VARIABLE = "WAMNET_OPENGL_CONTEXT"
@@ -298,7 +298,7 @@ class OpenGLPasses(Passes):
         executor = self._executor
         executor.build(self.denoiser, self.size)
         built = executor._built[self.denoiser.digest]
-        names = [image.name for image in gather_of(self.denoiser).images]
+        names = [image.name for image in images_of(self.denoiser)]
         textures = {"weight_texture": built.weights, **{f"image_{n}": self._images[n] for n in names}}
         with executor._context:
             executor._draw(built, self._result[0], textures)

@@ -286,11 +286,11 @@ def target_image(reference: Frame, normalization: Normalization) -> NDArray[np.f
     return feature_image(reference, ("color",), normalization)
 
 
-def pad(image: Array, window: Window) -> Array:
-    """Extend (H, W, C) by the border rule to (H + size - 1, W + size - 1, C)."""
-    margin = (window.before, window.after)
+def pad(image: Array, window: Window, axes: tuple[int, ...] = (0, 1)) -> Array:
+    """Extend (H, W, C) by the border rule to (H + size - 1, W + size - 1, C), or along some `axes` only."""
+    margins = [(window.before, window.after) if axis in axes else (0, 0) for axis in range(3)]
     mode: Any = BORDERS[window.border]
-    padded: Array = np.pad(image, (margin, margin, (0, 0)), mode=mode)
+    padded: Array = np.pad(image, margins, mode=mode)
     return padded
 
 
@@ -304,12 +304,16 @@ def windows_at(image: Array, y: Any, x: Any, window: Window) -> Array:
     return _gather(padded.reshape(-1), corner, padded.shape[1], image.shape[2], window.size)
 
 
-def all_windows(padded: Array, window: Window) -> Array:
-    """Return the windows (H, W, size * size * C) of all pixels of the image that was padded to `padded`."""
-    views = np.lib.stride_tricks.sliding_window_view(padded, (window.size, window.size), axis=(0, 1))
+def all_windows(padded: Array, window: Window, axes: tuple[int, ...] = (0, 1)) -> Array:
+    """Return the windows (H, W, size * size * C) of all pixels of the image that was padded to `padded`.
+
+    Along one of the `axes` only, they are a column (0) or a row (1) of `size` pixels.
+    """
+    sizes = (window.size,) * len(axes)
+    views = np.lib.stride_tricks.sliding_window_view(padded, sizes, axis=axes)
     height, width = views.shape[:2]
     # NumPy puts the window's axes last, (H, W, C, dy, dx); a window vector has the channel last.
-    return views.transpose(0, 1, 3, 4, 2).reshape(height, width, -1)
+    return np.moveaxis(views, 2, -1).reshape(height, width, -1)
 
 
 def _gather(values: Array, corner: Indices, row_px: Any, channels: int, size: int) -> Array:

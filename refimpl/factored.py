@@ -40,7 +40,7 @@ class Factors:
     @property
     def rank(self) -> int:
         """Return R."""
-        return self.horizontal.shape[0]
+        return len(self.horizontal)
 
 
 def largest_rank(size: int, n_in: int, n_out: int) -> int:

@@ -50,6 +50,31 @@ def test_the_picture_is_the_executors(wamnet, here, picture) -> None:
     assert frame.info["scene"] == "minicubes"
 
 
+def test_a_rank_cuts_the_first_layer(wamnet, here) -> None:
+    """The picture is that of denoise_on with this rank, and the output says what the cut costs."""
+    outcome = wamnet("denoise", "model.safetensors", "noisy.exr", "--rank", 2)
+    assert outcome.status == 0
+    assert "rank 2: moves the first layer's sums by at most " in outcome.out
+    with open_executor("numpy") as executor:
+        model, noisy = load_model(here / "model.safetensors"), exr.read_frame(here / "noisy.exr")
+        expected = denoise_on(executor, model, noisy, rank=2).image
+    assert (encoding.to_8bit(read_png(here / "denoised.png")) == encoding.to_8bit(expected)).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["--rank", 9999], "has ranks from 1 to"),
+        (["--rank", 2, "--executor", "opengl"], "between both passes"),
+    ],
+)
+def test_a_rank_that_cannot_be_is_refused(wamnet, here, options, reason) -> None:
+    outcome = wamnet("denoise", "model.safetensors", "noisy.exr", *options)
+    assert outcome.status == 2
+    assert reason in " ".join(outcome.err.split())
+    assert not (here / "denoised.png").exists()
+
+
 @pytest.mark.parametrize(("target", "source"), [("opencl", "denoise.cl"), ("glsl", "denoise.frag")])
 def test_compile_writes_a_kernel(wamnet, here, target, source) -> None:
     """Source, weights, manifest; by default into a folder that is named after the language."""

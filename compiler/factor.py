@@ -1,0 +1,203 @@
+"""A first layer of low rank as two programs: one along the rows of the images, one along the columns.
+
+1. The matrix of the only affine map that reads the window is cut to rank R [`factored.cut`], in float64; both
+   factors are rounded to float32 [`factor`].
+2. The first program maps a row of taps to R numbers, without a bias: an image of R channels. The second one
+   maps a column of taps of that image to the layer's neurons, and goes on as the given program does. Both
+   border rules hold for each axis alone (spec/factored.md, FAC-2).
+3. The error of both together, against the given program, is that of its own values, the first affine map's
+   being [`enclose`]
+
+       |V (H x)' - W x| <= |V (H x)' - V H x| + |W - V H| |x|
+
+   where ' is what the kernels compute: the rules of bounds.py for both passes, and the cut. From there on the
+   rules of bounds.py hold as they are. Without the last term it is the error of rounding alone, against the
+   network whose weights are the product V H.
+
+`x` is a box that holds all windows, or the windows of one picture [`over_images`, `at_images`].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..refimpl import dataset, factored
+from ..refimpl.errors import CompileError
+from . import bounds
+from .bounds import Enclosure
+from .emit import kernel_gather
+from .ir import Gather, Image, Node, Program, Type, attributes
+from .profiles import SineContract
+from .trace import trace
+from .verify import verify
+
+Array = NDArray[np.float64]
+
+HORIZONTAL = "horizontal"
+"""Name of the image between both passes, of the first one's output, and of its files."""
+
+NO_SINE = SineContract("none: the first pass has no sine", None)
+"""The contract of a program without sines."""
+
+Columns = Callable[[Enclosure], Enclosure]
+"""From the enclosure of numbers of the first pass to that of their columns of taps."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A program and its two passes; `layer` is the index of the first affine map in it and in `vertical`."""
+
+    whole: Program
+    horizontal: Program
+    vertical: Program
+    layer: int
+
+    @property
+    def rank(self) -> int:
+        """Return R."""
+        return kernel_gather(self.vertical).channels
+
+    @property
+    def factors(self) -> factored.Factors:
+        """Return the factors that the passes apply, in float64."""
+        size = kernel_gather(self.whole).window.size
+        vertical = _weight(self.vertical, self.layer)
+        (layer,) = (index for index, node in enumerate(self.horizontal.nodes) if node.op == "affine")
+        return factored.Factors(vertical.reshape(len(vertical), size, -1), _weight(self.horizontal, layer))
+
+
+def factor(program: Program, rank: int) -> Cut:
+    """Return the passes of a program whose window is read by one affine map, cut to this rank."""
+    gather, layer = kernel_gather(program), _layer(program)
+    name, size = str(program.nodes[layer]["weight"]), gather.window.size
+    factors = factored.cut(program.parameters[name].astype(np.float64), size, rank)
+    vertical, horizontal = (a.astype(np.float32) for a in (factors.vertical, factors.horizontal))
+    row = replace(gather, axes=(1,))
+    first = trace(lambda window: {HORIZONTAL: window @ horizontal.T}, {"window": _window(row)}, row)
+    image = Image(HORIZONTAL, rank, *_range(first), "sums along the rows, of the kernel before this one")
+    column = Gather(gather.window, (image,), axes=(0,))
+    nodes = tuple(_read_by(column, node) if node.op == "input" else node for node in program.nodes)
+    parameters = {**program.parameters, name: vertical.reshape(len(vertical), -1)}
+    second = replace(program, nodes=nodes, parameters=parameters, gather=column)
+    return Cut(program, verify(first, "horizontal pass"), verify(second, "vertical pass"), layer)
+
+
+def enclose(cut: Cut, contract: SineContract, x: Any, columns: Columns, of_cut: bool) -> list[Enclosure]:
+    """Return the enclosure of every node of the whole program, the kernel being both passes.
+
+    `x`: the windows' box (low, high), and that of the rows of taps; `columns`: from the enclosure of the
+    first pass's numbers to that of their columns of taps. `of_cut`: against the given program, else against
+    the one with the weights V H.
+    """
+    whole_box, row_box = x
+    (output,) = (index for _, index in cut.horizontal.outputs)
+    h = bounds.enclose(cut.horizontal, {"window": row_box}, contract)[output]
+    read = cut.whole.nodes[cut.layer].args[0]
+    until = replace(cut.vertical, nodes=cut.vertical.nodes[: cut.layer + 1], outputs=())
+    second = bounds.enclose(until, {}, contract, known={read: columns(h)})[cut.layer]
+    until = replace(cut.whole, nodes=cut.whole.nodes[: cut.layer + 1], outputs=())
+    wanted = bounds.enclose(until, {"window": whole_box}, contract)[cut.layer]
+    left_out = np.maximum(np.abs(whole_box[0]), np.abs(whole_box[1])) @ left(cut).T
+    if of_cut:
+        low, high, error = wanted.low, wanted.high, second.error + left_out
+    else:
+        low, high, error = wanted.low - left_out, wanted.high + left_out, second.error
+    known = Enclosure(low, high, error * (1 + bounds.OUTWARD), second.size)
+    return bounds.enclose(cut.whole, {"window": whole_box}, contract, known={cut.layer: known})
+
+
+def product(cut: Cut) -> Program:
+    """Return the whole program with the weights V H, in float64: what both passes compute, unrounded."""
+    name = str(cut.whole.nodes[cut.layer]["weight"])
+    return replace(cut.whole, parameters={**cut.whole.parameters, name: factored.expand(cut.factors)})
+
+
+def left(cut: Cut) -> Array:
+    """Return |W - V H| (D_out, D_in), not less than it is: what the cut leaves out."""
+    weight, factors = _weight(cut.whole, cut.layer), cut.factors
+    expanded = factored.expand(factors)
+    magnitude = factored.expand(factored.Factors(np.abs(factors.vertical), np.abs(factors.horizontal)))
+    # float64 rounds the sums of R products, and the difference.
+    rounding = (cut.rank + 2) * 2.0**-52 * (magnitude + np.abs(weight))
+    found: Array = np.abs(weight - expanded) + rounding
+    return found
+
+
+def over_images(cut: Cut, contract: SineContract, of_cut: bool = True) -> list[Enclosure]:
+    """Return the enclosures for all images in their ranges: a-priori."""
+    size, zero = kernel_gather(cut.whole).window.size, kernel_gather(cut.whole).window.border == "zero"
+
+    def columns(h: Enclosure) -> Enclosure:
+        """The same for each tap; beyond the border 0, without an error, where the rule says so."""
+        low, high = (np.minimum(h.low, 0.0), np.maximum(h.high, 0.0)) if zero else (h.low, h.high)
+        return Enclosure(np.tile(low, size), np.tile(high, size), np.tile(h.error, size))
+
+    boxes = tuple(bounds.window_box(kernel_gather(p)) for p in (cut.whole, cut.horizontal))
+    return enclose(cut, contract, boxes, columns, of_cut)
+
+
+def at_images(
+    cut: Cut, contract: SineContract, images: Mapping[str, NDArray[np.float32]], of_cut: bool = True
+) -> list[Enclosure]:
+    """Return the enclosures (H, W, ...) for given images (H, W, C): a-posteriori."""
+    whole = kernel_gather(cut.whole)
+    joined = np.concatenate([images[image.name] for image in whole.images], axis=-1).astype(np.float64)
+
+    def taps(image: Array, axes: tuple[int, ...]) -> Array:
+        """Return the windows (H, W, n) along some axes."""
+        found: Array = dataset.all_windows(dataset.pad(image, whole.window, axes), whole.window, axes)
+        return found
+
+    def columns(h: Enclosure) -> Enclosure:
+        """What the first pass leaves is the image of the second."""
+        return Enclosure(*(taps(part, (0,)) for part in (h.low, h.high, h.error)))
+
+    x = tuple((taps(joined, axes),) * 2 for axes in ((0, 1), (1,)))
+    return enclose(cut, contract, x, columns, of_cut)
+
+
+def _layer(program: Program) -> int:
+    """Return the index of the affine map that alone reads the window, or refuse the program."""
+    inputs = {index for index, node in enumerate(program.nodes) if node.op == "input"}
+    readers = [index for index, node in enumerate(program.nodes) if inputs & set(node.args)]
+    names = [node["weight"] for node in program.nodes if node.op == "affine"]
+    if len(readers) != 1 or program.nodes[readers[0]].op != "affine":
+        found = ", ".join(f"%{index} ({program.nodes[index].op})" for index in readers) or "nothing"
+        raise CompileError(
+            f"{found} reads the window: only a first layer, one affine map, can be cut to a rank; compile "
+            "the program without a rank"
+        )
+    if names.count(program.nodes[readers[0]]["weight"]) != 1:
+        raise CompileError(
+            "the first layer's matrix is applied to another layer too, which a cut would change; compile the "
+            "program without a rank"
+        )
+    return readers[0]
+
+
+def _read_by(gather: Gather, node: Node) -> Node:
+    """Return the input that a window is, as this one fills it."""
+    kind = _window(gather)
+    return replace(node, type=kind, attributes=attributes(**{**dict(node.attributes), "type": kind}))
+
+
+def _window(gather: Gather) -> Type:
+    """Return the type of a window vector."""
+    return Type(shape=(gather.n_inputs,))
+
+
+def _weight(program: Program, layer: int) -> Array:
+    """Return the matrix of an affine map in float64."""
+    return program.parameters[str(program.nodes[layer]["weight"])].astype(np.float64)
+
+
+def _range(horizontal: Program) -> tuple[float, float]:
+    """Return the least and largest number that the first pass may write."""
+    box, (output,) = bounds.window_box(kernel_gather(horizontal)), (i for _, i in horizontal.outputs)
+    found = bounds.enclose(horizontal, {"window": box}, NO_SINE)[output]
+    return float(np.min(found.low - found.read)), float(np.max(found.high + found.read))

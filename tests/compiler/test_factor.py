@@ -1,0 +1,153 @@
+"""Tests of first layers in two passes: programs, bounds, what a manifest says, refusals."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wamnet.compiler import artifact, bounds, factor
+from wamnet.compiler.compile import analysed, compile_program, sine_contract
+from wamnet.compiler.interpret import interpret
+from wamnet.compiler.ir import Gather, Image, Type, text
+from wamnet.compiler.trace import trace
+from wamnet.refimpl import dataset, siren
+from wamnet.refimpl.denoise import denoise_pixel
+from wamnet.refimpl.errors import CompileError
+
+SIZE, CHANNELS = 4, 3
+CONTRACT = sine_contract("ieee", "opencl")
+
+
+def program(function=None, border="clamp"):
+    """Trace a function of the window vector over one image in [-2, 2], or a small network."""
+    network = siren.init([SIZE * SIZE * CHANNELS, 10, 8, 3], 3.0, 3.0, seed=1, dtype=np.float32)
+    gather = Gather(dataset.Window(SIZE, border), (Image("a", CHANNELS, -2.0, 2.0),))
+    chosen = function or (lambda window: denoise_pixel(network, window))
+    return analysed(trace(chosen, {"window": Type(shape=(gather.n_inputs,))}, gather))
+
+
+def windows(image, window, axes):
+    return dataset.all_windows(dataset.pad(image, window, axes), window, axes)
+
+
+@pytest.mark.parametrize("border", dataset.BORDERS)
+@pytest.mark.parametrize("rank", [1, 5, SIZE * CHANNELS])
+def test_both_passes_are_the_network_of_the_product(rank, border) -> None:
+    """In float64, in which nothing but the order of sums differs."""
+    cut = factor.factor(program(border=border), rank)
+    window = dataset.Window(SIZE, border)
+    image = np.random.default_rng(1).uniform(-2, 2, (6, 9, CHANNELS))
+    (expected,) = interpret(
+        factor.product(cut), {"window": windows(image, window, (0, 1))}, np.float64
+    ).values()
+    (h,) = interpret(cut.horizontal, {"window": windows(image, window, (1,))}, np.float64).values()
+    (found,) = interpret(cut.vertical, {"window": windows(h, window, (0,))}, np.float64).values()
+    assert h.shape == (6, 9, rank)
+    # Sums of less than 100 terms below 2, through layers that stretch by less than 100: 1e4 roundings.
+    assert np.max(np.abs(found - expected)) <= 1e4 * 2.0**-52
+
+
+def test_programs_say_their_windows() -> None:
+    cut = factor.factor(program(), 5)
+    assert "  window 1x4, border clamp\n  image a: 3 in" in text(cut.horizontal)
+    assert "  window 4x1, border clamp\n  image horizontal: 5 in" in text(cut.vertical)
+    assert "input {name=window, type=float32[20]} : float32[20]" in text(cut.vertical)
+    (low, high), image = bounds.window_box(cut.horizontal.gather), cut.vertical.gather.images[0]
+    sums = np.maximum(low, high) @ np.abs(cut.factors.horizontal).T
+    # The range holds what the first pass may write, and little more.
+    assert sums.max() <= image.high <= 1.001 * sums.max()
+    assert 1.001 * -sums.max() <= image.low <= -sums.max()
+
+
+def test_the_cut_is_bounded_at_its_worst_window() -> None:
+    """The window that takes each input where the cut's row adds up reaches the bound of the first layer."""
+    whole = program()
+    cut = factor.factor(whole, 2)
+    weight = whole.parameters[str(whole.nodes[cut.layer]["weight"])].astype(np.float64)
+    difference = factor.product(cut).parameters[str(whole.nodes[cut.layer]["weight"])] - weight
+    row = int(np.abs(difference).sum(axis=1).argmax())
+    worst = 2.0 * np.sign(difference[row])
+    moved = abs(difference[row] @ worst)
+    layer = factor.over_images(cut, CONTRACT)[cut.layer].error[row]
+    alone = factor.over_images(cut, CONTRACT, of_cut=False)[cut.layer].error[row]
+    assert moved <= layer
+    # Nothing else is in the bound but rounding; float64 adds up in another order.
+    assert layer - alone <= (1 + 1e-5) * moved
+
+
+def test_a_bound_of_fewer_ranks_is_larger() -> None:
+    """At full rank what is left of the cut is the rounding of the factors."""
+    errors = []
+    for rank in (SIZE * CHANNELS, 6, 3, 1):
+        cut = factor.factor(program(), rank)
+        errors.append(float(factor.over_images(cut, CONTRACT)[cut.layer].error.max()))
+    assert errors == sorted(errors)
+    whole = bounds.over_box(program(), {"window": bounds.window_box(program().gather)}, CONTRACT)
+    full = bounds.output_errors(
+        program(), factor.over_images(factor.factor(program(), SIZE * CHANNELS), CONTRACT)
+    )
+    # Two passes of 12 and 48 terms, and the factors' rounding, against one of 48 terms.
+    assert full["color"].max() <= 10 * whole["color"].max()
+
+
+def test_manifest_and_files_hold_both_passes(tmp_path) -> None:
+    found = compile_program(program(), "opencl", "ieee", "tile8", rank=5)
+    names = [path.name for path in artifact.write(found, tmp_path)]
+    assert names == [
+        *("horizontal.denoise.cl", "horizontal.weights.bin", "denoise.cl", "weights.bin", "manifest.json")
+    ]
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert sorted(manifest["files"]) == sorted(names[:-1])
+    assert manifest["factored"]["rank"] == 5
+    assert manifest["factored"]["horizontal"]["window"] == {
+        "size": 4,
+        "border": "clamp",
+        "centre": 2,
+        "rows": 1,
+        "columns": 4,
+    }
+    assert manifest["bound"]["against"] == "float64 reference of the program that was cut"
+    assert max(manifest["factored"]["rounding"]["output"]) < max(manifest["bound"]["output"])
+    assert "pass      1 of 2: sums along the rows" in (tmp_path / "horizontal.denoise.cl").read_text()
+    assert "bound is that of both passes, against program " in (tmp_path / "denoise.cl").read_text()
+    other = compile_program(program(), "opencl", "ieee", "tile8", rank=4)
+    assert other.digest != found.digest
+
+
+def test_native_sines_promise_nothing_on_numpy() -> None:
+    found = compile_program(program(), "numpy", "native", rank=5).manifest
+    assert found["bound"]["output"] is None
+    assert found["factored"]["rounding"]["output"] is None
+
+
+TWICE = np.linspace(-0.1, 0.1, 48 * 48, dtype=np.float32).reshape(48, 48)
+"""A matrix that fits the window and what it gives."""
+
+UNFIT = {
+    r"%1 \(affine\), %2 \(add\) reads the window: only a first layer": lambda x: x @ TWICE.T + x,
+    r"%1 \(sin\) reads the window: only a first layer": lambda x: np.sin(x) @ TWICE.T,
+    "applied to another layer too": lambda x: np.sin(x @ TWICE.T) @ TWICE.T,
+}
+"""What is said of functions that have no first layer."""
+
+
+@pytest.mark.parametrize("reason", UNFIT)
+def test_programs_without_a_first_layer_are_refused(reason) -> None:
+    with pytest.raises(CompileError, match=reason):
+        factor.factor(program(UNFIT[reason]), 2)
+
+
+def test_a_wrong_factor_breaks_the_bound() -> None:
+    """The bound of rounding is so sharp that a change of one weight by a thousandth shows."""
+    cut = factor.factor(program(), SIZE * CHANNELS)
+    name = str(cut.vertical.nodes[cut.layer]["weight"])
+    changed = cut.vertical.parameters[name].copy()
+    changed.flat[np.abs(changed).argmax()] *= np.float32(1.001)
+    wrong = replace(
+        cut, vertical=replace(cut.vertical, parameters={**cut.vertical.parameters, name: changed})
+    )
+    whole, moved = (factor.left(c).max() for c in (cut, wrong))
+    assert moved > 100 * whole

@@ -1,0 +1,181 @@
+"""First layers in two passes, on every executor that has them: borders, sizes, ranks, schedules, faults."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wamnet.compiler import bounds, factor
+from wamnet.compiler.compile import TARGETS, analysed, compile_program, sine_contract
+from wamnet.compiler.interpret import interpret
+from wamnet.kernels import denoise_on, opencl_executor
+from wamnet.refimpl import dataset, factored
+from wamnet.refimpl.denoise import Model
+from wamnet.refimpl.errors import CompileError, InputError
+from wamnet.refimpl.frame import Frame
+
+EXAMPLES = max(settings.default.max_examples // 10, 1)
+"""Each example compiles two kernels, up to a second: a tenth of what other tests draw."""
+
+WAYS = [(t.name, s.name) for t in TARGETS.values() if t.chains for s in t.schedules]
+"""All targets and schedules that hold a first layer in two passes."""
+
+
+@st.composite
+def cases(draw):
+    """Draw (widths, channels, window size, border, image shape, rank, seed)."""
+    channels = draw(st.sampled_from([{"a": 3}, {"a": 3, "b": 1}, {"a": 1, "b": 4, "c": 2}]))
+    size = draw(st.integers(1, 12))
+    hidden = draw(st.lists(st.integers(1, 40), min_size=0, max_size=3))
+    widths = [size * size * sum(channels.values()), *hidden, draw(st.integers(1, 4))]
+    most = factored.largest_rank(size, *widths[:2])
+    return {
+        "widths": widths,
+        "channels": channels,
+        "size": size,
+        "border": draw(st.sampled_from(["clamp", "zero"])),
+        "shape": draw(st.tuples(st.integers(1, 17), st.integers(1, 45))),
+        "rank": draw(st.integers(1, most) | st.just(most)),
+        "seed": draw(st.integers(0, 2**32 - 1)),
+    }
+
+
+def images_of(channels, shape, seed=1):
+    random = np.random.default_rng(seed)
+    return {name: random.uniform(-2, 2, (*shape, n)).astype(np.float32) for name, n in channels.items()}
+
+
+def excess(kit, executor, artifact, program, images, of_cut):
+    """Return the largest error / bound at these images, against the program, or against its cut's product."""
+    rank = artifact.manifest["factored"]["rank"]
+    cut, contract = factor.factor(analysed(program), rank), sine_contract("ieee", artifact.target)
+    found = factor.at_images(cut, contract, images, of_cut)
+    (bound,) = bounds.output_errors(cut.whole, found).values()
+    wanted = cut.whole if of_cut else factor.product(cut)
+    (expected,) = interpret(wanted, {"window": kit.windows(program, images)}, np.float64).values()
+    assert np.isfinite(bound).all(), "a bound that is infinite holds for every kernel"
+    difference = np.abs(executor.run(artifact, images).astype(np.float64) - expected)
+    return float(np.max(difference / bound))
+
+
+@pytest.mark.parametrize(("target", "schedule"), WAYS)
+@settings(max_examples=EXAMPLES)
+@given(case=cases(), group=st.tuples(st.integers(1, 5), st.integers(1, 4)))
+def test_error_is_within_both_bounds(executor_named, kit, target, schedule, case, group):
+    """Against the network of the factors' product, up to rounding; against the whole one, with the cut."""
+    executor = executor_named(target)
+    program = kit.denoiser(
+        kit.network(case["widths"], (9.0, 3.0), case["seed"]), case["channels"], case["size"], case["border"]
+    )
+    images = images_of(case["channels"], case["shape"], case["seed"])
+    artifact = compile_program(program, target, "ieee", schedule, case["rank"])
+    for kernel in artifact.kernels:
+        assert kernel.manifest["schedule"]["name"] == schedule
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("LOCAL_SIZE", "TILE_LOCAL_SIZE"):
+            patch.setattr(opencl_executor, name, group)
+        for of_cut in (False, True):
+            assert excess(kit, executor, artifact, program, images, of_cut) <= 1
+
+
+def paper_s(kit, border="clamp", rank=0):
+    """Return the paper's network; with a rank, one whose first layer was made so, in float32."""
+    network = kit.network([864, 32, 32, 32, 32, 3], (3.0, 3.0))
+    if rank:
+        weight = factored.expand(factored.cut(network.weights[0], 12, rank))
+        network = replace(network, weights=(weight, *network.weights[1:]))
+    return kit.denoiser(network, {"color": 3, "normal": 3}, 12, border)
+
+
+@pytest.mark.parametrize("border", dataset.BORDERS)
+@pytest.mark.parametrize(("target", "schedule"), WAYS)
+def test_the_paper_s_network_of_rank_16(executor_named, kit, target, schedule, border) -> None:
+    """A model that was trained so loses nothing: its cut is as small as its own rounding to float32."""
+    program = paper_s(kit, border, 16)
+    artifact = compile_program(program, target, "ieee", schedule, 16)
+    images = images_of({"color": 3, "normal": 3}, (13, 31))
+    for of_cut in (False, True):
+        assert excess(kit, executor_named(target), artifact, program, images, of_cut) <= 1
+    report = artifact.manifest["factored"]
+    # Each weight is rounded by at most u = 2^-24 of itself when the model is made; its factors again, when
+    # they are cut: a product of two is off by 2 u of the magnitudes |V| |H|, which are larger than |W|.
+    assert report["cut"]["first_layer"] <= 2.0**-18 * report["cut"]["of"]
+    whole = compile_program(program, target, "ieee", schedule).manifest["bound"]["output"]
+    assert max(artifact.manifest["bound"]["output"]) <= max(whole)
+
+
+@pytest.mark.parametrize("rank", [1, 4])
+def test_executors_agree_through_denoise_on(executor_named, kit, rank) -> None:
+    """denoise_on(rank=R) is the picture of the model with the expanded cut, up to both bounds of rounding."""
+    network = kit.network([75, 9, 3], (3.0, 3.0))
+    model = Model(network, ("color",), dataset.Window(5, "zero"), dataset.Normalization())
+    noisy = Frame({"color": np.random.default_rng(2).random((7, 18, 3), dtype=np.float32)})
+    expanded = factored.expand(factored.cut(network.weights[0].astype(np.float64), 5, rank))
+    low = replace(model, siren=replace(network, weights=(expanded.astype(np.float32), *network.weights[1:])))
+    # The sums have at most 75 terms of magnitude below 1 each: 2^-24 * 75 * 4 roundings, times omega_0 = 3
+    # and the next layer's row sum, below 1, is less than 2^-12.
+    for name in ("numpy", "opencl"):
+        found = denoise_on(executor_named(name), model, noisy, rank=rank)
+        wanted = denoise_on(executor_named("numpy"), low, noisy)
+        assert np.max(np.abs(found.image - wanted.image)) <= 2.0**-12
+        assert found.cut.startswith(f"rank {rank}: moves the first layer's sums by at most ")
+    assert denoise_on(executor_named("numpy"), model, noisy).cut == ""
+
+
+def test_a_second_picture_of_another_size(executor_named, kit) -> None:
+    """The image between both passes is kept from run to run, and made anew for another size or rank."""
+    executor, program = executor_named("opencl"), paper_s(kit)
+    for rank, shape in ((3, (5, 9)), (3, (9, 5)), (2, (9, 5)), (3, (5, 9)), (3, (6, 20))):
+        artifact = compile_program(program, "opencl", "ieee", "tile16", rank)
+        images = images_of({"color": 3, "normal": 3}, shape)
+        assert excess(kit, executor, artifact, program, images, False) <= 1
+
+
+FAULTS = {
+    "first pass, tap": (0, "int left = x - CENTRE_COLUMN", "int left = x - CENTRE_COLUMN + 1"),
+    "first pass, row": (0, "int top = y - CENTRE_ROW", "int top = y + 1"),
+    "first pass, channel": (0, "row[p * 3 + i]", "row[p * 3 + (i ^ 1)]"),
+    "second pass, tap": (1, "int top = y - CENTRE_ROW", "int top = y - CENTRE_ROW + 1"),
+    "second pass, column": (1, "int left = x - CENTRE_COLUMN", "int left = x - 1"),
+    "second pass, pixel": (1, "row[p * 5 + i]", "row[i]"),
+    "second pass, border": (1, "clamp(top + dy, 0, height - 1)", "clamp(top + dy, 1, height - 1)"),
+}
+"""Which kernel, a piece of it, and what makes it wrong; none leaves an array."""
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_wrong_pass_is_caught(executor_named, kit, fault) -> None:
+    """Rank 5 of a 4 x 4 window, in tiles: each fault is far beyond the bound of rounding."""
+    executor, (number, old, new) = executor_named("opencl"), FAULTS[fault]
+    program = kit.denoiser(kit.network([48, 20, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
+    images = images_of({"a": 3}, (9, 34), 8)
+    artifact = compile_program(program, "opencl", "ieee", "tile8", 5)
+    assert excess(kit, executor, artifact, program, images, False) <= 1
+    wrong = kit.with_source(artifact.kernels[number], old, new)
+    broken = replace(artifact, before=wrong) if number == 0 else replace(wrong, before=artifact.before)
+    assert excess(kit, executor, broken, program, images, False) > 1
+
+
+def test_opengl_refuses(kit) -> None:
+    with pytest.raises(CompileError, match=r"rank 2: the image between both passes .* executor opencl or"):
+        compile_program(paper_s(kit), "opengl", rank=2)
+
+
+@pytest.mark.parametrize("rank", [-1, 73])
+def test_ranks_that_no_layer_has(kit, rank) -> None:
+    with pytest.raises(InputError, match=rf"rank is {rank}.*has ranks from 1 to 72"):
+        compile_program(paper_s(kit), "opencl", rank=rank)
+
+
+def test_the_images_are_those_of_the_first_pass(executor_named, kit) -> None:
+    """Their ranges are checked; nobody can give the image between both passes."""
+    artifact = compile_program(paper_s(kit), "opencl", rank=2)
+    images = images_of({"color": 3, "normal": 3}, (4, 4))
+    with pytest.raises(InputError, match="images for the kernel"):
+        executor_named("opencl").run(artifact, {factor.HORIZONTAL: np.zeros((4, 4, 2), np.float32)})
+    with pytest.raises(InputError, match="the kernel's bound holds for numbers in"):
+        executor_named("opencl").run(artifact, {**images, "color": 2 * images["color"]})

@@ -2,11 +2,13 @@
 
     python bench/denoise.py --size 1024 --repeats 7
     python bench/denoise.py --size 256 --ways opencl:plain opencl:tile16 opengl:inlined numpy torch.compile
+    python bench/denoise.py --channels 12 --ways opencl:tile16 opencl:tile16:rank16 opencl:tile16:rank8
 
-A way is TARGET:SCHEDULE, `numpy` (the interpreter), `torch` or `torch.compile` (a convolution and 1x1
-convolutions in channels-last order, all threads; left out, with a line, where PyTorch is not installed). The
-network is the paper's, 864-32-32-32-32-3 with its initial weights; the frame is noise. Ways take turns, so
-that drift of the machine's speed meets all of them alike.
+A way is TARGET:SCHEDULE, TARGET:SCHEDULE:rankR (the first layer cut to rank R, in two passes), `numpy` (the
+interpreter), `torch` or `torch.compile` (a convolution and 1x1 convolutions in channels-last order, all
+threads; left out, with a line, where PyTorch is not installed). The network is the paper's,
+864-32-32-32-32-3, or with --channels 12 (also albedo and position) 1728-32-32-32-32-3, with its initial
+weights; the frame is noise. Ways take turns, so that drift of the machine's speed meets all of them alike.
 
 Time is wall-clock time of a frame: for kernels the executor's `run`, with its checks and the copies of images
 and result; `kernel` is the OpenCL kernel alone, on images that the device has. Compile is the time until a
@@ -14,7 +16,8 @@ first frame can be run: tracing, bound, emission, the driver. GFLOP/s counts two
 and nothing for sines; OpenCL's are those of the kernel alone. The share is of the rate at which NumPy's BLAS
 multiplies float32 matrices of 4096 x 4096, measured between the ways; OPENBLAS_CORETYPE=SkylakeX is twice as
 fast on processors with AVX-512 that OpenBLAS does not know. The error is the largest difference from float64
-on a crop, beside the largest bound there.
+on a crop, beside the largest bound there; for a rank, from the network whose weights are the product of both
+factors.
 
 On a machine that others use, compare single threads: OPENBLAS_NUM_THREADS=1 POCL_MAX_PTHREAD_COUNT=1
 OMP_NUM_THREADS=1, and processor time in place of wall-clock time with --cpu.
@@ -29,7 +32,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -38,6 +40,7 @@ from numpy.typing import NDArray
 from wamnet.cli import machine
 from wamnet.compiler import bounds
 from wamnet.compiler.compile import analysed, compile_program, sine_contract
+from wamnet.compiler.factor import at_images, factor, product
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.lower import lower
 from wamnet.kernels import open_executor
@@ -46,8 +49,11 @@ from wamnet.kernels.memory import keep_freed_memory
 from wamnet.refimpl import dataset, siren
 from wamnet.refimpl.denoise import Model
 
-WIDTHS = (864, 32, 32, 32, 32, 3)
-"""The paper's network: 12 x 12 pixels with colour and normal."""
+HIDDEN = (32, 32, 32, 32, 3)
+"""The paper's layers after the window of 12 x 12 pixels."""
+
+FEATURES = {6: ("color", "normal"), 12: ("color", "normal", "albedo", "position")}
+"""What the network sees, by the number of channels: the paper's, and all that the presets use."""
 
 CROP = 48
 """Rows and columns of the crop on which errors are computed."""
@@ -70,11 +76,16 @@ Clock = Callable[[], float]
 
 @dataclass
 class Way:
-    """A way to denoise: a frame, the time to prepare it, and the times of its runs, of kernels in seconds."""
+    """A way to denoise: a frame, the time to prepare it, and the times of its runs, of kernels in seconds.
+
+    `weights`: of a pixel's matrices; `expected`: the float64 reference on the crop, and the bound there.
+    """
 
     run: Run
     on_crop: Run
     seconds_compile: float
+    weights: int
+    expected: tuple[Any, float]
     seconds: list[float] = field(default_factory=list)
     kernel: Callable[[Clock], float] | None = None
     seconds_kernel: list[float] = field(default_factory=list)
@@ -87,6 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("--ways", nargs="+", default=list(WAYS))
     parser.add_argument("--size", type=int, default=1024, help="width and height in pixels")
+    parser.add_argument("--channels", type=int, choices=tuple(FEATURES), default=6)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument(
         "--cpu", action="store_true", help="processor time of all threads, not wall-clock time"
@@ -94,7 +106,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     keep_freed_memory()
     clock = time.process_time if given.cpu else time.perf_counter
-    model, images = _model(), _images(given.size)
+    model = _model(given.channels)
+    images = _images(model, given.size)
     crop = {name: np.ascontiguousarray(image[:CROP, :CROP]) for name, image in images.items()}
     ways = {name: way for name in given.ways if (way := _way(name, model, images, crop))}
     products: list[float] = []
@@ -108,22 +121,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     facts = [
         *(f"{name} {value}" for name, value in machine.describe().items()),
         f"NumPy {np.__version__}, sgemm {MATRIX}: {rate:.0f} GFLOP/s",
-        f"{given.size}x{given.size}, {'-'.join(map(str, WIDTHS))}",
+        f"{given.size}x{given.size}, {'-'.join(map(str, model.siren.widths))}",
     ]
     print(", ".join(facts) + "\n")
-    _print_table(ways, rate, given.size, _expected(model, crop))
+    _print_table(ways, rate, given.size)
 
 
-def _print_table(ways: Mapping[str, Way], rate: float, size: int, expected: tuple[Any, float]) -> None:
+def _print_table(ways: Mapping[str, Way], rate: float, size: int) -> None:
     """Print a row for each way."""
-    reference, bound = expected
-    weights = sum(a * b for a, b in pairwise(WIDTHS))
     print("| way | ms, median | ms, range | GFLOP/s | of sgemm | kernel, ms | compile, s | error | bound |")
     print("|---|---|---|---|---|---|---|---|---|")
     for name, way in ways.items():
         median = statistics.median(way.seconds)
         counted = statistics.median(way.seconds_kernel or way.seconds)
-        flops = 2 * weights * size**2 / counted / 1e9
+        reference, bound = way.expected
+        flops = 2 * way.weights * size**2 / counted / 1e9
         span = f"{1e3 * min(way.seconds):.0f} - {1e3 * max(way.seconds):.0f}"
         kernel = f"{1e3 * statistics.median(way.seconds_kernel):.0f}" if way.seconds_kernel else ""
         error = float(np.abs(way.on_crop() - reference).max())
@@ -131,28 +143,36 @@ def _print_table(ways: Mapping[str, Way], rate: float, size: int, expected: tupl
         print(f"| {name} | {1e3 * median:.0f} | {span} | {figures} | {error:.1e} | {bound:.1e} |")
 
 
-def _model() -> Model:
-    """Return the paper's network with its initial weights."""
-    network = siren.init(list(WIDTHS), 3.0, 3.0, seed=1, dtype=np.float32)
-    return Model(network, ("color", "normal"), dataset.Window(12, "clamp"), dataset.Normalization())
+def _model(channels: int) -> Model:
+    """Return the paper's network for so many channels with its initial weights."""
+    window = dataset.Window(12, "clamp")
+    widths = [window.size**2 * channels, *HIDDEN]
+    network = siren.init(widths, 3.0, 3.0, seed=1, dtype=np.float32)
+    return Model(network, FEATURES[channels], window, dataset.Normalization())
 
 
-def _images(size: int) -> Images:
+def _images(model: Model, size: int) -> Images:
     """Return noise in the images' ranges."""
-    random = np.random.default_rng(1)
-    color, normal = (random.random((size, size, 3), dtype=np.float32) for _ in range(2))
-    return {"color": color, "normal": 2 * normal - 1}
+    random, images = np.random.default_rng(1), {}
+    for feature in (dataset.FEATURES[name] for name in model.features):
+        noise = random.random((size, size, feature.channels), dtype=np.float32)
+        low, high = np.float32(feature.low), np.float32(feature.high)
+        images[feature.name] = np.minimum(low + (high - low) * noise, high)
+    return images
 
 
-def _expected(model: Model, crop: Images) -> tuple[Any, float]:
-    """Return the float64 reference on the crop, and the largest bound there."""
-    program = lower(model)
+def _expected(model: Model, crop: Images, rank: int = 0) -> tuple[Any, float]:
+    """Return the float64 reference on the crop, and the largest bound there; of a rank: of rounding alone."""
+    program, contract = analysed(lower(model)), sine_contract("ieee", "opencl")
     joined = np.concatenate(list(crop.values()), axis=-1)
-    windows = dataset.all_windows(dataset.pad(joined, model.window), model.window)
-    (reference,) = interpret(program, {"window": windows}, np.float64).values()
-    (bound,) = bounds.at_inputs(
-        analysed(program), {"window": windows}, sine_contract("ieee", "opencl")
-    ).values()
+    windows = {"window": dataset.all_windows(dataset.pad(joined, model.window), model.window)}
+    if rank:
+        cut = factor(program, rank)
+        found = bounds.output_errors(program, at_images(cut, contract, crop, of_cut=False))
+        program = product(cut)
+    else:
+        found = bounds.at_inputs(program, windows, contract)
+    (reference,), (bound,) = interpret(program, windows, np.float64).values(), found.values()
     return reference, float(bound.max())
 
 
@@ -179,15 +199,17 @@ def _way(name: str, model: Model, images: Images, crop: Images) -> Way | None:
             print(f"{name}: left out, PyTorch is not installed")
             return None
         return _torch(name == "torch.compile", model, images, crop)
-    target, _, schedule = name.partition(":")
+    target, schedule, rank = [*name.split(":"), "", ""][:3]
+    number = int(rank.removeprefix("rank") or 0)
     executor: Any = open_executor(target)
     start = time.perf_counter()
-    artifact = compile_program(lower(model), target, "ieee", schedule or executor.schedule)
+    artifact = compile_program(lower(model), target, "ieee", schedule or executor.schedule, number)
     executor.build(artifact, next(iter(images.values())).shape[:2])
     seconds = time.perf_counter() - start
     run, on_crop = (partial(executor.run, artifact, given) for given in (images, crop))
     kernel = partial(executor.kernel_seconds, artifact, images) if target == "opencl" else None
-    return Way(run, on_crop, seconds, kernel=kernel)
+    weights = sum(a.size for k in artifact.kernels for a in k.program.parameters.values() if a.ndim == 2)
+    return Way(run, on_crop, seconds, weights, _expected(model, crop, number), kernel=kernel)
 
 
 def _torch(compiled: bool, model: Model, images: Images, crop: Images) -> Way:
@@ -223,7 +245,8 @@ def _torch(compiled: bool, model: Model, images: Images, crop: Images) -> Way:
 
     start = time.perf_counter()
     run(images)
-    return Way(partial(run, images), partial(run, crop), time.perf_counter() - start)
+    seconds, weights = time.perf_counter() - start, sum(w.size for w in model.siren.weights)
+    return Way(partial(run, images), partial(run, crop), seconds, weights, _expected(model, crop))
 
 
 if __name__ == "__main__":

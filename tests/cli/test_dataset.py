@@ -175,6 +175,7 @@ def test_ranges_and_parameters_are_passed_on(wamnet, tmp_path) -> None:
         (["minicubes", "--workers", 0], "workers is 0: at least one process must work"),
         (["minicubes", "--workers", 2, "--scheduler", "x"], "a running scheduler has its own workers; leave"),
         (["minicubes", "--set", "time=1"], "parameter time is 1.0: each frame has its own"),
+        (["minicubes", "--set", "warm=1"], "parameter warm is 1.0: minicubes wants three numbers"),
         (["minicubes", "--spp", 0], "spp is 0: it must be an integer from 1"),
     ],
 )

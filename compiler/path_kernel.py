@@ -125,7 +125,7 @@ NAME_SHOWN = 60
 
 
 def _harmless(name: str) -> str:
-    """Return a scene's name for a comment: letters of a file that was sent must not become a kernel's code."""
+    """Return a scene's name for a comment: a file's letters must not become a kernel's code."""
     return re.sub(r"[^A-Za-z0-9_. +-]", "_", name[:NAME_SHOWN])
 
 

@@ -23,7 +23,7 @@ import typer
 from ..refimpl.errors import InputError
 from . import machine, movie, options
 from .options import ExecutorName, Renderer
-from .outputs import check_output
+from .outputs import TEMPORARY, check_output, check_parent
 from .terminal import progress, say
 
 if TYPE_CHECKING:
@@ -135,24 +135,29 @@ def plan_shots(
 
 
 def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
-    """Return the pictures that are not there or damaged; refuse a folder with anything else in it."""
+    """Return the pictures that are not there or damaged; refuse a folder with anything else in it.
+
+    What a killed run has left is removed.
+    """
     from . import images
 
     if folder.exists() and not folder.is_dir():
         raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
-    if not folder.parent.is_dir():
-        rule, way_out = "it does not exist", f"create it: mkdir -p '{folder.parent}'"
-        raise InputError("output folder", str(folder.parent), rule, way_out)
+    check_parent(folder)
     known = {shot.path: shot for shot in shots}
-    there = {}
+    there, strays = {}, []
     for path in sorted(folder.iterdir()) if folder.exists() else []:
+        if path.name.startswith(TEMPORARY):
+            strays.append(path)
         if path.name.startswith("."):
-            continue  # a picture that was being written when a run was killed
+            continue
         origin = images.read_origin(path) if path in known else ""
         if path not in known or origin not in (None, known[path].origin):
             rule = f"it holds something else: {path.name}"
             raise InputError("output folder", str(folder), rule, "choose another with -o, or empty it")
         there[path] = origin
+    for path in strays:
+        path.unlink()
     return [shot for shot in shots if there.get(shot.path) is None]
 
 

@@ -105,6 +105,15 @@ def test_an_interrupted_run_goes_on(wamnet, tmp_path, monkeypatch) -> None:
     assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "whole.gif").read_bytes()
 
 
+def test_what_a_killed_run_leaves_is_removed(wamnet, tmp_path) -> None:
+    """The unfinished picture; another hidden file stays."""
+    (tmp_path / "a").mkdir()
+    for name in (".wamnet-x.png", ".kept"):
+        (tmp_path / "a" / name).write_text("")
+    assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a").status == 0
+    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == [".kept", "00000.png", "00001.png"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [

@@ -84,7 +84,8 @@ def _files(folder: Path) -> Iterator[Path]:
     for path in sorted(folder.iterdir()):
         hidden = path.name.startswith(".") and path.name not in {".ci", ".github"}
         if path.is_file():
-            yield path
+            if path.name != ".git":  # in a worktree of git it is a file that names the other folder
+                yield path
         elif not (
             hidden or path.name in FOREIGN or path.suffix == ".egg-info" or (path / "pyvenv.cfg").exists()
         ):

@@ -76,6 +76,7 @@ def animate(
     """
     from ..compiler.model_file import load_model
     from ..kernels import open_executor
+    from ..kernels.frame_plan import animation_times
 
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
@@ -86,9 +87,13 @@ def animate(
         rule = f"a film's name must end in {' or '.join(movie.WRITERS)}, a folder's in none"
         raise InputError("output", str(output), rule, "rename it")
     network = load_model(model)
-    chosen = {**options.parse_parameters(parameters or []), "start": start, "seconds": seconds, "fps": fps}
+    chosen = options.parse_parameters(parameters or [])
+    if "time" in chosen:
+        value = chosen["time"]
+        raise InputError("parameter time", value, "each picture has its own", "use --start and --seconds")
+    times = animation_times(start, seconds, fps)
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
-    shots = plan_shots(folder, scene, chosen, (size, reference_spp, seed), facts)
+    shots = plan_shots(folder, (scene, chosen), times, (size, reference_spp, seed), facts)
     left = missing(folder, shots)
     folder.mkdir(exist_ok=True)
     with (
@@ -106,16 +111,21 @@ def animate(
 
 
 def plan_shots(
-    folder: Path, name: str, chosen: dict[str, Any], numbers: tuple[int, int, int], facts: Sequence[str]
+    folder: Path,
+    named: tuple[str, dict[str, Any]],
+    times: Sequence[float],
+    numbers: tuple[int, int, int],
+    facts: Sequence[str],
 ) -> list[Shot]:
-    """Return the pictures of an animation; numbers are size, samples of the reference (or 0) and seed."""
-    from ..kernels.frame_plan import animation_times
+    """Return the pictures of an animation at some times.
+
+    `named` are the scene's name and parameters; numbers are size, samples of the reference (or 0) and seed.
+    """
     from ..refimpl.render import Job
     from ..refimpl.scene import scene_digest
     from ..refimpl.scenes import canonical
 
-    size, spp, seed = numbers
-    times = animation_times(*(chosen.pop(key) for key in ("start", "seconds", "fps")))
+    (name, chosen), (size, spp, seed) = named, numbers
     shots = []
     for index, time in enumerate(times):
         scene = canonical(name, **{**chosen, "time": time})

@@ -94,6 +94,9 @@ def compile_model(
             if value is not None:
                 rule = f"{model} is no scene: neither a canonical one nor a .json file"
                 raise InputError(option, value, rule, "leave it out, or name a scene")
+        if not Path(model).suffix and not Path(model).exists():
+            rule = "neither a canonical scene nor a file"
+            raise InputError("model or scene", model, rule, f"scenes are {options.SCENES}")
         check_folder(folder, name)
         kernel = compile_program(lower(load_model(Path(model))), name, profile)
     for path in write_kernel(kernel, folder):

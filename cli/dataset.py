@@ -108,9 +108,14 @@ def make(
     folder: Path, request: Request, frames: Sequence[FramePlan], workers: int | None, scheduler: str | None
 ) -> None:
     """Make what is missing in the folder; on a cluster if there is more than one worker (None: per core)."""
+    from ..kernels import open_executor
+
     known = 0
     if (folder / dataset_files.MANIFEST).exists():
         known = dataset_files.bytes_of(dataset_files.read_manifest(folder))
+    elif scheduler is None:
+        # A device that is missing here is told before a folder asks for it.
+        open_executor(request.executor).close()
     with (
         progress("checking", known) as look,
         dataset_files.Store.open(folder, request, frames, look) as store,

@@ -16,7 +16,7 @@ import typer
 from ..refimpl.errors import InputError
 
 SCENES = "minicubes, glossy, daylight, cornell, furnace, lone_light, empty"
-"""The canonical scenes; equal to the registry in refimpl, which is not imported for a help text."""
+"""Canonical scenes by name, for help texts; equal to the registry in refimpl, which they do not import."""
 
 LARGEST_EXPOSURE_STOPS = 64.0
 """Brightest and darkest exposure: a factor of 2**64; far past it float32 ends."""

@@ -11,6 +11,7 @@ schedule, to the byte.
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -130,12 +131,21 @@ def compile_path(
     return PathArtifact(target, profile, lanes, entry, text, name, emitted, planes, manifest)
 
 
+NAME_SHOWN = 60
+"""Characters of a scene's name in a source's comment; the manifest has all of it."""
+
+
+def _harmless(name: str) -> str:
+    """Return a scene's name for a comment: a file's letters must not become a kernel's code."""
+    return re.sub(r"[^A-Za-z0-9_. +-]", "_", name[:NAME_SHOWN])
+
+
 def _header(programs: PathPrograms, language: str, profile: Profile, lanes: int) -> list[str]:
     """Return the lines of the comment at the top of the source, up to the arguments."""
     settings = [f"{key} {value}" for key, value in programs.settings.facts().items()]
     return [
         f"wamnet path tracer, {language}. Generated: change the compiler, not this text.",
-        f"scene     {programs.scene}, digest {programs.scene_digest[:32]}",
+        f"scene     {_harmless(programs.scene)}, digest {programs.scene_digest[:32]}",
         f"paths     {', '.join(settings)}",
         f"schedule  {lanes} {'path' if lanes == 1 else 'paths'} at once",
         f"profile   {profile.name}: {profile.text}",

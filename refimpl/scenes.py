@@ -14,6 +14,8 @@ from collections.abc import Callable
 from itertools import product
 from typing import Any
 
+import numpy as np
+
 from .errors import InputError
 from .materials import Conductor, Dielectric, Mirror
 from .scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sky, Sphere, Vector, validate
@@ -215,18 +217,18 @@ CANONICAL: dict[str, Callable[..., Scene]] = {
 
 
 def canonical(name: str, **parameters: Any) -> Scene:
-    """Return a canonical scene by name; raise InputError for an unknown name or parameter."""
+    """Return a canonical scene by name; raise InputError for an unknown name, and wrong parameters."""
     if name not in CANONICAL:
         raise InputError(
             "scene", name, "no canonical scene has this name", f"known are {', '.join(CANONICAL)}"
         )
     known = inspect.signature(CANONICAL[name]).parameters
-    for parameter in parameters:
+    for parameter, value in parameters.items():
+        what = f"parameter {parameter}"
         if parameter not in known:
-            raise InputError(
-                f"parameter {parameter}",
-                parameters[parameter],
-                f"{name} has none such",
-                f"known are {', '.join(known)}",
-            )
+            raise InputError(what, value, f"{name} has none such", f"known are {', '.join(known)}")
+        default = known[parameter].default
+        if np.shape(value) != np.shape(default):
+            wanted = "three numbers with commas" if np.shape(default) else "one number"
+            raise InputError(what, value, f"{name} wants {wanted}", f"for example {default}")
     return validate(CANONICAL[name](**parameters))

@@ -121,6 +121,13 @@ def test_an_interrupted_run_goes_on(wamnet, tmp_path, monkeypatch) -> None:
         (["-o", "no/a"], "output folder is no: it does not exist"),
         (["-o", "file"], "output folder is file: it is a file"),
         (["-o", "full"], "output folder is full: it holds something else: x; choose another with -o"),
+        (["--set", "time=1"], "parameter time is 1.0: each picture has its own; use --start and --seconds"),
+        (["--set", "fps=1"], "parameter fps is 1.0: minicubes has none such; known are time, warm"),
+        (["--set", "warm=1"], "parameter warm is 1.0: minicubes wants three numbers"),
+        (
+            ["--fps", 0.001, "--seconds", 2000, "-o", "a.gif"],
+            "--fps is 0.001: a GIF shows each picture for 655.35 s at most; use more, or .mp4",
+        ),
         (["--fps", 60, "-o", "a.gif"], "--fps is 60.0: a GIF has 50 at most; use fewer, or .mp4"),
     ],
 )

@@ -14,8 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wamnet import kernels
 from wamnet.cli import cluster, dataset_files, exr
-from wamnet.kernels import frame_plan
+from wamnet.kernels import frame_plan, render_frame
+from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.render import Job, render
 from wamnet.refimpl.scene import scene_digest
 from wamnet.refimpl.scenes import canonical
@@ -198,12 +200,24 @@ def test_ranges_and_parameters_are_passed_on(wamnet, tmp_path) -> None:
         (["minicubes", "--workers", 0], "workers is 0: at least one process must work"),
         (["minicubes", "--workers", 2, "--scheduler", "x"], "a running scheduler has its own workers; leave"),
         (["minicubes", "--set", "time=1"], "parameter time is 1.0: each frame has its own"),
+        (["minicubes", "--set", "warm=1"], "parameter warm is 1.0: minicubes wants three numbers"),
         (["minicubes", "--spp", 0], "spp is 0: it must be an integer from 1"),
     ],
 )
 def test_refusals(refused, arguments, text) -> None:
     """Before any work, and without a folder."""
     assert text in refused("dataset", *arguments)
+
+
+def test_a_missing_device_leaves_no_folder(refused, monkeypatch) -> None:
+    """A folder that asks for it would refuse the same request for another executor."""
+
+    def missing(name: str) -> None:
+        raise ExecutorUnavailable(f"{name}: no device was found; install one")
+
+    monkeypatch.setattr(kernels, "open_executor", missing)
+    monkeypatch.setattr(render_frame, "open_executor", missing)
+    assert "opencl: no device was found; install one" in refused("dataset", *TINY, "--executor", "opencl")
 
 
 def test_another_request_overwrites_nothing(refused, wamnet) -> None:

@@ -112,7 +112,11 @@ def test_refusals_of_compiling_a_scene(wamnet, refused, here) -> None:
 def test_refusals_of_compile(refused, here) -> None:
     """No model; another kind of file; no such profile or target; a file in the folder's place."""
     target = ["--target", "glsl"]
-    assert "wamnet-model file is none: cannot be read" in refused("compile", "none", *target)
+    assert "wamnet-model file is none.st: cannot be read" in refused("compile", "none.st", *target)
+    assert (
+        "model or scene is minicube: neither a canonical scene nor a file; scenes are minicubes,"
+        in refused("compile", "minicube", *target)
+    )
     assert "noisy.exr: not a safetensors file" in refused("compile", "noisy.exr", *target)
     assert "profile 'best' does not exist; there are: ieee" in refused(
         "compile", "model.safetensors", *target, "--profile", "best"

@@ -24,7 +24,7 @@ from ..refimpl.errors import InputError
 from . import machine, movie, options
 from .options import ExecutorName, Renderer
 from .outputs import TEMPORARY, check_output, check_parent
-from .terminal import progress, say
+from .terminal import hint_on_interrupt, progress, say
 
 if TYPE_CHECKING:
     from ..kernels.executor import Executor
@@ -96,7 +96,11 @@ def animate(
     shots = plan_shots(folder, (scene, chosen), times, (size, reference_spp, seed), facts)
     left = missing(folder, shots)
     folder.mkdir(exist_ok=True)
-    with open_executor(executor.value) as runner, progress("drawing", len(left)) as advance:
+    with (
+        hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"),
+        open_executor(executor.value) as runner,
+        progress("drawing", len(left)) as advance,
+    ):
         draw = draw_frames if renderer.value == executor.value != "numpy" else draw_apart
         for _ in draw(left, network, runner, renderer.value):
             advance(1)

@@ -118,6 +118,12 @@ Parameters = Annotated[
         show_default=False,
     ),
 ]
+SamplerName = Annotated[
+    Sampler,
+    typer.Option(
+        "--sampler", help="Random numbers: independent, or evenly spread (less noise at many samples)."
+    ),
+]
 SceneName = Annotated[
     str,
     typer.Argument(

@@ -58,9 +58,7 @@ def render(
     time: options.Time = None,
     parameters: options.Parameters = None,
     max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
-    sampler: Annotated[
-        Sampler, typer.Option(help="Random numbers: independent, or evenly spread (less noise at many spp).")
-    ] = Sampler.pcg4d,
+    sampler: options.SamplerName = Sampler.pcg4d,
     dtype: Annotated[FloatType, typer.Option(help="Arithmetic; files hold float32.")] = FloatType.float32,
     executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
     workers: Annotated[

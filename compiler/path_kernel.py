@@ -30,6 +30,16 @@ SCHEMA = "wamnet-path-kernel-1"
 """Name and version of the manifest's form; described in spec/path_kernel.md."""
 
 
+SUMS = (
+    "row 0 is the picture's top row, in every language",
+    "each plane but deviation_* is a sum over the samples: divide by their number, add over launches",
+    "deviation_*: squared differences from the mean colour of this launch, summed; not to be added",
+    "colour is linear radiance; depth is measured along the ray; normal, position and direction are those",
+    "of world space; 0 where nothing is hit (a direction is always there)",
+)
+"""What the numbers mean that a kernel adds up: for whoever calls it."""
+
+
 @dataclass(frozen=True)
 class PathArtifact:
     """A compiled path kernel; `programs` are what was emitted, `planes` what it adds up, in order."""
@@ -113,6 +123,7 @@ def compile_path(
         "sine": asdict_finite(sine_contract(profile, target)),
         "passes": [*PASSES, *promised.passes],
         "planes": list(planes),
+        "sums": "; ".join(SUMS),
         "arguments": arguments,
     }
     name = f"path{suffix}"
@@ -139,6 +150,8 @@ def _header(programs: PathPrograms, language: str, profile: Profile, lanes: int)
         f"schedule  {lanes} {'path' if lanes == 1 else 'paths'} at once",
         f"profile   {profile.name}: {profile.text}",
         "bound     none: a path's decisions may fall differently near an edge",
+        "fixed     camera, time and all of the scene: another moment is another kernel",
+        *(f"{'sums' if i == 0 else '':10}{line}" for i, line in enumerate(SUMS)),
     ]
 
 

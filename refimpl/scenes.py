@@ -126,10 +126,10 @@ def glossy(time: float = 0.0, roughness: float = 0.22, ior: float = 1.5) -> Scen
     )
 
 
-def daylight(time: float = 0.0, haze: float = 400.0) -> Scene:
+def daylight(time: float = 0.0, sun_concentration: float = 400.0) -> Scene:
     """Return a gold ball, a glass ball and a matt block on a plain, under a sky whose sun goes round.
 
-    haze is the concentration of the sun's lobe: the lower, the softer its shadows.
+    sun_concentration is that of the sun's lobe: the lower, the softer its shadows.
     """
     angle = 2.0 * math.pi * time / TURN_SECONDS
     sky = Sky(
@@ -138,7 +138,7 @@ def daylight(time: float = 0.0, haze: float = 400.0) -> Scene:
         (0.18, 0.16, 0.14),
         (math.cos(angle + 0.9), 0.75, math.sin(angle + 0.9)),
         (2.6, 2.2, 1.6),
-        haze,
+        sun_concentration,
     )
     plain = Quad((-40.0, 0.0, -40.0), (0.0, 0.0, 80.0), (80.0, 0.0, 0.0), (0.52, 0.48, 0.42))
     block = Box((0.1, 0.46, -1.1), (0.45, 0.45, 0.45), (0.24, 0.42, 0.62), _about_y(math.radians(25.0)))

@@ -81,6 +81,8 @@ def test_compile_writes_a_scene_s_kernel(wamnet, here, target, source) -> None:
     kernel = compile_path(programs, executor, "ieee", 16 if lanes else 1)
     assert (here / "a" / source).read_text() == kernel.source
     assert json.loads((here / "a/manifest.json").read_text()) == json.loads(json.dumps(kernel.manifest))
+    assert wamnet("compile", "minicubes", *options, "--sampler", "sobol", "-o", "sobol").status == 0
+    assert "sampler sobol" in (here / "sobol" / source).read_text()
     wamnet("scene", "minicubes", "--time", 1.5, "-o", "s.json")
     assert wamnet("compile", "s.json", *options, "-o", "b").status == 0
     assert (here / "b" / source).read_text() == kernel.source

@@ -23,8 +23,8 @@ import typer
 from ..refimpl.errors import InputError
 from . import machine, movie, options
 from .options import ExecutorName, Renderer
-from .outputs import check_output
-from .terminal import progress, say
+from .outputs import TEMPORARY, check_output, check_parent
+from .terminal import hint_on_interrupt, progress, say
 
 if TYPE_CHECKING:
     from ..kernels.executor import Executor
@@ -76,6 +76,7 @@ def animate(
     """
     from ..compiler.model_file import load_model
     from ..kernels import open_executor
+    from ..kernels.frame_plan import animation_times
 
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
@@ -86,12 +87,20 @@ def animate(
         rule = f"a film's name must end in {' or '.join(movie.WRITERS)}, a folder's in none"
         raise InputError("output", str(output), rule, "rename it")
     network = load_model(model)
-    chosen = {**options.parse_parameters(parameters or []), "start": start, "seconds": seconds, "fps": fps}
+    chosen = options.parse_parameters(parameters or [])
+    if "time" in chosen:
+        value = chosen["time"]
+        raise InputError("parameter time", value, "each picture has its own", "use --start and --seconds")
+    times = animation_times(start, seconds, fps)
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
-    shots = plan_shots(folder, scene, chosen, (size, reference_spp, seed), facts)
+    shots = plan_shots(folder, (scene, chosen), times, (size, reference_spp, seed), facts)
     left = missing(folder, shots)
     folder.mkdir(exist_ok=True)
-    with open_executor(executor.value) as runner, progress("drawing", len(left)) as advance:
+    with (
+        hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"),
+        open_executor(executor.value) as runner,
+        progress("drawing", len(left)) as advance,
+    ):
         draw = draw_frames if renderer.value == executor.value != "numpy" else draw_apart
         for _ in draw(left, network, runner, renderer.value):
             advance(1)
@@ -102,16 +111,21 @@ def animate(
 
 
 def plan_shots(
-    folder: Path, name: str, chosen: dict[str, Any], numbers: tuple[int, int, int], facts: Sequence[str]
+    folder: Path,
+    named: tuple[str, dict[str, Any]],
+    times: Sequence[float],
+    numbers: tuple[int, int, int],
+    facts: Sequence[str],
 ) -> list[Shot]:
-    """Return the pictures of an animation; numbers are size, samples of the reference (or 0) and seed."""
-    from ..kernels.frame_plan import animation_times
+    """Return the pictures of an animation at some times.
+
+    `named` are the scene's name and parameters; numbers are size, samples of the reference (or 0) and seed.
+    """
     from ..refimpl.render import Job
     from ..refimpl.scene import scene_digest
     from ..refimpl.scenes import canonical
 
-    size, spp, seed = numbers
-    times = animation_times(*(chosen.pop(key) for key in ("start", "seconds", "fps")))
+    (name, chosen), (size, spp, seed) = named, numbers
     shots = []
     for index, time in enumerate(times):
         scene = canonical(name, **{**chosen, "time": time})
@@ -125,24 +139,29 @@ def plan_shots(
 
 
 def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
-    """Return the pictures that are not there or damaged; refuse a folder with anything else in it."""
+    """Return the pictures that are not there or damaged; refuse a folder with anything else in it.
+
+    What a killed run has left is removed.
+    """
     from . import images
 
     if folder.exists() and not folder.is_dir():
         raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
-    if not folder.parent.is_dir():
-        rule, way_out = "it does not exist", f"create it: mkdir -p '{folder.parent}'"
-        raise InputError("output folder", str(folder.parent), rule, way_out)
+    check_parent(folder)
     known = {shot.path: shot for shot in shots}
-    there = {}
+    there, strays = {}, []
     for path in sorted(folder.iterdir()) if folder.exists() else []:
+        if path.name.startswith(TEMPORARY):
+            strays.append(path)
         if path.name.startswith("."):
-            continue  # a picture that was being written when a run was killed
+            continue
         origin = images.read_origin(path) if path in known else ""
         if path not in known or origin not in (None, known[path].origin):
             rule = f"it holds something else: {path.name}"
             raise InputError("output folder", str(folder), rule, "choose another with -o, or empty it")
         there[path] = origin
+    for path in strays:
+        path.unlink()
     return [shot for shot in shots if there.get(shot.path) is None]
 
 

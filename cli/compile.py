@@ -6,7 +6,7 @@ A name of a canonical scene, or a file that ends in .json, is a scene; anything 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,7 +15,7 @@ import typer
 from ..refimpl.errors import InputError
 from . import options
 from .inputs import load_model
-from .options import Target
+from .options import Sampler, Target
 from .outputs import check_parent, unwritable
 from .render import load_scene
 from .terminal import say
@@ -23,6 +23,7 @@ from .terminal import say
 if TYPE_CHECKING:
     from ..compiler.artifact import Files
     from ..compiler.path_kernel import PathArtifact
+    from ..refimpl.scene import Scene
 
 EXAMPLES = """Examples:
 
@@ -59,6 +60,9 @@ def compile_model(
     max_depth: Annotated[
         int | None, typer.Option(help="Greatest number of bounces of a scene's paths.", show_default="5")
     ] = None,
+    sampler: Annotated[
+        Sampler | None, typer.Option(help="Random numbers of a scene's paths.", show_default="pcg4d")
+    ] = None,
     lanes: Annotated[
         int | None,
         typer.Option(help="Paths that a work item follows: 16 suit CPUs, 1 GPUs.", show_default="1"),
@@ -81,13 +85,21 @@ def compile_model(
             rule = f"{model} is a scene, whose kernels have one schedule"
             raise InputError("--schedule", schedule, rule, "leave it out, or name a model")
         check_folder(folder, name, of_scene=True)
-        kernel = _compiled_scene(model, name, profile, time, parameters or [], max_depth, lanes)
+        scene = load_scene(model, time, parameters or [])
+        kernel = _compiled_scene(scene, name, profile, max_depth, sampler, lanes)
     else:
-        given = {"--time": time, "--set": parameters, "--max-depth": max_depth, "--lanes": lanes}
+        given = {
+            "--time": time,
+            "--set": parameters,
+            "--max-depth": max_depth,
+            "--sampler": sampler and sampler.value,
+            "--lanes": lanes,
+        }
         for option, value in given.items():
             if value is not None:
                 rule = f"{model} is no scene: neither a canonical one nor a .json file"
                 raise InputError(option, value, rule, "leave it out, or name a scene")
+        _check_name(model)
         check_folder(folder, name)
         kernel = compile_program(lower(load_model(Path(model))), name, profile, schedule or PLAIN)
     for path in write_kernel(kernel, folder):
@@ -103,13 +115,19 @@ def is_scene(name: str) -> bool:
     return name in CANONICAL or Path(name).suffix.lower() == ".json"
 
 
+def _check_name(name: str) -> None:
+    """Refuse what looks like a scene's name and is none: a model's file has a suffix, or is there."""
+    if not Path(name).suffix and not Path(name).exists():
+        rule = "neither a canonical scene nor a file"
+        raise InputError("model or scene", name, rule, f"scenes are {options.SCENES}")
+
+
 def _compiled_scene(
-    scene: str,
+    scene: Scene,
     target: str,
     profile: str,
-    time: float | None,
-    parameters: Sequence[str],
     max_depth: int | None,
+    sampler: Sampler | None,
     lanes: int | None,
 ) -> PathArtifact:
     """Return the kernel that follows a scene's paths."""
@@ -118,7 +136,9 @@ def _compiled_scene(
     from ..refimpl.transport import Settings
 
     settings = Settings() if max_depth is None else Settings(max_depth=max_depth)
-    programs = lower_scene(load_scene(scene, time, parameters), settings, most_unrolled(target))
+    if sampler is not None:
+        settings = replace(settings, sampler=sampler.value)
+    programs = lower_scene(scene, settings, most_unrolled(target))
     return compile_path(programs, target, profile, 1 if lanes is None else lanes)
 
 

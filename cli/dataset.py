@@ -18,8 +18,8 @@ import typer
 
 from ..refimpl.errors import InputError
 from . import cluster, dataset_files, options
-from .options import Renderer
-from .terminal import progress, say
+from .options import Renderer, Sampler
+from .terminal import hint_on_interrupt, progress, say
 
 if TYPE_CHECKING:
     from ..kernels.frame_plan import FramePlan, Request
@@ -42,7 +42,7 @@ SceneOrNone = Annotated[
     str | None,
     typer.Argument(
         metavar="SCENE",
-        help="Canonical scene (minicubes, cornell, furnace, lone_light, empty); --check needs none.",
+        help=f"Canonical scene ({options.SCENES}); --check needs none.",
         show_default=False,
     ),
 ]
@@ -63,6 +63,7 @@ def dataset(
     parameters: options.Parameters = None,
     max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
     executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    sampler: options.SamplerName = Sampler.pcg4d,
     workers: Annotated[
         int | None, typer.Option(help="Processes that share the work.", show_default="one per core")
     ] = None,
@@ -82,27 +83,39 @@ def dataset(
     from ..kernels.frame_plan import Request, plan
 
     if only_check:
+        if scene is not None:
+            rule = "--check looks at the folder, whatever it shows"
+            raise InputError("argument SCENE", scene, rule, "leave it out: wamnet dataset --check -o FOLDER")
         check(output)
         return
     if scene is None:
-        raise InputError("argument SCENE", "missing", "a data set shows a scene", "name one: minicubes")
+        raise InputError(
+            "argument SCENE", "missing", "a data set shows a scene", f"name one: {options.SCENES}"
+        )
     chosen = options.parse_parameters(parameters or [])
-    request = Request(scene, chosen, start, seconds, frames, test, size, spp, seed, max_depth, executor.value)
+    numbers = (start, seconds, frames, test, size, spp, seed, max_depth)
+    request = Request(scene, chosen, *numbers, executor.value, sampler.value)
     if scheduler is not None and workers is not None:
         rule = "a running scheduler has its own workers"
         raise InputError("--workers", workers, rule, "leave out --workers or --scheduler")
     if workers is not None and workers < 1:
         raise InputError("workers", workers, "at least one process must work", "use 1 or more")
-    make(output, request, plan(request), workers, scheduler)
+    with hint_on_interrupt(lambda: f"the same command goes on where it was, in {output}"):
+        make(output, request, plan(request), workers, scheduler)
 
 
 def make(
     folder: Path, request: Request, frames: Sequence[FramePlan], workers: int | None, scheduler: str | None
 ) -> None:
     """Make what is missing in the folder; on a cluster if there is more than one worker (None: per core)."""
+    from ..kernels import open_executor
+
     known = 0
     if (folder / dataset_files.MANIFEST).exists():
         known = dataset_files.bytes_of(dataset_files.read_manifest(folder))
+    elif scheduler is None:
+        # A device that is missing here is told before a folder asks for it.
+        open_executor(request.executor).close()
     with (
         progress("checking", known) as look,
         dataset_files.Store.open(folder, request, frames, look) as store,

@@ -142,7 +142,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
         schema = manifest["schema"]
-    except (OSError, ValueError, TypeError, KeyError):
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
         raise _damaged(path) from None
     if schema != SCHEMA:
         raise InputError(f"{path}: schema", str(schema), f"it must be {SCHEMA}", "use that version of wamnet")
@@ -151,7 +151,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         good &= all(NAME.fullmatch(name) for name in _names(manifest)) and bool(manifest["frames"])
         good &= all(frame["split"] in ("train", "test") for frame in manifest["frames"])
         _sums_of(manifest)
-    except (TypeError, KeyError, ValueError, AttributeError):
+    except (TypeError, KeyError, ValueError, AttributeError, OverflowError):
         good = False
     if not good:
         raise _damaged(path)
@@ -363,13 +363,14 @@ def _known_before(folder: Path, request: Request, frames: Sequence[FramePlan]) -
 
 
 def _read_journal(path: Path) -> dict[str, Sum]:
-    """Return the pictures that a journal knows; a line that is cut short is none."""
+    """Return the pictures that a journal knows; a line that is cut short or damaged is none."""
     sums = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+    text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+    for line in text.splitlines():
         try:
             entry = json.loads(line)
             sums[str(entry["file"])] = Sum(int(entry["bytes"]), str(entry["sha256"]))
-        except (ValueError, TypeError, KeyError):
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
             continue
     return sums
 

@@ -86,6 +86,7 @@ class Plan:
     steps: int | None = None
     seed: int = 1
     renderer: str = "opencl"
+    trainer: str = "opencl"
 
 
 QUICK = Plan(size_px=24, train_frames=2, test_frames=2, reference_spp=8, steps=60)
@@ -167,19 +168,23 @@ def demo(
 
 
 def for_this_machine(plan: Plan) -> Plan:
-    """Return the plan with the first kernel that runs here as its renderer, or one that NumPy can do."""
+    """Return the plan with the first kernel that runs here as its renderer, or one that NumPy can do.
+
+    The device that renders trains too, if it can.
+    """
     from ..kernels import open_executor
 
     for name in RENDERS_FIRST:
         try:
-            open_executor(name).close()
+            with open_executor(name) as executor:
+                trains = executor.trains
         except ExecutorUnavailable as error:
             say(f"not rendered with {name}: {error}")
         else:
-            return replace(plan, renderer=name)
+            return replace(plan, renderer=name, trainer=name if trains else "numpy")
     spp = min(plan.reference_spp, REFERENCE_SPP_OF_NUMPY)
     say(f"rendered with NumPy, which is slow: references have {spp} paths per pixel")
-    return replace(plan, renderer="numpy", reference_spp=spp)
+    return replace(plan, renderer="numpy", trainer="numpy", reference_spp=spp)
 
 
 def begin(plan: Plan, folder: Path) -> None:
@@ -269,11 +274,11 @@ def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Mode
     done = 0
     try:
         begin = load_checkpoint(train.checkpoint_path(path))
-        state, seconds = train.fit(recipe, pairs, path, begin)
+        state, seconds = train.fit(recipe, pairs, path, begin, executor=plan.trainer)
         done = begin.step
     except InputError:
         # There is no checkpoint, or it is damaged, or one of other frames or another recipe: begin anew.
-        state, seconds = train.fit(recipe, pairs, path)
+        state, seconds = train.fit(recipe, pairs, path, executor=plan.trainer)
     if state.step > done:
         write_text(speed, f"{seconds / (state.step - done)}\n")
     return model_of(state, train.facts(pairs)), state, _seconds(speed)

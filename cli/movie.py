@@ -16,6 +16,9 @@ from .packages import need
 MOST_FPS_OF_GIF = 50.0
 """Most pictures per second of a GIF: it counts hundredths of a second, and viewers slow down below two."""
 
+LONGEST_S_OF_GIF = 655.35
+"""Longest time for which a GIF shows a picture, in seconds: 16 bits count hundredths."""
+
 
 def write_movie(path: Path, pictures: Sequence[Path], fps: float) -> None:
     """Write a film of PNG files as the suffix of `path` says."""
@@ -30,6 +33,9 @@ def check(path: Path, fps: float) -> None:
         need("imageio_ffmpeg", "to write MP4 files", "video")
     elif fps > MOST_FPS_OF_GIF:
         raise InputError("--fps", fps, f"a GIF has {MOST_FPS_OF_GIF:g} at most", "use fewer, or .mp4")
+    elif 0.0 < fps < 1.0 / LONGEST_S_OF_GIF:
+        rule = f"a GIF shows each picture for {LONGEST_S_OF_GIF} s at most"
+        raise InputError("--fps", fps, rule, "use more, or .mp4")
 
 
 def _opened(pictures: Sequence[Path]) -> Iterator[Any]:
@@ -49,7 +55,12 @@ def _write_gif(path: Path, pictures: Sequence[Path], fps: float) -> None:
     """Write a GIF that repeats for ever; each picture has a palette of its own."""
     (first,) = _opened(pictures[:1])
     others = _opened(pictures[1:])
-    first.save(path, format="GIF", save_all=True, append_images=others, duration=1000.0 / fps, loop=0)
+    try:
+        first.save(path, format="GIF", save_all=True, append_images=others, duration=1000.0 / fps, loop=0)
+    except OverflowError:
+        # Pillow joins equal pictures to one that is shown for longer.
+        rule = f"a GIF shows no picture for more than {LONGEST_S_OF_GIF} s, nor equal ones together"
+        raise InputError("film", str(path), rule, "make it shorter, or .mp4") from None
 
 
 def _write_mp4(path: Path, pictures: Sequence[Path], fps: float) -> None:

@@ -15,6 +15,9 @@ import typer
 
 from ..refimpl.errors import InputError
 
+SCENES = "minicubes, glossy, daylight, cornell, furnace, lone_light, empty"
+"""Canonical scenes by name, for help texts; equal to the registry in refimpl, which they do not import."""
+
 LARGEST_EXPOSURE_STOPS = 64.0
 """Brightest and darkest exposure: a factor of 2**64; far past it float32 ends."""
 
@@ -147,11 +150,17 @@ Parameters = Annotated[
         show_default=False,
     ),
 ]
+SamplerName = Annotated[
+    Sampler,
+    typer.Option(
+        "--sampler", help="Random numbers: independent, or evenly spread (less noise at many samples)."
+    ),
+]
 SceneName = Annotated[
     str,
     typer.Argument(
         metavar="SCENE",
-        help="Canonical scene (minicubes, cornell, furnace, lone_light, empty) or scene file (.json).",
+        help=f"Canonical scene ({SCENES}) or scene file (.json).",
         show_default=False,
     ),
 ]

@@ -58,9 +58,7 @@ def render(
     time: options.Time = None,
     parameters: options.Parameters = None,
     max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
-    sampler: Annotated[
-        Sampler, typer.Option(help="Random numbers: independent, or evenly spread (less noise at many spp).")
-    ] = Sampler.pcg4d,
+    sampler: options.SamplerName = Sampler.pcg4d,
     dtype: Annotated[FloatType, typer.Option(help="Arithmetic; files hold float32.")] = FloatType.float32,
     executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
     workers: Annotated[
@@ -135,8 +133,8 @@ def load_scene(name: str, time: float | None, assignments: Sequence[str]) -> Sce
     path = Path(name)
     if path.suffix.lower() != ".json":
         if name in CANONICAL:
-            _check_kinds(name, parameters)
-        elif path.suffix or path.exists():
+            return canonical(name, **parameters)
+        if path.suffix or path.exists():
             rule = "neither a canonical scene nor a scene file, whose name ends in .json"
             raise InputError("scene", name, rule, f"use a .json file or one of {', '.join(CANONICAL)}")
         return canonical(name, **parameters)
@@ -150,16 +148,3 @@ def load_scene(name: str, time: float | None, assignments: Sequence[str]) -> Sce
         raise InputError("scene file", str(path), f"it cannot be read ({reason})", "check the name") from None
     except InputError as error:
         raise InputError(f"{path}: {error.what}", error.value, error.rule, error.way_out) from None
-
-
-def _check_kinds(name: str, parameters: dict[str, Any]) -> None:
-    """Refuse three numbers where a scene wants one, and one where it wants three."""
-    import inspect
-
-    from ..refimpl.scenes import CANONICAL
-
-    for parameter, known in inspect.signature(CANONICAL[name]).parameters.items():
-        value = parameters.get(parameter, known.default)
-        if isinstance(value, tuple) != isinstance(known.default, tuple):
-            wanted = "three numbers with commas" if isinstance(known.default, tuple) else "one number"
-            raise InputError(f"parameter {parameter}", value, f"{name} wants {wanted}", "change --set")

@@ -11,6 +11,7 @@ schedule, to the byte.
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +28,16 @@ from .profiles import Profile
 
 SCHEMA = "wamnet-path-kernel-1"
 """Name and version of the manifest's form; described in spec/path_kernel.md."""
+
+
+SUMS = (
+    "row 0 is the picture's top row, in every language",
+    "each plane but deviation_* is a sum over the samples: divide by their number, add over launches",
+    "deviation_*: squared differences from the mean colour of this launch, summed; not to be added",
+    "colour is linear radiance; depth is measured along the ray; normal, position and direction are those",
+    "of world space; 0 where nothing is hit (a direction is always there)",
+)
+"""What the numbers mean that a kernel adds up: for whoever calls it."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +123,7 @@ def compile_path(
         "sine": asdict_finite(sine_contract(profile, target)),
         "passes": [*PASSES, *promised.passes],
         "planes": list(planes),
+        "sums": "; ".join(SUMS),
         "arguments": arguments,
     }
     name = f"path{suffix}"
@@ -119,16 +131,27 @@ def compile_path(
     return PathArtifact(target, profile, lanes, entry, text, name, emitted, planes, manifest)
 
 
+NAME_SHOWN = 60
+"""Characters of a scene's name in a source's comment; the manifest has all of it."""
+
+
+def _harmless(name: str) -> str:
+    """Return a scene's name for a comment: a file's letters must not become a kernel's code."""
+    return re.sub(r"[^A-Za-z0-9_. +-]", "_", name[:NAME_SHOWN])
+
+
 def _header(programs: PathPrograms, language: str, profile: Profile, lanes: int) -> list[str]:
     """Return the lines of the comment at the top of the source, up to the arguments."""
     settings = [f"{key} {value}" for key, value in programs.settings.facts().items()]
     return [
         f"wamnet path tracer, {language}. Generated: change the compiler, not this text.",
-        f"scene     {programs.scene}, digest {programs.scene_digest[:32]}",
+        f"scene     {_harmless(programs.scene)}, digest {programs.scene_digest[:32]}",
         f"paths     {', '.join(settings)}",
         f"schedule  {lanes} {'path' if lanes == 1 else 'paths'} at once",
         f"profile   {profile.name}: {profile.text}",
         "bound     none: a path's decisions may fall differently near an edge",
+        "fixed     camera, time and all of the scene: another moment is another kernel",
+        *(f"{'sums' if i == 0 else '':10}{line}" for i, line in enumerate(SUMS)),
     ]
 
 

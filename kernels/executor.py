@@ -52,7 +52,7 @@ class Executor(ABC):
 
     `lanes` is the number of paths that its path kernels should follow at once, `schedule` the name of the
     schedule that suits a denoiser on it, for pictures of at least `schedule_pixels`: smaller ones are done
-    with the plain kernel before the other is compiled.
+    with the plain kernel before the other is compiled. `trains` says whether it has a compiled trainer.
     """
 
     name: str
@@ -60,6 +60,7 @@ class Executor(ABC):
     lanes: int = 1
     schedule: str = PLAIN
     schedule_pixels: int = 0
+    trains: bool = False
 
     @abstractmethod
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:

@@ -43,7 +43,7 @@ KINDS = ("noisy", "target")
 
 @dataclass(frozen=True)
 class Request:
-    """All that determines a data set, besides the version: scene, animation, numbers, sizes, seed, executor.
+    """All that determines a data set, besides the version: scene, animation, numbers, sizes, seed, ways.
 
     The animation runs from `start_s` for `seconds`; `parameters` are those of the canonical scene.
     """
@@ -59,6 +59,7 @@ class Request:
     seed: int = 0
     max_depth: int = 5
     executor: str = "numpy"
+    sampler: str = "pcg4d"
 
     def as_data(self) -> dict[str, Any]:
         """Return the request as JSON's types."""
@@ -151,7 +152,7 @@ def plan(request: Request) -> list[FramePlan]:
     Frame i has the seeds seed + 2 i (noisy) and seed + 2 i + 1 (target).
     """
     _check(request)
-    size, settings = request.size_px, Settings(max_depth=request.max_depth)
+    size, settings = request.size_px, Settings(max_depth=request.max_depth, sampler=request.sampler)
     frames = []
     numbers = {"train": 0, "test": 0}
     for index, (split, time) in enumerate(frame_times(request)):

@@ -90,6 +90,7 @@ class OpenCLExecutor(Executor):
         if chosen.type & cl.device_type.CPU:
             self._shares = True
             self.lanes = CPU_LANES
+            self.trains = True
             self.schedule = CPU_SCHEDULES.get(chosen.native_vector_width_float, "tile4")
         self._encoders: dict[str, Any] = {}
         self._kept: Any = None
@@ -267,7 +268,7 @@ class OpenCLExecutor(Executor):
 
     def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
         """Build the step's kernels, and copy pictures and targets to the device: a processor."""
-        if not self._device.type & cl.device_type.CPU:
+        if not self.trains:
             raise InputError(
                 "device that trains",
                 self.device,

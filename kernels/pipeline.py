@@ -70,7 +70,7 @@ class Pipeline:
             self._features, model.normalization, executor.name, profile, self.path.planes
         )
         self.denoise = compile_program(lower(model), executor.name, profile, executor.schedule_for(size))
-        self._drawn = False
+        self._drawn = self._closed = False
         self.passes = executor.passes(self.encode, self.denoise, size)
 
     def _compiled(self, scene: Scene) -> PathArtifact:
@@ -91,6 +91,7 @@ class Pipeline:
 
     def draw(self, seed: int = 0, spp: int = 1, first_sample: int = 0) -> None:
         """Trace, encode and denoise a picture, on the device."""
+        self._check_open()
         Job(self._width, self._height, spp, seed, self._settings, first_sample=first_sample)
         if spp > SAMPLES_AT_ONCE:
             rule = f"a pipeline adds up in float32: at most {SAMPLES_AT_ONCE} paths per pixel"
@@ -117,6 +118,7 @@ class Pipeline:
 
     def _read(self, name: str) -> NDArray[np.float32]:
         """Copy an image to the host."""
+        self._check_open()
         if not self._drawn:
             raise InputError("pipeline", "nothing drawn", "an image is read after it was drawn", "draw first")
         return self.passes.read(name)
@@ -126,9 +128,16 @@ class Pipeline:
         self.draw(seed, spp, first_sample)
         return self.picture()
 
+    def _check_open(self) -> None:
+        """Refuse work without images."""
+        if self._closed:
+            raise InputError("pipeline", "closed", "its images were given back", "make another one")
+
     def close(self) -> None:
         """Give the images on the device back; the executor stays open."""
-        self.passes.close()
+        if not self._closed:
+            self._closed = True
+            self.passes.close()
 
     def __enter__(self) -> Pipeline:
         return self

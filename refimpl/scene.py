@@ -235,7 +235,7 @@ def _build(kind: type[_Built], data: Any, path: str) -> _Built:
                 f"{path}.{key}",
                 data[key],
                 f"{kind.__name__} has no such key",
-                f"known are {', '.join(known)}",
+                f"known are {', '.join(known)}" if known else "remove it: there are none",
             )
     hints = get_type_hints(kind)
     values = {}

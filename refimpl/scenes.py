@@ -14,6 +14,8 @@ from collections.abc import Callable
 from itertools import product
 from typing import Any
 
+import numpy as np
+
 from .errors import InputError
 from .materials import Conductor, Dielectric, Mirror
 from .scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sky, Sphere, Vector, validate
@@ -124,10 +126,10 @@ def glossy(time: float = 0.0, roughness: float = 0.22, ior: float = 1.5) -> Scen
     )
 
 
-def daylight(time: float = 0.0, haze: float = 400.0) -> Scene:
+def daylight(time: float = 0.0, sun_concentration: float = 400.0) -> Scene:
     """Return a gold ball, a glass ball and a matt block on a plain, under a sky whose sun goes round.
 
-    haze is the concentration of the sun's lobe: the lower, the softer its shadows.
+    sun_concentration is that of the sun's lobe: the lower, the softer its shadows.
     """
     angle = 2.0 * math.pi * time / TURN_SECONDS
     sky = Sky(
@@ -136,7 +138,7 @@ def daylight(time: float = 0.0, haze: float = 400.0) -> Scene:
         (0.18, 0.16, 0.14),
         (math.cos(angle + 0.9), 0.75, math.sin(angle + 0.9)),
         (2.6, 2.2, 1.6),
-        haze,
+        sun_concentration,
     )
     plain = Quad((-40.0, 0.0, -40.0), (0.0, 0.0, 80.0), (80.0, 0.0, 0.0), (0.52, 0.48, 0.42))
     block = Box((0.1, 0.46, -1.1), (0.45, 0.45, 0.45), (0.24, 0.42, 0.62), _about_y(math.radians(25.0)))
@@ -215,18 +217,18 @@ CANONICAL: dict[str, Callable[..., Scene]] = {
 
 
 def canonical(name: str, **parameters: Any) -> Scene:
-    """Return a canonical scene by name; raise InputError for an unknown name or parameter."""
+    """Return a canonical scene by name; raise InputError for an unknown name, and wrong parameters."""
     if name not in CANONICAL:
         raise InputError(
             "scene", name, "no canonical scene has this name", f"known are {', '.join(CANONICAL)}"
         )
     known = inspect.signature(CANONICAL[name]).parameters
-    for parameter in parameters:
+    for parameter, value in parameters.items():
+        what = f"parameter {parameter}"
         if parameter not in known:
-            raise InputError(
-                f"parameter {parameter}",
-                parameters[parameter],
-                f"{name} has none such",
-                f"known are {', '.join(known)}",
-            )
+            raise InputError(what, value, f"{name} has none such", f"known are {', '.join(known)}")
+        default = known[parameter].default
+        if np.shape(value) != np.shape(default):
+            wanted = "three numbers with commas" if np.shape(default) else "one number"
+            raise InputError(what, value, f"{name} wants {wanted}", f"for example {default}")
     return validate(CANONICAL[name](**parameters))

@@ -52,6 +52,9 @@ default: its samples are independent."""
 BLOCKS_PER_BOUNCE = 2
 """Blocks of four random numbers that a scattering uses; block 0 belongs to the camera."""
 
+LARGEST_DEPTH = (1 << 32) // BLOCKS_PER_BOUNCE
+"""Largest number of scatterings whose blocks, after the camera's, have numbers of 32 bits."""
+
 ROULETTE_LIMIT = 0.95
 """Greatest probability to go on after Russian roulette, so that paths between white walls end too."""
 
@@ -89,10 +92,12 @@ class Settings:
             raise InputError(
                 "max_depth", self.max_depth, "it counts scatterings", "use an integer of 0 or more"
             )
-        if self.roulette_depth is not None and self.roulette_depth < 0:
-            raise InputError(
-                "roulette_depth", self.roulette_depth, "it must be 0 or more", "use None for none"
-            )
+        if self.max_depth >= LARGEST_DEPTH:
+            rule = f"random numbers are counted in 32 bits: it must be below {LARGEST_DEPTH}"
+            raise InputError("max_depth", self.max_depth, rule, "5 is usual")
+        if self.roulette_depth is not None and not 0 <= self.roulette_depth < LARGEST_DEPTH:
+            rule = f"it must be 0 or more, and below {LARGEST_DEPTH}"
+            raise InputError("roulette_depth", self.roulette_depth, rule, "use None for none")
         if self.strategy not in STRATEGIES:
             raise InputError("strategy", self.strategy, "it is unknown", f"known are {', '.join(STRATEGIES)}")
         if self.heuristic not in HEURISTICS:

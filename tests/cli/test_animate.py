@@ -105,6 +105,15 @@ def test_an_interrupted_run_goes_on(wamnet, tmp_path, monkeypatch) -> None:
     assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "whole.gif").read_bytes()
 
 
+def test_what_a_killed_run_leaves_is_removed(wamnet, tmp_path) -> None:
+    """The unfinished picture; another hidden file stays."""
+    (tmp_path / "a").mkdir()
+    for name in (".wamnet-x.png", ".kept"):
+        (tmp_path / "a" / name).write_text("")
+    assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a").status == 0
+    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == [".kept", "00000.png", "00001.png"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
@@ -121,6 +130,13 @@ def test_an_interrupted_run_goes_on(wamnet, tmp_path, monkeypatch) -> None:
         (["-o", "no/a"], "output folder is no: it does not exist"),
         (["-o", "file"], "output folder is file: it is a file"),
         (["-o", "full"], "output folder is full: it holds something else: x; choose another with -o"),
+        (["--set", "time=1"], "parameter time is 1.0: each picture has its own; use --start and --seconds"),
+        (["--set", "fps=1"], "parameter fps is 1.0: minicubes has none such; known are time, warm"),
+        (["--set", "warm=1"], "parameter warm is 1.0: minicubes wants three numbers"),
+        (
+            ["--fps", 0.001, "--seconds", 2000, "-o", "a.gif"],
+            "--fps is 0.001: a GIF shows each picture for 655.35 s at most; use more, or .mp4",
+        ),
         (["--fps", 60, "-o", "a.gif"], "--fps is 60.0: a GIF has 50 at most; use fewer, or .mp4"),
     ],
 )

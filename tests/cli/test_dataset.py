@@ -14,11 +14,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wamnet import kernels
 from wamnet.cli import cluster, dataset_files, exr
-from wamnet.kernels import frame_plan
+from wamnet.kernels import frame_plan, render_frame
+from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.render import Job, render
 from wamnet.refimpl.scene import scene_digest
 from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.transport import Settings
 
 TINY = ("minicubes", "--frames", 2, "--test", 1, "--size", 12, "--spp", 4)
 
@@ -72,6 +75,27 @@ def test_kernels_on_a_cluster_give_the_same_bytes(wamnet, executor_named, tmp_pa
         arguments = ("--executor", executor, "--workers", workers, "-o", folder)
         assert wamnet("dataset", *TINY, *arguments).status == 0
     assert content(tmp_path / "a") == content(tmp_path / "b")
+
+
+def test_the_sampler_is_the_request_s(wamnet, tmp_path) -> None:
+    """It is in the manifest, and draws the pictures; another one is another data set."""
+    assert wamnet("dataset", *TINY, "--sampler", "sobol", "-o", "a").status == 0
+    manifest = json.loads((tmp_path / "a/manifest.json").read_text())
+    assert manifest["request"]["sampler"] == "sobol"
+    job = Job(12, 12, 4, manifest["frames"][0]["target"]["seed"], Settings(sampler="sobol"))
+    want = render(canonical("minicubes", time=0.0), job).frame["color"]
+    assert (exr.read_frame(tmp_path / "a/train/00000-target.exr")["color"] == want).all()
+    outcome = wamnet("dataset", *TINY, "-o", "a")
+    assert outcome.status == 2
+    assert "sampler sobol (now pcg4d)" in outcome.err
+
+
+def test_a_scene_and_a_check_do_not_mix(wamnet, refused) -> None:
+    """The folder says what it shows."""
+    assert wamnet("dataset", *TINY, "-o", "a").status == 0
+    assert "argument SCENE is glossy: --check looks at the folder" in refused(
+        "dataset", "glossy", "--check", "-o", "a"
+    )
 
 
 def test_check_tells_and_a_run_mends(wamnet, tmp_path) -> None:
@@ -143,7 +167,8 @@ def test_an_interrupted_process_is_gone_on_with(wamnet, tmp_path, sent, workers)
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
     if sent == signal.SIGINT:
-        assert (process.returncode, errors) == (130, b"wamnet: interrupted\n")
+        hint = b"wamnet: the same command goes on where it was, in a\n"
+        assert (process.returncode, errors) == (130, hint + b"wamnet: interrupted\n")
     done = list((tmp_path / "a").rglob("0*.exr"))
     times = {path: path.stat().st_mtime_ns for path in done}
     assert len(done) >= 2
@@ -175,12 +200,24 @@ def test_ranges_and_parameters_are_passed_on(wamnet, tmp_path) -> None:
         (["minicubes", "--workers", 0], "workers is 0: at least one process must work"),
         (["minicubes", "--workers", 2, "--scheduler", "x"], "a running scheduler has its own workers; leave"),
         (["minicubes", "--set", "time=1"], "parameter time is 1.0: each frame has its own"),
+        (["minicubes", "--set", "warm=1"], "parameter warm is 1.0: minicubes wants three numbers"),
         (["minicubes", "--spp", 0], "spp is 0: it must be an integer from 1"),
     ],
 )
 def test_refusals(refused, arguments, text) -> None:
     """Before any work, and without a folder."""
     assert text in refused("dataset", *arguments)
+
+
+def test_a_missing_device_leaves_no_folder(refused, monkeypatch) -> None:
+    """A folder that asks for it would refuse the same request for another executor."""
+
+    def missing(name: str) -> None:
+        raise ExecutorUnavailable(f"{name}: no device was found; install one")
+
+    monkeypatch.setattr(kernels, "open_executor", missing)
+    monkeypatch.setattr(render_frame, "open_executor", missing)
+    assert "opencl: no device was found; install one" in refused("dataset", *TINY, "--executor", "opencl")
 
 
 def test_another_request_overwrites_nothing(refused, wamnet) -> None:

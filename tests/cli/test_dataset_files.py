@@ -200,6 +200,21 @@ def test_folders_that_are_something_else(tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
+    "line", [b"\xff\x00\xfe", b'{"file": "a", "bytes": 1e999, "sha256": ""}', 50000 * b"["]
+)
+def test_a_journal_that_is_damaged(tmp_path, whole, line) -> None:
+    """As a power cut may leave it: what can be read of it counts, and nothing else."""
+    with contextlib.suppress(Killed), files.Store.open(tmp_path, REQUEST, plan(REQUEST)) as store:
+        for task in store.tasks()[:6]:
+            store.put(task, carry_out(task))
+        raise Killed
+    journal = tmp_path / files.UNFINISHED / files.JOURNAL
+    journal.write_bytes(line + b"\n" + journal.read_bytes())
+    assert make(tmp_path) == (12, [])
+    assert content(tmp_path) == whole
+
+
+@pytest.mark.parametrize(
     ("old", "new", "text"),
     [
         ("{", "[", "manifest is .*: it is no manifest of a data set, or damaged; restore it, or make"),
@@ -209,6 +224,8 @@ def test_folders_that_are_something_else(tmp_path) -> None:
         ("train/00000-noisy.exr", "../../00000-noisy.exr", "or damaged"),
         ('"split": "train"', '"split": "rest"', "or damaged"),
         ('"bytes": ', '"bytes": "x", "was": ', "or damaged"),
+        ('"bytes": ', '"bytes": 1e999, "was": ', "or damaged"),
+        ("{", 50000 * "[", "or damaged"),
     ],
 )
 def test_manifests_that_are_none(tmp_path, old, new, text) -> None:

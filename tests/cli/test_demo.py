@@ -149,6 +149,7 @@ def test_a_second_run_reuses_everything(finished, tmp_path, monkeypatch) -> None
 
     monkeypatch.setattr("wamnet.kernels.frame_plan.render_frame", never)
     monkeypatch.setattr("wamnet.refimpl.train.train_step", never)
+    monkeypatch.setattr("wamnet.kernels.trainer.Run.enqueue", never)
     results = demo.carry_out(demo.for_this_machine(demo.QUICK), folder)
     assert results.state.step == demo.QUICK.steps
     assert results.seconds_per_step > 0
@@ -185,7 +186,9 @@ def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
 
     monkeypatch.setattr("wamnet.kernels.open_executor", nothing)
     plan = demo.for_this_machine(demo.Plan())
-    assert plan == demo.replace(demo.Plan(), renderer="numpy", reference_spp=demo.REFERENCE_SPP_OF_NUMPY)
+    assert plan == demo.replace(
+        demo.Plan(), renderer="numpy", trainer="numpy", reference_spp=demo.REFERENCE_SPP_OF_NUMPY
+    )
     told = capsys.readouterr().out
     assert "not rendered with opengl: opengl: nothing there" in told
     assert "rendered with NumPy, which is slow: references have 32 paths per pixel" in told
@@ -270,7 +273,8 @@ def test_an_unknown_time_is_no_error(finished, report, tmp_path, content) -> Non
         path.write_bytes(content)
     assert demo._seconds(path) is None
     assert plots.training_curve([(1, 0.5), (2, 0.25)], None, plots.LIGHT).startswith(b"\x89PNG")
-    data = {**report, "training": {**report["training"], "seconds_per_step": None}}
+    plan = {**report["plan"], "trainer": "numpy"}
+    data = {**report, "plan": plan, "training": {**report["training"], "seconds_per_step": None}}
     pictures = [dict.fromkeys(("noisy", "denoised", "reference", "normal"), "")] * 2
     plot = {"light": "", "dark": ""}
     drawn = {"errors": [{"input": plot, "denoised": plot}] * 2, "training": plot}

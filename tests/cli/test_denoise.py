@@ -107,6 +107,8 @@ def test_compile_writes_a_scene_s_kernel(wamnet, here, target, source) -> None:
     kernel = compile_path(programs, executor, "ieee", 16 if lanes else 1)
     assert (here / "a" / source).read_text() == kernel.source
     assert json.loads((here / "a/manifest.json").read_text()) == json.loads(json.dumps(kernel.manifest))
+    assert wamnet("compile", "minicubes", *options, "--sampler", "sobol", "-o", "sobol").status == 0
+    assert "sampler sobol" in (here / "sobol" / source).read_text()
     wamnet("scene", "minicubes", "--time", 1.5, "-o", "s.json")
     assert wamnet("compile", "s.json", *options, "-o", "b").status == 0
     assert (here / "b" / source).read_text() == kernel.source
@@ -160,7 +162,11 @@ def test_a_schedule_that_does_not_hold_the_model(wamnet, here, monkeypatch) -> N
 def test_refusals_of_compile(refused, here) -> None:
     """No model; another kind of file; no such profile or target; a file in the folder's place."""
     target = ["--target", "glsl"]
-    assert "wamnet-model file is none: cannot be read" in refused("compile", "none", *target)
+    assert "wamnet-model file is none.st: cannot be read" in refused("compile", "none.st", *target)
+    assert (
+        "model or scene is minicube: neither a canonical scene nor a file; scenes are minicubes,"
+        in refused("compile", "minicube", *target)
+    )
     assert "noisy.exr: not a safetensors file" in refused("compile", "noisy.exr", *target)
     assert "profile 'best' does not exist; there are: ieee" in refused(
         "compile", "model.safetensors", *target, "--profile", "best"

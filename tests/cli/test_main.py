@@ -17,6 +17,7 @@ from wamnet.cli import options
 from wamnet.compiler.compile import TARGETS
 from wamnet.kernels import EXECUTORS
 from wamnet.refimpl.errors import TrainingError
+from wamnet.refimpl.scenes import CANONICAL
 from wamnet.refimpl.train import PRESETS
 from wamnet.refimpl.transport import SAMPLERS
 
@@ -67,6 +68,7 @@ def test_choices_equal_the_registries() -> None:
     assert [name.value for name in options.ExecutorName] == list(EXECUTORS)
     assert {name.value for name in options.Preset} == set(PRESETS)
     assert [name.value for name in options.Sampler] == list(SAMPLERS)
+    assert options.SCENES.split(", ") == list(CANONICAL)
     assert {module.compile_model.__globals__["EXECUTOR_OF"][target] for target in options.Target} <= set(
         TARGETS
     )

@@ -89,7 +89,7 @@ def test_roulette_is_absent_when_off():
 
 
 def test_features_are_absent_when_nobody_wants_them():
-    source = kernel(groups=("color",)).source
+    _, source = kernel(groups=("color",)).source.split("*/", 1)
     assert "look" not in source
     assert "deviation" not in source
     assert "sum_albedo" not in source
@@ -111,6 +111,22 @@ def test_interpreter_s_text_holds_all_programs():
         "# look",
         "# scatter",
     ]
+
+
+@pytest.mark.parametrize("target", SCHEDULES)
+def test_a_scene_s_name_is_no_code(target):
+    """Ends of comments, of lines, and escapes: the text differs from that of a plain name in one line."""
+    evil = "a */ evil\n#error\r\\ ??/ \u2028 " + 200 * "x"
+    plain, found = (
+        compile_path(
+            lower_scene(replace(scenes.canonical("empty"), name=name), Settings(max_depth=0)), target
+        ).source.split("\n")
+        for name in ("a", evil)
+    )
+    assert len(plain) == len(found)
+    (changed,) = ((a, b) for a, b in zip(plain, found, strict=True) if a != b)
+    expected = "a __ evil__error__ ___ _ " + 35 * "x"
+    assert changed[1].split(", digest")[0] == changed[0].split("a, digest")[0] + expected
 
 
 @pytest.mark.parametrize("target", SCHEDULES)

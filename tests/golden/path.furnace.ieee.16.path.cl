@@ -5,6 +5,12 @@
  * schedule  16 paths at once
  * profile   ieee: any order of summation, fused multiply-add allowed, emitted sine
  * bound     none: a path's decisions may fall differently near an edge
+ * fixed     camera, time and all of the scene: another moment is another kernel
+ * sums      row 0 is the picture's top row, in every language
+ *           each plane but deviation_* is a sum over the samples: divide by their number, add over launches
+ *           deviation_*: squared differences from the mean colour of this launch, summed; not to be added
+ *           colour is linear radiance; depth is measured along the ray; normal, position and direction are those
+ *           of world space; 0 where nothing is hit (a direction is always there)
  * arguments sums: float, one plane of global_size(1) rows of global_size(0) * 16 numbers for each of:
  *           color_r, color_g, color_b, deviation_r, deviation_g, deviation_b, albedo_r, albedo_g, albedo_b,
  *           normal_x, normal_y, normal_z, depth, position_x, position_y, position_z, direction_x, direction_y,

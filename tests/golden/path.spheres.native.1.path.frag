@@ -5,6 +5,12 @@
  * schedule  1 path at once
  * profile   native: any order of summation, fused multiply-add allowed, the target's own sine
  * bound     none: a path's decisions may fall differently near an edge
+ * fixed     camera, time and all of the scene: another moment is another kernel
+ * sums      row 0 is the picture's top row, in every language
+ *           each plane but deviation_* is a sum over the samples: divide by their number, add over launches
+ *           deviation_*: squared differences from the mean colour of this launch, summed; not to be added
+ *           colour is linear radiance; depth is measured along the ray; normal, position and direction are those
+ *           of world space; 0 where nothing is hit (a direction is always there)
  * arguments uniforms width, height of the image; first_row; first_sample; samples to add up; seed_number.
  *           sums_0, sums_1, ...: RGBA float colour buffers as wide as the image; number 4 k + c is component c
  *           of sums_k:

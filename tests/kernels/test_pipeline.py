@@ -314,6 +314,11 @@ def test_refusals(executor, model_of):
             pipeline.draw(spp=17)
         with pytest.raises(InputError, match="seed is -1: it must be an integer"):
             pipeline.draw(seed=-1)
+        pipeline.draw()
+    for use in (pipeline.draw, pipeline.picture, lambda: pipeline.image("color")):
+        with pytest.raises(InputError, match="pipeline is closed: its images were given back; make another"):
+            use()
+    pipeline.close()
     with pytest.raises(InputError, match="width is 0: it must be an integer"):
         Pipeline(executor, scene("empty"), model, (2, 0))
     with pytest.raises(InputError, match="feature name is heat: not a known feature"):

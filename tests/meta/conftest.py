@@ -84,8 +84,7 @@ def _files(folder: Path) -> Iterator[Path]:
     for path in sorted(folder.iterdir()):
         hidden = path.name.startswith(".") and path.name not in {".ci", ".github"}
         if path.is_file():
-            # In a linked worktree of Git .git is a file, and no file of the project.
-            if path.name != ".git":
+            if path.name != ".git":  # in a worktree of git it is a file that names the other folder
                 yield path
         elif not (
             hidden or path.name in FOREIGN or path.suffix == ".egg-info" or (path / "pyvenv.cfg").exists()

@@ -56,3 +56,10 @@ def test_the_patterns(line, reason):
     assert [name for name, pattern in FORBIDDEN.items() if re.search(pattern, line)] == (
         [reason] if reason else []
     )
+
+
+def test_a_worktree_of_git_is_the_project_s(house, tmp_path) -> None:
+    """Its `.git` is a file with a path of the machine, and none of the project's."""
+    (tmp_path / ".git").write_text("gitdir: elsewhere")
+    (tmp_path / "a.txt").write_text("")
+    assert [path.name for path in type(house)(tmp_path).files()] == ["a.txt"]

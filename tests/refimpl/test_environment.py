@@ -31,8 +31,8 @@ def built(sky, dtype=np.float64):
 def around(sky, points=48):
     """Return directions (P, 3) and weights (P,) of a quadrature over the sphere around the sun, fine near it.
 
-    Two Gauss rules in 1 - cos (up to 0.1 and beyond) and one on each side of the horizon's azimuth are not
-    needed: the gradient's corner at the horizon costs some 1e-5 with 48 x 96 points.
+    Gauss's rule in 1 - cos, on three intervals, times even steps around the sun. What is smooth in 1 - cos
+    alone, such as the density, has no error but rounding; the gradient's corner at the horizon costs 6e-6.
     """
     nodes, weights = np.polynomial.legendre.leggauss(points)
     parts = []
@@ -67,7 +67,7 @@ def test_directions_chi_square(concentration):
     sine = np.sqrt(1 - y * y)
     pdf = environment.pdf(sky, np.stack([sine * np.cos(phi), y, sine * np.sin(phi)], axis=-1))
     share = np.einsum("aibj,i,j->ab", pdf.reshape(16, 24, 32, 24), weights, weights) / 16 * np.pi / 32
-    assert share.sum() == pytest.approx(1.0, abs=1e-3)
+    assert share.sum() == pytest.approx(1.0, abs=1e-7)  # the narrow lobe costs the rule 5e-9
     assert chi_square_p(observed, share * SAMPLES) >= sidak(SIGNIFICANCE, 3)
 
 
@@ -76,8 +76,8 @@ def test_light_of_all_directions_is_what_the_shares_assume():
     directions, weights = around(SKY)
     total = weights @ environment.radiance(built(SKY), directions)
     everywhere = np.pi * (np.array(SKY.zenith) + 2 * np.array(SKY.horizon) + np.array(SKY.ground))
-    assert total == pytest.approx(everywhere + SKY.sun_irradiance, rel=1e-3)
-    assert weights @ environment.pdf(built(SKY), directions) == pytest.approx(1.0, abs=1e-6)
+    assert total == pytest.approx(everywhere + SKY.sun_irradiance, rel=2e-5)
+    assert weights @ environment.pdf(built(SKY), directions) == pytest.approx(1.0, abs=1e-12)
     expected = sum(SKY.sun_irradiance) / sum(everywhere + SKY.sun_irradiance)
     assert built(SKY).sun_share == pytest.approx(expected, rel=1e-12)
 
@@ -128,7 +128,8 @@ def test_plane_under_the_sky(strategy, concentration):
 def test_white_furnace(strategy):
     """A matt plane of reflectance 1/2 under a white sky: 1/2, as under the background 1."""
     mean, error = plane_radiance(WHITE, strategy=strategy)
-    assert_all_plausible(z_p(mean - 0.5, np.maximum(error, 1e-12)))
+    # Where every sample has the same value, the rounding of 16384 sums is all that differs: 2^14 u = 1.8e-12.
+    assert_all_plausible(z_p(mean - 0.5, np.maximum(error, 2.0**-39)))
 
 
 def test_camera_sees_the_sky_itself():

@@ -155,7 +155,7 @@ REFUSALS = [
     (
         "boxes.0.material",
         {"kind": "mirror", "ior": 2},
-        r"material.ior is 2: Mirror has no such key; known are",
+        r"material.ior is 2: Mirror has no such key; remove it: there are none",
     ),
     (
         "boxes.0.material",

@@ -22,6 +22,19 @@ def test_unknown_canonical_scene_lists_the_known_ones():
         scenes.canonical("minicubes", size=3)
 
 
+@pytest.mark.parametrize(
+    ("parameters", "text"),
+    [
+        ({"warm": 1.0}, "parameter warm is 1.0: minicubes wants three numbers with commas; for example"),
+        ({"warm": (1.0, 2.0)}, r"parameter warm is \(1.0, 2.0\): minicubes wants three numbers"),
+        ({"time": (1.0, 2.0, 3.0)}, r"parameter time is .*: minicubes wants one number; for example 0.0"),
+    ],
+)
+def test_numbers_in_place_of_colours_and_colours_in_place_of_numbers(parameters, text):
+    with pytest.raises(InputError, match=text):
+        scenes.canonical("minicubes", **parameters)
+
+
 @pytest.mark.parametrize("time", [0.0, 0.3, 1.7, 5.0, 7.99])
 def test_minicubes_turn_inside_their_room(time):
     """27 cubes, rigid: every corner stays in the room, distances between centres do not depend on time."""

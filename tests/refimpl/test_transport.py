@@ -239,6 +239,11 @@ def test_depth_adds_light_and_nothing_else():
     ("settings", "message"),
     [
         ({"max_depth": -1}, "max_depth is -1: it counts scatterings"),
+        (
+            {"max_depth": 2**31},
+            "max_depth is 2147483648: random numbers are counted in 32 bits",
+        ),
+        ({"roulette_depth": 2**31}, "roulette_depth is 2147483648: it must be 0 or more, and below"),
         ({"max_depth": 2.5}, "max_depth is 2.5: it counts scatterings"),
         ({"roulette_depth": -1}, "roulette_depth is -1: it must be 0 or more"),
         ({"strategy": "photon"}, "strategy is photon: it is unknown; known are mis, light, bsdf"),

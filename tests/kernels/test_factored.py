@@ -12,11 +12,14 @@ from hypothesis import strategies as st
 from wamnet.compiler import bounds, factor
 from wamnet.compiler.compile import TARGETS, analysed, compile_program, sine_contract
 from wamnet.compiler.interpret import interpret
-from wamnet.kernels import denoise_on, opencl_executor
+from wamnet.compiler.lower import lower
+from wamnet.kernels import Pipeline, denoise_on, opencl_executor
+from wamnet.kernels.passes import PICTURE
 from wamnet.refimpl import dataset, factored
 from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.scenes import canonical
 
 EXAMPLES = max(settings.default.max_examples // 10, 1)
 """Each example compiles two kernels, up to a second: a tenth of what other tests draw."""
@@ -133,6 +136,23 @@ def test_a_second_picture_of_another_size(executor_named, kit) -> None:
         artifact = compile_program(program, "opencl", "ieee", "tile16", rank)
         images = images_of({"color": 3, "normal": 3}, shape)
         assert excess(kit, executor, artifact, program, images, False) <= 1
+
+
+@pytest.mark.parametrize("name", ["numpy", "opencl"])
+def test_passes_over_a_picture_hold_both_kernels(executor_named, kit, name) -> None:
+    """Between a path kernel and a picture that stay on the device: the bits of `run` on the same images."""
+    executor, window = executor_named(name), dataset.Window(4, "zero")
+    model = Model(kit.network([96, 8, 3], (3.0, 3.0)), ("color", "normal"), window, dataset.Normalization())
+    with Pipeline(executor, canonical("minicubes"), model, (6, 11)) as pipeline:
+        factored_kernel = compile_program(lower(model), name, rank=3)
+        with executor.passes(pipeline.encode, factored_kernel, (6, 11)) as passes:
+            passes.trace(pipeline.path, pipeline.part(1, 2, 0))
+            passes.encode(2)
+            passes.denoise()
+            picture = passes.read(PICTURE)
+            images = {feature: passes.read(feature) for feature in model.features}
+    assert np.ptp(picture) > 0
+    assert (picture == executor.run(factored_kernel, images)).all()
 
 
 FAULTS = {

@@ -78,6 +78,26 @@ def test_the_cut_is_bounded_at_its_worst_window() -> None:
     assert layer - alone <= (1 + 1e-5) * moved
 
 
+def test_rounding_is_that_of_both_passes() -> None:
+    """The first pass's error goes through |V|, and the second one's sums of 4 x 11 + 1 terms add their own.
+
+    The range is that of the sums with the weights V H, some of whose rows are larger than those of W.
+    """
+    cut = factor.factor(program(), 11)
+    box, vertical = bounds.window_box(cut.horizontal.gather), np.abs(cut.factors.vertical).reshape(10, -1)
+    h = bounds.enclose(cut.horizontal, {"window": box}, CONTRACT)[-1]
+    layer = factor.over_images(cut, CONTRACT, of_cut=False)[cut.layer]
+    passed_on, own = (np.tile(part, SIZE) @ vertical.T for part in (h.error, h.largest))
+    assert (layer.error >= passed_on + bounds.gamma(45) * own).all()
+    node = cut.whole.nodes[cut.layer]
+    reach = 2.0 * np.abs(factor.product(cut).parameters[str(node["weight"])]).sum(axis=1)
+    assert (reach > 2.0 * np.abs(cut.whole.parameters[str(node["weight"])]).sum(axis=1)).any()
+    bias = cut.whole.parameters[str(node["bias"])].astype(np.float64)
+    # float64 adds 48 numbers up in another order.
+    assert (layer.high >= (bias + reach) - 48 * 2.0**-52 * reach).all()
+    assert (layer.low <= (bias - reach) + 48 * 2.0**-52 * reach).all()
+
+
 def test_a_bound_of_fewer_ranks_is_larger() -> None:
     """At full rank what is left of the cut is the rounding of the factors."""
     errors = []

@@ -6,9 +6,10 @@ A name of a canonical scene, or a file that ends in .json, is a scene; anything 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -81,24 +82,14 @@ def compile_model(
     folder, name = output or Path(target.value), EXECUTOR_OF[target]
     kernel: Files
     if is_scene(model):
-        if schedule is not None:
-            rule = f"{model} is a scene, whose kernels have one schedule"
-            raise InputError("--schedule", schedule, rule, "leave it out, or name a model")
+        _only_for("a model", {"--schedule": schedule}, f"{model} is a scene, whose kernels have one schedule")
         check_folder(folder, name, of_scene=True)
         scene = load_scene(model, time, parameters or [])
         kernel = _compiled_scene(scene, name, profile, max_depth, sampler, lanes)
     else:
-        given = {
-            "--time": time,
-            "--set": parameters,
-            "--max-depth": max_depth,
-            "--sampler": sampler and sampler.value,
-            "--lanes": lanes,
-        }
-        for option, value in given.items():
-            if value is not None:
-                rule = f"{model} is no scene: neither a canonical one nor a .json file"
-                raise InputError(option, value, rule, "leave it out, or name a scene")
+        of_scenes = {"--time": time, "--set": parameters, "--max-depth": max_depth, "--lanes": lanes}
+        of_scenes["--sampler"] = sampler and sampler.value
+        _only_for("a scene", of_scenes, f"{model} is no scene: neither a canonical one nor a .json file")
         _check_name(model)
         check_folder(folder, name)
         kernel = compile_program(lower(load_model(Path(model))), name, profile, schedule or PLAIN)
@@ -106,6 +97,13 @@ def compile_model(
         say(str(path))
     if reason := kernel.manifest.get("schedule", {}).get("reason"):
         say(f"schedule plain, not {schedule}: {reason}")
+
+
+def _only_for(what: str, given: Mapping[str, Any], rule: str) -> None:
+    """Refuse options that are given though what is compiled is something else."""
+    for option, value in given.items():
+        if value is not None:
+            raise InputError(option, value, rule, f"leave it out, or name {what}")
 
 
 def is_scene(name: str) -> bool:

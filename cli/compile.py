@@ -87,8 +87,8 @@ def compile_model(
         scene = load_scene(model, time, parameters or [])
         kernel = _compiled_scene(scene, name, profile, max_depth, sampler, lanes)
     else:
-        of_scenes = {"--time": time, "--set": parameters, "--max-depth": max_depth, "--lanes": lanes}
-        of_scenes["--sampler"] = sampler and sampler.value
+        of_scenes: dict[str, object] = {"--time": time, "--set": parameters, "--lanes": lanes}
+        of_scenes |= {"--max-depth": max_depth, "--sampler": sampler and sampler.value}
         _only_for("a scene", of_scenes, f"{model} is no scene: neither a canonical one nor a .json file")
         _check_name(model)
         check_folder(folder, name)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -517,7 +516,7 @@ def test_refusals(opencl: Any, executor_named: Any, monkeypatch: Any) -> None:
     with pytest.raises(InputError, match="changed parts of the recipe is batch"):
         train_on(opencl, replace(SMALL, batch=5), PAIRS, state=train.train(SMALL, PAIRS, until=1))
     with monkeypatch.context() as patch:
-        patch.setattr(opencl, "_device", SimpleNamespace(type=4))  # a GPU
+        patch.setattr(opencl, "trains", False)  # as on a GPU
         with pytest.raises(
             InputError, match=r"device that trains is .*: the step is scheduled for processors"
         ):

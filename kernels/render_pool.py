@@ -75,7 +75,9 @@ def render_parallel(
             worker.terminate()
         raise
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+        # Wait: the workers are idle or ended. The pool's own thread, were it left to close its pipes while
+        # this process exits, would meet the interpreter that wants to write into them.
+        pool.shutdown(wait=True, cancel_futures=True)
 
 
 @contextmanager

@@ -69,6 +69,23 @@ MANIFEST_NAME = "manifest.json"
 """File of the manifest."""
 
 
+class OneSource:
+    """What artifacts of one file besides the manifest have in common."""
+
+    source: str
+    source_name: str
+    manifest: Mapping[str, Any]
+
+    @property
+    def digest(self) -> str:
+        """Return the hash that names this artifact: of its source."""
+        return str(self.manifest["digest"])
+
+    def contents(self) -> Mapping[str, bytes]:
+        """Return the files besides the manifest, by name."""
+        return {self.source_name: self.source.encode()}
+
+
 class Files(Protocol):
     """An artifact of any kind: a manifest, and files beside it."""
 

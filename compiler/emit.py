@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from ..refimpl.errors import CompileError
 from .dialect import Dialect
 from .ir import Gather, Node, Program, users
+from .lines import Lines
 from .ops import LOOPS, OPS
 from .weights import layout, tables
 
@@ -155,7 +156,7 @@ def _plus(*terms: str | int) -> str:
 
 
 @dataclass
-class Body:
+class Body(Lines):
     """The statements of one kernel; other schedules override how values are kept and affine maps computed."""
 
     program: Program
@@ -341,10 +342,6 @@ class Body:
         """Return the type of a value's numbers."""
         return self.dialect.types[self.program.nodes[index].type.dtype]
 
-    def _comment(self, text: str) -> None:
-        self.lines.append("")
-        self._line(f"/* {text} */")
-
     def _nest(self, loops: Sequence[str], body: Sequence[str]) -> None:
         """Write loops around a body whose lines carry their own further indentation."""
         for loop in loops:
@@ -353,14 +350,3 @@ class Body:
             self._line(line)
         for _ in loops:
             self._close()
-
-    def _open(self, text: str) -> None:
-        self._line(text)
-        self.depth += 1
-
-    def _close(self) -> None:
-        self.depth -= 1
-        self._line("}")
-
-    def _line(self, text: str) -> None:
-        self.lines.append("    " * self.depth + text)

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from ..refimpl.errors import CompileError
 from .ir import Node, Program, Type, attributes
+from .lines import Lines
 from .loops import Loop, loops
 from .lower_scene import LAYERS, PATH, SURFACE, PathPrograms, Values, kinds, names
 from .path_dialect import PathDialect
@@ -90,7 +91,7 @@ def renamed_tables(programs: PathPrograms) -> Mapping[tuple[str, str], str]:
 
 
 @dataclass
-class _Kernel:
+class _Kernel(Lines):
     """The text of one kernel as it is written."""
 
     programs: PathPrograms
@@ -335,16 +336,3 @@ class _Kernel:
             elif value != name:
                 after.append(f"{name} = {value};")
         return before + after
-
-    # ---- lines -------------------------------------------------------------------------------------------
-
-    def _open(self, text: str) -> None:
-        self._line(text)
-        self.depth += 1
-
-    def _close(self) -> None:
-        self.depth -= 1
-        self._line("}")
-
-    def _line(self, text: str) -> None:
-        self.lines.append("    " * self.depth + text)

@@ -20,7 +20,9 @@ from dataclasses import dataclass, field
 
 from ..refimpl.errors import CompileError
 from .dialect import Dialect
+from .emit import schedule
 from .ir import Node, Program, users
+from .lines import Lines
 from .ops import OPS
 from .step import SQUARES, TARGET, TRANSPOSED, WINDOW, Step, Sum
 from .step_layout import LANES, Slot, slots, transposed_slots, vectors_for
@@ -51,7 +53,7 @@ class WindowForm:
 
 
 @dataclass
-class _Step:
+class _Step(Lines):
     """The text of the first kernel as it is written."""
 
     step: Step
@@ -64,7 +66,7 @@ class _Step:
         self.program = self.step.program
         self.places, self.transposed = slots(self.step), transposed_slots(self.step)
         self.readers = users(self.program)
-        self.groups = schedule(self.program)
+        self.groups = groups_of(self.program)
         self.group_of = {index: number for number, group in enumerate(self.groups) for index in group}
         ends = dict(self.program.outputs)
         self.summed = {ends[name] for known in self.step.sums for name in (known.left, known.right) if name}
@@ -270,40 +272,14 @@ class _Step:
             self._line((f"{zeros}0.0f; " if zeros else "") + f"{place} = {name};")
         self._close()
 
-    # ---- lines -------------------------------------------------------------------------------------------
 
-    def _comment(self, text: str) -> None:
-        self.lines.append("")
-        self._line(f"/* {text} */")
-
-    def _open(self, text: str) -> None:
-        self._line(text)
-        self.depth += 1
-
-    def _close(self, count: int = 1) -> None:
-        for _ in range(count):
-            self.depth -= 1
-            self._line("}")
-
-    def _line(self, text: str) -> None:
-        self.lines.append("    " * self.depth + text)
-
-
-def schedule(program: Program) -> list[tuple[int, ...]]:
-    """Return groups of node indices in order: neighbouring elementwise nodes of one shape, or one node."""
-    groups: list[list[int]] = []
+def groups_of(program: Program) -> list[tuple[int, ...]]:
+    """Return the groups of emit.py: schedule, or refuse what has no loop here: only vectors do."""
     for index, node in enumerate(program.nodes):
-        if node.op in ("constant", "parameter"):
-            continue
-        if node.op not in ("input", "affine") and not (OPS[node.op].elementwise and node.type.shape):
+        held = OPS[node.op].elementwise and node.type.shape
+        if not held and node.op not in ("constant", "parameter", "input", "affine"):
             raise CompileError(f"%{index} {node.op} : {node.type} has no schedule in a training kernel")
-        last = program.nodes[groups[-1][-1]] if groups else node
-        together = groups and all(OPS[n.op].elementwise for n in (node, last))
-        if together and node.type.shape == last.type.shape:
-            groups[-1].append(index)
-        else:
-            groups.append([index])
-    return [tuple(group) for group in groups]
+    return schedule(program)
 
 
 STEP_BEGIN = """\

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..refimpl.dataset import FEATURES, Normalization
 from ..refimpl.errors import CompileError
 from . import bounds, ir, profiles
+from .artifact import OneSource
 from .compile import sine_contract, target_named
 from .encode_dialect import ENCODE_DIALECTS, EncodeDialect
 from .ir import Image, Program
@@ -32,7 +33,7 @@ SCHEMA = "wamnet-encode-kernel-1"
 
 
 @dataclass(frozen=True)
-class EncodeArtifact:
+class EncodeArtifact(OneSource):
     """A compiled encoding; `program` is what was emitted, from `planes` of sums it makes `images`."""
 
     target: str
@@ -44,15 +45,6 @@ class EncodeArtifact:
     planes: tuple[str, ...]
     images: tuple[Image, ...]
     manifest: Mapping[str, Any]
-
-    @property
-    def digest(self) -> str:
-        """Return the hash that names this artifact: of its source."""
-        return str(self.manifest["digest"])
-
-    def contents(self) -> Mapping[str, bytes]:
-        """Return the files besides the manifest, by name."""
-        return {self.source_name: self.source.encode()}
 
 
 def compile_encode(

@@ -19,6 +19,7 @@ from typing import Any
 
 from ..refimpl.errors import CompileError
 from . import emit_path, ir, opencl_path, profiles
+from .artifact import OneSource
 from .compile import asdict_finite, sine_contract, target_named
 from .glsl_path import GLSLPath
 from .lower_scene import MOST_UNROLLED, PASSES, PathPrograms
@@ -41,7 +42,7 @@ SUMS = (
 
 
 @dataclass(frozen=True)
-class PathArtifact:
+class PathArtifact(OneSource):
     """A compiled path kernel; `programs` are what was emitted, `planes` what it adds up, in order."""
 
     target: str
@@ -53,15 +54,6 @@ class PathArtifact:
     programs: PathPrograms
     planes: tuple[str, ...]
     manifest: Mapping[str, Any]
-
-    @property
-    def digest(self) -> str:
-        """Return the hash that names this artifact: of its source."""
-        return str(self.manifest["digest"])
-
-    def contents(self) -> Mapping[str, bytes]:
-        """Return the files besides the manifest, by name."""
-        return {self.source_name: self.source.encode()}
 
 
 def _no_dialect(lanes: int) -> None:

@@ -147,7 +147,7 @@ def test_what_single_scattering_loses():
     all_of_them = {(a, c): albedo(a, c) for a in (0.1, 0.4, 0.7, 1.0) for c in (1.0, 0.7, 0.4, 0.1)}
     assert min(all_of_them, key=all_of_them.__getitem__) == (1.0, 1.0)
     assert max(all_of_them.values()) <= 1.0
-    assert all_of_them[0.1, 1.0] == pytest.approx(0.988, abs=1e-3)
+    assert round(all_of_them[0.1, 1.0], 2) == 0.99  # as CDR-5 says
 
 
 def test_ball_in_a_white_sky():

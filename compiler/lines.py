@@ -1,4 +1,4 @@
-"""Lines of a kernel's source as they are written: indentation and braces, as all C-like languages have them."""
+"""Lines of a kernel's source as they are written: indentation and braces, as in all C-like languages."""
 
 from __future__ import annotations
 

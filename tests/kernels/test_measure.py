@@ -1,0 +1,29 @@
+"""Times taken in turns: the order of the runs, what is measured, and what a way measures itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from wamnet.kernels.measure import Times, in_turns
+
+
+def test_ways_take_turns_after_warm_runs() -> None:
+    """One unmeasured run each, then round by round; a clock that counts its readings gives 1 a run."""
+    order: list[str] = []
+    readings = iter(range(100))
+
+    def way(name: str) -> Callable[[], None]:
+        return lambda: order.append(name)
+
+    found = in_turns({"a": way("a"), "b": way("b")}, 2, pause_s=0.0, clock=lambda: float(next(readings)))
+    assert order == ["a", "b"] * 3
+    assert found == {"a": Times((1.0, 1.0)), "b": Times((1.0, 1.0))}
+
+
+def test_a_way_may_measure_itself() -> None:
+    """What it returns stands in place of the clock's difference."""
+    own = iter([9.0, 3.0, 1.0, 2.0])
+    times = in_turns({"device": lambda: next(own)}, 3, pause_s=0.0)["device"]
+    assert times.seconds == (3.0, 1.0, 2.0)
+    assert times.median == 2.0
+    assert times.spread == (3.0 - 1.0) / 2.0

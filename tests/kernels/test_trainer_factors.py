@@ -138,7 +138,7 @@ def test_the_preset_s_derivatives_are_within_the_bound(opencl: Any, rank: int) -
 
 FAULTS = {
     "a work item is forgotten": ("product[n * SUMS + ", "product[SUMS + "),
-    "a column is forgotten": ("k = 0; k < RUN; ++k) {\n            slope +=", "k = 1; k < RUN; ++k) { slope +="),
+    "a column is forgotten": ("RUN; ++k) {\n            slope +=", "RUN - 1; ++k) {\n            slope +="),
     "another channel": ("theta + HORIZONTAL) + r", "theta + HORIZONTAL) + (r ^ 1)"),
     "a row is forgotten": ("dy < ROWS && r < RANK", "dy < ROWS - 1 && r < RANK"),
     "another neuron": ("vertical = theta[VERTICAL + (dy", "vertical = theta[VERTICAL - j + (dy"),

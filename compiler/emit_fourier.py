@@ -1,10 +1,10 @@
-"""The Fourier schedule: the sums over the window as products of spectra, tile by tile; then the tiled schedule.
+"""The Fourier schedule: sums over the window as products of spectra, tile by tile; then the tiled schedule.
 
 1. A work item computes `tiles` tiles side by side, each of OUT x OUT pixels, OUT = POINTS - WINDOW_SIZE + 1:
    those whose windows lie in POINTS x POINTS pixels of the images (overlap-save: what wraps around is not
    computed). Its patch is gathered row by row, under the border rule [`FourierBody._rows_forward`].
-2. Two channels are one complex number, and a vector holds such pairs of all tiles: `LANES` transforms at once,
-   none of which needs a shuffle. Rows are transformed as they come, columns when they are needed.
+2. Two channels are one complex number, and a vector holds such pairs of all tiles: `LANES` transforms at
+   once, none of which needs a shuffle. Rows are transformed as they come, columns when they are needed.
 3. A column k and its mirror image -k give both channels' spectra; each is multiplied with the spectra of the
    neurons' weights and summed over channels, with all tiles' sums in registers [`_products`].
 4. The sums of neurons j and j + LANES are one complex number again: one inverse transform of the columns, of
@@ -18,7 +18,6 @@ transformed when they are packed, in float64 [`fourier.spectrum`]. The bound is 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,7 +26,7 @@ from numpy.typing import NDArray
 from . import bounds, fourier
 from .bounds import Enclosure
 from .dialect import Dialect
-from .emit import BORDERS, emit, kernel_gather
+from .emit import BORDERS, kernel_gather
 from .emit_tiled import LARGEST_PRIVATE, Tiled, TiledBody, readers_of_window, refused_by_vectors
 from .ir import Node, Program
 from .profiles import SineContract
@@ -45,12 +44,12 @@ PRODUCTS = {
     "real": (("+", 0, "a"), ("-", 1, "b"), ("+", 2, "c"), ("-", 3, "d")),
     "imaginary": (("+", 1, "a"), ("+", 0, "b"), ("+", 3, "c"), ("+", 2, "d")),
 }
-"""What each part adds up: sign, pair of vectors of weights, and part of the spectra of a pair, a + i b and c + i d."""
+"""What each part adds up: sign, two vectors of weights, and part of a pair's spectra a + i b and c + i d."""
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Sizes of a kernel: pairs of channels, vectors of them, pairs of vectors of neurons, pixels of a tile."""
+    """Pairs of channels, vectors that hold all tiles' pairs, pairs of vectors of neurons, rows of a tile."""
 
     pairs: int
     inputs: int
@@ -165,7 +164,7 @@ class Fourier(Tiled):
         """Return the spectra of the windowed matrix, in float32, as `layout` says."""
         columns, groups, n, pairs = shape[:4]
         matrix = program.parameters[name].astype(np.float64)
-        spectra = fourier.spectrum(matrix, size, n).transpose(2, 1, 3, 0)[:columns]  # (columns, n, C, neurons)
+        spectra = fourier.spectrum(matrix, size, n).transpose(2, 1, 3, 0)[:columns]
         filled = np.zeros((columns, n, 2 * pairs, groups * 2 * self.lanes), np.complex128)
         filled[:, :, : spectra.shape[2], : spectra.shape[3]] = spectra
         # Channel j of the first half and channel j of the second are a pair.
@@ -230,10 +229,8 @@ class Named:
 def codelet(dialect: Dialect, name: str, points: int, kept: int, sign: int) -> list[str]:
     """Return the function that transforms `points` numbers and keeps the first `kept`."""
     statements = Statements(dialect)
-    inputs = [
-        tuple(statements.assign(f"from[{PARTS * k} * step{part}]") for part in ("", " + 1"))
-        for k in range(points)
-    ]
+    places = [(f"from[{PARTS * k} * step]", f"from[{PARTS * k} * step + 1]") for k in range(points)]
+    inputs = [(statements.assign(real), statements.assign(imaginary)) for real, imaginary in places]
     found = fourier.transform(inputs, sign)[:kept]
     lines = statements.needed([part.name for number in found for part in number])
     for k, number in enumerate(found):
@@ -265,7 +262,7 @@ class FourierBody(TiledBody):
             f"#define PAIRS {s.pairs} /* of channels */",
             f"#define INPUTS {s.inputs} /* vectors that hold the pairs of all tiles */",
             f"#define NEURONS {s.neurons} /* pairs of vectors of neurons */",
-            "#define STRIDE (2 * (POINTS + 1)) /* vectors from row to row, an odd number of cache lines apart */",
+            "#define STRIDE (2 * (POINTS + 1)) /* vectors from row to row: not a multiple of 4096 bytes */",
             *codelet(tile.dialect, "forward", tile.points, tile.points, -1),
             *codelet(tile.dialect, "backward", tile.points, s.out, 1),
         ]
@@ -290,7 +287,7 @@ class FourierBody(TiledBody):
     def _rows_forward(self) -> None:
         """Write the gathering and transformation of rows."""
         self._comment("rows of the images around the tiles, transformed")
-        self._line("union { vector all[INPUTS * POINTS * 2]; float number[INPUTS * POINTS * 2 * LANES]; } row;")
+        self._union("row", "INPUTS * POINTS * 2")
         self._line("vector rows[INPUTS * POINTS * STRIDE];")
         self._nest(["for (int i = 0; i < INPUTS * POINTS * 2; ++i) {"], ["row.all[i] = (vector)(0.0f);"])
         self._open("for (int dy = 0; dy < POINTS; ++dy) {")
@@ -321,7 +318,7 @@ class FourierBody(TiledBody):
         slot = self.slots[str(readers_of_window(self.program)[0]["weight"])]
         self._line("vector column[POINTS * 2];")
         self._line("vector mirror[POINTS * 2];")
-        self._line("union { vector all[INPUTS * POINTS * 4]; float number[INPUTS * POINTS * 4 * LANES]; } spectra;")
+        self._union("spectra", "INPUTS * POINTS * 4")
         self._line("vector product[TILES * 2][POINTS * 2];")
         self._line("vector back[TILES * NEURONS * OUT * STRIDE];")
         self._line(f"__global const vector *w = {self._vectors(slot.offset)};")
@@ -346,6 +343,10 @@ class FourierBody(TiledBody):
         self._open("if (opposite != k) {")
         self._line("backward(product[tile * 2 + 1], 1, to + 2 * opposite, POINTS + 1);")
         self._close(4)
+
+    def _union(self, name: str, vectors: str) -> None:
+        """Write the declaration of an array of vectors that can be read number by number."""
+        self._line(f"union {{ vector all[{vectors}]; float number[{vectors} * LANES]; }} {name};")
 
     def _products(self) -> None:
         """Write the products of a column of frequencies for all tiles."""

@@ -53,7 +53,7 @@ TWIDDLE = UNIT_ROUNDOFF * (1 + 2.0**-20)
 """Largest error of a twiddle factor, or relative one of a spectrum: rounded once, after float64."""
 
 COMPLEX_SUM_FLUSH = 6 * FLUSH
-"""Underflow of a complex sum: two operands and a result for each part, 3 sqrt(2) FLUSH, and their rounding."""
+"""Underflow of a complex sum: two operands and a result in each part, 3 sqrt(2) FLUSH, and their rounding."""
 
 COMPLEX_PRODUCT_FLUSH = 12 * FLUSH
 """The same of a product with a twiddle factor: four operands, two products and a sum for each part."""
@@ -101,7 +101,7 @@ def both_ways(image: Complex, sign: int) -> Complex:
     """Return the transform (N, N) of an image (N, N) along rows, then along columns."""
     real, imaginary = image
     for _ in range(2):  # along the second axis, which then becomes the first
-        columns = transform(list(zip(np.moveaxis(real, 1, 0), np.moveaxis(imaginary, 1, 0), strict=True)), sign)
+        columns = transform(list(zip(real.T, imaginary.T, strict=True)), sign)
         real, imaginary = (np.stack([number[part] for number in columns]) for part in (0, 1))
     return real, imaginary
 
@@ -136,20 +136,18 @@ def sums(tile: NDArray[Any], matrix: Array, size: int) -> NDArray[Any]:
     neurons = []
     for n in range(len(matrix)):
         real = imaginary = np.zeros((points, points), dtype)
-        for c in range(weights.shape[3]):
-            (a, b), w = channels[c], weights[n, :, :, c]
+        for channel in range(weights.shape[3]):
+            (a, b), w = channels[channel], weights[n, :, :, channel]
             g, h = w.real.astype(dtype), w.imag.astype(dtype)
             real, imaginary = real + a * g - b * h, imaginary + a * h + b * g
         neurons.append((real, imaginary))
-    out, found = points - size + 1, np.zeros((points, points, len(matrix)), dtype)
-    half = -(-len(matrix) // 2)
-    for n in range(half):
-        (a, b), (c, d) = neurons[n], neurons[(n + half) % len(matrix)]
-        real, imaginary = both_ways((a - d, b + c), 1)
-        found[..., n], found[..., (n + half) % len(matrix)] = real, imaginary
-        if len(matrix) == 1:
-            found[..., 0] = real
-    return found[:out, :out]
+    out, found = points - size + 1, np.zeros((points, points, 2 * len(matrix)), dtype)
+    gap = -(-len(matrix) // 2)
+    neurons += [(np.zeros_like(neurons[0][0]),) * 2] * gap
+    for n in range(gap):
+        (a, b), (c, d) = neurons[n], neurons[n + gap]
+        found[..., n], found[..., n + gap] = both_ways((a - d, b + c), 1)
+    return found[:out, :out, : len(matrix)]
 
 
 # ---- the bound -------------------------------------------------------------------------------------------
@@ -241,7 +239,9 @@ def deviation(of: Layer, norm: Array) -> tuple[Array, Array]:
     return of_products + back, 4 * np.maximum(n * norm, image)
 
 
-def enclose(program: Program, sine: SineContract, x: Any, norm: Array, plan: tuple[int, int]) -> list[Enclosure]:
+def enclose(
+    program: Program, sine: SineContract, x: Any, norm: Array, plan: tuple[int, int]
+) -> list[Enclosure]:
     """Return the enclosure of every node, the sums over the window being computed from spectra.
 
     `x`: the windows' box (low, high); `norm`: largest norm of the tile in which a window lies; `plan`: points

@@ -43,5 +43,5 @@ def fourier_schedule(name: str, points: int, tiles: int, lanes: int = 16, pixels
 
 
 OPENCL_FOURIER = (fourier_schedule("fft32", 32, 2),)
-"""The schedule beside the ladder. With vectors of 16, two tiles of 32 side by side are as fast as four and take
-half the memory; one takes a third more time, its weights pass by twice as often."""
+"""The schedule beside the ladder. Two tiles of 32 points side by side are as fast as four and take half the
+memory; one takes a third more time: the weights pass by twice as often."""

@@ -1,10 +1,11 @@
 """Schedules: ways to order the work of one program in a kernel, as data beside the program.
 
-A schedule never changes what is computed in exact arithmetic, only in which order and from where. Most reorder
-and fuse sums, which the bound of every profile allows (spec/profiles.md, PRO-1), so one bound holds for them; one
-that computes sums in another way states the bound of that way [`Schedule.enclosures`]. A target lists its schedules as rungs of a ladder, the plain one first [`compile.TARGETS`]; each rung
-adds one idea to the one before. A schedule that cannot hold a program says why, and the plain one takes its
-place [`pick`]: it holds every program.
+In exact arithmetic a schedule never changes what is computed, only in which order and from where. Most
+reorder and fuse sums, which the bound of every profile allows (spec/profiles.md, PRO-1), so that one bound
+holds for them; one that computes sums in another way states its own [`Schedule.enclosures`]. A target lists
+its schedules as rungs of a ladder, the plain one first [`compile.TARGETS`]; each rung adds one idea to one
+before. A schedule that cannot hold a program says why, and the one that it names instead takes its place, at
+last the plain one, which holds every program [`pick`].
 
 The layout of the weights belongs to the schedule: kernels walk through them in order.
 """
@@ -156,7 +157,7 @@ def text(picked: Mapping[str, Any]) -> str:
 
 
 def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:
-    """Return the schedule of this name, or the one in its place that can hold the program, with the reason."""
+    """Return the schedule of this name, or the one in its place that holds the program, with the reason."""
     known = {schedule.name: schedule for schedule in schedules}
     if name not in known:
         raise CompileError(f"schedule {name!r} does not exist for this target; there are: {', '.join(known)}")

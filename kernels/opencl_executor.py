@@ -40,8 +40,8 @@ TILE_LOCAL_SIZE = (1, 1)
 loop around them."""
 
 CPU_SCHEDULES = {16: "fft32", 8: "tile8"}
-"""Schedule of a denoiser by the floats in a vector register of a processor; others have registers of 4. What the
-first one refuses, `tile16` takes."""
+"""Schedule of a denoiser by the floats in a vector register of a processor; others have registers of 4. What
+the first one refuses, `tile16` takes."""
 
 STACK_BYTES = 2**20
 """Most bytes of a group's arrays on a processor: half the smallest stack that glibc gives a thread."""

@@ -1,4 +1,4 @@
-"""Tests of transforms, of sums from spectra, and of their bound: against numpy.fft, direct sums, and faults."""
+"""Transforms, sums from spectra, and their bound: against numpy.fft, direct sums, and planted faults."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.compiler import bounds, compile, emit_fourier, fourier
+from wamnet.compiler import bounds, emit_fourier, fourier, profiles
+from wamnet.compiler.compile import analysed, compile_program, round_up, sine_contract
 from wamnet.compiler.emit_tiled import LARGEST_PRIVATE
 from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.opencl_fourier import OPENCL_FOURIER, fourier_schedule
@@ -23,7 +24,7 @@ POWERS = (1, 2, 4, 8, 16, 32, 64)
 """Lengths of transforms."""
 
 (FFT32,) = OPENCL_FOURIER
-CONTRACT = compile.sine_contract("ieee", "opencl")
+CONTRACT = sine_contract("ieee", "opencl")
 
 
 def pairs_of(numbers):
@@ -104,7 +105,8 @@ def drawn(points, size, channels, neurons, seed):
     """Return a tile in float32 and a matrix of float32 numbers in float64."""
     random = np.random.default_rng(seed)
     tile = random.uniform(-2, 2, (points, points, channels)).astype(np.float32)
-    return tile, random.uniform(-1, 1, (neurons, size * size * channels)).astype(np.float32).astype(np.float64)
+    matrix = random.uniform(-1, 1, (neurons, size * size * channels)).astype(np.float32)
+    return tile, matrix.astype(np.float64)
 
 
 @given(
@@ -118,8 +120,9 @@ def test_sums_from_spectra_are_the_direct_ones(points, size, channels, neurons, 
     tile, matrix = drawn(points, size, channels, neurons, seed)
     wanted = direct(tile, matrix, size)
     # In float64: some hundreds of u of the norms.
-    norms = np.linalg.norm(tile.astype(np.float64)) * np.linalg.norm(matrix)
-    assert np.abs(fourier.sums(tile.astype(np.float64), matrix, size) - wanted).max() <= 500 * 2.0**-53 * norms
+    whole = tile.astype(np.float64)
+    norms = np.linalg.norm(whole) * np.linalg.norm(matrix)
+    assert np.abs(fourier.sums(whole, matrix, size) - wanted).max() <= 500 * 2.0**-53 * norms
     computed = fourier.sums(tile, matrix, size)
     assert computed.dtype == np.float32
     # `sums` pairs neurons at half of the layer, as many lanes do.
@@ -170,7 +173,7 @@ def program(widths=(96, 20, 3), channels=6, size=4, border="clamp"):
     network = siren.init(list(widths), 3.0, 3.0, seed=1, dtype=np.float32)
     gather = Gather(dataset.Window(size, border), (Image("a", channels, -2.0, 2.0),))
     kind = {"window": Type(shape=(gather.n_inputs,))}
-    return compile.analysed(trace(lambda window: denoise_pixel(network, window), kind, gather))
+    return analysed(trace(lambda window: denoise_pixel(network, window), kind, gather))
 
 
 def paper(channels=6, size=12, hidden=32):
@@ -178,11 +181,11 @@ def paper(channels=6, size=12, hidden=32):
 
 
 def test_the_manifest_states_the_bound_of_spectra() -> None:
-    found, tiled = (compile.compile_program(paper(), "opencl", "ieee", name) for name in ("fft32", "tile16"))
+    found, tiled = (compile_program(paper(), "opencl", "ieee", name) for name in ("fft32", "tile16"))
     assert found.manifest["schedule"]["name"] == "fft32"
     assert (found.manifest["schedule"]["pixels"], found.manifest["schedule"]["rows"]) == (42, 21)
     errors = bounds.output_errors(paper(), FFT32.enclosures(paper(), CONTRACT))["color"]
-    assert found.manifest["bound"]["output"] == [compile.round_up(error) for error in errors]
+    assert found.manifest["bound"]["output"] == [round_up(error) for error in errors]
     assert found.manifest["bound"] != tiled.manifest["bound"]
     assert f"<= {max(found.manifest['bound']['output']):g} for all images" in found.source
     assert "Global size: at least (ceil(width / 42), ceil(height / 21))" in found.source
@@ -191,7 +194,8 @@ def test_the_manifest_states_the_bound_of_spectra() -> None:
 def test_rows_of_a_picture_have_the_bounds_of_the_picture() -> None:
     image = {"a": np.random.default_rng(1).uniform(-2, 2, (45, 4, 6)).astype(np.float32)}
     whole = FFT32.enclosures(paper(), CONTRACT, image)[-1].error
-    parts = [FFT32.enclosures(paper(), CONTRACT, image, slice(top, top + 20))[-1].error for top in (0, 20, 40)]
+    rows = [slice(top, top + 20) for top in (0, 20, 40)]
+    parts = [FFT32.enclosures(paper(), CONTRACT, image, some)[-1].error for some in rows]
     assert whole.shape == (45, 4, 3)
     assert np.array_equal(np.concatenate(parts), whole)
 
@@ -206,7 +210,9 @@ REFUSED = {
     ),
     "component": (
         lambda: trace(
-            lambda x: x[..., 0] * 2.0, {"window": Type(shape=(3,))}, Gather(dataset.Window(1), (Image("a", 3, 0.0, 1.0),))
+            lambda x: x[..., 0] * 2.0,
+            {"window": Type(shape=(3,))},
+            Gather(dataset.Window(1), (Image("a", 3, 0.0, 1.0),)),
         ),
         "plain",
         "%1 is component, which has no form on vectors",
@@ -218,7 +224,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_it_does_not_hold_is_tiled_with_the_reason(case) -> None:
     make, instead, reason = REFUSED[case]
-    found = compile.compile_program(make(), "opencl", "ieee", "fft32").manifest["schedule"]
+    found = compile_program(make(), "opencl", "ieee", "fft32").manifest["schedule"]
     assert (found["name"], found["asked"]) == (instead, "fft32")
     assert re.match(reason, found["reason"])
 
@@ -240,7 +246,7 @@ def test_two_readers_are_refused(function, reason) -> None:
 
 
 def test_windows_along_one_axis_are_refused() -> None:
-    found = compile.compile_program(paper(), "opencl", "ieee", "fft32", rank=4).manifest
+    found = compile_program(paper(), "opencl", "ieee", "fft32", rank=4).manifest
     assert found["schedule"]["reason"] == "a window of 12 x 1 pixels in a tile of 32"
     assert found["schedule"]["name"] == "tile16"
 
@@ -249,16 +255,16 @@ def test_sums_that_may_overflow_are_refused() -> None:
     network = siren.init([150, 32, 3], 3.0, 3.0, seed=1, dtype=np.float32)
     gather = Gather(dataset.Window(5), (Image("a", 6, -1e38, 1e38),))
     traced = trace(lambda x: denoise_pixel(network, x), {"window": Type(shape=(150,))}, gather)
-    found = FFT32.enclosures(compile.analysed(traced), CONTRACT)
-    index = next(i for i, node in enumerate(compile.analysed(traced).nodes) if node.op == "affine")
+    found = FFT32.enclosures(analysed(traced), CONTRACT)
+    index = next(i for i, node in enumerate(analysed(traced).nodes) if node.op == "affine")
     assert found[index].overflows
     assert np.isinf(found[index].error).all()
     with pytest.raises(CompileError, match=r"affine \(layer 0, %\d\) may hold numbers up to"):
-        compile.compile_program(traced, "opencl", "ieee", "fft32")
+        compile_program(traced, "opencl", "ieee", "fft32")
 
 
 def emitted(program):
-    return pipeline.run(program, compile.profiles.profile_named("ieee").passes)
+    return pipeline.run(program, profiles.profile_named("ieee").passes)
 
 
 def test_private_bytes_are_those_of_its_arrays() -> None:
@@ -280,9 +286,11 @@ def test_golden_spectra(golden) -> None:
     """Tiles of 4 x 4 points, vectors of 4 numbers, blocks of 2 pixels."""
     network = siren.init([12, 5, 2], 3.0, 3.0, seed=1, dtype=np.float32)
     gather = Gather(dataset.Window(2, "zero"), (Image("i0", 2, -1.0, 1.0), Image("i1", 1, -1.0, 1.0)))
-    traced = trace(lambda x: np.sin(x @ network.weights[0].T) @ network.weights[1].T, {"window": Type(shape=(12,))}, gather)
+    first, last = network.weights
+    function = lambda x: np.sin(x @ first.T) @ last.T  # noqa: E731
+    traced = trace(function, {"window": Type(shape=(12,))}, gather)
     tiny = fourier_schedule("fft4", 4, 1, lanes=4, pixels=2)
-    golden("fft4.denoise.cl", tiny.emit(compile.analysed(traced), ["a tiny kernel"], True))
+    golden("fft4.denoise.cl", tiny.emit(analysed(traced), ["a tiny kernel"], True))
 
 
 @given(channels=st.integers(1, 7), size=st.integers(1, 5), neurons=st.integers(1, 40))
@@ -301,13 +309,15 @@ def test_every_spectrum_lies_where_the_kernel_reads_it(channels, size, neurons) 
             half, pair = divmod(c, s.pairs)
             found = stored[:, q, :, pair, half, :, lane]  # column, row of frequencies, part
             assert np.array_equal(found[..., 0] + 1j * found[..., 1], spectra[n, :, :17, c].T)
-    assert np.count_nonzero(stored) == sum(np.count_nonzero(p) for p in (spectra[:, :, :17].real, spectra[:, :, :17].imag))
+    half = spectra[:, :, :17]
+    assert np.count_nonzero(stored) == np.count_nonzero(half.real) + np.count_nonzero(half.imag)
 
 
 def test_operations_are_those_of_the_text() -> None:
     """The count by which a schedule is chosen: 456 sums and products of a transform of 32 numbers."""
     lines = emit_fourier.codelet(FFT32.dialect, "f", 32, 32, 1)
-    assert sum(line.count(f" {sign} ") for line in lines if "vector t" in line and "from[" not in line for sign in "+-*") == 456
+    computed = [line for line in lines if "vector t" in line and "from[" not in line]
+    assert sum(line.count(f" {sign} ") for line in computed for sign in "+-*") == 456
     one, spectra = FFT32.operations(emitted(paper()))
     assert one == 864 * 2
     assert spectra == (17 * 32 * 3 * 16 * 2 + 456 * (66 + 2 * (32 + 21))) / (2 * 21**2)

@@ -22,7 +22,7 @@ typedef float4 vector;
 #define PAIRS 2 /* of channels */
 #define INPUTS 1 /* vectors that hold the pairs of all tiles */
 #define NEURONS 1 /* pairs of vectors of neurons */
-#define STRIDE (2 * (POINTS + 1)) /* vectors from row to row, an odd number of cache lines apart */
+#define STRIDE (2 * (POINTS + 1)) /* vectors from row to row: not a multiple of 4096 bytes */
 void forward(const vector *from, int step, vector *to, int leap)
 {
     vector t0 = from[0 * step];

@@ -26,11 +26,7 @@ EXAMPLES = max(settings.default.max_examples // 10, 1)
 """Each example compiles two kernels, up to a second: a tenth of what other tests draw."""
 
 WAYS = [
-    (t.name, s.name)
-    for t in TARGETS.values()
-    if t.chains
-    for s in t.schedules
-    if not isinstance(s, Fourier)
+    (t.name, s.name) for t in TARGETS.values() if t.chains for s in t.schedules if not isinstance(s, Fourier)
 ]
 """All targets and schedules that hold a first layer in two passes: spectra are of windows along both axes."""
 

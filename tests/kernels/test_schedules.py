@@ -21,8 +21,8 @@ LADDER = [(t.name, s.name) for t in TARGETS.values() for s in t.schedules[1:]]
 
 
 LARGEST = {"inlined": (3, 10), "fft32": (20, 32)}
-"""Largest window and layer by schedule: Mesa compiles two thousand weights a second; a tile's sums must fit the
-stack. The other schedules' layers may have more neurons than a block."""
+"""Largest window and layer by schedule: Mesa compiles two thousand weights a second; a tile's sums must fit
+the stack. The other schedules' layers may have more neurons than a block."""
 
 
 @st.composite
@@ -140,7 +140,7 @@ FOURIER_FAULTS = {
     "border": ("clamp(top, 0, height - 1)", "clamp(top, 1, height - 1)"),
     "lane": ("PLACE(tile * PAIRS + 1", "PLACE(tile * PAIRS + 0"),
     "conjugate": ("b - d;", "b + d;"),
-    "opposite": ("int g = (POINTS - f) % POINTS;\n                #pragma", "int g = f;\n                #pragma"),
+    "opposite": ("product[t * 2 + 1][2 * g] =", "product[t * 2 + 1][2 * f] ="),
     "product": ("imaginary[t][1] += w1 * b;", "imaginary[t][1] -= w1 * b;"),
     "middle": ("if (opposite != k)", "if (opposite > k + 2)"),
     "rows": ("(tile * OUT + line) * STRIDE", "(tile * OUT + (line ^ 1)) * STRIDE"),

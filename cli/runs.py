@@ -85,9 +85,7 @@ def run_one(name: str, kernel: Artifact, model: Model, frame: Frame, truth: Any)
     return second.image, run
 
 
-def frame_bound(
-    model: Model, frame: Frame, target: str, profile: str, schedule: str = PLAIN
-) -> float | None:
+def frame_bound(model: Model, frame: Frame, target: str, profile: str, schedule: str = PLAIN) -> float | None:
     """Return the compiler's bound on a kernel's largest error in this frame, or None where it has none."""
     import numpy as np
 

@@ -144,7 +144,7 @@ FOURIER_FAULTS = {
     "product": ("imaginary[t][1] += w1 * b;", "imaginary[t][1] -= w1 * b;"),
     "middle": ("if (opposite != k)", "if (opposite > k + 2)"),
     "rows": ("(tile * OUT + line) * STRIDE", "(tile * OUT + (line ^ 1)) * STRIDE"),
-    "last": ("x + p < last", "x + p < last - 1"),
+    "block": ("int x = tile_x + block * PIXELS;", "int x = tile_x + (block ^ 1) * PIXELS;"),
 }
 """Pieces of a kernel of spectra, and what makes it wrong; none leaves an array."""
 

@@ -58,7 +58,8 @@ class Crop:
     def interpreted(self, program: Program) -> Array:
         """Return the output (rows, columns, 3) of a program of one window, in float64."""
         (found,) = interpret(program, {"window": self.windows}, np.float64).values()
-        return self.cut(found)
+        crop: Array = self.cut(found)
+        return crop
 
     def cut(self, picture: NDArray[Any]) -> Any:
         """Return the crop of a picture (H, W, C)."""

@@ -27,6 +27,9 @@ from .workload import Given
 
 Array = NDArray[Any]
 
+NO_CACHE = "nothing is kept"
+"""What stays on disk of code that a contender compiles, if it compiles any."""
+
 MACHINE = "machine"
 """Name of the rates of contenders that have none of their own: those of the machine."""
 
@@ -83,7 +86,7 @@ class Contender:
     schedule: str = ""
     packages: tuple[str, ...] = ()
     extra: str = "peers"
-    caches: str = "nothing"
+    caches: str = NO_CACHE
 
     def missing(self) -> str:
         """Return what is missing for it and how to get it, or nothing."""

@@ -15,7 +15,7 @@ from ...compiler.compile import TARGETS, analysed, compile_program
 from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from . import peer_oidn, peer_onnxruntime, peer_tinygrad, peer_torch
-from .contender import FULL, Contender, Opened, Tools, Variant
+from .contender import FULL, NO_CACHE, Contender, Opened, Tools, Variant
 from .cost import fused, sines_of
 
 VARIANTS: tuple[Variant, ...] = (
@@ -26,7 +26,7 @@ VARIANTS: tuple[Variant, ...] = (
 """Forms of the network besides the whole one."""
 
 CACHES = {
-    "numpy": "nothing is compiled",
+    "numpy": NO_CACHE,
     "opencl": "PoCL keeps kernels on disk, ~/.cache/pocl",
     "opengl": "Mesa keeps shaders on disk, ~/.cache/mesa_shader_cache",
 }
@@ -50,7 +50,7 @@ def kernel(executor: str, schedule: str, variant: Variant = FULL) -> Contender:
     ideas = {each.name: each.idea for each in TARGETS[executor].schedules}
     text = ideas[schedule] if variant is FULL else variant.text
     open_it = partial(_open_kernel, executor, schedule, variant)
-    return Contender(name, text, open_it, variant, executor, schedule, caches=CACHES.get(executor, "unknown"))
+    return Contender(name, text, open_it, variant, executor, schedule, caches=CACHES.get(executor, NO_CACHE))
 
 
 def _open_kernel(

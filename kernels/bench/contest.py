@@ -57,6 +57,9 @@ Told = Callable[[str, float], None]
 PROBE_PAUSE_S = 0.05
 """Seconds before a run of a small program: one library alone runs, whose threads wait for it."""
 
+MOST_TOLD = 200
+"""Characters of a peer's error that are repeated."""
+
 GROWTH_ROUNDS = 3
 """Most frames of each contender at another size: what grows is seen from few."""
 
@@ -92,7 +95,7 @@ class Contest:
     rows: dict[str, Row] = field(default_factory=dict)
     opened: dict[str, Opened] = field(default_factory=dict)
     machine: dict[str, list[float]] = field(default_factory=dict)
-    rates: dict[str, Rates] = field(default_factory=dict)
+    found_rates: dict[str, Rates] = field(default_factory=dict)
     sizes: dict[int, dict[str, Row]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -145,14 +148,22 @@ class Contest:
 
     @contextmanager
     def _failing(self, row: Row) -> Iterator[None]:
-        """Write an error into a row, and go on."""
+        """Write an error into a row, and go on; a peer may raise what it likes, others only our errors."""
         try:
             yield
+            return
         except ExecutorUnavailable as error:
             row.state, row.reason = MISSING, str(error)
         except (WamnetError, MemoryError) as error:
             row.state, row.reason = FAILED, str(error) or type(error).__name__
-            self.opened.pop(row.name, None)
+        except Exception as error:
+            if row.kind != PEER:
+                raise
+            row.state, row.reason = (
+                FAILED,
+                f"{type(error).__name__}: {' '.join(str(error).split())[:MOST_TOLD]}",
+            )
+        self.opened.pop(row.name, None)
 
     # ---- opening ------------------------------------------------------------------------------------------
 
@@ -203,12 +214,12 @@ class Contest:
         assert limits is not None, "the machine is measured first"
         if name == MACHINE:
             return limits.rates
-        if name not in self.rates:
+        if name not in self.found_rates:
             executor, _, schedule = name.partition(":")
             pause_s = min(PROBE_PAUSE_S, self.request.pause_s)
             times, side = rates.probed(self.tools.executor(executor), schedule, pause_s)
-            self.rates[name] = rates.rates_of(times, side * side, limits.bytes_per_s)
-        return self.rates[name]
+            self.found_rates[name] = rates.rates_of(times, side * side, limits.bytes_per_s)
+        return self.found_rates[name]
 
     def _too_long(self, seconds: float, by: str) -> str:
         """Return the reason for which something is left out."""
@@ -271,7 +282,7 @@ class Contest:
             if hoped is None:
                 continue
             self.told(f"{name} at {size}x{size}", 0.02)
-            row = rows[name] = Row(name, contender.text, self.rows[name].kind, MEASURED)
+            row = rows[name] = self._row_of(name, size)
             if hoped > self.request.budget_s:
                 row.state, row.reason = SKIPPED, self._too_long(hoped, "its time at another size")
                 continue
@@ -279,6 +290,14 @@ class Contest:
                 self.opened[name].run(shown)
                 ways[name] = partial(self._turn_of, row, shown)
         in_turns(ways, min(GROWTH_ROUNDS, self.request.repeats), 0, self.request.pause_s)
+
+    def _row_of(self, name: str, size: int) -> Row:
+        """Return the row of a contender at another size: what it does for a pixel stays."""
+        main = self.rows[name]
+        facts = {key: main.facts[key] for key in ("products", "sines", "bytes")}
+        predicted = main.facts["predicted_ms"]
+        facts["predicted_ms"] = predicted and predicted * (size / self.request.size) ** 2
+        return Row(name, main.text, main.kind, MEASURED, facts=facts)
 
     def _turn_of(self, row: Row, shown: Given) -> float:
         """Make a frame of another size and note its time."""
@@ -340,7 +359,7 @@ class Contest:
             for part, key in (("error", "max"), ("quality", "psnr_loss_db"))
         }
         limits = self.limits
-        return clean(
+        found: dict[str, Any] = clean(
             {
                 "schema": SCHEMA,
                 "size_px": request.size,
@@ -356,7 +375,7 @@ class Contest:
                 "unseen_frames": len(request.pairs),
                 "limits": limits and asdict(limits),
                 "limits_rounds_s": self.machine,
-                "rates": {name: asdict(found) for name, found in self.rates.items()},
+                "rates": {name: asdict(found) for name, found in self.found_rates.items()},
                 "contenders": rows,
                 "front": fronts,
                 "sizes": [
@@ -368,6 +387,7 @@ class Contest:
                 ],
             }
         )
+        return found
 
     def _with_rates(self, row: dict[str, Any], size: int) -> dict[str, Any]:
         """Return a row with what follows from its times at a size."""

@@ -49,9 +49,9 @@ class Rates:
 
 
 def predicted_seconds(stages: Sequence[Stage], rates: Rates, pixels: int) -> float | None:
-    """Return the time of a picture; None without stages, or where a rate is no positive number."""
+    """Return the time of a picture; None without stages, or where a rate is not positive."""
     known = (rates.products_per_s, rates.sines_per_s, rates.bytes_per_s)
-    if not stages or not all(0.0 < rate < math.inf for rate in known):
+    if not stages or not all(rate > 0.0 for rate in known):
         return None
     return pixels * sum(
         max(

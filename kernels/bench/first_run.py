@@ -42,7 +42,7 @@ SECONDS_AT_MOST = 180
 
 
 def first_runs(name: str, model: Model) -> tuple[float | None, float | None]:
-    """Return the seconds to the first frame with empty caches, and in a later process with the same caches."""
+    """Return the seconds to a first frame with empty caches, and in a later process with the same ones."""
     with tempfile.TemporaryDirectory() as folder:
         places = {variable: str(Path(folder, variable.lower())) for variable in CACHES}
         for place in places.values():

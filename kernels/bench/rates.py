@@ -164,11 +164,13 @@ def probed(executor: Executor, schedule: str, pause_s: float) -> tuple[dict[str,
 
 
 def rates_of(times: Mapping[str, Times], pixels: int, bytes_per_s: float) -> Rates:
-    """Return the rates behind the times of [`probes`]; differences that are noise give NaN or infinity."""
+    """Return the rates behind the times of [`probes`]; products whose time drowns in noise have rate NaN."""
     programs, per_pixel = probes(), {name: found.median / pixels for name, found in times.items()}
     more = products_of(programs["window"]) - products_of(programs["small"])
     products = _rate(more, per_pixel["window"] - per_pixel["small"])
-    sines = _rate(sines_of(programs["sines"]), per_pixel["sines"] - per_pixel["small"])
+    # Sines whose time drowns in noise cost nothing that could be seen.
+    waited = max(0.0, per_pixel["sines"] - per_pixel["small"])
+    sines = sines_of(programs["sines"]) / waited if waited > 0.0 else math.inf
     rest = per_pixel["small"] - products_of(programs["small"]) / products
     return Rates(products, sines, bytes_per_s, max(0.0, rest))
 

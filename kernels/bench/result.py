@@ -40,7 +40,8 @@ class Row:
         """Return the row as JSON's types."""
         head = {"name": self.name, "text": self.text, "kind": self.kind, "state": self.state}
         times = {"ms": milliseconds(self.seconds), "kernel_ms": milliseconds(self.kernel_seconds)}
-        return clean({**head, "reason": self.reason, **times, **self.facts})
+        found: dict[str, Any] = clean({**head, "reason": self.reason, **times, **self.facts})
+        return found
 
 
 def milliseconds(seconds: Sequence[float]) -> dict[str, Any] | None:

@@ -64,6 +64,7 @@ def given(model: Model, frame: Frame) -> Given:
 
 def noise(size: int) -> Frame:
     """Return all layers (size, size, C) of numbers in [0, 1), or in [-1, 1) for directions."""
+    check_size(size)
     layers = {}
     for number, layer in enumerate(LAYERS.values()):
         side = min(size, NOISE_PX)

@@ -15,7 +15,7 @@ from ..refimpl.errors import InputError
 from . import bench_report, machine, packages
 from .inputs import load_model, need_layers
 from .options import ExecutorName, parse_names
-from .outputs import check_output, replacing, write_text
+from .outputs import check_output, replacing, unwritable, write_text
 from .terminal import hint_on_interrupt, progress, say, table
 
 if TYPE_CHECKING:
@@ -164,6 +164,8 @@ def measure(
     with Tools() as tools, progress("measuring", 1.0) as advance:
         everybody = contenders.of_machine(tools, request.size, request.quick and not only)
         taking_part = contenders.chosen(everybody, only, executors)
+        if output:
+            make_folder(output)
         contest = Contest(request, taking_part, tools, told=lambda what, share: advance(share))
         hint = f"what was measured until then is in {output}" if output else "nothing is kept"
         with hint_on_interrupt(lambda: hint):
@@ -244,17 +246,20 @@ def _sizes(text: str) -> tuple[int, ...]:
 
 
 def check_folder(output: Path) -> None:
-    """Refuse an output folder in which the results cannot be written, and make it."""
+    """Refuse an output folder in which the results cannot be written."""
     if output.exists() and not output.is_dir():
         raise InputError("output folder", str(output), "it is a file", "choose another with -o")
+    if output.is_dir():
+        for name in (JSON_NAME, TEXT_NAME):
+            check_output(output / name)
+
+
+def make_folder(output: Path) -> None:
+    """Make the output folder, before anything is measured."""
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(
-            "output folder", str(output), f"{error.strerror}", "choose another with -o"
-        ) from None
-    for name in (JSON_NAME, TEXT_NAME):
-        check_output(output / name)
+        raise unwritable(output, error, "output folder") from None
 
 
 def write(data: dict[str, Any], output: Path) -> None:

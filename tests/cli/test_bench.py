@@ -32,7 +32,7 @@ def here(samples, tmp_path, monkeypatch):
 
 @pytest.fixture
 def found(wamnet, here):
-    """Run the benchmark on two kernels of the interpreter at two sizes, and return its data and what it said."""
+    """Run the benchmark on the interpreter at two sizes, and return its data and what it said."""
     outcome = wamnet(
         *("bench", "model.safetensors", "--only", "numpy:*", "--repeats", 2),
         *("--size", 16, "--sizes", "8,16", "-o", "made/speed"),
@@ -260,7 +260,6 @@ def page(**facts) -> str:
         "versions": {},
         **facts,
     }
-    data["training"]["recipe"] = dict.fromkeys(("steps", "batch", "batch_size", "rate", "learning_rate"), 1)
     maps = {name: {"light": "data:,", "dark": "data:,"} for name in ("input", "denoised")}
     drawn = {"errors": [maps], "training": {"light": "data:,", "dark": "data:,"}}
     return report.page(data, [picture], drawn)

@@ -19,6 +19,9 @@ PRINTED = plots.PAPER
 WIDE = ("range", "frames/s", "compile, s")
 """Columns that a terminal has no room for."""
 
+NO_CACHE = "nothing is kept"
+"""What a contender's `caches` says that leaves no compiled code on disk; equal to that of kernels."""
+
 NONE = "–"
 """What stands where there is no number."""
 
@@ -217,8 +220,8 @@ def _lines(data: Data, pictures: Sequence[str]) -> Iterator[str]:
         yield from _table(*growth_table(data))
     if lines := notes(data):
         yield from ("## Left out, and why", "", *(f"* {line}" for line in lines), "")
-    caches = [(row["name"], row["caches"]) for row in measured(data)]
-    yield from ("## Caches of compiled code", "", *(f"* {name}: {text}" for name, text in caches), "")
+    if caches := sorted({row["caches"] for row in measured(data) if row["caches"] != NO_CACHE}):
+        yield from ("## Code that stays compiled", "", *(f"* {text}" for text in caches), "")
     yield from (f"![{name}]({name})" for name in pictures)
 
 

@@ -2,7 +2,7 @@
 
 1. The reference is computed on a crop at the picture's first corner, whose pixels see the border [`Crop`].
    It is the full network's, whatever a variant leaves out [`Crop.full`]; beside it stands the function that a
-   variant computes, whose distance is rounding alone, with a bound [`rounding_of`].
+   variant computes, whose distance is rounding alone, with a bound [`Crop.rounding`].
 2. The error is a difference of colours in [0, 1]: the largest, the mean, and the largest in units in the last
    place of the reference [`errors`].
 3. Quality is PSNR and SSIM against a reference frame, and what is lost of the full network's [`quality`].
@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler import bounds
-from ...compiler.compile import analysed, sine_contract
+from ...compiler.compile import analysed
 from ...compiler.factor import at_images, factor, product
 from ...compiler.interpret import interpret
 from ...compiler.ir import Program
 from ...compiler.lower import lower
+from ...compiler.profiles import EMITTED_SINE
 from ...refimpl import dataset, metrics
 from ...refimpl.denoise import Model, denoise
 from ...refimpl.frame import Frame
@@ -54,6 +55,7 @@ class Crop:
         joined = np.concatenate(list(self.images.values()), axis=-1)
         self.windows = dataset.all_windows(dataset.pad(joined, model.window), model.window)
         self.full = self.interpreted(lower(model))
+        self._rounding: dict[Variant, tuple[Array, float]] = {}
 
     def interpreted(self, program: Program) -> Array:
         """Return the output (rows, columns, 3) of a program of one window, in float64."""
@@ -61,22 +63,27 @@ class Crop:
         crop: Array = self.cut(found)
         return crop
 
+    def rounding(self, variant: Variant) -> tuple[Array, float]:
+        """Return what a variant computes in float64, and the largest bound of a kernel's rounding."""
+        if variant not in self._rounding:
+            self._rounding[variant] = self._rounded(variant)
+        return self._rounding[variant]
+
+    def _rounded(self, variant: Variant) -> tuple[Array, float]:
+        """Compute both: profile `ieee` has one sine for all targets."""
+        program, contract = analysed(variant.program(self.model)), EMITTED_SINE
+        if variant.rank:
+            whole = factor(program, variant.rank)
+            found = bounds.output_errors(program, at_images(whole, contract, self.images, of_cut=False))
+            program = product(whole)
+        else:
+            found = bounds.at_inputs(program, {"window": self.windows}, contract)
+        (bound,) = found.values()
+        return self.interpreted(program), float(self.cut(bound).max())
+
     def cut(self, picture: NDArray[Any]) -> Any:
         """Return the crop of a picture (H, W, C)."""
         return picture[: self.rows, : self.columns]
-
-
-def rounding_of(variant: Variant, target: str, crop: Crop) -> tuple[Array, float]:
-    """Return what a variant computes in float64 on the crop, and the largest bound of a kernel's rounding."""
-    program, contract = analysed(variant.program(crop.model)), sine_contract("ieee", target)
-    if variant.rank:
-        whole = factor(program, variant.rank)
-        found = bounds.output_errors(program, at_images(whole, contract, crop.images, of_cut=False))
-        program = product(whole)
-    else:
-        found = bounds.at_inputs(program, {"window": crop.windows}, contract)
-    (bound,) = found.values()
-    return crop.interpreted(program), float(crop.cut(bound).max())
 
 
 def errors(picture: NDArray[Any], reference: Array) -> dict[str, float]:

@@ -4,7 +4,7 @@
    that no cache holds, counted as three passes as in J. McCalpin's STREAM ("Memory Bandwidth and Machine
    Balance in Current High Performance Computers", IEEE TCCA Newsletter, 1995), and NumPy's sine; the last two
    in a thread for each core [`machine_ways`, `limits_of`].
-2. An executor with a schedule: three small programs of its own [`probes`]: a window of 2 x 2, one of 4 x 4,
+2. An executor with a schedule: three small programs of its own [`probes`]: a window of 2 x 2, one of 6 x 6,
    and the first one with a chain of sines, on a picture so large that they take milliseconds [`probed`].
    Differences of their times give products and sines a second, and what is left of the first one's time is
    that of a pixel [`rates_of`].
@@ -46,7 +46,7 @@ BLOCK_NUMBERS = 2**14
 SINE_BLOCKS = 256
 """Blocks of which NumPy's sine is taken: 4 million numbers."""
 
-PROBE_PX = (64, 128, 256, 512)
+PROBE_PX = (128, 256, 512)
 """Widths and heights of the pictures on which small programs run: the first that takes long enough."""
 
 PROBE_S = 4e-3
@@ -140,7 +140,7 @@ def _in_threads(work: Callable[[slice], None], blocks: list[slice]) -> None:
 
 def probes() -> Mapping[str, Program]:
     """Return the three small programs by name."""
-    return {"small": _probe(2, 0), "window": _probe(4, 0), "sines": _probe(2, PROBE_SINES)}
+    return {"small": _probe(2, 0), "window": _probe(6, 0), "sines": _probe(2, PROBE_SINES)}
 
 
 def probe_images(size: int) -> Images:

@@ -24,9 +24,9 @@ def times(products_s: float, sines_s: float, pixel_s: float) -> dict[str, Times]
 
 
 def test_small_programs_do_what_is_counted() -> None:
-    """Windows of 24 and 96 numbers to 32 and on to 3; 8 sines of 32 numbers one after another."""
+    """Windows of 24 and 216 numbers to 32 and on to 3; 8 sines of 32 numbers one after another."""
     counts = {name: (products_of(p), sines_of(p)) for name, p in rates.probes().items()}
-    assert counts == {"small": (864, 0), "window": (32 * 96 + 96, 0), "sines": (864, 256)}
+    assert counts == {"small": (864, 0), "window": (32 * 216 + 96, 0), "sines": (864, 256)}
 
 
 def test_planted_rates_are_found() -> None:

@@ -29,9 +29,15 @@ DARK = Theme(text="#cbd5e1", curve="#fbbf24")
 PAPER = Theme(text="#1f2430", curve="#b4530a", page="#ffffff")
 """For a file that is looked at by itself."""
 
-PLACES = ((6, 4), (6, -10), (-6, 4), (-6, -10), (6, 14), (6, -20), (-6, 14), (-6, -20), (6, 24), (6, -30))
+PLACES = tuple((x, sign * y) for y in (3, 12, 22, 32, 42, 52, 62) for x in (6, -6) for sign in (1, -1))
 """Where a label may stand from its point, in points of print: the first place that is free; a negative first
 number puts its end there."""
+
+NEAR = 12
+"""Heights up to this one, in points of print, need no line from the point to its label."""
+
+MARKER_PX = 9.0
+"""Half the side of the square around a marker that labels leave free, in pixels."""
 
 DOTS_PER_INCH = 150
 """Resolution of the plots: sharp on a phone, small in a file."""
@@ -162,24 +168,38 @@ def growth(lines: Mapping[str, Sequence[tuple[int, float]]], theme: Theme) -> by
 
 
 def _label(figure: Any, axis: Any, points: Sequence[Point], theme: Theme) -> None:
-    """Write the points' names where no other name stands, those on the front first."""
-    taken: list[Any] = []
+    """Write the points' names where nothing else stands, those on the front first."""
+    from matplotlib.text import Text
+    from matplotlib.transforms import Bbox
+
     figure.draw_without_rendering()
+    times = [(point.ms, point.y) for point in points]
+    times += [(point.predicted_ms, point.y) for point in points if point.predicted_ms]
+    centres = axis.transData.transform(times)
+    corners = ((x - MARKER_PX, y - MARKER_PX, x + MARKER_PX, y + MARKER_PX) for x, y in centres)
+    taken = [Bbox.from_extents(*corner) for corner in corners]
+    if legend := axis.get_legend():
+        taken.append(legend.get_window_extent())
     frame = axis.get_window_extent()
     for point in sorted(points, key=lambda point: (not point.on_front, point.ms)):
         for x, y in PLACES:
-            side = "left" if x > 0 else "right"
             text = axis.annotate(
                 point.name,
                 (point.ms, point.y),
                 (x, y),
                 textcoords="offset points",
-                ha=side,
+                ha="left" if x > 0 else "right",
+                va="bottom" if y > 0 else "top",
                 fontsize=7.5,
                 color=theme.text,
                 fontweight="bold" if point.on_front else "normal",
+                arrowprops={"arrowstyle": "-", "color": theme.text, "linewidth": 0.4, "alpha": 0.6}
+                if abs(y) > NEAR
+                else None,
             )
-            box = text.get_window_extent()
+            # The first call puts the text into its place; its own box has no line to the point.
+            text.get_window_extent()
+            box = Text.get_window_extent(text)
             inside = frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1
             if (inside and not any(box.overlaps(other) for other in taken)) or (x, y) == PLACES[-1]:
                 taken.append(box)

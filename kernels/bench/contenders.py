@@ -40,8 +40,8 @@ PEERS: tuple[Contender, ...] = (
 )
 """What others make."""
 
-QUICK = ("numpy:plain", "torch.compile", "oidn:fast")
-"""What a quick run measures besides the kernels with the schedules that suit their devices."""
+QUICK = ("onnxruntime", "oidn:fast")
+"""Peers of a quick run: those that have nothing to compile."""
 
 
 def kernel(executor: str, schedule: str, variant: Variant = FULL) -> Contender:
@@ -75,7 +75,8 @@ def _open_kernel(
 def of_machine(tools: Tools, size: int, quick: bool = False) -> list[Contender]:
     """Return all contenders of a machine; those that cannot run here are in the list and say so later.
 
-    `quick`: the kernels with the schedules that suit their devices for pictures of this size, and `QUICK`.
+    `quick`: the kernels with the schedules that suit their devices for pictures of this size, the first
+    variant, and `QUICK`.
     """
     found = []
     for name, target in TARGETS.items():
@@ -85,8 +86,8 @@ def of_machine(tools: Tools, size: int, quick: bool = False) -> list[Contender]:
             suits = target.schedules[0].name
         chosen = [suits] if quick else [schedule.name for schedule in target.schedules]
         found += [kernel(name, schedule) for schedule in chosen]
-        if target.chains and name != "numpy":
-            found += [kernel(name, suits, variant) for variant in VARIANTS]
+        if name != "numpy":
+            found += [kernel(name, suits, variant) for variant in (VARIANTS[:1] if quick else VARIANTS)]
     return [*found, *(peer for peer in PEERS if not quick or peer.name in QUICK)]
 
 

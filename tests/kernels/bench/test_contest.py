@@ -61,13 +61,11 @@ def rows(data: dict) -> dict[str, dict]:
 
 
 def names_on(executor) -> list[Contender]:
-    """Return the plain kernel of an executor and, where it can, one of each other kind."""
+    """Return the plain kernel of an executor, others of OpenCL, and one of a rank."""
     found = [contenders.kernel(executor.name, "plain")]
     if executor.name == "opencl":
         found += [contenders.kernel("opencl", name) for name in ("vector16", "tile4")]
-    if executor.name != "opengl":
-        found.append(contenders.kernel(executor.name, "plain", Variant("rank3", "cut", rank=3)))
-    return found
+    return [*found, contenders.kernel(executor.name, "plain", Variant("rank3", "cut", rank=3))]
 
 
 def test_kernels_are_within_their_bound(executor, model) -> None:

@@ -38,7 +38,9 @@ class Row:
 
     def as_data(self) -> dict[str, Any]:
         """Return the row as JSON's types."""
-        head = {"name": self.name, "text": self.text, "kind": self.kind, "state": self.state}
+        # One that was interrupted between its first frame and its rounds has no time.
+        state = PENDING if self.state == MEASURED and not self.seconds else self.state
+        head = {"name": self.name, "text": self.text, "kind": self.kind, "state": state}
         times = {"ms": milliseconds(self.seconds), "kernel_ms": milliseconds(self.kernel_seconds)}
         found: dict[str, Any] = clean({**head, "reason": self.reason, **times, **self.facts})
         return found

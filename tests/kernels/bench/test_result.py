@@ -71,3 +71,9 @@ def test_a_row_that_was_not_reached() -> None:
         "ms": None,
         "kernel_ms": None,
     }
+
+
+def test_without_a_time_nothing_was_measured() -> None:
+    """An interrupt between the first frame and the rounds."""
+    assert Row("a", "what", "peer", state="measured").as_data()["state"] == "pending"
+    assert Row("a", "what", "peer", state="measured", seconds=[1.0]).as_data()["state"] == "measured"

@@ -22,6 +22,7 @@ import numpy as np
 from ..refimpl.errors import CompileError
 from . import artifact, bounds, ir, profiles, schedules
 from .artifact import Artifact
+from .c import C
 from .dialect import Dialect
 from .emit import kernel_gather, output_channels
 from .factor import HORIZONTAL, Cut, factor, left, over_images
@@ -82,7 +83,10 @@ TARGETS: Mapping[str, Target] = {
         _dialect_target(GLSL(), *GLSL_LADDER),
     )
 }
-"""All targets, by the name of the executor that runs them."""
+"""All targets of paths, encodings and denoisers, by the name of the executor that runs them."""
+
+DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C())}
+"""All targets of denoisers: those, and C, which is made to be pasted."""
 
 
 KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
@@ -104,9 +108,9 @@ class Bound:
     sines: tuple[tuple[float, float], ...]
 
 
-def analysed(program: Program) -> Program:
+def analysed(program: Program, profile: str = "ieee") -> Program:
     """Return the program that bounds speak about: after the common passes, each sine one node."""
-    return pipeline.run(program, pipeline.COMMON)
+    return pipeline.run(program, (*pipeline.COMMON, *profiles.profile_named(profile).common))
 
 
 def sine_contract(profile: str, target: str) -> SineContract:
@@ -167,9 +171,19 @@ def _refuse_domain(
 
 def target_named(name: str) -> Target:
     """Return the target, or say which ones there are."""
+    if name not in DENOISERS:
+        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(DENOISERS)}")
+    return DENOISERS[name]
+
+
+def target_of_pipelines(name: str) -> Target:
+    """Return a target that has kernels of all kinds, or refuse one whose kernels denoise alone."""
+    found = target_named(name)
     if name not in TARGETS:
-        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(TARGETS)}")
-    return TARGETS[name]
+        raise CompileError(
+            f"target {name} has denoisers alone; for other kernels there are {', '.join(TARGETS)}"
+        )
+    return found
 
 
 def compile_program(
@@ -182,7 +196,7 @@ def compile_program(
     """
     chosen = target_named(target)
     kernel_gather(program)
-    common = analysed(program)
+    common = analysed(program, profile)
     if not rank:
         return _compiled(common, chosen, profile, schedule, bound_over_images(common, profile, target))
     if not chosen.chains:
@@ -325,7 +339,7 @@ def _assemble(
         "entry_point": target.entry,
         "profile": {"name": profile.name, "text": profile.text},
         "sine": asdict_finite(sine_contract(profile.name, target.name)),
-        "passes": [*pipeline.COMMON, *profile.passes],
+        "passes": [*pipeline.COMMON, *profile.common, *profile.passes],
         "window": _window(gather),
         "images": [asdict(image) for image in gather.images],
         "output": {

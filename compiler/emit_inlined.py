@@ -47,6 +47,8 @@ class Inlined(Schedule):
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
+        if program.exact:
+            return "products of matrices and vectors add up in no stated order, and profile exact states one"
         count = sum(array.size for array in weights.weights(program).values())
         if count > LARGEST_WEIGHTS:
             return (

@@ -70,6 +70,7 @@ void main()
         "the target, the values are encoded already. Draw one triangle that covers it"
     )
     max_output_channels = 4
+    magnitude = "abs({0})"
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
     qualifiers = {"float32": "PRECISE "}
     table = "const {type} {name}[{count}] = {type}[{count}]({values});"

@@ -3,7 +3,8 @@
 1. Rounding: the relative error of each class of operations that targets may make [`RELATIVE_ERROR`].
 2. Sine: an absolute error on a domain, or no promise [`SineContract`]. Profile `ieee` emits its own sine;
    `native` calls the target's, whose promise stands in the target's dialect [`sine_contract`].
-3. The passes that turn the common program into the one that is emitted [`Profile`].
+3. The passes that bounds see after the common ones, and those that turn the program into the one that is
+   emitted [`Profile`].
 
 Sources: OpenCL C 1.2 specification, section 7.4 (divide 2.5 ulp, sqrt 3 ulp, sin 4 ulp, exp2 and log2 3 ulp,
 full profile); GLSL 4.60 specification, section 4.7.1 (+ - * correctly rounded, a / b 2.5 ulp for 2**-126 <=
@@ -20,6 +21,7 @@ from dataclasses import dataclass
 
 from ..refimpl.errors import CompileError
 from . import sine
+from .ir import LEAST
 from .ops import Rounding
 
 UNIT_ROUNDOFF = 2.0**-24
@@ -60,12 +62,16 @@ class SineContract:
 
 @dataclass(frozen=True)
 class Profile:
-    """A promise: `sine` None means the target's own, `passes` run after the common ones."""
+    """A promise: `sine` None means the target's own, `passes` run after bounds are computed.
+
+    `common` run before that, after the passes that all profiles share.
+    """
 
     name: str
     text: str
     sine: SineContract | None
     passes: tuple[str, ...]
+    common: tuple[str, ...] = ()
 
 
 EMITTED_SINE = SineContract(
@@ -78,6 +84,13 @@ EMITTED_COSINE = SineContract(
 )
 """The cosine of compiler/sine.py; denoisers have none, the derivative of a sine does."""
 
+EXACT_SINE = SineContract(
+    f"{EMITTED_SINE.text}, 0 where the reduced argument is below {LEAST:g}",
+    sine.POLYNOMIALS[sine.DEGREE].error + LEAST,
+    sine.DOMAIN,
+)
+"""The sine of compiler/sine.py in which no number is denormal."""
+
 PROFILES: Mapping[str, Profile] = {
     profile.name: profile
     for profile in (
@@ -88,11 +101,29 @@ PROFILES: Mapping[str, Profile] = {
             ("expand_sine", "fold", "eliminate_dead"),
         ),
         Profile(
+            "exact",
+            "the same bits on every target: one order of summation, every operation rounded, emitted sine",
+            EXACT_SINE,
+            ("expand_sine", "fold", "eliminate_dead"),
+            ("pin",),
+        ),
+        Profile(
             "native", "any order of summation, fused multiply-add allowed, the target's own sine", None, ()
         ),
     )
 }
 """All profiles, by name."""
+
+
+def unpinned(name: str, what: str) -> Profile:
+    """Return the profile of programs that no pass pins, or refuse `exact`."""
+    found = profile_named(name)
+    if found.common:
+        raise CompileError(
+            f"{what} divide and take roots, which targets round differently: profile {name} holds denoisers; "
+            "use profile ieee"
+        )
+    return found
 
 
 def profile_named(name: str) -> Profile:

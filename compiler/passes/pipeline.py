@@ -12,6 +12,7 @@ from .expand_sine import expand_sine
 from .expand_tables import expand_tables
 from .fold import fold, fold_float32
 from .fuse_bias import fuse_bias
+from .pin import pin
 from .scalarize import scalarize
 
 PASSES: Mapping[str, Callable[[Program], Program]] = {
@@ -20,6 +21,7 @@ PASSES: Mapping[str, Callable[[Program], Program]] = {
     "scalarize": scalarize,
     "expand_tables": expand_tables,
     "fuse_bias": fuse_bias,
+    "pin": pin,
     "expand_sine": expand_sine,
     "eliminate_dead": eliminate_dead,
 }

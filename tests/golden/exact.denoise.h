@@ -26,7 +26,8 @@
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif
 /* No product may be fused with a sum. Compilers differ in what they obey, so give them -ffp-contract=off too:
-   clang takes the standard's pragma, GCC ignores that and takes its own, others may ignore both. */
+   clang takes the standard's pragma unless it is told -ffp-contract=fast, GCC ignores that and takes its own,
+   others may ignore both. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=off")

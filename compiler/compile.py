@@ -28,7 +28,7 @@ from .emit import kernel_gather, output_channels
 from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
 from .glsl_inlined import GLSL_LADDER
-from .ir import OUTPUT_ENCODING, Gather, Program
+from .ir import LEAST, OUTPUT_ENCODING, Gather, Program
 from .opencl import OpenCL
 from .opencl_tiled import OPENCL_LADDER
 from .passes import pipeline
@@ -95,6 +95,13 @@ KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on
 
 JSON_INFO = ("normalization", "recipe")
 """Which of them are JSON texts."""
+
+
+AGAINST = "float64 reference, same float32 weights and images"
+"""What a bound compares a kernel with."""
+
+AGAINST_PINNED = f"{AGAINST}, where weights below {LEAST!r} are 0"
+"""The same for an exact kernel."""
 
 
 @dataclass(frozen=True)
@@ -350,7 +357,7 @@ def _assemble(
         "arguments": schedule.arguments.format(channels=output_channels(emitted)),
         "bound": {
             "output": bound.output and [round_up(error) for error in bound.output],
-            "against": "float64 reference, same float32 weights and images",
+            "against": AGAINST_PINNED if emitted.exact else AGAINST,
         },
         "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],
         "info": {name: _info_value(name, text) for name, text in emitted.info if name in KEPT_INFO},

@@ -14,6 +14,7 @@ from wamnet.compiler.compile import analysed, compile_program
 from wamnet.compiler.grain import READ, SINE, Size
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import LEAST, Gather, Image, Type
+from wamnet.compiler.ops import OPS
 from wamnet.compiler.passes import pipeline
 from wamnet.compiler.profiles import EXACT_SINE, PROFILES
 from wamnet.compiler.trace import trace
@@ -149,6 +150,11 @@ def test_weights_below_the_threshold_become_zero():
     assert program.exact
     assert np.array_equal(program.parameters["W0"], [[1.0, LEAST, 0.0, 0.0]])
     assert READ.least == np.log2(LEAST)
+
+
+def test_rules_are_of_operations_that_exist():
+    assert set(grain.RULES) <= set(OPS)
+    assert all(OPS[op].rounding in ("exact", "nearest", "dot", "sine") for op in grain.RULES)
 
 
 # ---- refusals ----------------------------------------------------------------------------------------

@@ -294,6 +294,7 @@ def test_the_manifest_says_what_was_promised(kit, paper):
         "fold",
         "eliminate_dead",
     ]
+    assert manifest["bound"]["against"].endswith("where weights below 9.094947017729282e-13 are 0")
     assert manifest["sine"]["error"] == EMITTED_SINE.error + LEAST
 
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import accumulate
 
 from ..refimpl.errors import CompileError
 from .dialect import Dialect
@@ -86,10 +85,18 @@ def emit(
         images=dialect.image_separator.join(images),
         image=gather.images[0].name,
         names=", ".join(f"image_{i.name}" for i in gather.images),
+        results=_each_result(dialect.result_declaration, program, dialect),
+        starts=_each_result(dialect.result_start, program, dialect),
         unordered=dialect.unordered[bounded or program.exact],
     )
     comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
     return "\n".join([*comment, begin, *body.text(), dialect.end.format()]) + "\n"
+
+
+def _each_result(template: str, program: Program, dialect: Dialect) -> str:
+    """Return a line for each result that a kernel writes."""
+    names = dialect.results(output_channels(program))
+    return "\n".join(template.format(number=number, result=name) for number, name in enumerate(names))
 
 
 def private_bytes(program: Program) -> int:
@@ -263,12 +270,16 @@ class Body(Lines):
         index = self.program.outputs[0][1]
         channels = output_channels(self.program)
         self._comment(f"output {self.program.outputs[0][0]}")
-        store = self.dialect.store
-        if self.program.nodes[index].type.shape:
-            line = store.format(channels=channels, i="i", value=self._written(self._read(index, "i")))
-            self._nest([f"for (int i = 0; i < {channels}; ++i) {{"], [line])
-        else:
-            self._line(store.format(channels=1, i="0", value=self._written(self._read(index, ""))))
+        store, results = self.dialect.store, self.dialect.results(channels)
+        if not self.program.nodes[index].type.shape:
+            value = self._written(self._read(index, ""))
+            self._line(store.format(result=results[0], channels=1, i="0", value=value))
+            return
+        each = self.dialect.channels_per_result or channels
+        for first, result in zip(range(0, channels, each), results, strict=True):
+            value = self._written(self._read(index, _plus(first, "i")))
+            line = store.format(result=result, channels=channels, i="i", value=value)
+            self._nest([f"for (int i = 0; i < {min(each, channels - first)}; ++i) {{"], [line])
 
     def _written(self, value: str) -> str:
         """Return the text of a number as it is written: an exact program has one zero."""
@@ -281,9 +292,7 @@ class Body(Lines):
 
         An exact program reads one image after another.
         """
-        firsts = accumulate((image.channels for image in self.gather.images), initial=0)
-        images = list(zip(self.gather.images, firsts, strict=False))
-        for group in [[image] for image in images] if self.program.exact else [images]:
+        for group in self.gather.groups(by_image=self.program.exact):
             self._over_taps(group, body)
 
     def _over_taps(self, images: Sequence[tuple[Image, int]], body: Callable[[str], list[str]]) -> None:

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,11 +174,8 @@ class InlinedBody(Body):
         gather = self.gather
         for image in gather.images:
             self._line(f"{_vector(image.channels)} {image.name}_{index};")
-        firsts = accumulate((image.channels for image in gather.images), initial=0)
-        images, taps = list(zip(gather.images, firsts, strict=False)), range(gather.rows * gather.columns)
-        by_tap = [(tap, *image) for tap in taps for image in images]
-        by_image = [(tap, *image) for image in images for tap in taps]
-        for tap, image, first in by_image if self.program.exact else by_tap:
+        taps, groups = range(gather.rows * gather.columns), gather.groups(by_image=self.program.exact)
+        for tap, (image, first) in ((tap, image) for group in groups for tap in taps for image in group):
             row, column = divmod(tap, gather.columns)
             dy, dx = row - gather.rows // 2, column - gather.columns // 2
             name, start = f"{image.name}_{index}", tap * gather.channels + first
@@ -207,9 +203,11 @@ class InlinedBody(Body):
         """Write the only output."""
         name, index = self.program.outputs[0]
         self._comment(f"output {name}")
-        components = COMPONENTS[self.program.nodes[index].type.shape[0] - 1]
-        for part in components if self.program.exact else (components,):
-            self._line(f"result.{part} = {self._written(f'v{index}_0.{part}')};")
+        channels = self.program.nodes[index].type.shape[0]
+        for vector, result in enumerate(self.dialect.results(channels)):
+            components = COMPONENTS[min(4, channels - 4 * vector) - 1]
+            for part in components if self.program.exact else (components,):
+                self._line(f"{result}.{part} = {self._written(f'v{index}_{vector}.{part}')};")
 
     def _element(self, index: int, lane: str) -> str:
         """Return the name of a value inside a function."""

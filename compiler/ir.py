@@ -18,6 +18,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -92,11 +93,13 @@ class Gather:
     """The program's input `window` holds, for each tap (dy, dx) in C order, the channels of all `images`.
 
     `axes` are those along which the window reaches: both, or one, 0 (a column of pixels) or 1 (a row).
+    `joined`: the images are the channels of one, which a target holds in several.
     """
 
     window: Window
     images: tuple[Image, ...]
     axes: tuple[int, ...] = (0, 1)
+    joined: bool = False
 
     @property
     def rows(self) -> int:
@@ -122,8 +125,19 @@ class Gather:
     def by_image(self) -> NDArray[np.intp]:
         """Return the window's indices (n_inputs,): image by image, in each tap by tap, channel by channel."""
         taps = np.arange(self.n_inputs).reshape(-1, self.channels)
+        if self.joined:
+            return taps.ravel()
         ends = np.cumsum([image.channels for image in self.images])[:-1]
         return np.concatenate([part.ravel() for part in np.split(taps, ends, axis=1)])
+
+    def groups(self, by_image: bool) -> list[list[tuple[Image, int]]]:
+        """Return the images, each with its first channel's place in a tap: those that are read together.
+
+        All of them, or `by_image` one after another; those that are joined are one.
+        """
+        firsts = accumulate((image.channels for image in self.images), initial=0)
+        found = list(zip(self.images, firsts, strict=False))
+        return [[image] for image in found] if by_image and not self.joined else [found]
 
 
 @dataclass(frozen=True)

@@ -173,18 +173,18 @@ def test_error_is_within_the_bound(denoiser, kit, paper):
     assert bound.max() <= 1.001 * alike.max()
 
 
-@pytest.mark.parametrize("target", [name for name in DENOISERS if name != "opengl"])
+@pytest.mark.parametrize("target", DENOISERS)
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 def test_a_first_layer_in_two_passes_gives_the_same_bits(executor_named, kit, border, target):
     program = kit.denoiser(kit.network([150, 9, 3], (3.0, 3.0)), {"a": 4, "b": 2}, 5, border)
     random = np.random.default_rng(2)
     images = {"a": image("random", (7, 18, 4), random), "b": image("tiny", (7, 18, 2), random)}
-    found = executor_named("numpy").run(compile_program(program, "numpy", "exact", rank=4), images)
+    found = executor_named("numpy").run(compile_program(program, "numpy", "exact", rank=6), images)
     assert len(np.unique(found)) > 100
     for schedule in [s.name for s in DENOISERS[target].schedules]:
-        artifact = compile_program(program, target, "exact", schedule, rank=4)
+        artifact = compile_program(program, target, "exact", schedule, rank=6)
         assert all(kernel.program.exact for kernel in artifact.kernels)
-        again = executor_named(target).run(artifact, images)
+        again = executor_named(OPENED.get(target, target)).run(artifact, images)
         assert np.array_equal(bits(again), bits(found))
 
 

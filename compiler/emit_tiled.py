@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from . import weights
 from .dialect import Dialect
-from .emit import BORDERS, Body, emit, kernel_gather, output_channels
+from .emit import BORDERS, Body, emit, kernel_gather, output_channels, schedule
 from .ir import Gather, Node, Program
 from .ops import OPS
 from .schedules import Schedule
@@ -55,8 +55,10 @@ def refused_by_vectors(program: Program, dialect: Dialect) -> str:
             continue
         if not OPS[node.op].elementwise or node.op not in dialect.operations:
             return f"%{index} is {node.op}, which has no form on vectors"
-        if node.type.dtype != "float32" or not node.type.shape:
-            return f"%{index} is {node.type}: vectors hold float32[n]"
+        if node.type.dtype not in dialect.types or not node.type.shape:
+            return f"%{index} is {node.type}: vectors hold float32[n] and bool[n]"
+    if reason := _truth_between_loops(program):
+        return reason
     output = program.nodes[program.outputs[0][1]]
     if (channels := output_channels(program)) > dialect.max_output_channels:
         return f"it writes {channels} channels, of at most {dialect.max_output_channels}"
@@ -64,6 +66,17 @@ def refused_by_vectors(program: Program, dialect: Dialect) -> str:
         return "something besides an affine map reads the window"
     if output.op in ("constant", "parameter", "input"):
         return "the output is not computed"
+    return ""
+
+
+def _truth_between_loops(program: Program) -> str:
+    """Return which truth value another loop would have to read from an array, or nothing."""
+    group_of = {index: number for number, group in enumerate(schedule(program)) for index in group}
+    for reader, node in enumerate(program.nodes):
+        for index in node.args:
+            known = program.nodes[index]
+            if known.type.dtype == "bool" and group_of.get(index) != group_of[reader]:
+                return f"%{index} is {known.type}, which %{reader} in another loop reads"
     return ""
 
 

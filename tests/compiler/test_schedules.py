@@ -94,7 +94,11 @@ SHARED = gathered(lambda x: np.sin(x @ W.T) @ W.T)
 
 REFUSED = {
     "component": (gathered(lambda x: x[..., 0] * 2.0), "%1 is component, which has no form on vectors"),
-    "select": (gathered(lambda x: np.where(x @ W.T < 0.5, x, 2.0)), "%3 is less, which has no form"),
+    "equal": (gathered(lambda x: np.where(x @ W.T == 0.5, 1.0, x @ W.T)), "%3 is equal, which has no form"),
+    "truth": (
+        gathered(lambda x: np.where((y := x @ W.T) < 0.5, np.sin(y) @ rounded(3, 3).T, y)),
+        r"%\d+ is bool\[3\], which %\d+ in another loop reads",
+    ),
     "window": (gathered(lambda x: x * 2.0), "something besides an affine map reads the window"),
     "output": (gathered(lambda x: x), "the output is not computed"),
     "shared": (SHARED, "a matrix is applied to the window and to a layer, which need it in two orders"),

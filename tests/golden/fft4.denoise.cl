@@ -2,6 +2,7 @@
  * a tiny kernel
  */
 typedef float4 vector;
+typedef int4 mask;
 #define MINIMUM(a, b) ((vector)(b) < (vector)(a) ? (vector)(b) : (vector)(a))
 #define MAXIMUM(a, b) ((vector)(b) > (vector)(a) ? (vector)(b) : (vector)(a))
 #ifdef __has_builtin

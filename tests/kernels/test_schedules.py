@@ -176,7 +176,7 @@ INLINED_FAULTS = {
     "border": ("clamp(at, ivec2(0)", "clamp(at, ivec2(1)"),
     "vector": ("v1_1 += mat3x4", "v1_0 += mat3x4"),
     "omega": ("= 3.0f * v1", "= 2.0f * v1"),
-    "components": ("v46_1.x;", "v46_0.x;"),
+    "components": ("_1.x;", "_0.x;"),
 }
 """Pieces of an inlined kernel, and what makes it wrong."""
 

@@ -33,6 +33,7 @@ from .opencl_tiled import OPENCL_LADDER
 from .passes import pipeline
 from .profiles import Profile, SineContract
 from .schedules import PLAIN, Pick, Plain, Printed, Schedule, pick
+from .sums import is_split
 
 MOST_IN_TEXTURE = 4
 """Channels of a texture."""
@@ -91,6 +92,10 @@ KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on
 
 JSON_INFO = ("normalization", "recipe")
 """Which of them are JSON texts."""
+
+
+SUMS = "sums      over the window: a partial sum for each image and row of taps, in any order; then these"
+"""What a header says where the bound rests on partial sums [sums.py]."""
 
 
 @dataclass(frozen=True)
@@ -271,6 +276,7 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound, pi
         f"profile   {profile.name}: {profile.text}",
         f"sine      {sine_contract(profile.name, target.name).text}",
         f"bound     {_bound_text(bound)}",
+        *([SUMS] if is_split(gather) else []),
         *([] if picked.schedule.name == PLAIN else [f"schedule  {schedules.text(picked.manifest())}"]),
         f"arguments {arguments[0]}",
         *(f"          {line}" for line in arguments[1:]),

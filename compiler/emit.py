@@ -2,8 +2,8 @@
 
 1. Nodes are grouped in their order [`schedule`]: neighbouring elementwise nodes of one shape share a loop, an
    affine node is a loop nest of its own.
-2. An affine node that reads the window accumulates straight from the images, tap by tap; the window vector
-   exists only if something else reads it [`_over_window`].
+2. An affine node that reads the window accumulates straight from the images, a partial sum for each row of
+   taps of an image [sums.py]; the window vector exists only if something else reads it [`_over_window`].
 3. A value that another group reads is an array `v<number>`; a number, or a value that only its own loop
    reads, is a variable `t<number>`; numbers are those of the printed program.
 
@@ -20,6 +20,7 @@ from .dialect import Dialect
 from .ir import Gather, Node, Program, users
 from .lines import Lines
 from .ops import LOOPS, OPS
+from .sums import is_split
 from .weights import layout, tables
 
 BORDERS: Mapping[str, tuple[str, str]] = {
@@ -93,8 +94,16 @@ def emit(
 def private_bytes(program: Program) -> int:
     """Return the bytes of the arrays that a kernel declares for each pixel."""
     body = Body(program, Dialect(), kernel_gather(program))
-    shapes = [program.nodes[index].type.shape for index in body.group_of if body.declares(index)]
-    return sum(4 * shape[0] for shape in shapes)
+    parts = [index for index in _split(program) if index in body.group_of]
+    arrays = [*filter(body.declares, body.group_of), *parts]
+    return sum(4 * program.nodes[index].type.shape[0] for index in arrays)
+
+
+def _split(program: Program) -> list[int]:
+    """Return the indices of the affine maps that add up partial sums over the window [sums.py]."""
+    nodes = program.nodes
+    found = [i for i, node in enumerate(nodes) if node.op == "affine" and nodes[node.args[0]].op == "input"]
+    return found if is_split(kernel_gather(program)) else []
 
 
 def kernel_gather(program: Program) -> Gather:
@@ -219,17 +228,24 @@ class Body(Lines):
         neurons = f"for (int j = 0; j < {n_out}; ++j) {{"
         self._nest([neurons], [f"v{index}[j] = {start};"])
         if source.op == "input":
+            sums, zero, add = f"v{index}", [], []
+            if is_split(self.gather):
+                sums = f"part{index}"
+                zero, add = [f"{sums}[j] = 0.0f;"], [f"v{index}[j] += {sums}[j];"]
+                self._line(f"{self.dialect.variable('float32')} {sums}[{n_out}];")
             self._over_window(
-                lambda tap: self._accumulate(index, neurons, _plus(weight.offset, f"({tap}) * {n_out}", "j"))
+                lambda tap: self._accumulate(sums, neurons, _plus(weight.offset, f"({tap}) * {n_out}", "j")),
+                lambda: self._nest([neurons] if zero else [], zero),
+                lambda: self._nest([neurons] if add else [], add),
             )
         else:
-            inner = self._accumulate(index, neurons, _plus(weight.offset, f"i * {n_out}", "j"))
+            inner = self._accumulate(f"v{index}", neurons, _plus(weight.offset, f"i * {n_out}", "j"))
             value = f"float value = {self._read(node.args[0], 'i')};"
             self._nest([f"for (int i = 0; i < {n_in}; ++i) {{"], [value, *inner])
 
-    def _accumulate(self, index: int, neurons: str, weight: str) -> list[str]:
-        """Return the loop that adds `value` times one row of weights to all neurons."""
-        return [neurons, f"    v{index}[j] += {self._weight(weight)} * value;", "}"]
+    def _accumulate(self, sums: str, neurons: str, weight: str) -> list[str]:
+        """Return the loop that adds `value` times one row of weights to all neurons' sums."""
+        return [neurons, f"    {sums}[j] += {self._weight(weight)} * value;", "}"]
 
     def _elementwise(self, group: tuple[int, ...]) -> None:
         """Write the operations of a group, in a loop when they work on vectors."""
@@ -270,23 +286,33 @@ class Body(Lines):
 
     # ---- the window --------------------------------------------------------------------------------------
 
-    def _over_window(self, body: Callable[[str], list[str]]) -> None:
-        """Write the loops over taps and channels that set `value`; `body` takes the index into the window."""
-        (before, value), names = BORDERS[self.gather.window.border], self.sides
+    def _over_window(
+        self,
+        body: Callable[[str], list[str]],
+        before: Callable[[], None] = lambda: None,
+        after: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Write the loops over rows of taps, images, taps and channels that set `value`.
+
+        `body` takes the index into the window; `before` and `after` write what stands around each image's row.
+        """
+        (inside, value), names = BORDERS[self.gather.window.border], self.sides
         self._open(f"for (int dy = 0; dy < {names.rows}; ++dy) {{")
         self._line(f"int row = clamp(y + dy - {names.row}, 0, height - 1);")
-        self._open(f"for (int dx = 0; dx < {names.columns}; ++dx) {{")
-        self._line(f"int column = clamp(x + dx - {names.column}, 0, width - 1);")
-        if before:
-            self._line(before.format(sides=names))
-        self._line(f"int tap = (dy * {names.columns} + dx) * {self.gather.channels};")
         first = 0
         for image in self.gather.images:
+            before()
+            self._open(f"for (int dx = 0; dx < {names.columns}; ++dx) {{")
+            self._line(f"int column = clamp(x + dx - {names.column}, 0, width - 1);")
+            if inside:
+                self._line(inside.format(sides=names))
+            self._line(f"int tap = (dy * {names.columns} + dx) * {self.gather.channels};")
             pixel = self.dialect.pixel.format(image=image.name, channels=image.channels)
             lines = [f"float value = {value.format(pixel=pixel)};", *body(_plus("tap", first, "c"))]
             self._nest([f"for (int c = 0; c < {image.channels}; ++c) {{"], lines)
+            self._close()
+            after()
             first += image.channels
-        self._close()
         self._close()
 
     # ---- values ------------------------------------------------------------------------------------------

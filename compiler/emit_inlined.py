@@ -25,6 +25,7 @@ from .emit import Body, emit, kernel_gather
 from .emit_tiled import refused_by_vectors
 from .ir import Node, Program
 from .schedules import Schedule
+from .sums import is_split
 from .weights import Slot
 
 LARGEST_WEIGHTS = 2**16
@@ -164,30 +165,40 @@ class InlinedBody(Body):
             for first in range(0, matrix.shape[1], 4):
                 columns = matrix[:, first : first + 4]
                 held = f"v{node.args[0]}_{first // 4}.{COMPONENTS[columns.shape[1] - 1]}"
-                self._multiply(index, columns, held)
+                self._multiply(f"v{index}", columns, held)
 
     def _windowed(self, index: int, matrix: NDArray[np.float32]) -> None:
-        """Write the products of all taps."""
-        gather, first = self.gather, 0
-        for image in self.gather.images:
-            self._line(f"{_vector(image.channels)} {image.name}_{index};")
-        for tap in range(gather.rows * gather.columns):
-            row, column = divmod(tap, gather.columns)
-            dy, dx = row - gather.rows // 2, column - gather.columns // 2
-            for image in self.gather.images:
-                name = f"{image.name}_{index}"
+        """Write the products of all taps: a partial sum for each row of taps of an image."""
+        gather, first, vectors = self.gather, 0, range(self.vectors(index))
+        names = [f"{image.name}_{index}" for image in gather.images]
+        for image, name in zip(gather.images, names, strict=True):
+            self._line(f"{_vector(image.channels)} {name};")
+        split = is_split(gather)
+        if split:
+            parts = ", ".join(f"part{index}_{vector}" for vector in vectors)
+            self._line(f"{self.dialect.variable('float32')} {parts};")
+        for image, name in zip(gather.images, names, strict=True):
+            for tap in range(gather.rows * gather.columns):
+                row, column = divmod(tap, gather.columns)
+                dy, dx = row - gather.rows // 2, column - gather.columns // 2
+                at = tap * gather.channels + first
                 self._line(f"{name} = tap_{image.name}(ivec2(x, y) + ivec2({dx}, {dy}));")
-                self._multiply(index, matrix[:, first : first + image.channels], name)
-                first += image.channels
+                columns = matrix[:, at : at + image.channels]
+                sums = f"part{index}" if split else f"v{index}"
+                self._multiply(sums, columns, name, "=" if split and column == 0 else "+=")
+                if split and column == gather.columns - 1:
+                    for vector in vectors:
+                        self._line(f"v{index}_{vector} += part{index}_{vector};")
+            first += image.channels
 
-    def _multiply(self, index: int, columns: NDArray[np.float32], value: str) -> None:
+    def _multiply(self, sums: str, columns: NDArray[np.float32], value: str, operator: str = "+=") -> None:
         """Write the additions of columns (D_out, k) times `value` with k components to all vectors."""
         count = columns.shape[1]
         kind = "vec4" if count == 1 else f"mat{count}x4"
-        for vector in range(self.vectors(index)):
+        for vector in range(-(-columns.shape[0] // 4)):
             numbers = [n for column in columns.T for n in _filled(column, vector)]
             constant = f"{kind}({', '.join(map(self._literal, numbers))})"
-            self._line(f"v{index}_{vector} += {constant} * {value};")
+            self._line(f"{sums}_{vector} {operator} {constant} * {value};")
 
     def _outputs(self) -> None:
         """Write the only output."""

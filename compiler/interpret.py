@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .ir import Node, Parameters, Program
+from .ir import Gather, Node, Parameters, Program
 from .loops import Loop, loops
 from .ops import OPS
+from .sums import parts
 
 Array = NDArray[Any]
 
@@ -75,7 +76,22 @@ def _value(
     if node.op == "loop":
         return values[node.args[int(node["index"])]]  # type: ignore[arg-type]
     operands = [_spread(values[arg], program.nodes[arg], node) for arg in node.args]
+    if node.op == "affine" and kind == np.float32 and program.gather and _is_input(program, node.args[0]):
+        return _in_parts(node, operands[0], parameters, program.gather)
     return apply(node, operands, parameters, kind)
+
+
+def _is_input(program: Program, index: int) -> bool:
+    return program.nodes[index].op == "input"
+
+
+def _in_parts(node: Node, x: Any, parameters: Any, gather: Gather) -> Any:
+    """Return W x + b in float32 as kernels add it up: partial sums of each image's rows of taps [sums.py]."""
+    weight = parameters[str(node["weight"])]
+    found = parameters[str(node["bias"])] if node.get("bias") is not None else np.float32(0)
+    for part in parts(gather, weight.shape[1]):
+        found = found + np.matmul(x[..., part], weight[:, part].T)
+    return found
 
 
 def element(dtype: str, kind: np.dtype[Any]) -> np.dtype[Any]:

@@ -86,7 +86,7 @@ def sum_errors(step: Step, windows: Array, targets: Array) -> dict[str, Array]:
     for the sum; padding adds zeros, which round nothing, and the sum over groups is part of the order.
     """
     given = {name: (np.asarray(x, np.float64),) * 2 for name, x in ((WINDOW, windows), (TARGET, targets))}
-    nodes = enclose(step.program, given, EMITTED_SINE, EMITTED_COSINE)
+    nodes = enclose(step.program, given, EMITTED_SINE, EMITTED_COSINE, local=False)
     ends = dict(step.program.outputs)
     return {known.parameter: _sum_error(known, ends, nodes, len(windows)) for known in step.sums}
 

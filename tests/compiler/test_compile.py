@@ -228,8 +228,8 @@ def test_a_bound_needs_precise_and_no_bound_does_not():
 def test_private_bytes_are_those_of_the_declared_arrays():
     for target in ("opencl", "opengl"):
         artifact = compile_program(lower(model()), target)
-        declared = re.findall(r"float v\d+\[(\d+)\];", artifact.source)
-        assert artifact.manifest["private_bytes"] == 4 * sum(map(int, declared)) == 56
+        declared = re.findall(r"(?:float|PRECISE float) (?:v|part)\d+\[(\d+)\];", artifact.source)
+        assert artifact.manifest["private_bytes"] == 4 * sum(map(int, declared)) == 72
 
 
 def test_too_many_output_channels_for_a_fragment():

@@ -131,7 +131,7 @@ def test_a_wrong_tile_is_caught(executor_named, kit, schedule, fault):
 INLINED_FAULTS = {
     "tap": ("ivec2(x, y) + ivec2(-2, 1)", "ivec2(x, y) + ivec2(-1, 1)"),
     "border": ("clamp(at, ivec2(0)", "clamp(at, ivec2(1)"),
-    "vector": ("v1_1 += mat3x4", "v1_0 += mat3x4"),
+    "vector": ("v1_1 += part1_1", "v1_0 += part1_1"),
     "omega": ("= 3.0f * v1", "= 2.0f * v1"),
     "components": ("v46_1.x;", "v46_0.x;"),
 }

@@ -14,16 +14,16 @@ import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 import numpy as np
 
 from ..refimpl.errors import CompileError
-from . import artifact, bounds, ir, profiles, schedules
+from . import artifact, bounds, certificate, ir, profiles, schedules
 from .artifact import Artifact
 from .dialect import Dialect
 from .emit import kernel_gather, output_channels
+from .enclosure import round_up as round_up
 from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
 from .glsl_inlined import GLSL_LADDER
@@ -102,11 +102,12 @@ SUMS = "sums      over the window: a partial sum for each image and row of taps,
 class Bound:
     """A-priori promise: `output` bounds each channel's error, None where an operation promises nothing.
 
-    `sines` holds the range of each sine's argument.
+    `sines` holds the range of each sine's argument; `proof` the steps of a certificate, if it has one.
     """
 
     output: tuple[float, ...] | None
     sines: tuple[tuple[float, float], ...]
+    proof: certificate.Proof | None = None
 
 
 def analysed(program: Program) -> Program:
@@ -140,8 +141,10 @@ def bound_over_images(program: Program, profile: str, target: str, cut: Cut | No
         if contract.error is not None and not bounds.argument_reach(argument).max() <= contract.domain:
             _refuse_domain(number + 1, len(sines), index, ranges[-1], contract)
     errors = bounds.output_errors(program, found)[program.outputs[0][0]]
-    known = all(math.isfinite(error) for error in errors)
-    return Bound(tuple(float(e) for e in errors) if known else None, tuple(ranges))
+    if not all(math.isfinite(error) for error in errors):
+        return Bound(None, tuple(ranges))
+    proof = None if cut else certificate.prove(program, found, contract)
+    return Bound(proof.bound if proof else tuple(float(e) for e in errors), tuple(ranges), proof)
 
 
 def _check_sizes(program: Program, found: Sequence[bounds.Enclosure]) -> None:
@@ -298,16 +301,6 @@ def _bound_text(bound: Bound) -> str:
     return f"|output - float64 reference| <= {round_up(max(bound.output)):g} for all images in these ranges"
 
 
-def round_up(value: float, digits: int = 3) -> float:
-    """Return the smallest number of so many significant decimal digits that is not below `value`."""
-    if value == 0 or not math.isfinite(value):
-        return value
-    # Decimals hold every float64 exactly, and the float64 nearest to one above `value` is not below it.
-    exact = Decimal(value)
-    unit = Decimal(1).scaleb(exact.adjusted() - digits + 1)
-    return float(exact.quantize(unit, ROUND_CEILING))
-
-
 def _assemble(
     common: Program,
     emitted: Program,
@@ -344,6 +337,7 @@ def _assemble(
             "output": bound.output and [round_up(error) for error in bound.output],
             "against": "float64 reference, same float32 weights and images",
         },
+        "certificate": artifact.CERTIFICATE_NAME if bound.proof else None,
         "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],
         "info": {name: _info_value(name, text) for name, text in emitted.info if name in KEPT_INFO},
         "files": {
@@ -359,7 +353,12 @@ def _assemble(
         },
     }
     manifest = json.loads(json.dumps(manifest, allow_nan=False))
-    return Artifact(target.name, profile.name, target.entry, source, source_name, emitted, weights, manifest)
+    proven = None
+    if bound.proof:
+        sine = sine_contract(profile.name, target.name)
+        proven = certificate.certificate(common, bound.proof, sine, schedule, emitted, manifest)
+    names = (target.name, profile.name, target.entry)
+    return Artifact(*names, source, source_name, emitted, weights, manifest, certificate=proven)
 
 
 def _window(gather: Gather) -> dict[str, Any]:

@@ -294,7 +294,7 @@ class Body(Lines):
     ) -> None:
         """Write the loops over rows of taps, images, taps and channels that set `value`.
 
-        `body` takes the index into the window; `before` and `after` write what stands around each image's row.
+        `body` takes the index into the window; `before` and `after` write what stands around an image's row.
         """
         (inside, value), names = BORDERS[self.gather.window.border], self.sides
         self._open(f"for (int dy = 0; dy < {names.rows}; ++dy) {{")

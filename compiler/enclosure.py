@@ -6,7 +6,9 @@ float64, in which all of it is computed, rounds too: results are widened by more
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 import numpy as np
@@ -76,3 +78,13 @@ def sine_range(low: Array, high: Array) -> tuple[Array, Array]:
     least = np.where(trough, -1.0, np.minimum(at_low, at_high))
     most = np.where(crest, 1.0, np.maximum(at_low, at_high))
     return np.maximum(least - RANGE_OUTWARD, -1.0), np.minimum(most + RANGE_OUTWARD, 1.0)
+
+
+def round_up(value: float, digits: int = 3) -> float:
+    """Return the smallest number of so many significant decimal digits that is not below `value`."""
+    if value == 0 or not math.isfinite(value):
+        return value
+    # Decimals hold every float64 exactly, and the float64 nearest to one above `value` is not below it.
+    exact = Decimal(value)
+    unit = Decimal(1).scaleb(exact.adjusted() - digits + 1)
+    return float(exact.quantize(unit, ROUND_CEILING))

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +100,7 @@ def output_error(program: Program, found: Sequence[Enclosure], output: int) -> A
     if not all(np.isfinite(part).all() for part in own):
         return None
     matrices = [layer.scale * _weight(program, layer) for layer in layers[1:]]
-    if _work(matrices) > LARGEST_WORK:
+    if not decomposable(matrices):
         return None
     errors = np.zeros(len(own[-1]))
     for rows in outputs(len(errors)):
@@ -111,6 +112,11 @@ def output_error(program: Program, found: Sequence[Enclosure], output: int) -> A
 def outputs(count: int) -> list[list[int]]:
     """Return groups of outputs, each with scalings of its own."""
     return [[i] for i in range(count)] if count <= MOST_ALONE else [list(range(count))]
+
+
+def decomposable(matrices: Sequence[Array]) -> bool:
+    """Return whether norms of matrices (m, n) of these sizes are found in little time."""
+    return _work(matrices) <= LARGEST_WORK
 
 
 def _work(matrices: Sequence[Array]) -> int:
@@ -147,6 +153,27 @@ def amplified(matrices: Sequence[Array], own: Sequence[Array], scales: Sequence[
 
 def scalings(matrices: Sequence[Array], error: Array) -> list[Array]:
     """Return s_1 ... s_(L-1) for which the first layer's errors (n,) reach the output least amplified."""
+    return [np.array(scale) for scale in _scalings(*map(_Held, (*matrices, _short(error))))]
+
+
+class _Held:
+    """An array that can be looked up: a manifest's bound and its certificate ask for the same scalings."""
+
+    def __init__(self, array: Array) -> None:
+        self.array = array
+        self._key = (array.shape, array.tobytes())
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Held) and self._key == other._key
+
+
+@lru_cache(maxsize=16)
+def _scalings(*held: _Held) -> list[Array]:
+    """Return the scalings for matrices and, last, the first layer's errors."""
+    *matrices, error = (array.array for array in held)
     widths = [matrix.shape[1] for matrix in matrices]
     logs, means = [np.zeros(n) for n in widths], [np.zeros(n) for n in widths]
     squares = [np.zeros(n) for n in widths]

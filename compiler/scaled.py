@@ -96,10 +96,10 @@ def output_error(program: Program, found: Sequence[Enclosure], output: int) -> A
     # What comes in with an error, or is known as a whole, counts as the first layer's own.
     if found[first.affine].own is not None and np.any(found[first.read].error):
         return None
-    own = [_own(found, layer) for layer in layers]
+    own = [own_error(found, layer) for layer in layers]
     if not all(np.isfinite(part).all() for part in own):
         return None
-    matrices = [layer.scale * _weight(program, layer) for layer in layers[1:]]
+    matrices = [layer.scale * weight_of(program, layer) for layer in layers[1:]]
     if not decomposable(matrices):
         return None
     errors = np.zeros(len(own[-1]))
@@ -124,7 +124,7 @@ def _work(matrices: Sequence[Array]) -> int:
     return sum(matrix.size * min(matrix.shape) for matrix in matrices)
 
 
-def _own(found: Sequence[Enclosure], layer: Layer) -> Array:
+def own_error(found: Sequence[Enclosure], layer: Layer) -> Array:
     """Return the errors (m,) that a layer's operations add, at its end: slopes are at most 1."""
     total = np.zeros(1)
     indices = {layer.affine: abs(layer.scale), layer.multiply: 1.0}
@@ -136,7 +136,7 @@ def _own(found: Sequence[Enclosure], layer: Layer) -> Array:
     return total
 
 
-def _weight(program: Program, layer: Layer) -> Array:
+def weight_of(program: Program, layer: Layer) -> Array:
     """Return the matrix (m, n) in float64."""
     return program.parameters[str(program.nodes[layer.affine]["weight"])].astype(np.float64)
 

@@ -3,7 +3,6 @@
 from fractions import Fraction
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -69,7 +68,7 @@ def test_partial_sums_in_any_order_are_within_the_bound(seed):
         1 + 2**-20
     )
     (lanes,) = sums.rounding(wide, b, point[None], point[None], blocks)
-    assert lanes == pytest.approx(bound)
+    assert abs(lanes[0] - bound) <= 2.0**-40 * bound  # float64 adds in another order
 
 
 def test_a_long_chain_of_equal_terms_comes_near_the_bound():

@@ -3,6 +3,7 @@
 1. A feature turns a layer of a frame into numbers near [-1, 1] [`FEATURES`], with scales that belong to the
    model, not to the frame [`Normalization`], [`normalization_of`].
 2. The chosen features, one after another on the channel axis, are the feature image [`feature_image`].
+   What is no number counts as 0 there, once and for all executors [`known`].
 3. The image is padded by the border rule [`pad`], so that every pixel has a full window; the window of a
    pixel is the network's input vector [`windows_at`].
 4. Training draws pixels uniformly from all frames with the counter generator [`sample_pixels`] and gathers
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 
 from .encoding import to_display
 from .errors import InputError
-from .frame import Frame
+from .frame import Frame, check_finite
 from .rng import counter, random_block
 from .vectors import vector
 
@@ -278,11 +279,20 @@ def _encoded(frame: Frame, feature: Feature, normalization: Normalization) -> Ar
         what = f"feature {feature.name!r}: layers of the frame"
         rule = f"layer {feature.layer!r} must be present"
         raise InputError(what, ", ".join(frame.layers), rule, "render it, or choose other features")
-    return feature.encode(frame[feature.layer].astype(np.float64), normalization)
+    return feature.encode(known(frame[feature.layer].astype(np.float64)), normalization)
+
+
+def known(values: Array) -> Array:
+    """Return the values (...) with 0 for NaN, as where nothing is hit; encodings clip infinities."""
+    return np.where(np.isnan(values), 0.0, values)
 
 
 def target_image(reference: Frame, normalization: Normalization) -> NDArray[np.float32]:
-    """Return the colours (H, W, 3) to learn: the reference's, encoded as the color feature is."""
+    """Return the colours (H, W, 3) to learn: the reference's, encoded as the color feature is.
+
+    What is no number is refused here: it would be learned.
+    """
+    check_finite("layer 'color' of the reference", reference["color"])
     return feature_image(reference, ("color",), normalization)
 
 
@@ -375,10 +385,12 @@ def build(
 
 
 def _check_pairs(pairs: Sequence[tuple[Frame, Frame]]) -> None:
-    """Refuse no pairs, and pairs whose pictures differ in size."""
+    """Refuse no pairs, pairs whose pictures differ in size, and noisy frames with what is no number."""
     if not pairs:
         raise InputError("training pairs", "none", "at least one", "give a noisy frame and its reference")
     for index, (noisy, reference) in enumerate(pairs):
+        for name, values in noisy.layers.items():
+            check_finite(f"pair {index}: layer {name!r}", values)
         sizes = [f"{frame.width}x{frame.height}" for frame in (noisy, reference)]
         if sizes[0] != sizes[1]:
             raise InputError(

@@ -145,7 +145,7 @@ def test_failure_at_the_second_name_leaves_whole_files_and_the_old_manifest(tmp_
     assert (tmp_path / "denoise.cl").read_text() == two.source
     assert (tmp_path / "weights.bin").read_bytes() == artifacts.weight_bytes(one)
     assert (tmp_path / "manifest.json").read_text() == artifacts.manifest_text(one)
-    assert len(list(tmp_path.iterdir())) == 3
+    assert len(list(tmp_path.iterdir())) == 4
 
 
 def test_two_writers_at_once_leave_whole_files(tmp_path):
@@ -156,7 +156,7 @@ def test_two_writers_at_once_leave_whole_files(tmp_path):
             assert (tmp_path / "denoise.cl").read_text() in {kernel.source for kernel in kernels}
     texts = {artifacts.manifest_text(kernel) for kernel in kernels}
     assert (tmp_path / "manifest.json").read_text() in texts
-    assert len(list(tmp_path.iterdir())) == 3
+    assert len(list(tmp_path.iterdir())) == 4
 
 
 # ---- refusals ------------------------------------------------------------------------------------------

@@ -65,8 +65,8 @@ def _minimum(operands: Sequence[Enclosure]) -> list[Near]:
     """Between 0 and 1 for each; 0 for one that is chosen by neither side."""
     a, b = operands
     reach = a.read + b.read
-    half = 0.5
-    return [Near(half * ~never, half * ~never) for never in (a.low - reach > b.high, b.low - reach > a.high)]
+    halves = [np.where(never, 0.0, 0.5) for never in (a.low - reach > b.high, b.low - reach > a.high)]
+    return [Near(half, half) for half in halves]
 
 
 def _maximum(operands: Sequence[Enclosure]) -> list[Near]:

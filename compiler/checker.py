@@ -49,7 +49,7 @@ def check(path: Path) -> dict[str, Any]:
     try:
         held, manifest, text, arrays = _read(path)
         layers, box = _layers(text)
-        promise = PROMISES.get(held["sine"]["text"])
+        promise: Any = PROMISES.get(held["sine"]["text"])
         if promise is None or promise.domain != (held["sine"]["domain"] or np.inf):
             raise Refused("sine: nobody promises it")
         _same("sine", manifest["sine"]["text"], promise.text)

@@ -23,10 +23,11 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..refimpl import factored
 from ..refimpl.factored import Factors
-from .bounds import OUTWARD, Enclosure, enclose, gamma
+from .bounds import OUTWARD, Enclosure, enclose
 from .interpret import interpret
 from .ir import Program
 from .profiles import EMITTED_COSINE, EMITTED_SINE, FLUSH
+from .sums import gamma
 
 Array = NDArray[Any]
 

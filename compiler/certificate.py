@@ -58,6 +58,8 @@ def prove(program: Program, found: Sequence[bounds.Enclosure], sine: SineContrac
     network = scaled.network(program, found, output)
     if sine.error is None or len(network) < 2 or program.nodes[network[0].read].op != "input":
         return None
+    if found[network[0].affine].own is None:  # a schedule's own sums, which the steps know nothing of
+        return None
     low, high = bounds.window_box(program.gather)  # type: ignore[arg-type]
     layers, own = [], []
     for number, layer in enumerate(network):

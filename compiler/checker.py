@@ -25,12 +25,13 @@ import numpy as np
 
 from ..refimpl.errors import InputError
 from .opencl import OpenCL
-from .profiles import EMITTED_SINE
+from .profiles import emitted_sine
+from .sine import POLYNOMIALS
 
 U, TINY, WIDER = 2.0**-24, 2.0**-126, 1 + 2.0**-34
 """float32's rounding and smallest normal number; a factor of more than float64 can be off in what follows."""
 
-PROMISES = {promise.text: promise for promise in (EMITTED_SINE, OpenCL.native_sine)}
+PROMISES = {promise.text: promise for promise in (*map(emitted_sine, POLYNOMIALS), OpenCL.native_sine)}
 """What is known of sines, by the name that a certificate gives."""
 
 BROKEN = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)

@@ -35,8 +35,8 @@ from .profiles import UNIT_ROUNDOFF
 
 Array = NDArray[np.float64]
 
-MOST_SORTED = 2**17
-"""Most terms, of all sums of all pixels, that are sorted: beyond, each addition counts as large as M."""
+MOST_SORTED = 2**8
+"""Most terms of each of many pixels that are sorted: beyond, each addition counts as large as M."""
 
 
 def gamma(n: int) -> float:
@@ -102,7 +102,7 @@ def _part(weight: Array, low: Array, high: Array, bias: Array | None = None) -> 
 
 def _additions(count: int, cap: Array, terms: Callable[[], Array]) -> Array:
     """Return how large all additions of `count` terms (..., count) are together; none is above cap (...)."""
-    if cap.ndim > 1 and cap.size * count > MOST_SORTED:
+    if cap.ndim > 1 and cap.shape[-1] * count > MOST_SORTED:
         return (count - 1) * cap
     largest = np.cumsum(-np.sort(-terms(), axis=-1), axis=-1)[..., 1:]
     found: Array = np.minimum(largest, cap[..., None]).sum(axis=-1)

@@ -83,13 +83,13 @@ def test_a_long_chain_of_equal_terms_comes_near_the_bound():
 
 
 def test_many_terms_count_as_large_as_their_sum():
-    """Beyond `MOST_SORTED` terms of all pixels, the bound is larger, and still below n gamma(n)."""
+    """Beyond `MOST_SORTED` terms of each of many pixels the bound is larger, and still below gamma(n)."""
     random = np.random.default_rng(2)
     weight, x = random.normal(size=(8, 64)), random.uniform(-1, 1, (400, 64))
-    assert sums.MOST_SORTED < 400 * 8 * 65
+    assert sums.MOST_SORTED < 8 * 64
     large = sums.rounding(weight, np.zeros(8), x, x, [np.arange(64)])
-    small = sums.rounding(weight, np.zeros(8), x[:4], x[:4], [np.arange(64)])
-    assert (small <= large[:4]).all()
+    small = sums.rounding(weight, np.zeros(8), x[0], x[0], [np.arange(64)])
+    assert (small < large[0]).all()
     assert (large <= sums.gamma(66) * (np.abs(x) @ np.abs(weight).T)).all()
 
 

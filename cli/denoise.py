@@ -24,6 +24,8 @@ wamnet denoise model.safetensors noisy.exr -o denoised.png
 
 wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr
 
+wamnet denoise model.safetensors noisy.exr --executor opencl --variant window8+rank16
+
 wamnet denoise small.safetensors noisy.exr --executor opencl --rank 16"""
 """Shown below the help of `wamnet denoise`."""
 
@@ -47,11 +49,13 @@ def denoise(
     executor: options.Executor = ExecutorName.numpy,
     schedule: options.Schedule = None,
     rank: options.CutRank = 0,
+    variant: options.Variant = None,
 ) -> None:
     """Denoise a frame with a trained model.
 
     The kernel's schedule is the one that suits the device, unless another is named.
     """
+    from ..compiler.variants import FULL
     from ..kernels import denoise_on, open_executor
     from . import exr
 
@@ -62,12 +66,12 @@ def denoise(
     )
     _say_what_is_no_number(frame, noisy, network)
     with open_executor(executor.value) as runner:
-        result = denoise_on(runner, network, noisy, schedule=schedule, rank=rank)
+        result = denoise_on(runner, network, noisy, schedule=schedule, rank=rank, variant=variant or FULL)
     write_denoised(output, result.image, network, noisy)
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")
     say(f"schedule {result.schedule}")
-    if rank:
-        say(result.cut)
+    if result.variant:
+        say(result.variant)
     say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation")
 
 

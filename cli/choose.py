@@ -153,9 +153,7 @@ def _kept_or_measured(
         say(f"curve: {len(kept.points)} points measured before, kept in {cache.folder() / key}.json")
         return kept
     with progress(f"measuring {len(names)} variants", 1.0) as advance:
-        found = measure_curve.measure(
-            runner, model, (side, side), profile, pairs, names, on_done=advance
-        )
+        found = measure_curve.measure(runner, model, (side, side), profile, pairs, names, on_done=advance)
     path = cache.write_json(key, found.as_data())
     where = f"kept in {path}" if path else "not kept: the cache folder cannot be written"
     say(f"curve: {len(found.points)} points measured now, {where}")

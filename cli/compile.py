@@ -94,7 +94,7 @@ def compile_model(
     kernel: Files
     if is_scene(model):
         of_models = {"--schedule": schedule, "--variant": variant, **request.options()}
-        _only_for("a model", of_models, f"{model} is a scene, whose kernels have one schedule and no variants")
+        _only_for("a model", of_models, f"{model} is a scene, whose kernels have one schedule, no variants")
         check_folder(folder, name, of_scene=True)
         scene = load_scene(model, time, parameters or [])
         kernel = _compiled_scene(scene, name, profile, max_depth, sampler, lanes)

@@ -122,8 +122,8 @@ CutRank = Annotated[
     typer.Option(
         "--rank",
         metavar="R",
-        help="Cut the first layer to this rank, and run it along rows, then columns: 16 halves the time. "
-        "Made for models that were trained with a rank: others lose much.",
+        help="Short for --variant rankR: cut the first layer to this rank, and run it along rows, then "
+        "columns. Trained on with it, a model loses little.",
         show_default="no cut",
     ),
 ]
@@ -132,8 +132,8 @@ Variant = Annotated[
     typer.Option(
         "--variant",
         metavar="NAME",
-        help="Fewer operations: [bold]full[/], or some of without-FEATURE, windowN, hiddenN, rankN, sineN with + "
-        "between them, as in window8+rank16.",
+        help="Fewer operations: [bold]full[/], or some of without-FEATURE, windowN, hiddenN, rankN, sineN "
+        "with + between them, as in window8+rank16.",
         show_default="full",
     ),
 ]
@@ -177,14 +177,15 @@ CurveFile = Annotated[
 CurveFrames = Annotated[
     Path | None,
     typer.Option(
-        "--frames", metavar="FOLDER", help="Data set whose test frames errors are measured on.", show_default=False
+        "--frames",
+        metavar="FOLDER",
+        help="Data set whose test frames errors are measured on.",
+        show_default=False,
     ),
 ]
 CurveSize = Annotated[
     int | None,
-    typer.Option(
-        "--size", metavar="N", help="Times are those of N x N pixels.", show_default="1024"
-    ),
+    typer.Option("--size", metavar="N", help="Times are those of N x N pixels.", show_default="1024"),
 ]
 Schedule = Annotated[
     str | None,

@@ -8,8 +8,8 @@
 3. What is left out is replaced by what is likely there [`_spread`], so that a picture that is constant is
    denoised as before.
 4. Each varied network is also one of the full network's shape, with zeros where something is left out
-   [`Varied.inside`]. With D = W' - W and d = b' - b a layer's sums move, for inputs in a box with the middle c
-   and the radius r, by at most |D c + d| + |D| r, besides what its inputs' own move passes on through |W'|
+   [`Varied.inside`]. With D = W' - W and d = b' - b a layer's sums move, for inputs in a box with the middle
+   c and the radius r, by at most |D c + d| + |D| r, besides what its inputs' own move passes on through |W'|
    [`enclose`]. The rules of bounds.py carry that to the output, and add what rounding does.
 
 The bound speaks of all images. Taps that are left out may hold anything: it says little for cuts (a picture
@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refimpl import dataset, factored
+from ..refimpl import factored
 from ..refimpl.dataset import FEATURES, Window
 from ..refimpl.denoise import Model
 from ..refimpl.errors import InputError
@@ -94,9 +94,11 @@ class Varied:
 
         Rows of neurons that are left out are as they were: nothing reads them.
         """
-        parameters = self.weights, self.biases
-        rounded = [tuple(np.float64(np.float32(a)) for a in arrays) for arrays in parameters]
-        return rounded[0], rounded[1]
+        weights, biases = (
+            tuple(array.astype(np.float32).astype(np.float64) for array in arrays)
+            for arrays in (self.weights, self.biases)
+        )
+        return weights, biases
 
     @property
     def products(self) -> int:
@@ -117,7 +119,7 @@ class Varied:
 
 
 def narrow_window(varied: Varied, size: int) -> Varied:
-    """Leave out the taps around the middle size x size; what they held is taken to be the mean of those left."""
+    """Leave out taps around the middle size x size; what they held is taken to be the mean of those left."""
     before, taps = varied.window.size, varied.window.size**2
     _check(f"window{size}", 1 <= size < before, f"the window has {before} x {before} taps", "window8")
     first = before // 2 - size // 2
@@ -140,9 +142,7 @@ def leave_out_feature(varied: Varied, name: str) -> Varied:
     weight, bias = varied.weights[0].copy(), varied.biases[0].copy()
     bias = bias + weight[:, gone].sum(axis=1) * (feature.low + feature.high) / 2
     weight[:, gone] = 0.0
-    moved = replace(
-        varied, weights=(weight, *varied.weights[1:]), biases=(bias, *varied.biases[1:])
-    )
+    moved = replace(varied, weights=(weight, *varied.weights[1:]), biases=(bias, *varied.biases[1:]))
     return replace(moved, kept=(varied.kept[0][chosen], *varied.kept[1:]), features=tuple(others))
 
 
@@ -185,7 +185,7 @@ def choose_sine(varied: Varied, degree: int) -> Varied:
 
 
 def _spread(varied: Varied, left: Indices, channels: int) -> Varied:
-    """Leave the inputs at these positions of `kept`; the weights of others go to all that are left, evenly."""
+    """Leave inputs at these positions of `kept`; the weights of others go to all that are left, evenly."""
     kept, weight = varied.kept[0], varied.weights[0].copy()
     chosen = kept[left]
     gone = np.setdiff1d(kept, chosen)
@@ -199,7 +199,7 @@ def _spread(varied: Varied, left: Indices, channels: int) -> Varied:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of approximation: what its name begins with, a sentence, its function, and what comes before it."""
+    """A kind of approximation: the beginning of its name, a sentence, its function, what comes before it."""
 
     name: str
     text: str
@@ -290,7 +290,7 @@ def _check(name: str, holds: bool, rule: str, way_out: str) -> None:
 
 
 def enclose(varied: Varied, target: str, profile: str) -> list[Enclosure]:
-    """Return enclosures of the full network's values for all images; errors are those of a variant's kernel."""
+    """Return enclosures of the full network's values for all images, errors being a variant's kernel's."""
     whole = analysed(lower(varied.whole))
     contract = sine_contract(varied.profile(profile), target)
     box = bounds.window_box(kernel_gather(whole))
@@ -331,7 +331,7 @@ def _moved(x: Enclosure, weight: Array, bias: Array) -> Array:
 
 
 def _two_passes(varied: Varied, target: str, profile: str, error: Array) -> Array:
-    """Return the error of the first layer's sums as two passes compute them, for the neurons that are left."""
+    """Return the error of the first layer's sums as two passes compute them, for neurons that are left."""
     cut = factor.factor(analysed(lower(varied.model)), varied.rank)
     found = factor.over_images(cut, sine_contract(varied.profile(profile), target))[cut.layer].error
     rows = varied.kept[1] if len(varied.kept) > 1 else np.arange(len(error))
@@ -341,7 +341,7 @@ def _two_passes(varied: Varied, target: str, profile: str, error: Array) -> Arra
 
 
 def bound_of(varied: Varied, target: str, profile: str) -> Array | None:
-    """Return how far each channel (3,) of a variant's kernel may be from the full network; None: any distance.
+    """Return how far each channel (3,) of a variant's kernel may be from the full network; None: no bound.
 
     In display-encoded colour, over all images, against float64.
     """
@@ -361,12 +361,10 @@ def program_of(model: Model, name: str) -> Program:
 def compile_variant(
     model: Model, name: str, target: str, profile: str = "ieee", schedule: str = PLAIN
 ) -> Artifact:
-    """Return the kernel of a variant; its manifest says under `variant` what was done and how far it moves."""
+    """Return the kernel of a variant; its manifest says under `variant` what was done and what it moves."""
     variant = parse(name)
     varied = vary(variant, model)
-    found = compile_program(
-        lower(varied.model), target, varied.profile(profile), schedule, varied.rank
-    )
+    found = compile_program(lower(varied.model), target, varied.profile(profile), schedule, varied.rank)
     if not variant.steps:
         return found
     return replace(found, manifest={**found.manifest, "variant": report(variant, varied, target, profile)})

@@ -83,7 +83,14 @@ def main() -> None:
         curve = measure(device, model, size, "ieee", tests, names, options.schedules)
         full = psnr(model, tests)
         print(f"{curve.device}, {options.size}x{options.size}; full network: {full:.2f} dB\n")
-        heads = ("variant", "products a pixel", "schedule", "ms", "loss, dB", f"after {options.tune} steps, dB")
+        heads = (
+            "variant",
+            "products a pixel",
+            "schedule",
+            "ms",
+            "loss, dB",
+            f"after {options.tune} steps, dB",
+        )
         print(f"| {' | '.join((*heads, 'largest error', 'bound'))} |\n|{'---|' * (len(heads) + 2)}")
         for name in names:
             best, after = fastest(curve.points, name), ""

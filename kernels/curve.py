@@ -46,8 +46,8 @@ class Point:
     def text(self) -> str:
         """Return the point for a reader."""
         return (
-            f"{self.variant}, schedule {self.schedule}: {self.milliseconds:.4g} ms, error {self.error_max:.3g}, "
-            f"PSNR loss {self.psnr_loss_db:.3g} dB"
+            f"{self.variant}, schedule {self.schedule}: {self.milliseconds:.4g} ms, "
+            f"error {self.error_max:.3g}, PSNR loss {self.psnr_loss_db:.3g} dB"
         )
 
 
@@ -197,7 +197,7 @@ def _point(entry: Mapping[str, Any]) -> Point:
     variants.parse(texts["variant"])
     numbers = {name: math.nan if entry[name] is None else float(entry[name]) for name in NUMBERS}
     assert {*texts, *numbers} == {field.name for field in fields(Point)}
-    return Point(**texts, **numbers)
+    return Point(texts["variant"], texts["schedule"], texts["executor"], *numbers.values())
 
 
 def read(path: Any) -> Curve:

@@ -146,9 +146,7 @@ def quality(
     return max(float(error.max()) for error in errors), mean, math.fsum(losses) / len(losses)
 
 
-def _compiled(
-    model: Model, name: str, executor: Executor, profile: str, schedule: str
-) -> Artifact | None:
+def _compiled(model: Model, name: str, executor: Executor, profile: str, schedule: str) -> Artifact | None:
     """Return the kernel of a variant, or None where this schedule or target cannot hold it."""
     try:
         artifact = variants.compile_variant(model, name, executor.name, profile, schedule)

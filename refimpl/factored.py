@@ -32,7 +32,7 @@ Array = NDArray[np.floating[Any]]
 
 
 SHARED = 0.5
-"""What two taps of a channel along an axis share of their power, by [`cut`], against a tap's own share of 1."""
+"""What two taps of a channel along an axis have in common, by [`cut`], against 1 that is a tap's own."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,9 @@ def expand(factors: Factors) -> Array:
 def cut(weight: Array, size: int, rank: int, shared: float = SHARED) -> Factors:
     """Return the factors of the weights of rank `rank` that give the sums of (D_out, D_in) most nearly.
 
-    Windows x with E[x x^T] = A (rows) times A (columns) of each channel, A = I + shared 1 1^T: the mean square
-    of (W - V H) x is the squared Frobenius norm of A^(1/2) (W - V H) A^(1/2). `shared` 0: the nearest weights.
+    Windows x with E[x x^T] = A (rows) times A (columns) of each channel, A = I + shared 1 1^T: the mean
+    square of (W - V H) x is the squared Frobenius norm of A^(1/2) (W - V H) A^(1/2). `shared` 0: the nearest
+    weights.
     """
     n_out, n_in = weight.shape
     check_rank(rank, size, n_in, n_out)
@@ -90,7 +91,8 @@ def cut(weight: Array, size: int, rank: int, shared: float = SHARED) -> Factors:
 def _power_of_ones(n: int, shared: float, exponent: float) -> Array:
     """Return (I + shared 1 1^T)^exponent (n, n): its eigenvalues are 1, and 1 + n shared along 1."""
     ones: Array = np.ones((n, n)) / n
-    return np.eye(n) + ((1.0 + n * shared) ** exponent - 1.0) * ones
+    power: Array = np.eye(n) + ((1.0 + n * shared) ** exponent - 1.0) * ones
+    return power
 
 
 def start(weight: Array, size: int, rank: int) -> Factors:

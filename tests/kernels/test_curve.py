@@ -23,7 +23,11 @@ def point(variant, ms, error=0.1, loss=0.0, schedule="tile16", mean=0.01):
     return Point(variant, schedule, "opencl", ms, error, mean, loss, 1.0)
 
 
-FULL, RANK, NARROW = point("full", 100.0, 1e-6), point("rank16", 40.0, 0.2, 0.3), point("window8", 60.0, 0.1, 0.1)
+FULL, RANK, NARROW = (
+    point("full", 100.0, 1e-6),
+    point("rank16", 40.0, 0.2, 0.3),
+    point("window8", 60.0, 0.1, 0.1),
+)
 POINTS = (FULL, RANK, NARROW)
 """Three points: the faster, the less accurate."""
 
@@ -87,11 +91,15 @@ def test_numbers_that_are_none_break_every_rule(number) -> None:
 
 
 def test_where_nothing_fits_the_nearest_point_is_named() -> None:
-    with pytest.raises(InputError, match="limit is --max-ms 30: no point .* nearest is rank16, schedule tile16"):
+    with pytest.raises(
+        InputError, match=r"limit is --max-ms 30: no point .* nearest is rank16, schedule tile16"
+    ):
         choose(POINTS, Limits(max_ms=30.0))
-    with pytest.raises(InputError, match="nearest is window8.*: 60 ms"):
+    with pytest.raises(InputError, match=r"nearest is window8.*: 60 ms"):
         choose(POINTS, Limits(max_ms=50.0, max_error=0.1))
-    with pytest.raises(InputError, match="--max-loss-db -1: no point of the curve keeps it; the nearest is full"):
+    with pytest.raises(
+        InputError, match="--max-loss-db -1: no point of the curve keeps it; the nearest is full"
+    ):
         choose(POINTS, Limits(max_loss_db=-1.0))
     with pytest.raises(InputError, match="curve is 0 points: no point of the curve has a time"):
         choose([], Limits(max_ms=1.0))
@@ -158,10 +166,10 @@ def test_data_that_are_no_curve_are_refused(message) -> None:
 
 
 def test_files_that_are_no_curve_are_refused(tmp_path) -> None:
-    with pytest.raises(InputError, match="curve file is .*: cannot be read"):
+    with pytest.raises(InputError, match=r"curve file is .*: cannot be read"):
         curve.read(tmp_path / "none.json")
     (tmp_path / "half.json").write_text("{")
-    with pytest.raises(InputError, match="curve file is .*: is no JSON"):
+    with pytest.raises(InputError, match=r"curve file is .*: is no JSON"):
         curve.read(tmp_path / "half.json")
 
 
@@ -189,7 +197,9 @@ def test_the_cache_gives_only_what_is_wanted(tmp_path, monkeypatch) -> None:
 def test_keys_tell_everything_apart() -> None:
     keys = [curve.key_of(CURVE, "opencl", "frames", ["full"])]
     keys += [curve.key_of(replace(CURVE, size=(64, 65)), "opencl", "frames", ["full"])]
-    keys += [curve.key_of(CURVE, *rest) for rest in (("numpy", "frames", ["full"]), ("opencl", "f", ["full"]))]
+    keys += [
+        curve.key_of(CURVE, *rest) for rest in (("numpy", "frames", ["full"]), ("opencl", "f", ["full"]))
+    ]
     keys += [curve.key_of(CURVE, "opencl", "frames", ["full", "rank2"])]
     assert len(set(keys)) == len(keys)
 

@@ -1,4 +1,4 @@
-"""Variants on every executor: a kernel is the varied network up to rounding, and within the bound of the full one."""
+"""Variants on every executor: the varied network up to rounding, the full one up to the variant's bound."""
 
 from __future__ import annotations
 

@@ -25,7 +25,6 @@ from .terminal import say
 if TYPE_CHECKING:
     from ..compiler.artifact import Artifact, Files
     from ..compiler.path_kernel import PathArtifact
-    from ..refimpl.denoise import Model
     from ..refimpl.scene import Scene
 
 EXAMPLES = """Examples:
@@ -104,8 +103,12 @@ def compile_model(
         _only_for("a scene", of_scenes, f"{model} is no scene: neither a canonical one nor a .json file")
         _check_name(model)
         check_folder(folder, name)
-        check_request(request, variant)
-        kernel = _compiled_model(load_model(Path(model)), name, profile, schedule, variant, request)
+        kernel = _compiled_model(Path(model), name, profile, schedule, variant, request)
+    _write(kernel, folder, schedule)
+
+
+def _write(kernel: Files, folder: Path, schedule: str | None) -> None:
+    """Write a kernel, and say its files, and why its schedule is another one."""
     for path in write_kernel(kernel, folder):
         say(str(path))
     if reason := kernel.manifest.get("schedule", {}).get("reason"):
@@ -113,12 +116,14 @@ def compile_model(
 
 
 def _compiled_model(
-    model: Model, target: str, profile: str, schedule: str | None, variant: str | None, request: Request
+    path: Path, target: str, profile: str, schedule: str | None, variant: str | None, request: Request
 ) -> Artifact:
     """Return the kernel of a model: of a variant that is named, or that keeps limits, or of all of it."""
     from ..compiler.schedules import PLAIN
     from ..compiler.variants import FULL, compile_variant
 
+    check_request(request, variant)
+    model = load_model(path)
     if request.limited:
         variant, schedule = choose(model, request, target, profile, schedule)
     return compile_variant(model, variant or FULL, target, profile, schedule or PLAIN)

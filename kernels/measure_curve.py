@@ -25,6 +25,7 @@ from ..refimpl import dataset, metrics
 from ..refimpl.denoise import Model, denoise
 from ..refimpl.errors import CompileError, InputError
 from ..refimpl.frame import Frame
+from ..refimpl.rng import counter, random_block, uniform_floats
 from .curve import Curve, Point
 from .denoise_on import images_of
 from .executor import Executor, Images
@@ -47,6 +48,9 @@ REPEATS = 5
 
 PAUSE_S = 0.05
 """Seconds before each run: no other library runs here whose threads would go on spinning."""
+
+NOISE_TAG = 0x4E4F4953
+"""Counter `block` of the words that become noise ("NOIS" in ASCII)."""
 
 Pairs = Sequence[tuple[Frame, Frame]]
 Done = Callable[[float], None]
@@ -117,10 +121,13 @@ def promising(executor: Executor, model: Model, profile: str) -> tuple[str, ...]
 
 def noise(model: Model, size: tuple[int, int]) -> Images:
     """Return images (H, W, C) of random numbers in the ranges of the model's features, by name."""
-    random = np.random.default_rng(1)
     found = {}
-    for feature in (dataset.FEATURES[name] for name in model.features):
-        drawn = random.random((*size, feature.channels), dtype=np.float32)
+    for number, feature in enumerate(dataset.FEATURES[name] for name in model.features):
+        count = size[0] * size[1] * feature.channels
+        blocks = counter(np.arange((count + 3) // 4))
+        words = random_block(counter(1), blocks, counter(number), counter(NOISE_TAG))
+        drawn = uniform_floats(np.stack(words, axis=-1).reshape(-1)[:count], np.float32)
+        drawn = drawn.reshape(*size, feature.channels)
         found[feature.name] = np.float32(feature.low) + np.float32(feature.high - feature.low) * drawn
     return found
 

@@ -85,7 +85,6 @@ def test_a_rank_cuts_the_first_layer(wamnet, here) -> None:
     ("options", "reason"),
     [
         (["--rank", 9999], "has ranks from 1 to"),
-        (["--rank", 2, "--executor", "opengl"], "between both passes"),
     ],
 )
 def test_a_rank_that_cannot_be_is_refused(wamnet, here, options, reason) -> None:

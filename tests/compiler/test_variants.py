@@ -213,7 +213,9 @@ def test_the_bound_of_a_linear_network_is_reached(name, neurons) -> None:
     worst = np.where(slope[0] * outward > 0, high, low)
     moved = abs(middle[0] + slope[0] @ worst)
     (bound, *_) = variants.bound_of(varied, "opencl", "ieee")
-    assert moved <= bound + 2e-7
+    # Its sine is not quite the line that `moved` is computed with: see above.
+    curved = 1e-2**3 / 6
+    assert moved <= bound + curved
     # Beside the move there is rounding: that of a sine, as the next layer weighs it, and of sums below 1.
     rounding = 2 * sine.POLYNOMIALS[11].error * np.abs(whole[1]).sum(axis=1).max()
     assert bound <= moved + rounding + 2 * 97 * 2.0**-24

@@ -79,7 +79,11 @@ def test_a_kernel_is_its_variant(executor_named, target, schedule, name) -> None
     promise = variants.bound_of(varied, target, "ieee")
     assert (np.abs(found - full).max(axis=(0, 1)) <= promise).all()
     if name == "full":
-        assert (promise < 1e-3).all(), "the bound of nothing left out is that of rounding"
+        alone = bounds.over_box(program, {"window": bounds.window_box(program.gather)}, contract)
+        # Nothing is left out: it is the bound of rounding, which both compute, widened once more in each of
+        # three layers.
+        (alone,) = alone.values()
+        assert (promise <= (1 + 4 * bounds.OUTWARD) ** 3 * alone).all()
 
 
 def test_denoise_on_runs_variants(executor_named) -> None:

@@ -39,7 +39,8 @@ from numpy.typing import NDArray
 
 from wamnet.cli import machine
 from wamnet.compiler import bounds
-from wamnet.compiler.compile import analysed, compile_program, sine_contract
+from wamnet.compiler.artifact import Artifact
+from wamnet.compiler.compile import analysed, compile_program, schedule_named, sine_contract
 from wamnet.compiler.factor import at_images, factor, product
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.lower import lower
@@ -64,7 +65,7 @@ MATRIX = 4096
 PAUSE_S = 0.3
 """Seconds before a measurement: threads of OpenMP and OpenBLAS spin for a while after their last work."""
 
-WAYS = ("opencl:plain", "opencl:vector16", "opencl:tile16", "torch", "torch.compile")
+WAYS = ("opencl:plain", "opencl:vector16", "opencl:tile16", "opencl:fft32", "torch", "torch.compile")
 """What is measured by default: what takes less than a few seconds a frame."""
 
 FACTOR = np.full((MATRIX, MATRIX), 0.5, np.float32)
@@ -161,7 +162,7 @@ def _images(model: Model, size: int) -> Images:
     return images
 
 
-def _expected(model: Model, crop: Images, rank: int = 0) -> tuple[Any, float]:
+def _expected(model: Model, crop: Images, rank: int = 0, made: Artifact | None = None) -> tuple[Any, float]:
     """Return the float64 reference on the crop, and the largest bound there; of a rank: of rounding alone."""
     program, contract = analysed(lower(model)), sine_contract("ieee", "opencl")
     joined = np.concatenate(list(crop.values()), axis=-1)
@@ -170,6 +171,9 @@ def _expected(model: Model, crop: Images, rank: int = 0) -> tuple[Any, float]:
         cut = factor(program, rank)
         found = bounds.output_errors(program, at_images(cut, contract, crop, of_cut=False))
         program = product(cut)
+    elif made:
+        schedule = schedule_named(made.target, made.manifest["schedule"]["name"])
+        found = bounds.output_errors(program, schedule.enclosures(program, contract, crop))
     else:
         found = bounds.at_inputs(program, windows, contract)
     (reference,), (bound,) = interpret(program, windows, np.float64).values(), found.values()
@@ -209,7 +213,7 @@ def _way(name: str, model: Model, images: Images, crop: Images) -> Way | None:
     run, on_crop = (partial(executor.run, artifact, given) for given in (images, crop))
     kernel = partial(executor.kernel_seconds, artifact, images) if target == "opencl" else None
     weights = sum(a.size for k in artifact.kernels for a in k.program.parameters.values() if a.ndim == 2)
-    return Way(run, on_crop, seconds, weights, _expected(model, crop, number), kernel=kernel)
+    return Way(run, on_crop, seconds, weights, _expected(model, crop, number, artifact), kernel=kernel)
 
 
 def _torch(compiled: bool, model: Model, images: Images, crop: Images) -> Way:

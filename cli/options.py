@@ -108,7 +108,7 @@ Profile = Annotated[
     typer.Option(
         "--profile",
         help="What the arithmetic promises: [bold]ieee[/] brings its own sine and a bound on the error, "
-        "[bold]native[/] uses the target's sine.",
+        "[bold]ieee-sine7[/] one of degree 7 (3 to 13), [bold]native[/] uses the target's sine.",
     ),
 ]
 Trainer = Annotated[

@@ -29,6 +29,7 @@ from .glsl import GLSL
 from .glsl_inlined import GLSL_LADDER
 from .ir import OUTPUT_ENCODING, Gather, Program
 from .opencl import OpenCL
+from .opencl_fourier import OPENCL_FOURIER
 from .opencl_tiled import OPENCL_LADDER
 from .passes import pipeline
 from .profiles import Profile, SineContract
@@ -77,7 +78,7 @@ TARGETS: Mapping[str, Target] = {
             SineContract("np.sin, whose documentation promises nothing", None),
             (Printed(),),
         ),
-        _dialect_target(OpenCL(), *OPENCL_LADDER),
+        _dialect_target(OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER),
         _dialect_target(GLSL(), *GLSL_LADDER),
     )
 }
@@ -113,16 +114,16 @@ def sine_contract(profile: str, target: str) -> SineContract:
     return profiles.profile_named(profile).sine or target_named(target).native_sine
 
 
-def bound_over_images(program: Program, profile: str, target: str, cut: Cut | None = None) -> Bound:
+def bound_over_images(
+    program: Program, profile: str, target: str, cut: Cut | None = None, schedule: Schedule | None = None
+) -> Bound:
     """Return the bound of an analysed program over all that its images can hold, or refuse it.
 
-    `cut`: it is run as these two passes.
+    `cut`: it is run as these two passes; `schedule`: not the plain one.
     """
     contract = sine_contract(profile, target)
-    if cut:
-        found = over_images(cut, contract)
-    else:
-        found = bounds.enclose(program, {"window": bounds.window_box(kernel_gather(program))}, contract)
+    chosen = schedule or target_named(target).schedules[0]
+    found = over_images(cut, contract) if cut else chosen.enclosures(program, contract)
     if profiles.profile_named(profile).sine is not None:
         _check_sizes(program, found)
     sines = [index for index, node in enumerate(program.nodes) if node.op == "sin"]
@@ -183,7 +184,9 @@ def compile_program(
     kernel_gather(program)
     common = analysed(program)
     if not rank:
-        return _compiled(common, chosen, profile, schedule, bound_over_images(common, profile, target))
+        picked = _picked(common, chosen, profile, schedule).schedule
+        bound = bound_over_images(common, profile, target, schedule=picked)
+        return _compiled(common, chosen, profile, schedule, bound)
     if chosen.most is not None and rank > chosen.most:
         raise CompileError(
             f"rank {rank}: the image between both passes has as many channels, and {chosen.language} "
@@ -249,6 +252,17 @@ def _compiled(
     return _assemble(common, emitted, chosen, promised, bound, picked, source)
 
 
+def schedule_named(target: str, name: str) -> Schedule:
+    """Return the schedule of this name of a target."""
+    return {schedule.name: schedule for schedule in target_named(target).schedules}[name]
+
+
+def _picked(common: Program, chosen: Target, profile: str, schedule: str) -> Pick:
+    """Return the schedule of an analysed program."""
+    emitted = pipeline.run(common, profiles.profile_named(profile).passes)
+    return pick(chosen.schedules, schedule, emitted)
+
+
 def _header(program: Program, target: Target, profile: Profile, bound: Bound, picked: Pick) -> list[str]:
     """Return the lines of the comment at the top of the source."""
     gather, channels = kernel_gather(program), output_channels(program)
@@ -257,7 +271,7 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound, pi
         for i in gather.images
     ]
     encoding = dict(program.info).get(OUTPUT_ENCODING)
-    arguments = picked.schedule.arguments.format(channels=channels).split("\n")
+    arguments = _arguments(picked, channels).split("\n")
     rows, columns = gather.rows, gather.columns
     tap = f"{rows // 2}" if rows == columns else f"({rows // 2}, {columns // 2})"
     return [
@@ -275,6 +289,12 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound, pi
         f"arguments {arguments[0]}",
         *(f"          {line}" for line in arguments[1:]),
     ]
+
+
+def _arguments(picked: Pick, channels: int) -> str:
+    """Return how a kernel is called."""
+    columns, rows = picked.extent
+    return picked.schedule.arguments.format(channels=channels, columns=columns, rows=rows)
 
 
 def _weight_lines(program: Program, schedule: Schedule) -> list[str]:
@@ -333,7 +353,7 @@ def _assemble(
             "channels": output_channels(emitted),
             "encoding": dict(emitted.info).get(OUTPUT_ENCODING, ""),
         },
-        "arguments": schedule.arguments.format(channels=output_channels(emitted)),
+        "arguments": _arguments(picked, output_channels(emitted)),
         "bound": {
             "output": bound.output and [round_up(error) for error in bound.output],
             "against": "float64 reference, same float32 weights and images",

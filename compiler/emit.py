@@ -250,6 +250,8 @@ class Body(Lines):
                 self._line(self._declaration(index))
         statements = []
         for index in group:
+            if self._fuses(index):
+                continue
             kind = self.dialect.variable(self.program.nodes[index].type.dtype)
             statements.append(f"{kind} t{index} = {self._expression(index, lane)};")
             if shape and self._is_array(index):
@@ -263,6 +265,10 @@ class Body(Lines):
             return self._read(node.args[0], str(node["index"]))
         operands = [self._read(arg, lane, self.group_of[index]) for arg in node.args]
         return self.dialect.expression(node, self.program.nodes[node.args[-1]].type.dtype, operands)
+
+    def _fuses(self, index: int) -> bool:
+        """Return whether a value has no name, but stands in the only expression that reads it."""
+        return False
 
     def _outputs(self) -> None:
         """Write the only output to the result."""
@@ -311,7 +317,7 @@ class Body(Lines):
         if node.op == "parameter":
             return self._weight(_plus(self.slots[str(node["name"])].offset, lane))
         if not node.type.shape or self.group_of[index] == group:
-            return f"t{index}"
+            return self._expression(index, lane) if self._fuses(index) else f"t{index}"
         return self._element(index, lane)
 
     def _element(self, index: int, lane: str) -> str:

@@ -35,7 +35,7 @@ from ..refimpl.siren import Siren
 from . import bounds, factor, ir, sine
 from .artifact import Artifact
 from .bounds import Enclosure
-from .compile import analysed, compile_program, round_up, sine_contract
+from .compile import analysed, compile_program, round_up, schedule_named, sine_contract
 from .emit import kernel_gather
 from .ir import Program
 from .lower import lower
@@ -289,7 +289,7 @@ def _check(name: str, holds: bool, rule: str, way_out: str) -> None:
 # ---- bounds -----------------------------------------------------------------------------------------------
 
 
-def enclose(varied: Varied, target: str, profile: str) -> list[Enclosure]:
+def enclose(varied: Varied, target: str, profile: str, schedule: str = PLAIN) -> list[Enclosure]:
     """Return enclosures of the full network's values for all images, errors being a variant's kernel's."""
     whole = analysed(lower(varied.whole))
     contract = sine_contract(varied.profile(profile), target)
@@ -309,8 +309,8 @@ def enclose(varied: Varied, target: str, profile: str) -> list[Enclosure]:
             for parameters in (outside, inside)
         )
         error = kernel.error
-        if layer == 0 and varied.rank:
-            error = _two_passes(varied, target, profile, error)
+        if layer == 0:
+            error = _first_error(varied, target, profile, schedule, error)
         known[index] = replace(
             kernel,
             low=wanted.low,
@@ -330,23 +330,30 @@ def _moved(x: Enclosure, weight: Array, bias: Array) -> Array:
     return found
 
 
-def _two_passes(varied: Varied, target: str, profile: str, error: Array) -> Array:
-    """Return the error of the first layer's sums as two passes compute them, for neurons that are left."""
-    cut = factor.factor(analysed(lower(varied.model)), varied.rank)
-    found = factor.over_images(cut, sine_contract(varied.profile(profile), target))[cut.layer].error
-    rows = varied.kept[1] if len(varied.kept) > 1 else np.arange(len(error))
-    passes = np.array(np.broadcast_to(error, varied.biases[0].shape))
-    passes[rows] = found
-    return passes
+def _first_error(varied: Varied, target: str, profile: str, schedule: str, error: Array) -> Array:
+    """Return the error of the first layer's sums as the kernel computes them: one pass, two, or spectra.
+
+    `error` is that of one pass; neurons that are left out keep it.
+    """
+    program, contract = analysed(lower(varied.model)), sine_contract(varied.profile(profile), target)
+    if varied.rank:
+        found = factor.over_images(factor.factor(program, varied.rank), contract)
+    else:
+        found = schedule_named(target, schedule).enclosures(program, contract)
+    layer = next(index for index, node in enumerate(program.nodes) if node.op == "affine")
+    rows = varied.kept[1] if len(varied.kept) > 1 else np.arange(len(varied.biases[0]))
+    errors = np.array(np.broadcast_to(error, varied.biases[0].shape))
+    errors[rows] = found[layer].error
+    return errors
 
 
-def bound_of(varied: Varied, target: str, profile: str) -> Array | None:
+def bound_of(varied: Varied, target: str, profile: str, schedule: str = PLAIN) -> Array | None:
     """Return how far each channel (3,) of a variant's kernel may be from the full network; None: no bound.
 
     In display-encoded colour, over all images, against float64.
     """
     whole = analysed(lower(varied.whole))
-    (errors,) = bounds.output_errors(whole, enclose(varied, target, profile)).values()
+    (errors,) = bounds.output_errors(whole, enclose(varied, target, profile, schedule)).values()
     return np.minimum(errors, LARGEST_DIFFERENCE) if np.isfinite(errors).all() else None
 
 
@@ -367,12 +374,15 @@ def compile_variant(
     found = compile_program(lower(varied.model), target, varied.profile(profile), schedule, varied.rank)
     if not variant.steps:
         return found
-    return replace(found, manifest={**found.manifest, "variant": report(variant, varied, target, profile)})
+    used = found.manifest["schedule"]["name"]
+    return replace(
+        found, manifest={**found.manifest, "variant": report(variant, varied, target, profile, used)}
+    )
 
 
-def report(variant: Variant, varied: Varied, target: str, profile: str) -> Mapping[str, Any]:
+def report(variant: Variant, varied: Varied, target: str, profile: str, schedule: str) -> Mapping[str, Any]:
     """Return what a manifest says about a variant."""
-    bound = bound_of(varied, target, profile)
+    bound = bound_of(varied, target, profile, schedule)
     return {
         "name": variant.name,
         "approximations": [f"{kind}{value}" for kind, value in variant.steps],

@@ -182,7 +182,7 @@ def _untimed(
     pictures = [executor.run(artifact, images_of(varied.model, noisy)) for noisy, _ in pairs]
     targets = [dataset.target_image(clean, scales) for _, clean in pairs]
     found = quality(pictures, full, targets)
-    bound = variants.bound_of(varied, executor.name, profile)
+    bound = variants.bound_of(varied, executor.name, profile, schedule)
     return Point(
         name, schedule, executor.name, math.nan, *found, math.nan if bound is None else float(bound.max())
     )

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from ...refimpl.errors import CompileError
 from ..ir import Program
+from ..profiles import EXPAND_SINE
+from ..sine import POLYNOMIALS
 from ..verify import verify
 from .eliminate_dead import eliminate_dead
 from .expand_sine import expand_sine
@@ -20,7 +23,8 @@ PASSES: Mapping[str, Callable[[Program], Program]] = {
     "scalarize": scalarize,
     "expand_tables": expand_tables,
     "fuse_bias": fuse_bias,
-    "expand_sine": expand_sine,
+    EXPAND_SINE: expand_sine,
+    **{f"{EXPAND_SINE}_{degree}": partial(expand_sine, degree=degree) for degree in POLYNOMIALS},
     "eliminate_dead": eliminate_dead,
 }
 """All passes, by name."""

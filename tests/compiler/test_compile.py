@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from wamnet.compiler import artifact as artifacts
 from wamnet.compiler import ir
 from wamnet.compiler.compile import TARGETS, analysed, compile_program, round_up
+from wamnet.compiler.emit_tiled import refused_by_vectors
+from wamnet.compiler.glsl_inlined import GLSLInlined
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.lower import lower
@@ -237,6 +239,16 @@ def test_too_many_output_channels_for_a_fragment():
         CompileError, match=r"output has 33 channels: GLSL .* writes at most 32; compile for another"
     ):
         compile_program(gathered(lambda x: x, channels=33), "opengl")
+
+
+def test_a_schedule_that_writes_fewer_channels_gives_way():
+    """A language may have one form with several results and one without; no target has both yet."""
+    dialect = GLSLInlined()
+    dialect.max_output_channels = 4
+    w = np.ones((5, 5), np.float32)
+    assert "it writes 5 channels, of at most 4" in refused_by_vectors(
+        gathered(lambda x: x @ w, channels=5), dialect
+    )
 
 
 @pytest.mark.parametrize("channels", [1, 4, 5, 8, 11])

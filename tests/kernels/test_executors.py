@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from contextlib import ExitStack
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +15,10 @@ from hypothesis import strategies as st
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.interpret import interpret
+from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.lower import lower
-from wamnet.kernels import denoise_on
+from wamnet.compiler.trace import trace
+from wamnet.kernels import denoise_on, open_executor
 from wamnet.refimpl import dataset, denoise, frame
 from wamnet.refimpl.errors import CompileError, InputError
 
@@ -349,3 +352,21 @@ def test_too_large_a_texture_is_refused(executor_named, kit):
         InputError, match="texture for 'a' is 100000 x 1 with 1 channels: this OpenGL takes at most"
     ):
         executor.run(artifact, {"a": np.zeros((1, 100000, 1), np.float32)})
+
+
+def test_two_contexts_that_open_before_either_runs(executor_named):
+    """EGL took its context for the current one, and drew in OSMesa: black, or another kernel's picture."""
+    kinds = ("egl", "osmesa")
+    for kind in kinds:
+        executor_named(f"opengl-{kind}")  # or the test is skipped
+    gather = Gather(dataset.Window(1, "clamp"), (Image("a", 1, 0.0, 1.0),))
+    artifacts = [
+        compile_program(trace(lambda x, f=factor: x * f, {"window": Type(shape=(1,))}, gather), "opengl")
+        for factor in (2.0, 3.0)
+    ]
+    with ExitStack() as opened:
+        found = [opened.enter_context(open_executor("opengl", context=kind)) for kind in kinds]
+        for executor in found:
+            for artifact, factor in zip(artifacts, (2.0, 3.0), strict=True):
+                picture = executor.run(artifact, {"a": np.full((2, 2, 1), 0.25, np.float32)})
+                assert np.array_equal(picture, np.full((2, 2, 1), 0.25 * factor, np.float32))

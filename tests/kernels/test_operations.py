@@ -9,7 +9,7 @@ from wamnet.compiler.bounds import NO_BOUND
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ops import LOOPS, OPS
-from wamnet.compiler.sine import COSINE_ERROR
+from wamnet.compiler.profiles import EMITTED_COSINE
 from wamnet.refimpl import rng
 
 W = np.array([[1.5, -2.0, 0.25, 3.0], [0.1, 0.2, -0.3, 0.7]], np.float32)
@@ -150,10 +150,10 @@ def test_random_numbers_are_those_of_the_reference(executor, kit, image):
 
 
 def test_cosine_without_a_bound_is_near(executor, kit, image):
-    """Every target's cosine is right to 2^-11 on [-pi, pi], and the emitted one to COSINE_ERROR."""
+    """Every target's cosine is right to 2^-11 on [-pi, pi], and the emitted one to its contract."""
     program = kit.program(lambda x: np.cos(1.5 * x), {"a": 4})
     exact = np.cos((np.float32(1.5) * image).astype(np.float64))
-    for profile, error in (("ieee", COSINE_ERROR), ("native", 2.0**-11)):
+    for profile, error in (("ieee", EMITTED_COSINE.error), ("native", 2.0**-11)):
         artifact = compile_program(program, executor.name, profile)
         assert artifact.manifest["bound"]["output"] is None
         assert np.max(np.abs(executor.run(artifact, {"a": image}) - exact)) <= error

@@ -123,6 +123,19 @@ def test_constant_pictures_are_denoised_as_before() -> None:
     assert np.abs(denoised(dropped, flat) - denoised(model, flat)).max() <= 96 * 1e3 * 2.0**-25 / 16
 
 
+@pytest.mark.parametrize("name", ["window3", "without-normal+window2"])
+def test_a_narrow_window_keeps_each_channel_s_sum(name) -> None:
+    """What a channel adds to a neuron in a picture of one colour."""
+    varied = vary(parse(name), small())
+    before, after = (
+        np.asarray(w, np.float64).reshape(7, 16, 6).sum(axis=1)
+        for w in (small().siren.weights[0], varied.weights[0])
+    )
+    left = slice(0, 3) if "without" in name else slice(0, 6)
+    # Sums of 16 weights below 1, added up in another order, and divided.
+    assert np.abs(after - before)[:, left].max() <= 3 * 16 * 2.0**-52
+
+
 def test_the_middle_of_the_window_stays() -> None:
     """With weights at the pixel itself alone nothing is lost, for even and odd sizes."""
     for size in (4, 5):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..compiler import schedules
 from ..compiler.artifact import Artifact
+from ..compiler.ir import sha256
 from ..compiler.variants import FULL, compile_variant, parse, vary
 from ..refimpl.dataset import feature_image
 from ..refimpl.denoise import Model
@@ -34,6 +35,11 @@ class RunResult:
     device: str
     schedule: str
     variant: str = ""
+
+    @property
+    def digest(self) -> str:
+        """Return the SHA-256 of the picture's numbers, little-endian float32, rows from the top."""
+        return sha256(self.image.astype("<f4").tobytes())
 
 
 def images_of(model: Model, frame: Frame) -> Images:

@@ -88,11 +88,17 @@ class Tiled(Schedule):
         """Return why this schedule cannot hold the program, or nothing."""
         if reason := refused_by_vectors(program, self.dialect):
             return reason
+        if reason := self._shared_matrix(program):
+            return reason
+        if (found := self.private_bytes(program)) > LARGEST_PRIVATE:
+            return f"its arrays take {found} bytes a work item, of at most {LARGEST_PRIVATE}"
+        return ""
+
+    def _shared_matrix(self, program: Program) -> str:
+        """Return a refusal where one matrix is needed in two orders."""
         used = _readers_of_window(program)
         if _matrices(used) & _matrices(node for node in program.nodes if node not in used):
             return "a matrix is applied to the window and to a layer, which need it in two orders"
-        if (found := self.private_bytes(program)) > LARGEST_PRIVATE:
-            return f"its arrays take {found} bytes a work item, of at most {LARGEST_PRIVATE}"
         return ""
 
     def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
@@ -127,7 +133,7 @@ class Tiled(Schedule):
         for name, slot in self.layout(program).items():
             rows = np.atleast_2d(program.parameters[name].T)  # (D_in, D_out), or (1, D_out)
             if name in windowed:
-                rows = rows[_image_by_image(gather)]
+                rows = rows[self._window_rows(gather)]
             blocks = self.blocks(rows.shape[1])
             filled = np.zeros((len(rows), blocks.total * self.lanes), np.float32)
             filled[:, : rows.shape[1]] = rows
@@ -135,7 +141,13 @@ class Tiled(Schedule):
             pieces.append(by_block.reshape(slot.shape).ravel())
         return np.concatenate(pieces)
 
-    def _body(self, program: Program) -> TiledBody:
+    def _window_rows(self, gather: Gather) -> NDArray[np.intp]:
+        """Return the window's indices (n_inputs,): image by image, in each tap by tap, channel by channel."""
+        taps = np.arange(gather.n_inputs).reshape(-1, gather.channels)
+        ends = np.cumsum([image.channels for image in gather.images])[:-1]
+        return np.concatenate([part.ravel() for part in np.split(taps, ends, axis=1)])
+
+    def _body(self, program: Program) -> Body:
         """Return the writer of the kernel's statements."""
         return TiledBody(program, self.dialect, kernel_gather(program), tile=self)
 
@@ -149,13 +161,6 @@ def _readers_of_window(program: Program) -> list[Node]:
 def _matrices(nodes: Iterable[Node]) -> set[str]:
     """Return the names of the matrices that affine maps among these nodes apply."""
     return {str(node["weight"]) for node in nodes if node.op == "affine"}
-
-
-def _image_by_image(gather: Gather) -> NDArray[np.intp]:
-    """Return the window's indices (n_inputs,): image by image, in each tap by tap, channel by channel."""
-    taps = np.arange(gather.n_inputs).reshape(-1, gather.channels)
-    ends = np.cumsum([image.channels for image in gather.images])[:-1]
-    return np.concatenate([part.ravel() for part in np.split(taps, ends, axis=1)])
 
 
 @dataclass

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -34,13 +34,15 @@ class Schedule(ABC):
     """One way to order a kernel's work; `idea` is the sentence that sets this rung apart from the last.
 
     `arguments` says how to call the kernel, `pixels` how many neighbours of a row a work item computes,
-    `order` how a matrix lies among the weights.
+    `order` how a matrix lies among the weights; `language` and `suffix` are set where they are its own.
     """
 
     name: str
     idea: str
     arguments: str
     pixels: int = 1
+    language: str = ""
+    suffix: str = ""
     order: str = "matrices input-major: D_in x D_out, in C order"
 
     def refusal(self, program: Program) -> str:
@@ -54,6 +56,10 @@ class Schedule(ABC):
     @abstractmethod
     def private_bytes(self, program: Program) -> int:
         """Return the bytes of the arrays that a work item declares."""
+
+    def details(self, program: Program) -> Mapping[str, Any]:
+        """Return what a caller must know besides, for the manifest."""
+        return {}
 
     def layout(self, program: Program) -> Mapping[str, Slot]:
         """Return where each weight lies."""
@@ -106,10 +112,12 @@ class Pick:
     schedule: Schedule
     asked: str
     reason: str = ""
+    details: Mapping[str, Any] = field(default_factory=dict)
 
     def manifest(self) -> Mapping[str, Any]:
         """Return what a manifest says about it."""
         found = {"name": self.schedule.name, "idea": self.schedule.idea, "pixels": self.schedule.pixels}
+        found |= self.details
         return {**found, "asked": self.asked, "reason": self.reason} if self.reason else found
 
 
@@ -125,4 +133,8 @@ def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:
     if name not in known:
         raise CompileError(f"schedule {name!r} does not exist for this target; there are: {', '.join(known)}")
     reason = known[name].refusal(program)
-    return Pick(schedules[0], name, reason) if reason else Pick(known[name], name)
+    return (
+        Pick(schedules[0], name, reason)
+        if reason
+        else Pick(known[name], name, "", known[name].details(program))
+    )

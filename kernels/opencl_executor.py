@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -139,6 +139,9 @@ class OpenCLExecutor(Executor):
 
     def _local_size(self, artifact: Artifact) -> tuple[int, int]:
         """Return the size of a group: smaller on a processor for kernels with large arrays."""
+        if group := artifact.manifest["schedule"].get("group"):
+            self._check_group(artifact.manifest)
+            return group[0], group[1]
         items, used = int(self._device.max_work_group_size), int(artifact.manifest["private_bytes"])
         if self._device.type & cl.device_type.CPU:
             items = min(items, STACK_BYTES // max(used, 1))
@@ -152,6 +155,24 @@ class OpenCLExecutor(Executor):
         wanted = LOCAL_SIZE if artifact.manifest["schedule"]["pixels"] == 1 else TILE_LOCAL_SIZE
         x = min(wanted[0], items)
         return x, min(wanted[1], items // x)
+
+    def _check_group(self, manifest: Mapping[str, Any]) -> None:
+        """Refuse a kernel whose groups the device does not hold."""
+        schedule, device = manifest["schedule"], self._device
+        items = schedule["group"][0] * schedule["group"][1]
+        shared, private = schedule["shared_bytes"], items * manifest["private_bytes"]
+        least = {
+            "items": (items, int(device.max_work_group_size)),
+            "bytes that they share": (shared, int(device.local_mem_size)),
+        }
+        if device.type & cl.device_type.CPU:
+            least["bytes of variables, on a processor's stack"] = (private, STACK_BYTES)
+        for what, (wanted, most) in least.items():
+            if wanted > most:
+                raise CompileError(
+                    f"{self.device}: schedule {schedule['name']} needs groups of {wanted} {what}, and at "
+                    f"most {most} are to be had; use schedule plain"
+                )
 
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
         with self._told(next(iter(images.values())).shape[:2]):

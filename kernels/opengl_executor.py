@@ -22,6 +22,7 @@ from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
 from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
+from ..compiler.glsl_compute import SHADER_VERSION
 from ..compiler.path_kernel import PathArtifact
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import osmesa
@@ -77,11 +78,15 @@ thousand pixels pay for the time."""
 
 @dataclass(frozen=True)
 class _Built:
-    """A kernel on the device, with weights or None, and the sizes of which it has drawn a few pixels."""
+    """A kernel on the device, with weights or None, and the sizes of which it has drawn a few pixels.
+
+    A compute shader has no triangle, and the pixels (x, y) of a group's `tile`.
+    """
 
     program: Any
     triangle: Any
     weights: Any
+    tile: tuple[int, int] | None = None
     drawn: set[tuple[int, int]] = field(default_factory=set)
 
     def release(self) -> None:
@@ -124,12 +129,35 @@ class OpenGLExecutor(Executor):
                 f"{self.device} lacks {ORDER_EXTENSION}, whose `precise` the error bound needs: use profile "
                 "native, which then promises nothing, or executor opencl or numpy"
             )
+        if "group" in artifact.manifest["schedule"]:
+            return self._compile_compute(artifact)
         with self._context, ExitStack() as made:
             weights = self._weights(artifact)
             made.callback(weights.release)
             program, triangle = self._program(artifact.source, made)
             made.pop_all()
             return _Built(program, triangle, weights)
+
+    def _compile_compute(self, artifact: Artifact) -> _Built:
+        """Compile a compute shader, and put the weights into a storage buffer."""
+        schedule = artifact.manifest["schedule"]
+        if self._context.version_code < SHADER_VERSION:
+            raise CompileError(
+                f"{self.device} has OpenGL {self._context.version_code / 100:.1f}: schedule "
+                f"{schedule['name']} is a compute shader, which OpenGL "
+                f"{SHADER_VERSION / 100:.1f} has; use schedule plain"
+            )
+        with self._context, ExitStack() as made:
+            data = artifact.weights.astype("<f4").tobytes() or bytes(16)
+            weights = self._context.buffer(data)
+            made.callback(weights.release)
+            try:
+                program = self._context.compute_shader(artifact.source)
+            except moderngl.Error as error:
+                raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+            made.pop_all()
+            width, height = schedule["group"]
+            return _Built(program, None, weights, (width * schedule["pixels"], height))
 
     def _program(self, source: str, made: ExitStack) -> tuple[Any, Any]:
         """Return the shaders and the triangle that they draw; `made` gives them back if something fails."""
@@ -157,7 +185,7 @@ class OpenGLExecutor(Executor):
         built = self._built[artifact.digest]
         height, width = next(iter(images.values())).shape[:2]
         with self._context, ExitStack() as made:
-            textures = {"weight_texture": built.weights}
+            textures = {}
             for name, image in images.items():
                 textures[f"image_{name}"] = self._texture(name, image)
                 made.callback(textures[f"image_{name}"].release)
@@ -165,9 +193,21 @@ class OpenGLExecutor(Executor):
             made.callback(target.release)
             frame = self._context.framebuffer([target])
             made.callback(frame.release)
-            self._draw(built, frame, textures)
+            self._denoise(built, frame, target, textures)
             pixels = np.frombuffer(target.read(), np.float32).reshape(height, width, 4)
         return pixels[..., : output_channels(artifact.program)].copy()
+
+    def _denoise(self, built: _Built, frame: Any, target: Any, textures: Mapping[str, Any]) -> None:
+        """Run a denoiser into a texture, which is that of the framebuffer."""
+        if built.tile is None:
+            self._draw(built, frame, {"weight_texture": built.weights, **textures})
+            return
+        self._bind(built, textures, {})
+        built.weights.bind_to_storage_buffer(0)
+        target.bind_to_image(0, read=False, write=True)
+        groups = (-(-n // size) for n, size in zip(target.size, built.tile, strict=True))
+        built.program.run(*groups, 1)
+        self._context.memory_barrier()
 
     def _draw(
         self,
@@ -177,15 +217,19 @@ class OpenGLExecutor(Executor):
         values: Mapping[str, int] | None = None,
     ) -> None:
         """Draw a built shader into a framebuffer, with textures and numbers under their uniforms' names."""
+        self._bind(built, textures, values or {})
+        frame.use()
+        built.triangle.render(mode=moderngl.TRIANGLES, vertices=3)
+
+    def _bind(self, built: _Built, textures: Mapping[str, Any], values: Mapping[str, int]) -> None:
+        """Give a built shader its textures and numbers."""
         units = {name: unit for unit, name in enumerate(textures)}
         for name, texture in textures.items():
             texture.use(units[name])
-        for name, value in {**units, **(values or {})}.items():
+        for name, value in {**units, **values}.items():
             # A driver removes what the shader does not read, and its name with it.
             if name in built.program:
                 built.program[name].value = value
-        frame.use()
-        built.triangle.render(mode=moderngl.TRIANGLES, vertices=3)
 
     def build_path(self, kernel: PathArtifact) -> None:
         """Compile the shaders and draw one pixel: drivers finish compiling when they draw."""
@@ -299,9 +343,9 @@ class OpenGLPasses(Passes):
         executor.build(self.denoiser, self.size)
         built = executor._built[self.denoiser.digest]
         names = [image.name for image in images_of(self.denoiser)]
-        textures = {"weight_texture": built.weights, **{f"image_{n}": self._images[n] for n in names}}
+        textures = {f"image_{n}": self._images[n] for n in names}
         with executor._context:
-            executor._draw(built, self._result[0], textures)
+            executor._denoise(built, self._result[0], self._result[1][0], textures)
 
     def read(self, name: str) -> NDArray[np.float32]:
         """Copy a texture to the host."""

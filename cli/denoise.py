@@ -56,10 +56,11 @@ def denoise(
     from . import exr
 
     check_output(output, (".exr", ".png"), [model, frame])
-    network, noisy = load_model(model), exr.read_frame(frame)
+    network, noisy = load_model(model), exr.read_frame(frame, finite=False)
     need_layers(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )
+    _say_what_is_no_number(frame, noisy, network)
     with open_executor(executor.value) as runner:
         result = denoise_on(runner, network, noisy, schedule=schedule, rank=rank)
     write_denoised(output, result.image, network, noisy)
@@ -68,6 +69,18 @@ def denoise(
     if rank:
         say(result.cut)
     say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation")
+
+
+def _say_what_is_no_number(path: Path, noisy: Frame, model: Model) -> None:
+    """Warn of pixels that are read as something else."""
+    from ..refimpl.dataset import FEATURES
+    from ..refimpl.frame import not_finite
+
+    read = {FEATURES[name].layer for name in model.features}
+    for layer, count in not_finite(noisy).items():
+        if layer in read:
+            rule = "NaN is read as 0, an infinity as the end of the range"
+            say(f"{path}: {count} pixels of {layer} are not finite: {rule}")
 
 
 def write_denoised(path: Path, encoded: Any, model: Model, noisy: Frame) -> None:

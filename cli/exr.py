@@ -81,8 +81,8 @@ def write_frame(path: Path, frame: Frame) -> None:
             raise unwritable(path, RuntimeError(reason)) from None
 
 
-def read_frame(path: Path) -> Frame:
-    """Read the known layers of an EXR file as a valid float32 frame."""
+def read_frame(path: Path, finite: bool = True) -> Frame:
+    """Read the known layers of an EXR file as a float32 frame that is valid, `finite` or not."""
     channels, header = _read_channels(path)
     groups = _group(channels)
     found = {name: _layer(path, name, groups) for name in LAYERS}
@@ -96,7 +96,7 @@ def read_frame(path: Path) -> Frame:
     info = {k.removeprefix(INFO_PREFIX): str(v) for k, v in header.items() if k.startswith(INFO_PREFIX)}
     frame = Frame(layers, info)
     try:
-        validate(frame)
+        validate(frame, finite)
     except InputError as error:
         raise InputError(f"{path}: {error.what}", error.value, error.rule, error.way_out) from None
     return frame

@@ -3,6 +3,7 @@
 1. A feature turns a layer of a frame into numbers near [-1, 1] [`FEATURES`], with scales that belong to the
    model, not to the frame [`Normalization`], [`normalization_of`].
 2. The chosen features, one after another on the channel axis, are the feature image [`feature_image`].
+   What is no number counts as 0 there, once and for all executors [`known`].
 3. The image is padded by the border rule [`pad`], so that every pixel has a full window; the window of a
    pixel is the network's input vector [`windows_at`].
 4. Training draws pixels uniformly from all frames with the counter generator [`sample_pixels`] and gathers
@@ -278,7 +279,12 @@ def _encoded(frame: Frame, feature: Feature, normalization: Normalization) -> Ar
         what = f"feature {feature.name!r}: layers of the frame"
         rule = f"layer {feature.layer!r} must be present"
         raise InputError(what, ", ".join(frame.layers), rule, "render it, or choose other features")
-    return feature.encode(frame[feature.layer].astype(np.float64), normalization)
+    return feature.encode(known(frame[feature.layer].astype(np.float64)), normalization)
+
+
+def known(values: Array) -> Array:
+    """Return the values (...) with 0 for NaN, as where nothing is hit; encodings clip infinities."""
+    return np.where(np.isnan(values), 0.0, values)
 
 
 def target_image(reference: Frame, normalization: Normalization) -> NDArray[np.float32]:

@@ -84,15 +84,24 @@ class Frame:
         return int(next(iter(self.layers.values())).shape[1])
 
 
-def validate(frame: Frame) -> None:
-    """Raise InputError unless the layers are known, of one size, of floats, and finite in every pixel."""
+def validate(frame: Frame, finite: bool = True) -> None:
+    """Raise InputError unless the layers are known, of one size, of floats, and finite in every pixel.
+
+    `finite` False leaves the last rule out, for a reader that states one of its own [`dataset.known`].
+    """
     if not frame.layers:
         raise InputError("the frame's list of layers", "empty", "at least one layer is needed", _known())
     for name, values in frame.layers.items():
         _check_form(name, values)
     _check_sizes(frame.layers)
-    for name, values in frame.layers.items():
+    for name, values in frame.layers.items() if finite else ():
         check_finite(f"layer {name!r}", values)
+
+
+def not_finite(frame: Frame) -> dict[str, int]:
+    """Return the number of pixels with a NaN or an infinity of each layer that has some."""
+    counts = {name: int((~np.isfinite(v)).any(axis=-1).sum()) for name, v in frame.layers.items()}
+    return {name: count for name, count in counts.items() if count}
 
 
 def check_finite(what: str, image: Floats) -> None:

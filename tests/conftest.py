@@ -87,6 +87,14 @@ def executor(request: pytest.FixtureRequest, executor_named: Callable[[str], Any
 
 
 @pytest.fixture(scope="session")
+def kit() -> Any:
+    """Give what tests of executors share."""
+    from kit import Kit
+
+    return Kit()
+
+
+@pytest.fixture(scope="session")
 def mitsuba(executor_named: Callable[[str], Any]) -> Any:
     """Give the module `mitsuba` in its scalar variant, which needs no other library."""
     return executor_named("mitsuba")

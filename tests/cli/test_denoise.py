@@ -50,6 +50,26 @@ def test_the_picture_is_the_executors(wamnet, here, picture) -> None:
     assert frame.info["scene"] == "minicubes"
 
 
+def test_pixels_that_are_no_numbers_are_named_and_read_by_the_rule(wamnet, here, monkeypatch) -> None:
+    """The frame is denoised, the output says what was replaced; other commands refuse the frame."""
+    noisy = exr.read_frame(here / "noisy.exr")
+    noisy["color"][2, 3] = np.nan
+    noisy["color"][5, 6, 1] = np.inf
+    with monkeypatch.context() as patch:
+        patch.setattr(exr, "validate", lambda frame: None)
+        exr.write_frame(here / "bad.exr", noisy)
+    outcome = wamnet("denoise", "model.safetensors", "bad.exr")
+    assert outcome.status == 0
+    assert (
+        "bad.exr: 2 pixels of color are not finite: NaN is read as 0, an infinity as the end" in outcome.out
+    )
+    with open_executor("numpy") as executor:
+        expected = denoise_on(executor, load_model(here / "model.safetensors"), noisy).image
+    assert np.isfinite(expected).all()
+    assert (encoding.to_8bit(read_png(here / "denoised.png")) == encoding.to_8bit(expected)).all()
+    assert wamnet("compare", "bad.exr", "noisy.exr").status == 2
+
+
 def test_a_rank_cuts_the_first_layer(wamnet, here) -> None:
     """The picture is that of denoise_on with this rank, and the output says what the cut costs."""
     outcome = wamnet("denoise", "model.safetensors", "noisy.exr", "--rank", 2)

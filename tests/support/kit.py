@@ -1,4 +1,4 @@
-"""Small programs, images, and the one comparison that all tests of executors use."""
+"""Small programs, images, and the one comparison that all tests of executors use [`Kit`]."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pytest
 
 from wamnet.compiler import bounds
 from wamnet.compiler.artifact import Artifact
@@ -85,8 +84,3 @@ class Kit:
 def _per_pixel(array: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """Return (H, W, C) of an array that may lack the last axis, or all but it (constants)."""
     return array.reshape(*size, -1) if np.ndim(array) >= 2 else np.atleast_1d(array)
-
-
-@pytest.fixture(scope="session")
-def kit() -> Kit:
-    return Kit()

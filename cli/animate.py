@@ -174,7 +174,7 @@ def draw_apart(shots: Sequence[Shot], model: Model, executor: Executor, renderer
     for shot in shots:
         frame = render_frame(renderer, shot.scene, shot.noisy, workers=None).frame
         noisy = to_display(frame["color"], model.normalization.exposure_stops)
-        denoised = denoise_on(executor, model, frame).image
+        denoised = denoise_on(executor, model, frame, pictures=len(shots)).image
         reference = None
         if shot.reference is not None:
             reference = render_frame(renderer, shot.scene, shot.reference, workers=None).frame
@@ -193,8 +193,8 @@ def draw_frames(shots: Sequence[Shot], model: Model, executor: Executor, rendere
         for shot in shots:
             if pipeline is None:
                 size, whole = (shot.noisy.height, shot.noisy.width), shot.reference is not None
-                settings, show = shot.noisy.settings, ("color",)
-                made = Pipeline(executor, shot.scene, model, size, settings=settings, show=show, whole=whole)
+                given: dict[str, Any] = {"settings": shot.noisy.settings, "show": ("color",), "whole": whole}
+                made = Pipeline(executor, shot.scene, model, size, pictures=len(shots), **given)
                 pipeline = stack.enter_context(made)
             else:
                 pipeline.set_scene(shot.scene)

@@ -24,6 +24,7 @@ from .terminal import say
 if TYPE_CHECKING:
     from ..compiler.artifact import Files
     from ..compiler.path_kernel import PathArtifact
+    from ..refimpl.denoise import Model
     from ..refimpl.scene import Scene
 
 EXAMPLES = """Examples:
@@ -36,6 +37,9 @@ wamnet compile minicubes --time 2.5 --target glsl -o scene-glsl
 
 wamnet compile mine.json --target opencl --lanes 16 -o scene-opencl"""
 """Shown below the help of `wamnet compile`."""
+
+HERE_SIZE, HERE_PICTURES = (1024, 1024), 1000
+"""What a kernel for this machine is chosen for: the paper's pictures (height, width), and many of them."""
 
 EXECUTOR_OF = {Target.opencl: "opencl", Target.glsl: "opengl"}
 """The compiler names a target by the executor that runs it; people know the language."""
@@ -69,11 +73,15 @@ def compile_model(
         typer.Option(help="Paths that a work item follows: 16 suit CPUs, 1 GPUs.", show_default="1"),
     ] = None,
     schedule: options.Schedule = None,
+    here: Annotated[
+        bool,
+        typer.Option("--here", help="Take the schedule that suits this machine: as tuned, or built in."),
+    ] = False,
 ) -> None:
     """Compile a model, or a scene, to a kernel: source, weights, and a manifest with its interface.
 
     The source is meant to be read and pasted into another program: a model's denoises, with a bound on its
-    error; a scene's traces paths. No device is needed.
+    error; a scene's traces paths. No device is needed, but for --here.
     """
     from ..compiler.compile import compile_program
     from ..compiler.lower import lower
@@ -82,7 +90,8 @@ def compile_model(
     folder, name = output or Path(target.value), EXECUTOR_OF[target]
     kernel: Files
     if is_scene(model):
-        _only_for("a model", {"--schedule": schedule}, f"{model} is a scene, whose kernels have one schedule")
+        of_models = {"--schedule": schedule, "--here": here or None}
+        _only_for("a model", of_models, f"{model} is a scene, whose kernels have one schedule")
         check_folder(folder, name, of_scene=True)
         scene = load_scene(model, time, parameters or [])
         kernel = _compiled_scene(scene, name, profile, max_depth, sampler, lanes)
@@ -92,11 +101,27 @@ def compile_model(
         _only_for("a scene", of_scenes, f"{model} is no scene: neither a canonical one nor a .json file")
         _check_name(model)
         check_folder(folder, name)
-        kernel = compile_program(lower(load_model(Path(model))), name, profile, schedule or PLAIN)
+        network = load_model(Path(model))
+        if here:
+            schedule = _chosen_here(network, name, profile, schedule)
+        kernel = compile_program(lower(network), name, profile, schedule or PLAIN)
     for path in write_kernel(kernel, folder):
         say(str(path))
     if reason := kernel.manifest.get("schedule", {}).get("reason"):
         say(f"schedule plain, not {schedule}: {reason}")
+
+
+def _chosen_here(network: Model, executor: str, profile: str, schedule: str | None) -> str:
+    """Return the schedule for this machine's device, and say why."""
+    from ..kernels import open_executor
+    from ..kernels.tune import choose
+
+    if schedule is not None:
+        raise InputError("--schedule", schedule, "--here chooses another", "leave one of them out")
+    with open_executor(executor) as runner:
+        found = choose(runner, network, HERE_SIZE, profile, pictures=HERE_PICTURES)
+        say(f"schedule {found.schedule} for {runner.device}: {found.reason}")
+    return found.schedule
 
 
 def _only_for(what: str, given: Mapping[str, Any], rule: str) -> None:

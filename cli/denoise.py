@@ -53,6 +53,7 @@ def denoise(
     The kernel's schedule is the one that suits the device, unless another is named.
     """
     from ..kernels import denoise_on, open_executor
+    from ..kernels.tune import first_time
     from . import exr
 
     check_output(output, (".exr", ".png"), [model, frame])
@@ -63,12 +64,14 @@ def denoise(
     _say_what_is_no_number(frame, noisy, network)
     with open_executor(executor.value) as runner:
         result = denoise_on(runner, network, noisy, schedule=schedule, rank=rank)
+        first = first_time(runner, result.digest, result.seconds_compile)
     write_denoised(output, result.image, network, noisy)
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")
-    say(f"schedule {result.schedule}")
+    say(f"schedule {result.schedule}; {result.reason}")
     if rank:
         say(result.cut)
-    say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation")
+    before = "" if first == result.seconds_compile else f" (the first time {first:.3f} s)"
+    say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation{before}")
 
 
 def _say_what_is_no_number(path: Path, noisy: Frame, model: Model) -> None:

@@ -17,6 +17,7 @@ from ..refimpl.denoise import Model
 from ..refimpl.frame import Frame
 from .executor import Executor, Images
 from .memory import keep_freed_memory
+from .tune import Choice, choose
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,8 @@ class RunResult:
 
     `seconds_compile`: tracing, passes, bound, emission, the driver's compilation and one run on a few pixels.
     `seconds_run`: images to the device, the kernel, the result back; not the encoding of the features.
-    `schedule`: what was picked, and why, where it is not what was asked for. `cut`: what a rank costs.
+    `schedule`: what was picked, and why, where it is not what was asked for; `reason`: why it was asked for.
+    `digest`: the kernel's. `cut`: what a rank costs.
     """
 
     image: NDArray[np.float32]
@@ -33,6 +35,8 @@ class RunResult:
     seconds_run: float
     device: str
     schedule: str
+    reason: str
+    digest: str
     cut: str = ""
 
 
@@ -48,23 +52,28 @@ def denoise_on(
     profile: str = "ieee",
     schedule: str | None = None,
     rank: int = 0,
+    pictures: int = 1,
 ) -> RunResult:
-    """Return the denoised frame and the times; without a `schedule`, the one that suits device and size.
+    """Return the denoised frame and the times.
 
+    Without a `schedule`, it is the one that suits device, size and so many `pictures` to come [tune.py].
     With a `rank` the first layer is cut to it, and run in two passes [factor.py].
     """
     images = images_of(model, frame)
     start = time.perf_counter()
     size = (frame.height, frame.width)
-    wanted = schedule or executor.schedule_for(size)
-    artifact = compile_program(lower(model), executor.name, profile, wanted, rank)
+    found = Choice(schedule or "", "as asked")
+    if not schedule:
+        found = choose(executor, model, size, profile, rank, pictures)
+    artifact = compile_program(lower(model), executor.name, profile, found.schedule, rank)
     executor.build(artifact, size)
     keep_freed_memory()
     built = time.perf_counter()
     image = executor.run(artifact, images)
     seconds = time.perf_counter() - built
     picked = schedules.text(artifact.manifest["schedule"])
-    return RunResult(image, built - start, seconds, executor.device, picked, _cut_text(artifact))
+    facts = (executor.device, picked, found.reason, artifact.digest, _cut_text(artifact))
+    return RunResult(image, built - start, seconds, *facts)
 
 
 def _cut_text(artifact: Artifact) -> str:

@@ -42,6 +42,9 @@ loop around them."""
 CPU_SCHEDULES = {16: "tile16", 8: "tile8"}
 """Schedule of a denoiser by the floats in a vector register of a processor; others have registers of 4."""
 
+GPU_SCHEDULE = "group4"
+"""Schedule of a denoiser on a graphics processor."""
+
 STACK_BYTES = 2**20
 """Most bytes of a group's arrays on a processor: half the smallest stack that glibc gives a thread."""
 
@@ -91,7 +94,14 @@ class OpenCLExecutor(Executor):
             self._shares = True
             self.lanes = CPU_LANES
             self.trains = True
-            self.schedule = CPU_SCHEDULES.get(chosen.native_vector_width_float, "tile4")
+            lanes = chosen.native_vector_width_float
+            self.schedule = CPU_SCHEDULES.get(lanes, "tile4")
+            self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
+        elif chosen.type & cl.device_type.GPU:
+            self.schedule = GPU_SCHEDULE
+            self.schedule_reason = "built-in choice for graphics processors, not measured on one"
+        else:
+            self.schedule_reason = "built-in choice for unknown devices"
         self._encoders: dict[str, Any] = {}
         self._kept: Any = None
 
@@ -235,6 +245,10 @@ class OpenCLExecutor(Executor):
         numbers = (np.int32(size[1]), np.int32(size[0]))
         places = _whole(items, built.local)
         built.kernel(self._queue, places, built.local, *inputs, built.weights, output, *numbers)
+
+    def forget(self) -> None:
+        """Drop the kernels that were built for denoising."""
+        self._built.clear()
 
     def kernel_seconds(
         self, artifact: Artifact, images: Images, clock: Callable[[], float] = time.perf_counter

@@ -70,6 +70,9 @@ SOFTWARE = "llvmpipe"
 SOFTWARE_SCHEDULE = "inlined"
 """Schedule of a denoiser there: reads of weights are chains of checks and gathers, constants are not."""
 
+GPU_SCHEDULE = "compute4"
+"""Schedule of a denoiser on a graphics processor with compute shaders."""
+
 SOFTWARE_PIXELS = 700_000
 """Pixels of the smallest picture for which that is compiled: llvmpipe compiles a weight in 0.63 ms on one
 core, and on two cores multiplies by it in 0.96 ns with the plain kernel, in 0.04 ns with the other: 690
@@ -106,6 +109,14 @@ class OpenGLExecutor(Executor):
         self.device = f"{self._context.info['GL_RENDERER']} through {kind}"
         if SOFTWARE in self.device:
             self.schedule, self.schedule_pixels = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
+            name, least = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
+            self.schedule_reason = f"built-in choice for software, {name} from {least} pixels on"
+        elif self._context.version_code >= SHADER_VERSION:
+            self.schedule = GPU_SCHEDULE
+            self.schedule_reason = "built-in choice for graphics processors, not measured on one"
+        else:
+            self.schedule_reason = f"built-in choice before OpenGL {SHADER_VERSION / 100:.1f}"
+        self.driver = self._context.info["GL_VERSION"]
         self._built: dict[str, _Built] = {}
         self._paths: dict[str, _Built] = {}
         self._encoders: dict[str, _Built] = {}
@@ -230,6 +241,13 @@ class OpenGLExecutor(Executor):
             # A driver removes what the shader does not read, and its name with it.
             if name in built.program:
                 built.program[name].value = value
+
+    def forget(self) -> None:
+        """Drop the kernels that were built for denoising."""
+        with self._context:
+            for built in self._built.values():
+                built.release()
+        self._built.clear()
 
     def build_path(self, kernel: PathArtifact) -> None:
         """Compile the shaders and draw one pixel: drivers finish compiling when they draw."""

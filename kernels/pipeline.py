@@ -34,13 +34,15 @@ from ..refimpl.transport import Settings
 from .executor import Executor, Part
 from .passes import PICTURE
 from .render_on import SAMPLES_AT_ONCE, compile_scene
+from .tune import choose
 
 
 class Pipeline:
     """A scene and a model on an open executor, for pictures of one size; a context manager.
 
     `show` names features that are to be readable besides those of the model. With `whole`, paths are traced
-    by the kernel of render_on.py, which writes more than is needed: one to compile where both are used. The
+    by the kernel of render_on.py, which writes more than is needed: one to compile where both are used. So
+    many `pictures` are to come: what compiles long may pay [tune.py]. The
     kernels are `path`, `encode` and `denoise`; `passes` runs them one by one.
     """
 
@@ -55,6 +57,7 @@ class Pipeline:
         profile: str = "ieee",
         show: Sequence[str] = (),
         whole: bool = False,
+        pictures: int = 1,
     ) -> None:
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
@@ -69,7 +72,8 @@ class Pipeline:
         self.encode = compile_encode(
             self._features, model.normalization, executor.name, profile, self.path.planes
         )
-        self.denoise = compile_program(lower(model), executor.name, profile, executor.schedule_for(size))
+        chosen = choose(executor, model, size, profile, pictures=pictures)
+        self.denoise = compile_program(lower(model), executor.name, profile, chosen.schedule)
         self._drawn = self._closed = False
         self.passes = executor.passes(self.encode, self.denoise, size)
 

@@ -22,7 +22,7 @@ from .render import load_scene
 from .terminal import say
 
 if TYPE_CHECKING:
-    from ..compiler.artifact import Files
+    from ..compiler.artifact import Artifact, Files
     from ..compiler.path_kernel import PathArtifact
     from ..refimpl.denoise import Model
     from ..refimpl.scene import Scene
@@ -73,20 +73,13 @@ def compile_model(
         typer.Option(help="Paths that a work item follows: 16 suit CPUs, 1 GPUs.", show_default="1"),
     ] = None,
     schedule: options.Schedule = None,
-    here: Annotated[
-        bool,
-        typer.Option("--here", help="Take the schedule that suits this machine: as tuned, or built in."),
-    ] = False,
+    here: options.Here = False,
 ) -> None:
     """Compile a model, or a scene, to a kernel: source, weights, and a manifest with its interface.
 
     The source is meant to be read and pasted into another program: a model's denoises, with a bound on its
     error; a scene's traces paths. No device is needed, but for --here.
     """
-    from ..compiler.compile import compile_program
-    from ..compiler.lower import lower
-    from ..compiler.schedules import PLAIN
-
     folder, name = output or Path(target.value), EXECUTOR_OF[target]
     kernel: Files
     if is_scene(model):
@@ -101,14 +94,23 @@ def compile_model(
         _only_for("a scene", of_scenes, f"{model} is no scene: neither a canonical one nor a .json file")
         _check_name(model)
         check_folder(folder, name)
-        network = load_model(Path(model))
-        if here:
-            schedule = _chosen_here(network, name, profile, schedule)
-        kernel = compile_program(lower(network), name, profile, schedule or PLAIN)
+        kernel = _compiled_model(load_model(Path(model)), name, profile, schedule, here)
     for path in write_kernel(kernel, folder):
         say(str(path))
-    if reason := kernel.manifest.get("schedule", {}).get("reason"):
-        say(f"schedule plain, not {schedule}: {reason}")
+    picked = kernel.manifest.get("schedule", {})
+    if "reason" in picked:
+        say(f"schedule {picked['name']}, not {picked['asked']}: {picked['reason']}")
+
+
+def _compiled_model(network: Model, target: str, profile: str, schedule: str | None, here: bool) -> Artifact:
+    """Return a model's kernel, with the schedule of this name, of this machine, or the plain one."""
+    from ..compiler.compile import compile_program
+    from ..compiler.lower import lower
+    from ..compiler.schedules import PLAIN
+
+    if here:
+        schedule = _chosen_here(network, target, profile, schedule)
+    return compile_program(lower(network), target, profile, schedule or PLAIN)
 
 
 def _chosen_here(network: Model, executor: str, profile: str, schedule: str | None) -> str:

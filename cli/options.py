@@ -127,6 +127,10 @@ CutRank = Annotated[
         show_default="no cut",
     ),
 ]
+Here = Annotated[
+    bool,
+    typer.Option("--here", help="Take the schedule that suits this machine: as tuned, or built in."),
+]
 Schedule = Annotated[
     str | None,
     typer.Option(

@@ -36,7 +36,7 @@ from ..compiler.factor import at_images, factor, product
 from ..compiler.interpret import interpret
 from ..compiler.ir import Program
 from ..compiler.lower import lower
-from ..refimpl import dataset
+from ..refimpl import dataset, rng
 from ..refimpl.denoise import Model
 from ..refimpl.errors import CompileError
 from . import cache, measure
@@ -240,13 +240,14 @@ def _checks(program: Program, target: str, profile: str, rank: int) -> Checks:
 
 def noise(program: Program, size: tuple[int, int]) -> Images:
     """Return images of `size` (height, width) with noise in the ranges that a program's may hold."""
-    random, images = np.random.default_rng(1), {}
+    images = {}
     gather = program.gather
     assert gather is not None, "lower gives a program with a window"
-    for image in gather.images:
+    for number, image in enumerate(gather.images):
         low, high = np.float32(image.low), np.float32(image.high)
-        drawn = low + (high - low) * random.random((*size, image.channels), dtype=np.float32)
-        images[image.name] = np.minimum(drawn, high)
+        place = rng.counter(np.arange(size[0] * size[1] * image.channels))
+        drawn = rng.uniforms(rng.counter(1), place, rng.counter(number), rng.counter(0))[0]
+        images[image.name] = np.minimum(low + (high - low) * drawn, high).reshape(*size, image.channels)
     return images
 
 

@@ -18,6 +18,7 @@ class GLSLCompute(GLSLInlined, GroupDialect):
     kind = "vec4"
     wait = "barrier();"
     literal_zero = "vec4(0.0f)"
+    max_output_channels = 4
     pixel_at = "texelFetch(image_{image}, ivec2(column, row), 0)[{c}]"
     begin = f"""\
 #version {SHADER_VERSION} core

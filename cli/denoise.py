@@ -24,6 +24,8 @@ wamnet denoise model.safetensors noisy.exr -o denoised.png
 
 wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr
 
+wamnet denoise model.safetensors noisy.exr --executor c --profile exact
+
 wamnet denoise small.safetensors noisy.exr --executor opencl --rank 16"""
 """Shown below the help of `wamnet denoise`."""
 
@@ -45,12 +47,14 @@ def denoise(
         Path, typer.Option("-o", "--output", metavar="FILE", help="Linear colour (.exr) or picture (.png).")
     ] = Path("denoised.png"),
     executor: options.Executor = ExecutorName.numpy,
+    profile: options.Profile = "ieee",
     schedule: options.Schedule = None,
     rank: options.CutRank = 0,
 ) -> None:
     """Denoise a frame with a trained model.
 
-    The kernel's schedule is the one that suits the device, unless another is named.
+    The kernel's schedule is the one that suits the device, unless another is named. With profile exact the
+    result is the same to the last bit on every executor; its digest is printed, to be compared.
     """
     from ..kernels import denoise_on, open_executor
     from ..kernels.tune import first_time
@@ -63,8 +67,8 @@ def denoise(
     )
     _say_what_is_no_number(frame, noisy, network)
     with open_executor(executor.value) as runner:
-        result = denoise_on(runner, network, noisy, schedule=schedule, rank=rank)
-        first = first_time(runner, result.digest, result.seconds_compile)
+        result = denoise_on(runner, network, noisy, profile, schedule, rank)
+        first = first_time(runner, result.kernel, result.seconds_compile)
     write_denoised(output, result.image, network, noisy)
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")
     say(f"schedule {result.schedule}; {result.reason}")
@@ -72,6 +76,8 @@ def denoise(
         say(result.cut)
     before = "" if first == result.seconds_compile else f" (the first time {first:.3f} s)"
     say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation{before}")
+    if profile == "exact":
+        say(f"sha256 of the float32 result, the same on every executor: {result.digest}")
 
 
 def _say_what_is_no_number(path: Path, noisy: Frame, model: Model) -> None:

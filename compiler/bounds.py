@@ -8,7 +8,7 @@
 3. Over a box of inputs that gives an a-priori bound [`over_box`]; at given inputs, with intervals of one
    point and all pixels at once, a sharper a-posteriori one [`at_inputs`].
 4. A number on the way that may be too large for float32 leaves no bound: the kernel may hold an infinity
-   there, and NaN after it [`_held`].
+   there, and NaN after it [`held`].
 5. The rules themselves are computed in float64; what that rounding and the reference's own could change is
    below 2**-28 of each term, and every result is widened by more [`_outward`].
 
@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .ir import Gather, Node, Program
+from .ir import LEAST, Gather, Node, Program
 from .ops import LOOPS, OPS
 from .profiles import (
     EXP2_ULPS,
@@ -118,10 +118,10 @@ def _rounded(context: Context, low: Array, high: Array, passed_on: Array) -> Enc
     """Add to the error that is passed on the error of rounding the result."""
     magnitude = np.maximum(np.abs(low), np.abs(high)) + passed_on
     relative = RELATIVE_ERROR[OPS[context.node.op].rounding]
-    return _held(low, high, passed_on + relative * magnitude + FLUSH, (1 + relative) * magnitude + FLUSH)
+    return held(low, high, passed_on + relative * magnitude + FLUSH, (1 + relative) * magnitude + FLUSH)
 
 
-def _held(low: Array, high: Array, error: Array, size: Array) -> Enclosure:
+def held(low: Array, high: Array, error: Array, size: Array) -> Enclosure:
     """Give no bound where numbers of this size may overflow, or where their size is not known (NaN)."""
     return Enclosure(low, high, np.where(size < OVERFLOW, error, np.inf), size)
 
@@ -156,7 +156,7 @@ def _affine(context: Context, operands: list[Enclosure]) -> Enclosure:
     underflow = FLUSH * (np.sum(x.seen, axis=-1, keepdims=True) + 4 * n)
     # In any order of summation no partial sum is larger than the sum of all magnitudes.
     whole = ((x.seen + FLUSH) @ size + np.abs(bias)) * (1 + gamma(n)) + n * FLUSH
-    return _held(middle - reach, middle + reach, error + underflow, whole)
+    return held(middle - reach, middle + reach, error + underflow, whole)
 
 
 def _add(context: Context, operands: list[Enclosure]) -> Enclosure:
@@ -264,7 +264,7 @@ def _power(context: Context, operands: list[Enclosure]) -> Enclosure:
         relative = power_error(exponent, logarithm / np.log(2.0))
     magnitude = np.abs(high) + passed_on
     error = np.where(safe, passed_on + relative * magnitude + FLUSH, np.inf)
-    return _held(low, high, error, (1 + relative) * magnitude + FLUSH)
+    return held(low, high, error, (1 + relative) * magnitude + FLUSH)
 
 
 def power_error(exponent: Array, logarithm: Array) -> Array:
@@ -458,7 +458,8 @@ def enclose(
             continue
         if node.op == "input":
             low, high = (np.asarray(end, np.float64) for end in inputs[str(node["name"])])
-            found.append(Enclosure(low, high, np.zeros_like(low)))
+            # An exact program reads small numbers as 0.
+            found.append(Enclosure(low, high, np.full_like(low, LEAST if program.exact else 0.0)))
             continue
         operands = [_spread(found[arg], program.nodes[arg], node) for arg in node.args]
         # An infinite bound may meet a weight of 0: _outward reads the NaN as no bound.

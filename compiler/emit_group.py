@@ -30,6 +30,7 @@ from .emit import kernel_gather
 from .emit_inlined import InlinedBody
 from .emit_tiled import Tiled, refused_by_vectors
 from .ir import Gather, Image, Node, Program
+from .schedules import PLAIN
 
 MOST_CHANNELS = 4
 """Most channels of a tile: one of 64 x 8 pixels for windows of 12 x 12 then takes 23 KB, of the 32 KB that
@@ -78,13 +79,16 @@ class Grouped(Tiled):
         dialect: GroupDialect,
         pixels: int,
         group: tuple[int, int] = (16, 8),
+        instead: str = PLAIN,
     ) -> None:
         super().__init__(name, idea, dialect, lanes=4, pixels=pixels, vectors=LARGEST_NUMBERS)
-        self.words, self.group = dialect, group
+        self.words, self.group, self.instead = dialect, group, instead
         self.arguments = self.arguments.replace("{group}", f"{group[0]} x {group[1]}")
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
+        if program.exact:
+            return "the order of its sums is not pinned as profile exact states"
         if reason := refused_by_vectors(program, self.dialect) or self._shared_matrix(program):
             return reason
         if (numbers := self._numbers(program)) > LARGEST_NUMBERS:
@@ -239,7 +243,7 @@ class GroupBody(InlinedBody):
         if source.op == "input":
             for image, begin, end in chunks(self.gather):
                 self._load(image, begin, end)
-                self._over_taps(index, first, end - begin)
+                self._products_of_taps(index, first, end - begin)
                 first += self.gather.rows * self.gather.columns * (end - begin) * self.vectors(index)
             return
         for i in range(n_in):
@@ -269,7 +273,7 @@ class GroupBody(InlinedBody):
         self._close()
         self._line(self.words.wait)
 
-    def _over_taps(self, index: int, first: int, channels: int) -> None:
+    def _products_of_taps(self, index: int, first: int, channels: int) -> None:
         """Write the products of the tile's taps with the weights from vector `first` on."""
         step = channels * self.vectors(index)
         self._open(f"for (int dy = 0; dy < {self.sides.rows}; ++dy) {{")

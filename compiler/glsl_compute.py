@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from .emit_group import GroupDialect, Grouped
 from .glsl_inlined import GLSLInlined
+from .schedules import PLAIN
 
 SHADER_VERSION = 430
 """The version of GLSL, and of OpenGL, that has compute shaders."""
@@ -54,9 +55,9 @@ void main()
     )
 
 
-def _compute(name: str, idea: str, pixels: int) -> Grouped:
+def _compute(name: str, idea: str, pixels: int, instead: str = PLAIN) -> Grouped:
     """Return a rung of the ladder."""
-    found = Grouped(name, idea, GLSLCompute(), pixels)
+    found = Grouped(name, idea, GLSLCompute(), pixels, instead=instead)
     found.language, found.suffix = f"GLSL {SHADER_VERSION / 100:.2f}, compute shader", ".comp"
     return found
 
@@ -67,6 +68,6 @@ GLSL_COMPUTE = (
         "a tile of the image in memory that a work group shares; layers in registers, one pixel each",
         1,
     ),
-    _compute("compute4", "the same with 4 pixels an invocation, which share each weight", 4),
+    _compute("compute4", "the same with 4 pixels an invocation, which share each weight", 4, "compute"),
 )
 """The schedules for graphics processors; none of them has been measured on one."""

@@ -54,6 +54,8 @@ OPENCL_GROUPS = (
         OpenCLGroup(),
         pixels=1,
     ),
-    Grouped("group4", "the same with 4 pixels an item, which share each weight", OpenCLGroup(), pixels=4),
+    Grouped(
+        "group4", "the same with 4 pixels an item, which share each weight", OpenCLGroup(), 4, instead="group"
+    ),
 )
 """The schedules for graphics processors; none of them has been measured on one."""

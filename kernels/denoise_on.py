@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..compiler import schedules
 from ..compiler.artifact import Artifact
 from ..compiler.compile import compile_program
+from ..compiler.ir import sha256
 from ..compiler.lower import lower
 from ..refimpl.dataset import feature_image
 from ..refimpl.denoise import Model
@@ -27,7 +28,7 @@ class RunResult:
     `seconds_compile`: tracing, passes, bound, emission, the driver's compilation and one run on a few pixels.
     `seconds_run`: images to the device, the kernel, the result back; not the encoding of the features.
     `schedule`: what was picked, and why, where it is not what was asked for; `reason`: why it was asked for.
-    `digest`: the kernel's. `cut`: what a rank costs.
+    `kernel`: its digest. `cut`: what a rank costs.
     """
 
     image: NDArray[np.float32]
@@ -36,8 +37,13 @@ class RunResult:
     device: str
     schedule: str
     reason: str
-    digest: str
+    kernel: str
     cut: str = ""
+
+    @property
+    def digest(self) -> str:
+        """Return the SHA-256 of the picture's numbers, little-endian float32, rows from the top."""
+        return sha256(self.image.astype("<f4").tobytes())
 
 
 def images_of(model: Model, frame: Frame) -> Images:

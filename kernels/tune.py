@@ -31,11 +31,12 @@ from numpy.typing import NDArray
 from .. import compiler
 from ..compiler import bounds
 from ..compiler.artifact import Artifact
-from ..compiler.compile import TARGETS, analysed, compile_program, sine_contract
+from ..compiler.compile import DENOISERS, analysed, compile_program, sine_contract
 from ..compiler.factor import at_images, factor, product
 from ..compiler.interpret import interpret
 from ..compiler.ir import Program
 from ..compiler.lower import lower
+from ..compiler.schedules import Schedule
 from ..refimpl import dataset, rng
 from ..refimpl.denoise import Model
 from ..refimpl.errors import CompileError
@@ -54,8 +55,8 @@ SLOW = 8.0
 REPEATS = 5
 """Rounds of measurement."""
 
-Checks = tuple[Images, NDArray[np.float64], NDArray[np.float64]]
-"""A crop's images, the float64 reference, and the bound there."""
+Checks = tuple[Images, NDArray[np.float64], Callable[[Schedule], NDArray[np.float64]]]
+"""A crop's images, the float64 reference, and the bound there of a schedule."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ def choose(
     pictures: int = 1,
 ) -> Choice:
     """Return the schedule for so many pictures of `size` (height, width): as measured here, or built in."""
-    if len(TARGETS[executor.name].schedules) > 1 and (
+    if len(DENOISERS[executor.name].schedules) > 1 and (
         found := remembered(executor, model, size, profile, rank)
     ):
         best = found.best(pictures)
@@ -124,7 +125,7 @@ def remembered(
     found = cache.read_json(_entry(executor, model, size, profile, rank))
     try:
         rows = tuple(Row(**row) for row in found["rows"])
-        known = {schedule.name for schedule in TARGETS[executor.name].schedules}
+        known = {schedule.name for schedule in DENOISERS[executor.name].schedules}
         if not known >= {row.schedule for row in rows}:
             return None
         height, width = found["size"]
@@ -149,12 +150,12 @@ def tune(
     rows: dict[str, Row] = {}
     ready: dict[str, Artifact] = {}
     trials: dict[str, float] = {}
-    for schedule in TARGETS[executor.name].schedules:
+    for schedule in DENOISERS[executor.name].schedules:
         progress(schedule.name)
         compiled = lambda name=schedule.name: compile_program(program, executor.name, profile, name, rank)  # noqa: E731
         try:
             row, artifact = _built(executor, schedule.name, compiled, size)
-            _checked(executor, artifact, checks)
+            _checked(executor, artifact, checks, schedule)
         except (CompileError, WrongResult) as error:
             rows[schedule.name] = Row(schedule.name, note=str(error))
             continue
@@ -205,9 +206,10 @@ def _built(
     return Row(name, None, seconds[0], seconds[0] if in_source else seconds[1]), artifact
 
 
-def _checked(executor: Executor, artifact: Artifact, checks: Checks) -> None:
+def _checked(executor: Executor, artifact: Artifact, checks: Checks, schedule: Schedule) -> None:
     """Refuse an artifact whose result on the crop is not within the bound."""
-    images, expected, bound = checks
+    images, expected, bound_of = checks
+    bound = bound_of(schedule)
     error = np.abs(executor.run(artifact, images).astype(np.float64) - expected)
     if not (error <= bound).all():
         worst = float(np.nanmax(error / bound)) if np.isfinite(error).any() else float("nan")
@@ -228,13 +230,19 @@ def _checks(program: Program, target: str, profile: str, rank: int) -> Checks:
     assert gather is not None, "lower gives a program with a window"
     joined = np.concatenate(list(images.values()), axis=-1)
     windows = {"window": dataset.all_windows(dataset.pad(joined, gather.window), gather.window)}
-    if rank:
-        cut = factor(whole, rank)
-        found = bounds.output_errors(whole, at_images(cut, contract, images, of_cut=False))
-        whole = product(cut)
-    else:
-        found = bounds.at_inputs(whole, windows, contract)
-    (expected,), (bound,) = interpret(whole, windows, np.float64).values(), found.values()
+    cut = factor(whole, rank) if rank else None
+
+    def bound(schedule: Schedule) -> NDArray[np.float64]:
+        """Return the bound at the crop's pixels."""
+        found = (
+            at_images(cut, contract, images, of_cut=False)
+            if cut
+            else schedule.enclosures(whole, contract, images)
+        )
+        (errors,) = bounds.output_errors(whole, found).values()
+        return errors
+
+    (expected,) = interpret(product(cut) if cut else whole, windows, np.float64).values()
     return images, expected, bound
 
 

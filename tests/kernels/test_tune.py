@@ -44,7 +44,8 @@ def test_every_schedule_is_checked_and_the_fastest_is_taken(executor_named):
     executor = executor_named("opencl")
     table = tune.tune(executor, model(), SIZE, repeats=1)
     assert {r.schedule for r in table.rows} == {s.name for s in TARGETS["opencl"].schedules}
-    assert all((r.ms is None) == bool(r.note) and r.again_s > 0 for r in table.rows)
+    assert all((r.ms is None) == bool(r.note) for r in table.rows)
+    assert all(r.again_s > 0 for r in table.rows if r.ms is not None)
     assert table.network == "54-8-3, color + normal, window 3 (clamp)"
     assert tune.remembered(executor, model(), SIZE) == table
     best = min((r for r in table.rows if r.ms is not None), key=lambda r: r.ms)

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from ..refimpl.errors import ExecutorUnavailable, InputError
-from . import dataset, dataset_files, report, train
+from . import bench, dataset, dataset_files, report, train
 from .compare import Score, measure
 from .compile import write_kernel
 from .outputs import unwritable, write_text
@@ -65,6 +65,12 @@ SHOWN_FIRST = ("opencl", "opengl", "numpy")
 
 RENDERS_FIRST = ("opencl", "opengl")
 """What renders the frames: the first kernel that runs here, else the reference."""
+
+REPEATS = 3
+"""Times of each contender that the report shows."""
+
+BUDGET_S = 3.0
+"""Seconds a picture that a contender of the report may take."""
 
 _Result = TypeVar("_Result")
 
@@ -163,7 +169,8 @@ def demo(
     begin(plan, folder)
     with hint_on_interrupt(lambda: f"go on with the same command: {command}"):
         results = carry_out(plan, folder)
-        report.write(folder, plan, results, command)
+        speed = None if quick else _timed(results.seconds, "speed", lambda: measure_speed(plan, results))
+        report.write(folder, plan, results, command, speed)
     _tell(results, folder)
 
 
@@ -313,6 +320,15 @@ def run_kernels(
     with open_executor(by) as executor:
         others = [denoise_on(executor, model, frame).image for frame in frames[1:]]
     return [images[by], *others], by, runs
+
+
+def measure_speed(plan: Plan, results: Results) -> dict[str, Any]:
+    """Return what a reduced benchmark finds: schedules and variants, by time, error and quality."""
+    from ..kernels.bench.contest import Request
+
+    pairs = tuple((frame.noisy, frame.reference) for frame in results.unseen)
+    request = Request(results.model, plan.size_px, REPEATS, pairs=pairs, budget_s=BUDGET_S, quick=True)
+    return bench.measure(request, command="wamnet bench --quick")
 
 
 def score(model: Model, noisy: Frame, reference: Frame, denoised: Any) -> dict[str, tuple[Score, ...]]:

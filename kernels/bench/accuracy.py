@@ -18,12 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler import bounds
-from ...compiler.compile import analysed
+from ...compiler.compile import analysed, schedule_named
 from ...compiler.factor import at_images, factor, product
 from ...compiler.interpret import interpret
 from ...compiler.ir import Program
 from ...compiler.lower import lower
 from ...compiler.profiles import EMITTED_SINE
+from ...compiler.schedules import PLAIN
 from ...refimpl import dataset, metrics
 from ...refimpl.denoise import Model, denoise
 from ...refimpl.frame import Frame
@@ -32,8 +33,11 @@ from .contender import Variant
 
 Array = NDArray[np.float64]
 
-CROP_PX = 48
-"""Rows and columns of the crop."""
+CROP_PX = 42
+"""Rows and columns of the crop: whole tiles of every schedule."""
+
+MARGIN_PX = 48
+"""Rows and columns beyond the crop that any schedule looks at: a window, and the points of a tile."""
 
 ULP_FLOOR = 2.0**-10
 """Colours below this, a quarter of an 8-bit step, are measured in its units: near black units vanish."""
@@ -47,15 +51,14 @@ class Crop:
         self.model = model
         height, width = next(iter(images.values())).shape[:2]
         self.rows, self.columns = min(CROP_PX, height), min(CROP_PX, width)
-        after = model.window.after
         self.images = {
-            name: np.ascontiguousarray(image[: self.rows + after, : self.columns + after])
+            name: np.ascontiguousarray(image[: self.rows + MARGIN_PX, : self.columns + MARGIN_PX])
             for name, image in images.items()
         }
         joined = np.concatenate(list(self.images.values()), axis=-1)
         self.windows = dataset.all_windows(dataset.pad(joined, model.window), model.window)
         self.full = self.interpreted(lower(model))
-        self._rounding: dict[Variant, tuple[Array, float]] = {}
+        self._rounding: dict[tuple[Variant, str, str], tuple[Array, float]] = {}
 
     def interpreted(self, program: Program) -> Array:
         """Return the output (rows, columns, 3) of a program of one window, in float64."""
@@ -63,13 +66,17 @@ class Crop:
         crop: Array = self.cut(found)
         return crop
 
-    def rounding(self, variant: Variant) -> tuple[Array, float]:
-        """Return what a variant computes in float64, and the largest bound of a kernel's rounding."""
-        if variant not in self._rounding:
-            self._rounding[variant] = self._rounded(variant)
-        return self._rounding[variant]
+    def rounding(self, variant: Variant, target: str | None, schedule: str = "") -> tuple[Array, float]:
+        """Return what a variant computes in float64, and the largest bound of a kernel's rounding.
 
-    def _rounded(self, variant: Variant) -> tuple[Array, float]:
+        `schedule` of `target`: whose sums; a peer without a target is held to those of the interpreter.
+        """
+        key = variant, target or "numpy", schedule or PLAIN
+        if key not in self._rounding:
+            self._rounding[key] = self._rounded(*key)
+        return self._rounding[key]
+
+    def _rounded(self, variant: Variant, target: str, schedule: str) -> tuple[Array, float]:
         """Compute both: profile `ieee` has one sine for all targets."""
         program, contract = analysed(variant.program(self.model)), EMITTED_SINE
         if variant.rank:
@@ -77,7 +84,8 @@ class Crop:
             found = bounds.output_errors(program, at_images(whole, contract, self.images, of_cut=False))
             program = product(whole)
         else:
-            found = bounds.at_inputs(program, {"window": self.windows}, contract)
+            chosen = schedule_named(target, schedule)
+            found = bounds.output_errors(program, chosen.enclosures(program, contract, self.images))
         (bound,) = found.values()
         return self.interpreted(program), float(self.cut(bound).max())
 

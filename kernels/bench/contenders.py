@@ -1,7 +1,7 @@
 """The list of contenders: all executors with all their schedules, all variants of the network, all peers.
 
 1. A kernel is named EXECUTOR:SCHEDULE, with :VARIANT where it is not the whole network [`kernel`].
-2. Variants run with the schedule that suits the device [`Executor.schedule`] [`of_machine`].
+2. Variants run with the schedule that suits the device, or the one that stands in for it [`of_machine`].
 3. Peers stand in files of their own, `peer_*.py`; a new one is a file and a line in `PEERS`.
 """
 
@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from functools import partial
 
-from ...compiler.compile import TARGETS, analysed, compile_program
+from ...compiler.compile import TARGETS, analysed, compile_program, schedule_named
+from ...compiler.schedules import PLAIN
 from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from . import peer_oidn, peer_onnxruntime, peer_tinygrad, peer_torch
@@ -87,8 +88,15 @@ def of_machine(tools: Tools, size: int, quick: bool = False) -> list[Contender]:
         chosen = [suits] if quick else [schedule.name for schedule in target.schedules]
         found += [kernel(name, schedule) for schedule in chosen]
         if name != "numpy":
-            found += [kernel(name, suits, variant) for variant in (VARIANTS[:1] if quick else VARIANTS)]
+            passes = _of_two_passes(name, suits)
+            found += [kernel(name, passes, variant) for variant in (VARIANTS[:1] if quick else VARIANTS)]
     return [*found, *(peer for peer in PEERS if not quick or peer.name in QUICK)]
+
+
+def _of_two_passes(target: str, suits: str) -> str:
+    """Return the schedule of a first layer in two passes: spectra hold none and name what stands in."""
+    schedule = schedule_named(target, suits)
+    return schedule.name if schedule.instead == PLAIN else schedule.instead
 
 
 def chosen(contenders: Sequence[Contender], only: Sequence[str], executors: Sequence[str]) -> list[Contender]:

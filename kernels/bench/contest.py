@@ -195,7 +195,7 @@ class Contest:
         if contender.variant is None:
             return
         row.facts["error"] = accuracy.errors(crop.cut(picture), crop.full)
-        expected, bound = crop.rounding(contender.variant)
+        expected, bound = crop.rounding(contender.variant, contender.executor, contender.schedule)
         found = accuracy.errors(crop.cut(picture), expected)["max"]
         row.facts["rounding"] = {"max": found, "bound": bound if contender.executor else None}
 

@@ -1,0 +1,122 @@
+"""Cases: what is given, what is expected, how far off an answer may be, and which clause says so.
+
+1. A kind of case has a function of the reference, the clauses that it tests, and a way to make its cases
+   [`Kind`]; all kinds stand in `kinds/`.
+2. A file of vectors holds the cases of one kind, with the version of the format [`save`], [`load`]. Files are
+   text that can be reviewed: floats are hexadecimal (numbers.py).
+3. A case is valid, and has expected values with bounds, or invalid, and must be refused.
+
+Versions are X.Y.Z: X changes with the format, Y with the behaviour that is expected, Z with the cases.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ...refimpl.errors import InputError
+from .numbers import to_json
+
+VERSION = "1.0.0"
+"""Version of format, behaviour and cases."""
+
+FORMAT = "wamnet-vectors"
+"""Value of the key `format`, by which a file of vectors is recognised."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """One expected output: a value, how far off each number may be, and where that bound comes from.
+
+    `bound` 0 asks for equality; `accepted` holds other values that are right too, where the spec leaves a choice.
+    """
+
+    value: Any
+    bound: Any = 0.0
+    source: str = "exact"
+    accepted: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True)
+class Case:
+    """One question to a program, and the answer. `expected` None: the program must refuse the input."""
+
+    id: str
+    clause: str
+    inputs: Mapping[str, Any]
+    expected: Mapping[str, Output] | None
+    flags: tuple[str, ...] = ()
+    note: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the case in the form of JSON."""
+        data: dict[str, Any] = {"id": self.id, "clause": self.clause, "flags": list(self.flags)}
+        if self.note:
+            data["note"] = self.note
+        data |= {"valid": self.expected is not None, "input": to_json(dict(self.inputs))}
+        if self.expected is not None:
+            data["expected"] = {name: _output_json(output) for name, output in self.expected.items()}
+        return data
+
+
+def _output_json(output: Output) -> dict[str, Any]:
+    """Return an expected output in the form of JSON."""
+    data = {"value": to_json(output.value), "bound": to_json(output.bound), "source": output.source}
+    if output.accepted:
+        data["accepted"] = [to_json(value) for value in output.accepted]
+    return data
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of case: its name, title, what its fields are, its cases, and the reference's answer.
+
+    `inputs` and `outputs` describe fields for the format page: type, shape, unit.
+    """
+
+    name: str
+    title: str
+    inputs: Mapping[str, str]
+    outputs: Mapping[str, str]
+    make: Callable[[], Sequence[Case]]
+    answer: Callable[[Mapping[str, Any]], Mapping[str, Any]]
+    profiles: tuple[str, ...] = field(default=("ieee", "exact"))
+
+
+def save(kind: Kind, folder: Path) -> Path:
+    """Write the vectors of a kind, one case a line, and return the file."""
+    lines = [json.dumps(case.to_json(), allow_nan=False) for case in kind.make()]
+    head = {"format": FORMAT, "version": VERSION, "kind": kind.name, "title": kind.title}
+    opening = json.dumps(head)[:-1]
+    path = folder / f"{kind.name}.json"
+    path.write_text(opening + ', "cases": [\n' + ",\n".join(lines) + "\n]}\n")
+    return path
+
+
+def load(path: Path) -> tuple[str, list[Case]]:
+    """Return the kind's name and the cases of a file of vectors."""
+    try:
+        data = json.loads(path.read_text())
+    except (OSError, ValueError) as error:
+        raise InputError("file of vectors", str(path), f"it cannot be read ({error})", "fetch it again") from None
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError("file of vectors", str(path), f"its format must be {FORMAT!r}", "give another file")
+    if str(data.get("version")).split(".")[0] != VERSION.split(".")[0]:
+        rule = f"this runner reads version {VERSION.split('.')[0]}"
+        raise InputError(f"{path}: version", data.get("version"), rule, "update wamnet or the vectors")
+    return str(data["kind"]), [_case(item) for item in data["cases"]]
+
+
+def _case(data: Mapping[str, Any]) -> Case:
+    """Return a case from JSON; numbers stay texts until they are compared."""
+    expected = None
+    if data["valid"]:
+        expected = {
+            name: Output(o["value"], o["bound"], o["source"], tuple(o.get("accepted", ())))
+            for name, o in data["expected"].items()
+        }
+    flags, note = tuple(data["flags"]), data.get("note", "")
+    return Case(data["id"], data["clause"], data["input"], expected, flags, note)

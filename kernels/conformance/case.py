@@ -101,7 +101,9 @@ def load(path: Path) -> tuple[str, list[Case]]:
     try:
         data = json.loads(path.read_text())
     except (OSError, ValueError) as error:
-        raise InputError("file of vectors", str(path), f"it cannot be read ({error})", "fetch it again") from None
+        raise InputError(
+            "file of vectors", str(path), f"it cannot be read ({error})", "fetch it again"
+        ) from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise InputError("file of vectors", str(path), f"its format must be {FORMAT!r}", "give another file")
     if str(data.get("version")).split(".")[0] != VERSION.split(".")[0]:

@@ -74,7 +74,9 @@ def _array(value: Any, convert: Any, dtype: Any, what: str) -> NDArray[Any]:
         return np.array(converted(value), dtype)
     except (ValueError, OverflowError):
         rule = "lists must be of one length on each axis, integers below 2**63"
-        raise InputError(what, _shortened(value), rule, "answer with the shape that the format page states") from None
+        raise InputError(
+            what, _shortened(value), rule, "answer with the shape that the format page states"
+        ) from None
 
 
 def _float(leaf: Any, what: str) -> float:

@@ -1,0 +1,17 @@
+"""All kinds of cases, by name: a new one is a module here and a line in `KINDS` or `FUNCTIONS`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ..case import Kind
+from ..functions import Function
+from . import light, numbers
+
+FUNCTIONS: Mapping[str, Function] = {f.name: f for f in (*numbers.FUNCTIONS, *light.FUNCTIONS)}
+"""Kinds that are functions of numbers, which executors can run."""
+
+KINDS: Mapping[str, Kind] = {
+    kind.name: kind for kind in (*numbers.KINDS, *(function.kind() for function in FUNCTIONS.values()))
+}
+"""Kinds by name."""

@@ -1,0 +1,144 @@
+"""Verdicts: each case is asked, each answer is held to its bounds, and nothing that a program does is a traceback.
+
+1. Cases are chosen by kind, clause, flag or part of their id [`chosen`].
+2. A verdict is one word [`Verdict`], with the first output that deviates, what was expected, what was found,
+   and the error beside its bound [`judge`].
+3. `unsupported` is no failure; the report counts it. A NaN is never within a bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...refimpl.errors import InputError
+from . import case as cases_module
+from .case import Case, Output
+from .numbers import from_json, number_text
+from .protocol import NoAnswerError, Session
+
+PASS, FAIL, UNSUPPORTED = "pass", "fail", "unsupported"
+"""Verdicts of answers; the others are those of [`NoAnswerError`]."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What came of a case. `stage`: the first output that deviates; `ratio`: error / bound, the largest."""
+
+    id: str
+    kind: str
+    clause: str
+    verdict: str
+    text: str = ""
+    stage: str = ""
+    expected: str = ""
+    got: str = ""
+    ratio: float = 0.0
+
+    @property
+    def failed(self) -> bool:
+        """Return whether this is a failure."""
+        return self.verdict not in (PASS, UNSUPPORTED)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the verdict in the form of JSON."""
+        return {**asdict(self), "ratio": number_text(self.ratio)}
+
+
+def read_vectors(folder: Path) -> dict[str, list[Case]]:
+    """Return all cases under a folder, by kind."""
+    paths = sorted(folder.glob("*.json"))
+    if not paths:
+        rule = "it holds no file of vectors"
+        raise InputError("folder of vectors", str(folder), rule, "give spec/vectors or a copy of it")
+    return dict(cases_module.load(path) for path in paths)
+
+
+def chosen(cases: Mapping[str, Sequence[Case]], words: Sequence[str]) -> dict[str, list[Case]]:
+    """Return the cases whose id contains one of the words, or whose clause or flags are one; all without words."""
+    found = {
+        kind: [c for c in some if not words or any(w in c.id or w in (c.clause, *c.flags) for w in words)]
+        for kind, some in cases.items()
+    }
+    return {kind: some for kind, some in found.items() if some}
+
+
+def run(
+    session: Session,
+    cases: Mapping[str, Sequence[Case]],
+    profile: str,
+    on_progress: Callable[[int], None] = lambda count: None,
+) -> Iterator[Verdict]:
+    """Yield a verdict for each case."""
+    known = session.hello()["kinds"]
+    for kind, some in cases.items():
+        for case in some:
+            if kind not in known:
+                yield Verdict(case.id, kind, case.clause, UNSUPPORTED, "the program does not name this kind")
+            else:
+                yield _asked(session, kind, case, profile)
+            on_progress(1)
+
+
+def _asked(session: Session, kind: str, case: Case, profile: str) -> Verdict:
+    """Ask one case."""
+    request = {"id": case.id, "kind": kind, "profile": profile, "input": dict(case.inputs)}
+    try:
+        answer = session.ask(request)
+    except NoAnswerError as error:
+        return Verdict(case.id, kind, case.clause, error.verdict, str(error))
+    return judge(kind, case, answer)
+
+
+def judge(kind: str, case: Case, answer: Mapping[str, Any]) -> Verdict:
+    """Hold an answer to what is expected."""
+    if answer.get("unsupported"):
+        return Verdict(case.id, kind, case.clause, UNSUPPORTED, str(answer["unsupported"])[:200])
+    refused = "refused" in answer
+    if case.expected is None:
+        text = "" if refused else "the input is invalid and must be refused"
+        return Verdict(case.id, kind, case.clause, PASS if refused else FAIL, text)
+    if refused:
+        text = f"a valid input was refused: {str(answer['refused'])[:200]}"
+        return Verdict(case.id, kind, case.clause, FAIL, text)
+    outputs = answer.get("output")
+    if not isinstance(outputs, dict):
+        return Verdict(case.id, kind, case.clause, "garbage", "the answer has no output")
+    largest = 0.0
+    for name, expected in case.expected.items():
+        if name not in outputs:
+            return Verdict(case.id, kind, case.clause, FAIL, "the output is missing", name)
+        wrong, ratio = _compared(name, expected, outputs[name])
+        if wrong:
+            return Verdict(case.id, kind, case.clause, FAIL, *wrong, ratio)
+        largest = max(largest, ratio)
+    return Verdict(case.id, kind, case.clause, PASS, ratio=largest)
+
+
+def _compared(name: str, expected: Output, got: Any) -> tuple[tuple[str, str, str, str] | None, float]:
+    """Return (text, stage, expected, got) of the worst number beyond its bound, if any, and the largest ratio."""
+    if isinstance(expected.value, str) and "0x" not in expected.value:
+        same = got in (expected.value, *expected.accepted)
+        return (None if same else ("another text", name, expected.value, str(got)[:80])), 0.0
+    try:
+        found = from_json(got, f"output {name}").astype(np.float64)
+    except InputError as error:
+        return (str(error), name, "", ""), np.inf
+    wanted = from_json(expected.value, name).astype(np.float64)
+    if found.shape != wanted.shape:
+        return (f"shape {found.shape}, not {wanted.shape}", name, "", ""), np.inf
+    bound = np.broadcast_to(from_json(expected.bound, name).astype(np.float64), wanted.shape)
+    with np.errstate(invalid="ignore"):
+        error = np.where(found == wanted, 0.0, np.abs(found - wanted))
+    error = np.where(np.isnan(error), np.inf, error)
+    ratio = np.divide(error, bound, out=np.where(error > 0, np.inf, 0.0), where=bound > 0)
+    if np.all(error <= bound):
+        return None, float(ratio.max(initial=0.0))
+    worst = np.unravel_index(int(np.argmax(np.where(error <= bound, -1.0, ratio))), ratio.shape)
+    place = name + "".join(f"[{index}]" for index in worst)
+    text = f"error {error[worst]:.3g}, bound {bound[worst]:.3g}"
+    return (text, place, number_text(wanted[worst]), number_text(found[worst])), float(ratio[worst])

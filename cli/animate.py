@@ -37,7 +37,9 @@ EXAMPLES = """Examples:
 
 wamnet animate model.safetensors -o turning.mp4
 
-wamnet animate model.safetensors --seconds 2 --fps 5 --reference-spp 64 -o turning.gif"""
+wamnet animate model.safetensors --seconds 2 --fps 5 --reference-spp 64 -o turning.gif
+
+wamnet animate small.safetensors --rank 16 --executor opencl --renderer opencl -o turning.mp4"""
 """Shown below the help of `wamnet animate`."""
 
 
@@ -69,6 +71,7 @@ def animate(
     parameters: options.Parameters = None,
     executor: options.Executor = ExecutorName.numpy,
     renderer: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    rank: options.CutRank = 0,
 ) -> None:
     """Show what a model does over an animation: noisy, denoised and reference side by side.
 
@@ -93,6 +96,7 @@ def animate(
         raise InputError("parameter time", value, "each picture has its own", "use --start and --seconds")
     times = animation_times(start, seconds, fps)
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
+    facts += cut_facts(network, rank)
     shots = plan_shots(folder, (scene, chosen), times, (size, reference_spp, seed), facts)
     left = missing(folder, shots)
     folder.mkdir(exist_ok=True)
@@ -102,12 +106,22 @@ def animate(
         progress("drawing", len(left)) as advance,
     ):
         draw = draw_frames if renderer.value == executor.value != "numpy" else draw_apart
-        for _ in draw(left, network, runner, renderer.value):
+        for _ in draw(left, network, runner, renderer.value, rank):
             advance(1)
     if is_film:
         movie.write_movie(output, [shot.path for shot in shots], fps)
         shutil.rmtree(folder)
     say(f"{output}: {len(shots)} pictures, {len(left)} of them made now")
+
+
+def cut_facts(network: Model, rank: int) -> list[str]:
+    """Return what a cut of the first layer adds to a picture's origin; refuse a rank that it cannot have."""
+    from ..refimpl.factored import check_rank
+
+    if not rank:
+        return []
+    check_rank(rank, network.window.size, *network.siren.widths[:2])
+    return [f"rank {rank}"]
 
 
 def plan_shots(
@@ -165,7 +179,9 @@ def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
     return [shot for shot in shots if there.get(shot.path) is None]
 
 
-def draw_apart(shots: Sequence[Shot], model: Model, executor: Executor, renderer: str) -> Iterator[None]:
+def draw_apart(
+    shots: Sequence[Shot], model: Model, executor: Executor, renderer: str, rank: int = 0
+) -> Iterator[None]:
     """Render, denoise and write pictures, rendering and denoising on different devices."""
     from ..kernels import denoise_on
     from ..kernels.render_frame import render_frame
@@ -174,7 +190,7 @@ def draw_apart(shots: Sequence[Shot], model: Model, executor: Executor, renderer
     for shot in shots:
         frame = render_frame(renderer, shot.scene, shot.noisy, workers=None).frame
         noisy = to_display(frame["color"], model.normalization.exposure_stops)
-        denoised = denoise_on(executor, model, frame).image
+        denoised = denoise_on(executor, model, frame, rank=rank).image
         reference = None
         if shot.reference is not None:
             reference = render_frame(renderer, shot.scene, shot.reference, workers=None).frame
@@ -182,7 +198,9 @@ def draw_apart(shots: Sequence[Shot], model: Model, executor: Executor, renderer
         yield
 
 
-def draw_frames(shots: Sequence[Shot], model: Model, executor: Executor, renderer: str) -> Iterator[None]:
+def draw_frames(
+    shots: Sequence[Shot], model: Model, executor: Executor, renderer: str, rank: int = 0
+) -> Iterator[None]:
     """Render, denoise and write pictures by one pipeline, on the device that does both."""
     from contextlib import ExitStack
 
@@ -193,8 +211,16 @@ def draw_frames(shots: Sequence[Shot], model: Model, executor: Executor, rendere
         for shot in shots:
             if pipeline is None:
                 size, whole = (shot.noisy.height, shot.noisy.width), shot.reference is not None
-                settings, show = shot.noisy.settings, ("color",)
-                made = Pipeline(executor, shot.scene, model, size, settings=settings, show=show, whole=whole)
+                made = Pipeline(
+                    executor,
+                    shot.scene,
+                    model,
+                    size,
+                    settings=shot.noisy.settings,
+                    show=("color",),
+                    whole=whole,
+                    rank=rank,
+                )
                 pipeline = stack.enter_context(made)
             else:
                 pipeline.set_scene(shot.scene)

@@ -34,7 +34,7 @@ wamnet train -i n0.exr -t r0.exr -i n1.exr -t r1.exr --features color,normal --s
 
 wamnet train -i noisy.exr -t reference.exr --resume --steps 20000
 
-wamnet train --dataset cubes --from model.safetensors --rank 12 --steps 2000 -o small.safetensors"""
+wamnet train --dataset cubes --from model.safetensors --rank 12 --executor opencl -o small.safetensors"""
 """Shown below the help of `wamnet train`."""
 
 CHECKPOINT_INTERVAL_S = 30.0

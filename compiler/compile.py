@@ -34,15 +34,12 @@ from .passes import pipeline
 from .profiles import Profile, SineContract
 from .schedules import PLAIN, Pick, Plain, Printed, Schedule, pick
 
-MOST_IN_TEXTURE = 4
-"""Channels of a texture."""
-
 
 @dataclass(frozen=True)
 class Target:
     """Something that runs kernels: how its source is made, and what its own sine promises.
 
-    `chains`: a kernel may read what another one wrote, with any number of channels.
+    `widest`: most channels of an image that a kernel reads, `most` of all that it writes; None: any number.
     """
 
     name: str
@@ -51,7 +48,8 @@ class Target:
     entry: str
     native_sine: SineContract
     schedules: tuple[Schedule, ...]
-    chains: bool = True
+    widest: int | None = None
+    most: int | None = None
 
 
 def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
@@ -63,7 +61,8 @@ def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
         dialect.entry,
         dialect.native_sine,
         (Plain(dialect), *ladder),
-        chains=dialect.max_output_channels > MOST_IN_TEXTURE,
+        widest=dialect.channels_per_result,
+        most=dialect.max_output_channels,
     )
 
 
@@ -185,16 +184,17 @@ def compile_program(
     common = analysed(program)
     if not rank:
         return _compiled(common, chosen, profile, schedule, bound_over_images(common, profile, target))
-    if not chosen.chains:
+    if chosen.most is not None and rank > chosen.most:
         raise CompileError(
             f"rank {rank}: the image between both passes has as many channels, and {chosen.language} "
-            f"writes at most {MOST_IN_TEXTURE}; use executor opencl or numpy, or leave out the rank"
+            f"writes at most {chosen.most}; use a smaller rank, or executor opencl or numpy"
         )
-    cut = factor(common, rank)
+    cut = factor(common, rank, chosen.widest)
     bound = bound_over_images(common, profile, target, cut)
     alone = bound_over_images(cut.horizontal, profile, target)
     notes = (
-        f"pass      1 of 2: sums along the rows, of a first layer of rank {rank}",
+        f"pass      1 of 2: sums along the rows, of a first layer of rank {rank}"
+        + ("" if chosen.widest is None else f"; {chosen.widest} in each colour buffer,\n          in order"),
         f"pass      2 of 2: sums along the columns of the first pass's image, and the layers after it; the\n"
         f"          bound is that of both passes, against program {ir.digest(common)[:32]}",
     )

@@ -1,11 +1,12 @@
 """What a target's language looks like: templates and a table of operations, no decisions.
 
 emit.py fills the templates in. Names in braces: `image` and `channels` of a feature image, `entry`,
-`images` and `defines` of the whole kernel, `unordered` (what stands where the language cannot keep operations
-in order: without an error bound, with one), `index` into the weights, `i` and `value` of an output channel,
-`0`, `1`, `2` the operands of an operation, `type` the type of its result, `table` the name of its table,
-`name`, `count` and `values` of a table's declaration. The text between is the language's own, its braces
-doubled. An operation's template may differ for a kind of operand: `minimum.int32`.
+`images`, `results`, `starts` and `defines` of the whole kernel (`number` and `result` of each result),
+`unordered` (what stands where the language cannot keep operations in order: without an error bound, with
+one), `index` into the weights, `i` and `value` of an output channel, `0`, `1`, `2` the operands of one,
+`type` the type of its result, `table` the name of its table, `name`, `count` and `values` of a table's
+declaration. The text between is the language's own, its braces doubled. An operation's template may differ
+for a kind of operand: `minimum.int32`. More channels than `channels_per_result` go into several results.
 """
 
 from __future__ import annotations
@@ -34,8 +35,11 @@ class Dialect:
     pixel: str
     weight: str
     store: str
+    result_declaration: str = ""
+    result_start: str = ""
     arguments: str
     max_output_channels: int
+    channels_per_result: int | None = None
     native_sine: SineContract
     unordered: tuple[str, str] = ("", "")
     types: Mapping[str, str] = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "bool"}
@@ -69,6 +73,13 @@ class Dialect:
         "take": "{table}[{0}]",
         "row": "{table}[{0}]",
     }
+
+    def results(self, channels: int) -> list[str]:
+        """Return what is written into, in order; a language with one result for all channels has one."""
+        most = self.channels_per_result
+        if most is None or channels <= most:
+            return ["result"]
+        return [f"result_{number}" for number in range(-(-channels // most))]
 
     def variable(self, dtype: str) -> str:
         """Return the words before the name of a variable of this kind."""

@@ -84,10 +84,18 @@ def emit(
         entry=dialect.entry,
         images=dialect.image_separator.join(images),
         image=gather.images[0].name,
+        results=_each_result(dialect.result_declaration, program, dialect),
+        starts=_each_result(dialect.result_start, program, dialect),
         unordered=dialect.unordered[bounded],
     )
     comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
     return "\n".join([*comment, begin, *body.text(), dialect.end.format()]) + "\n"
+
+
+def _each_result(template: str, program: Program, dialect: Dialect) -> str:
+    """Return a line for each result that a kernel writes."""
+    names = dialect.results(output_channels(program))
+    return "\n".join(template.format(number=number, result=name) for number, name in enumerate(names))
 
 
 def private_bytes(program: Program) -> int:
@@ -261,12 +269,16 @@ class Body(Lines):
         index = self.program.outputs[0][1]
         channels = output_channels(self.program)
         self._comment(f"output {self.program.outputs[0][0]}")
-        store = self.dialect.store
-        if self.program.nodes[index].type.shape:
-            line = store.format(channels=channels, i="i", value=self._read(index, "i"))
-            self._nest([f"for (int i = 0; i < {channels}; ++i) {{"], [line])
-        else:
-            self._line(store.format(channels=1, i="0", value=self._read(index, "")))
+        store, results = self.dialect.store, self.dialect.results(channels)
+        if not self.program.nodes[index].type.shape:
+            self._line(store.format(result=results[0], channels=1, i="0", value=self._read(index, "")))
+            return
+        each = self.dialect.channels_per_result or channels
+        for first, result in zip(range(0, channels, each), results, strict=True):
+            line = store.format(
+                result=result, channels=channels, i="i", value=self._read(index, _plus(first, "i"))
+            )
+            self._nest([f"for (int i = 0; i < {min(each, channels - first)}; ++i) {{"], [line])
 
     # ---- the window --------------------------------------------------------------------------------------
 

@@ -193,8 +193,10 @@ class InlinedBody(Body):
         """Write the only output."""
         name, index = self.program.outputs[0]
         self._comment(f"output {name}")
-        components = COMPONENTS[self.program.nodes[index].type.shape[0] - 1]
-        self._line(f"result.{components} = v{index}_0.{components};")
+        channels = self.program.nodes[index].type.shape[0]
+        for vector, result in enumerate(self.dialect.results(channels)):
+            components = COMPONENTS[min(4, channels - 4 * vector) - 1]
+            self._line(f"{result}.{components} = v{index}_{vector}.{components};")
 
     def _element(self, index: int, lane: str) -> str:
         """Return the name of a value inside a function."""

@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from ..refimpl.errors import CompileError
 from .dialect import Dialect
 from .emit import schedule
+from .emit_factors import factor_defines
 from .ir import Node, Program, users
 from .lines import Lines
 from .ops import OPS
@@ -358,14 +359,29 @@ __kernel void wamnet_update(
         }
         return;
     }
-    float16 g = sums[i];
-    for (int n = 1; n < groups; ++n) {
-        g += sums[n * SUMS + i];
-    }
+{slopes}
     const float16 theta = old[i], m = old[COUNT + i], v = old[2 * COUNT + i];
     const float16 learning_rate = learning_rate_number, grown_1 = grown_1_number, grown_2 = grown_2_number;
 """
-"""The second kernel up to Adam."""
+"""The second kernel up to Adam, with braces as they are."""
+
+SLOPES = """\
+    float16 g = sums[i];
+    for (int n = 1; n < groups; ++n) {
+        g += sums[n * SUMS + i];
+    }"""
+"""The derivative: the sum over all work items."""
+
+SLOPES_SPLIT = """\
+    /* Factors move in place of their product, vectors PRODUCT to PRODUCT_END; theirs is one sum already. */
+    if (i >= PRODUCT && i < PRODUCT_END) {
+        return;
+    }
+    float16 g = sums[i];
+    for (int n = 1; n < groups && i < FACTORS; ++n) {
+        g += sums[n * SUMS + i];
+    }"""
+"""The same where a matrix is trained through its factors [emit_factors.py]."""
 
 
 def step_text(step: Step, form: WindowForm, dialect: Dialect, helpers: Sequence[str]) -> tuple[str, int]:
@@ -384,6 +400,7 @@ def step_text(step: Step, form: WindowForm, dialect: Dialect, helpers: Sequence[
         "SUMS": places[SQUARES].end,
         "SCRATCH": body.scratch_vectors,
         "LOSS_TERMS": f"{float(step.batch * places[SQUARES].width)!r}f",
+        **factor_defines(step),
     }
     begin = STEP_BEGIN.format(
         defines="\n".join(f"#define {name} {value}" for name, value in defines.items()),
@@ -415,7 +432,8 @@ def update_text(step: Step, adam: Program, dialect: Dialect) -> str:
             value = f"t{ends['theta']}.s{lane:x}"
             lines.append(f"    if (neuron + {lane} < {slot.width}) {target.format(lane)} = {value};")
         lines.append("}")
-    return UPDATE_BEGIN + "\n".join(f"    {line}" for line in lines) + "\n}\n"
+    begin = UPDATE_BEGIN.replace("{slopes}", SLOPES if step.split is None else SLOPES_SPLIT)
+    return begin + "\n".join(f"    {line}" for line in lines) + "\n}\n"
 
 
 def _number(node: Node, index: int, dialect: Dialect) -> str:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from . import weights
 from .dialect import Dialect
-from .emit import BORDERS, Body, emit, kernel_gather
+from .emit import BORDERS, Body, emit, kernel_gather, output_channels
 from .ir import Gather, Node, Program
 from .ops import OPS
 from .schedules import Schedule
@@ -58,6 +58,8 @@ def refused_by_vectors(program: Program, dialect: Dialect) -> str:
         if node.type.dtype != "float32" or not node.type.shape:
             return f"%{index} is {node.type}: vectors hold float32[n]"
     output = program.nodes[program.outputs[0][1]]
+    if (channels := output_channels(program)) > dialect.max_output_channels:
+        return f"it writes {channels} channels, of at most {dialect.max_output_channels}"
     if any(node.op != "affine" for node in _readers_of_window(program)):
         return "something besides an affine map reads the window"
     if output.op in ("constant", "parameter", "input"):

@@ -2,9 +2,10 @@
 
 1. The matrix of the only affine map that reads the window is cut to rank R [`factored.cut`], in float64; both
    factors are rounded to float32 [`factor`].
-2. The first program maps a row of taps to R numbers, without a bias: an image of R channels. The second one
-   maps a column of taps of that image to the layer's neurons, and goes on as the given program does. Both
-   border rules hold for each axis alone (spec/factored.md, FAC-2).
+2. The first program maps a row of taps to R numbers, without a bias: an image of R channels, or several side
+   by side where an image holds fewer [`between`]. The second one maps a column of taps of it to the layer's
+   neurons, and goes on as the given program does. Both border rules hold for each axis alone
+   (spec/factored.md, FAC-2).
 3. The error of both together, against the given program, is that of its own values, the first affine map's
    being [`enclose`]
 
@@ -71,20 +72,33 @@ class Cut:
         return factored.Factors(vertical.reshape(len(vertical), size, -1), _weight(self.horizontal, layer))
 
 
-def factor(program: Program, rank: int) -> Cut:
-    """Return the passes of a program whose window is read by one affine map, cut to this rank."""
+def factor(program: Program, rank: int, widest: int | None = None) -> Cut:
+    """Return the passes of a program whose window is read by one affine map, cut to this rank.
+
+    `widest`: most channels of an image between them, if there is a limit.
+    """
     gather, layer = kernel_gather(program), _layer(program)
     name, size = str(program.nodes[layer]["weight"]), gather.window.size
     factors = factored.cut(program.parameters[name].astype(np.float64), size, rank)
     vertical, horizontal = (a.astype(np.float32) for a in (factors.vertical, factors.horizontal))
     row = replace(gather, axes=(1,))
     first = trace(lambda window: {HORIZONTAL: window @ horizontal.T}, {"window": _window(row)}, row)
-    image = Image(HORIZONTAL, rank, *_range(first), "sums along the rows, of the kernel before this one")
-    column = Gather(gather.window, (image,), axes=(0,))
+    column = Gather(gather.window, between(rank, _range(first), widest), axes=(0,))
     nodes = tuple(_read_by(column, node) if node.op == "input" else node for node in program.nodes)
     parameters = {**program.parameters, name: vertical.reshape(len(vertical), -1)}
     second = replace(program, nodes=nodes, parameters=parameters, gather=column)
     return Cut(program, verify(first, "horizontal pass"), verify(second, "vertical pass"), layer)
+
+
+def between(rank: int, reach: tuple[float, float], widest: int | None) -> tuple[Image, ...]:
+    """Return the images between both passes: one, or as many of at most `widest` channels as are needed."""
+    text = "sums along the rows, of the kernel before this one"
+    if widest is None:
+        return (Image(HORIZONTAL, rank, *reach, text),)
+    starts = range(0, rank, widest)
+    return tuple(
+        Image(f"{HORIZONTAL}_{n}", min(widest, rank - start), *reach, text) for n, start in enumerate(starts)
+    )
 
 
 def enclose(cut: Cut, contract: SineContract, x: Any, columns: Columns, of_cut: bool) -> list[Enclosure]:

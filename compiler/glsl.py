@@ -14,6 +14,9 @@ WEIGHT_TEXTURE_WIDTH = 1024
 """Texels in a row of the weight texture: every implementation takes 1024 rows of 1024, a million weights."""
 
 
+MOST_RESULTS = 8
+"""Colour buffers that every implementation of OpenGL 3.3 draws into at once (MAX_DRAW_BUFFERS)."""
+
 ORDER_EXTENSION = "GL_ARB_gpu_shader5"
 """The extension of OpenGL 3.3 that brings `precise`."""
 
@@ -42,7 +45,7 @@ class GLSL(Dialect):
 {{defines}}
 {{images}}
 uniform sampler2D weight_texture;
-layout(location = 0) out vec4 result;
+{{results}}
 
 float weights(int index)
 {{{{
@@ -56,10 +59,12 @@ void main()
     int height = textureSize(image_{{image}}, 0).y;
     int x = int(gl_FragCoord.x);
     int y = int(gl_FragCoord.y);
-    result = vec4(0.0, 0.0, 0.0, 1.0);"""
+{{starts}}"""
     pixel = "texelFetch(image_{image}, ivec2(column, row), 0)[c]"
     weight = "weights({index})"
-    store = "result[{i}] = {value};"
+    store = "{result}[{i}] = {value};"
+    result_declaration = "layout(location = {number}) out vec4 {result};"
+    result_start = "    {result} = vec4(0.0, 0.0, 0.0, 1.0);"
     arguments = (
         "each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel\n"
         "row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the\n"
@@ -69,7 +74,8 @@ void main()
         "result: a float colour buffer of width x height, row 0 again the top row; no sRGB conversion by\n"
         "the target, the values are encoded already. Draw one triangle that covers it"
     )
-    max_output_channels = 4
+    max_output_channels = 4 * MOST_RESULTS
+    channels_per_result = 4
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
     qualifiers = {"float32": "PRECISE "}
     table = "const {type} {name}[{count}] = {type}[{count}]({values});"

@@ -12,13 +12,13 @@ class GLSLInlined(GLSL):
     begin = f"""\
 {PREAMBLE}
 {{images}}
-layout(location = 0) out vec4 result;
+{{results}}
 {{defines}}
 void main()
 {{{{
     int x = int(gl_FragCoord.x);
     int y = int(gl_FragCoord.y);
-    result = vec4(0.0, 0.0, 0.0, 1.0);"""
+{{starts}}"""
     types = {"float32": "vec4"}
     arguments = "\n".join(
         line

@@ -8,6 +8,8 @@
    transposed stands there twice, the second time under its name and [`TRANSPOSED`].
 4. The error of a sum follows from the enclosures of what is added, for every order of summation
    [`sum_errors`].
+5. Where the first layer has low rank, its factors move in place of its matrix [`Split`]; the error of their
+   derivatives follows from that of the matrix's [`factor_errors`].
 """
 
 from __future__ import annotations
@@ -19,6 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from ..refimpl import factored
+from ..refimpl.factored import Factors
 from .bounds import OUTWARD, Enclosure, enclose, gamma
 from .interpret import interpret
 from .ir import Program
@@ -45,17 +49,40 @@ class Sum:
     right: str | None = None
 
 
+def factor_names(parameter: str) -> tuple[str, str]:
+    """Return the names of a matrix's vertical and of its horizontal factor."""
+    return f"{parameter}.vertical", f"{parameter}.horizontal"
+
+
+@dataclass(frozen=True)
+class Split:
+    """The matrix `parameter` (D_out, size run) is the product of two factors, which are trained in its place.
+
+    As parameters they are matrices, vertical (D_out, size rank) and horizontal (rank, run) [factored.py].
+    """
+
+    parameter: str
+    size: int
+    rank: int
+
+    @property
+    def factors(self) -> tuple[str, str]:
+        """Return the names of the vertical and of the horizontal factor."""
+        return factor_names(self.parameter)
+
+
 @dataclass(frozen=True)
 class Step:
-    """A program of one example, and what is added up over `batch` examples."""
+    """A program of one example, and what is added up over `batch` examples; `split`: see there."""
 
     program: Program
     sums: tuple[Sum, ...]
     batch: int
+    split: Split | None = None
 
     @property
     def trained(self) -> tuple[str, ...]:
-        """Return the names of the parameters that are trained, in the program's order."""
+        """Return the names of the parameters that have a derivative, in the program's order."""
         return tuple(known.parameter for known in self.sums if known.parameter != SQUARES)
 
 
@@ -89,6 +116,37 @@ def sum_errors(step: Step, windows: Array, targets: Array) -> dict[str, Array]:
     nodes = enclose(step.program, given, EMITTED_SINE, EMITTED_COSINE)
     ends = dict(step.program.outputs)
     return {known.parameter: _sum_error(known, ends, nodes, len(windows)) for known in step.sums}
+
+
+def factor_errors(factors: Factors, dweight: Array, error: Array) -> Factors:
+    """Return how far the kernels' derivatives by both factors may be from [`factored.backward`].
+
+    `error` (D_out, D_in) is that of dweight. A sum of n products is rounded at most n + 1 times.
+    """
+    magnitude = Factors(
+        *(np.abs(array.astype(np.float64)) for array in (factors.vertical, factors.horizontal))
+    )
+    passed_on = factored.backward(magnitude, error)
+    size = factored.backward(magnitude, np.abs(dweight) + error + FLUSH)
+    n_out, run = magnitude.vertical.shape[0] * magnitude.vertical.shape[1], magnitude.horizontal.shape[1]
+    widened = (
+        (e + gamma(n + 1) * s + 2 * n * FLUSH) * (1 + OUTWARD)
+        for e, s, n in (
+            (passed_on.vertical, size.vertical, run),
+            (passed_on.horizontal, size.horizontal, n_out),
+        )
+    )
+    return Factors(*widened)
+
+
+def expansion_error(factors: Factors) -> Array:
+    """Return how far the kernels' product (D_out, D_in) of two factors may be from [`factored.expand`]."""
+    magnitude = Factors(
+        *(np.abs(array.astype(np.float64)) for array in (factors.vertical, factors.horizontal))
+    )
+    rank = factors.rank
+    widened: Array = (gamma(rank + 1) * factored.expand(magnitude) + 2 * rank * FLUSH) * (1 + OUTWARD)
+    return widened
 
 
 def _sum_error(known: Sum, ends: Mapping[str, int], nodes: Sequence[Enclosure], n: int) -> Array:

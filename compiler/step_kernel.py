@@ -1,7 +1,7 @@
 """The kernels of a training step for OpenCL: source, layout, and what they promise [`compile_step`].
 
 1. Lower the reference's step and Adam [`lower_step.py`]; put the emitted sine and cosine in.
-2. Emit both kernels [`emit_step.py`].
+2. Emit both kernels [`emit_step.py`], and those of a first layer of low rank [`emit_factors.py`].
 
 Profile `ieee`: any order of summation, fused multiply-add, emitted sine. What the derivatives of one step may
 be off is computed at given examples [`step.sum_errors`]. There is no bound for all weights that training may
@@ -14,19 +14,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from . import ir
+from .emit_factors import factors_text
 from .emit_step import WindowForm, step_text, update_text
 from .ir import Program
 from .lower_step import lower_adam, lower_step
 from .opencl_path import schedule
 from .passes import pipeline
 from .profiles import PROFILES
-from .step import Step
+from .step import Split, Step
 from .step_layout import LANES, Slot, slots, transposed_slots
+
+FIRST = "W0"
+"""Name of the first layer's matrix in a step."""
 
 
 @dataclass(frozen=True)
 class StepKernel:
-    """Both kernels; `step` is the analysed one, `adam` the program of one number.
+    """All kernels; `step` is the analysed one, `adam` the program of one number.
 
     `places` says where parameters lie, `copies` where transposed matrices do; `scratch_vectors` is the memory
     of a work item.
@@ -45,9 +49,17 @@ class StepKernel:
         return ir.sha256(self.source.encode())
 
 
-def compile_step(widths: tuple[int, ...], omegas: tuple[float, float], batch: int, size: int) -> StepKernel:
-    """Return the kernels that train layers of `widths` on windows of `size` x `size` pixels."""
-    return compile_lowered(lower_step(widths, *omegas, batch), size)
+def compile_step(
+    widths: tuple[int, ...], omegas: tuple[float, float], batch: int, size: int, rank: int = 0
+) -> StepKernel:
+    """Return the kernels that train layers of `widths` on windows of `size` x `size` pixels.
+
+    With a `rank` the factors of the first layer are what is trained.
+    """
+    step = lower_step(widths, *omegas, batch)
+    if rank:
+        step = replace(step, split=Split(FIRST, size, rank))
+    return compile_lowered(step, size)
 
 
 def compile_lowered(step: Step, size: int) -> StepKernel:
@@ -65,4 +77,6 @@ def compile_lowered(step: Step, size: int) -> StepKernel:
         f" * program   {ir.digest(step.program)[:32]}\n */\n"
     )
     source = header + text + "\n" + update_text(step, adam, dialect)
+    if step.split is not None:
+        source += "\n" + factors_text()
     return StepKernel(source, step, adam, slots(step), transposed_slots(step), scratch_vectors)

@@ -2,8 +2,9 @@
 
 1. A matrix is stored input-major, (D_in, D_out), as denoisers store it (weights.py); its rows are filled up
    with zeros to whole vectors. A vector is a matrix of one row [`Slot`].
-2. All trained parameters follow one another; moments and sums are laid out alike [`slots`]. Transposed
-   matrices are kept beside them in an order of their own [`transposed_slots`].
+2. All trained parameters follow one another; moments and sums are laid out alike [`slots`]. A matrix whose
+   factors are trained stands there too: without moments, and its sums are what the factors' are made of.
+   Transposed matrices are kept beside them in an order of their own [`transposed_slots`].
 3. Zeros that fill up stay zeros: sums write zeros there, and Adam leaves what has no gradient (ADM-4).
 """
 
@@ -49,9 +50,15 @@ def vectors_for(width: int) -> int:
 
 
 def slots(step: Step) -> Mapping[str, Slot]:
-    """Return the slots of the trained parameters, then that of the squared errors, which has no parameter."""
+    """Return the slots of the parameters with derivatives, then of factors, then of the squared errors."""
     found = _placed(step.program, step.trained)
     end = max(slot.end for slot in found.values())
+    if step.split is not None:
+        split, (vertical, horizontal) = step.split, step.split.factors
+        n_out, n_in = step.program.parameters[split.parameter].shape
+        found[vertical] = Slot(vertical, split.size * split.rank, n_out, end)
+        found[horizontal] = Slot(horizontal, n_in // split.size, split.rank, found[vertical].end)
+        end = found[horizontal].end
     width = step.program.nodes[dict(step.program.outputs)[SQUARES]].type.shape[0]
     return {**found, SQUARES: Slot(SQUARES, 1, width, end)}
 

@@ -1,11 +1,11 @@
 """First layers of low rank: what a cut costs on unseen frames, and what training wins back.
 
     wamnet demo -o out/demo
-    python experiments/ranks.py --dataset out/demo/frames --ranks 16 12 8 --tune 2000 6000
+    python experiments/ranks.py --dataset out/demo/frames --ranks 16 12 8 --executor opencl
 
-Train the preset `short` in full, cut its first layer, and train on in factored form; and train in that form
-from the start, for as many steps as the full network. Print PSNR of display-encoded colour on the test frames
-of a data set, as a Markdown table. Seconds are wall-clock times.
+Train the preset `short` in full, cut its first layer, and train on in factored form; with --fresh also train
+in that form from the start, for as many steps as the full network. Print PSNR of display-encoded colour on
+the test frames of a data set, as a Markdown table. Seconds are wall-clock times.
 """
 
 from __future__ import annotations
@@ -14,16 +14,19 @@ import argparse
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
 from wamnet.cli import dataset_files
+from wamnet.kernels import open_executor, train_on
 from wamnet.refimpl import dataset, factored, metrics
 from wamnet.refimpl.denoise import Model, denoise
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.train import SHORT, Recipe, model_of, train
+from wamnet.refimpl.train import SHORT, Recipe, TrainState, model_of, train
 
 Pair = tuple[Frame, Frame]
+Fit = Callable[..., TrainState]
 
 
 def scores(model: Model, tests: Sequence[Pair]) -> str:
@@ -56,7 +59,12 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=6000, help="steps of the full network")
     parser.add_argument("--tune", nargs="+", type=int, default=[2000], help="steps after the cut")
     parser.add_argument("--ranks", nargs="+", type=int, default=[16, 12, 8])
+    parser.add_argument("--executor", choices=("numpy", "opencl"), default="numpy", help="what trains")
+    parser.add_argument("--fresh", action="store_true", help="also with a rank from random weights on")
     options = parser.parse_args()
+    fit: Fit = train
+    if options.executor != "numpy":
+        fit = partial(train_on, open_executor(options.executor).__enter__())
     pairs, tests = (dataset_files.read_pairs(options.dataset, split) for split in ("train", "test"))
     recipe = replace(SHORT, steps=options.steps, seed=1)
     print("| first layer | products a pixel | s | PSNR dB, unseen frames |\n|---|---|---|---|")
@@ -69,7 +77,7 @@ def main() -> None:
         print(f"| {' | '.join(cells)} |", flush=True)
         return model
 
-    full = row(f"full, {options.steps} steps", 0, lambda: model_of(train(recipe, pairs)))
+    full = row(f"full, {options.steps} steps", 0, lambda: model_of(fit(recipe, pairs)))
     for rank in options.ranks:
         row(f"cut to rank {rank}", rank, lambda rank=rank: cut(full, rank))  # type: ignore[misc]
         for steps in options.tune:
@@ -77,14 +85,15 @@ def main() -> None:
             row(
                 f"the same and {steps} steps",
                 rank,
-                lambda tuned=tuned: model_of(train(tuned, pairs, network=full.siren)),  # type: ignore[misc]
+                lambda tuned=tuned: model_of(fit(tuned, pairs, network=full.siren)),  # type: ignore[misc]
             )
-        fresh = replace(recipe, rank=rank)
-        row(
-            f"rank {rank} from the start, {options.steps} steps",
-            rank,
-            lambda fresh=fresh: model_of(train(fresh, pairs)),  # type: ignore[misc]
-        )
+        if options.fresh:
+            fresh = replace(recipe, rank=rank)
+            row(
+                f"rank {rank} from the start, {options.steps} steps",
+                rank,
+                lambda fresh=fresh: model_of(fit(fresh, pairs)),  # type: ignore[misc]
+            )
 
 
 if __name__ == "__main__":

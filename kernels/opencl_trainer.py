@@ -16,6 +16,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
+from ..compiler.emit_factors import KERNELS
 from ..compiler.emit_step import TILE
 from ..compiler.step import SQUARES, TRANSPOSED
 from ..compiler.step_kernel import StepKernel
@@ -43,6 +44,7 @@ class OpenCLTrainer:
     ) -> None:
         self._queue, self._context, self._kernel = queue, queue.context, kernel
         self._step, self._update = program.wamnet_step, program.wamnet_update
+        self._factors = [getattr(program, name) for name in KERNELS] if kernel.step.split else []
         device = queue.device
         if values.size >= INDEX_LIMIT or values.nbytes > device.max_mem_alloc_size:
             raise InputError(
@@ -90,14 +92,30 @@ class OpenCLTrainer:
                 self._queue, (self._groups,), (1,), self._values, self._targets, drawn, old, self._transposed,
                 self._scratch, self._sums, self._failed,
             )  # fmt: skip
+            self._slopes(old)
             size = -(-self._count // UPDATE_SIZE) * UPDATE_SIZE
             self._update(
                 self._queue, (size,), (UPDATE_SIZE,), self._sums, np.int32(self._groups), old, moved,
                 self._transposed, losses, self._failed, np.int32(at), np.int32(step + at),
                 *map(np.float32, rates),
             )  # fmt: skip
+            self._expand(moved)
             drawn_so_far.append(drawn)
         self._queue.flush()
+
+    def _slopes(self, old: Any) -> None:
+        """Start the kernels of the factors' derivatives, if the first weights have factors."""
+        if (split := self._kernel.step.split) is not None:
+            product, horizontal = (self._kernel.places[name] for name in (split.parameter, split.factors[1]))
+            sizes = (split.size * product.vectors,), (horizontal.rows,)
+            self._factors[0](self._queue, sizes[0], (1,), self._sums, np.int32(self._groups), old)
+            self._factors[1](self._queue, sizes[1], (1,), self._sums, old)
+
+    def _expand(self, moved: Any) -> None:
+        """Start the product of the moved factors, if there are any."""
+        if (split := self._kernel.step.split) is not None:
+            rows = self._kernel.places[split.parameter].rows
+            self._factors[2](self._queue, (rows,), (split.size,), moved, self._failed)
 
     def finish(self) -> tuple[int, NDArray[np.float32], int | None]:
         """Wait; return first step and losses of the last block, and the step whose loss is not finite.
@@ -122,6 +140,10 @@ class OpenCLTrainer:
         end = self._kernel.places[SQUARES].end
         found = np.empty((self._groups, end * LANES), np.float32)
         cl.enqueue_copy(self._queue, found, self._sums)
+        if (split := self._kernel.step.split) is not None:
+            # These are one sum already, in the place of the first work item.
+            for slot in (self._kernel.places[name] for name in (split.parameter, *split.factors)):
+                found[1:, slot.offset * LANES : slot.end * LANES] = 0
         return unpack(self._kernel.places, np.add.accumulate(found, axis=0)[-1])
 
     def _upload(self, array: NDArray[Any]) -> Any:

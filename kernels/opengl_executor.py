@@ -4,12 +4,14 @@
 2. Upload images and weights as float textures; texel row 0 is the frame's top row.
 3. Draw one triangle that covers a float colour buffer of the image's size [`VERTEX_SHADER`], and read it
    back: fragment (x, y) computed the pixel in column x of row y, so rows need no turning.
+4. Of two passes the first one draws into as many buffers as its channels fill, which the second one reads
+   [`OpenGLExecutor._draw_all`].
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,11 +23,12 @@ from numpy.typing import NDArray
 from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
 from ..compiler.encode_kernel import EncodeArtifact
+from ..compiler.factor import HORIZONTAL
 from ..compiler.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
 from ..compiler.path_kernel import PathArtifact
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import osmesa
-from .executor import Executor, Images, Part, black, images_of, keep
+from .executor import Executor, Images, Part, black, gather_of, keep
 from .passes import PICTURE, Passes
 
 CONTEXT_VARIABLE = "WAMNET_OPENGL_CONTEXT"
@@ -107,12 +110,14 @@ class OpenGLExecutor(Executor):
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
         """Compile the shaders, upload the weights, and draw a few pixels."""
-        built = self._built.get(artifact.digest) or self._compile(artifact)
-        with self._context:
-            for old in keep(self._built, artifact.digest, built):
-                old.release()
+        for kernel in artifact.kernels:
+            built = self._built.get(kernel.digest) or self._compile(kernel)
+            with self._context:
+                for old in keep(self._built, kernel.digest, built):
+                    old.release()
         # llvmpipe compiles again for textures whose width or height is, or is not, a power of two.
         small = (3 if size[0] & (size[0] - 1) else 2, 3 if size[1] & (size[1] - 1) else 2)
+        built = self._built[artifact.kernels[-1].digest]
         if small not in built.drawn:
             self._run(artifact, black(artifact, small))
             built.drawn.add(small)
@@ -154,20 +159,30 @@ class OpenGLExecutor(Executor):
         return self._texture("weights", padded)
 
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
-        built = self._built[artifact.digest]
-        height, width = next(iter(images.values())).shape[:2]
+        size, textures = next(iter(images.values())).shape[:2], {}
         with self._context, ExitStack() as made:
-            textures = {"weight_texture": built.weights}
             for name, image in images.items():
-                textures[f"image_{name}"] = self._texture(name, image)
-                made.callback(textures[f"image_{name}"].release)
-            target = self._context.texture((width, height), 4, dtype="f4")
-            made.callback(target.release)
-            frame = self._context.framebuffer([target])
-            made.callback(frame.release)
-            self._draw(built, frame, textures)
-            pixels = np.frombuffer(target.read(), np.float32).reshape(height, width, 4)
-        return pixels[..., : output_channels(artifact.program)].copy()
+                textures[name] = self._texture(name, image)
+                made.callback(textures[name].release)
+            drawn = [self._drawn_into(kernel, size, made) for kernel in artifact.kernels]
+            self._draw_all(artifact, textures, drawn)
+            read = [np.frombuffer(target.read(), np.float32).reshape(*size, 4) for target in drawn[-1][1]]
+        return np.concatenate(read, axis=-1)[..., : output_channels(artifact.program)].copy()
+
+    def _drawn_into(self, kernel: Artifact, size: tuple[int, ...], made: ExitStack) -> tuple[Any, list[Any]]:
+        """Return the framebuffer and the textures that a kernel draws into."""
+        count = -(-output_channels(kernel.program) // 4)
+        return self._targets("the pictures", (size[0], size[1]), count, made)
+
+    def _draw_all(
+        self, artifact: Artifact, textures: Mapping[str, Any], drawn: Sequence[tuple[Any, list[Any]]]
+    ) -> None:
+        """Draw an artifact's kernels one after another: images (by name), then what each pass has drawn."""
+        for kernel, (frame, targets) in zip(artifact.kernels, drawn, strict=True):
+            built = self._built[kernel.digest]
+            named = {f"image_{image.name}": textures[image.name] for image in gather_of(kernel).images}
+            self._draw(built, frame, {"weight_texture": built.weights, **named})
+            textures = {f"{HORIZONTAL}_{number}": target for number, target in enumerate(targets)}
 
     def _draw(
         self,
@@ -273,10 +288,10 @@ class OpenGLPasses(Passes):
         with executor._context, ExitStack() as made:
             self._sums = executor._targets("the pictures", size, -(-len(encode.planes) // 4), made)
             self._encoded = executor._targets("the pictures", size, len(encode.images), made)
-            self._result = executor._targets("the pictures", size, 1, made)
+            self._drawn = [executor._drawn_into(kernel, size, made) for kernel in denoise.kernels]
             self._made = made.pop_all()
         names = [image.name for image in encode.images]
-        self._images = dict(zip((*names, PICTURE), self._encoded[1] + self._result[1], strict=True))
+        self._images = dict(zip((*names, PICTURE), self._encoded[1] + self._drawn[-1][1], strict=True))
 
     def trace(self, kernel: PathArtifact, part: Part) -> None:
         """Draw the sums."""
@@ -297,11 +312,8 @@ class OpenGLPasses(Passes):
         """Draw the picture."""
         executor = self._executor
         executor.build(self.denoiser, self.size)
-        built = executor._built[self.denoiser.digest]
-        names = [image.name for image in images_of(self.denoiser)]
-        textures = {"weight_texture": built.weights, **{f"image_{n}": self._images[n] for n in names}}
         with executor._context:
-            executor._draw(built, self._result[0], textures)
+            executor._draw_all(self.denoiser, self._images, self._drawn)
 
     def read(self, name: str) -> NDArray[np.float32]:
         """Copy a texture to the host."""

@@ -40,8 +40,9 @@ class Pipeline:
     """A scene and a model on an open executor, for pictures of one size; a context manager.
 
     `show` names features that are to be readable besides those of the model. With `whole`, paths are traced
-    by the kernel of render_on.py, which writes more than is needed: one to compile where both are used. The
-    kernels are `path`, `encode` and `denoise`; `passes` runs them one by one.
+    by the kernel of render_on.py, which writes more than is needed: one to compile where both are used. With
+    a `rank` the model's first layer is cut to it, and is two passes [factor.py]. The kernels are `path`,
+    `encode` and `denoise`; `passes` runs them one by one.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class Pipeline:
         profile: str = "ieee",
         show: Sequence[str] = (),
         whole: bool = False,
+        rank: int = 0,
     ) -> None:
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
@@ -69,7 +71,8 @@ class Pipeline:
         self.encode = compile_encode(
             self._features, model.normalization, executor.name, profile, self.path.planes
         )
-        self.denoise = compile_program(lower(model), executor.name, profile, executor.schedule_for(size))
+        schedule = executor.schedule_for(size)
+        self.denoise = compile_program(lower(model), executor.name, profile, schedule, rank)
         self._drawn = self._closed = False
         self.passes = executor.passes(self.encode, self.denoise, size)
 

@@ -11,18 +11,20 @@ The definition is refimpl/train.py; how far a step may be from it: compiler/step
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler.step_kernel import compile_step
+from ..compiler.step import factor_names
+from ..compiler.step_kernel import FIRST, compile_step
 from ..refimpl import adam, dataset, train
 from ..refimpl.adam import AdamState
 from ..refimpl.dataset import Dataset, Indices
 from ..refimpl.errors import InputError, TrainingError
+from ..refimpl.factored import Factors
 from ..refimpl.frame import Frame
 from ..refimpl.siren import Siren
 from ..refimpl.train import Checkpoint, Progress, Recipe, TrainState
@@ -98,17 +100,25 @@ class Run:
 
     def state(self, step: int) -> TrainState:
         """Return the state before `step`, the one reached or the one before it."""
-        theta, m, v = (self._ordered(arrays) for arrays in self.device.state(step))
-        layers = len(theta) // 2
-        network = replace(self.template.siren, weights=theta[:layers], biases=theta[layers:])
-        history = tuple(pair for pair in sorted(self.history.items()) if pair[0] < step)
-        moments = AdamState(m, v, step)
-        return replace(self.template, siren=network, moments=moments, step=step, history=history)
-
-    def _ordered(self, arrays: Any) -> tuple[NDArray[np.float32], ...]:
-        """Return arrays by name in the order of a state, in its shapes."""
-        like = named(self.template.siren.weights + self.template.siren.biases)
-        return tuple(arrays[name].reshape(array.shape) for name, array in like.items())
+        found, *moments = self.device.state(step)
+        network = self.template.siren
+        weights, biases = (
+            _ordered(found, [f"{kind}{layer}" for layer in range(len(arrays))], arrays)
+            for kind, arrays in (("W", network.weights), ("b", network.biases))
+        )
+        names, like = names_of(self.template.parameters), self.template.parameters
+        factors = None
+        if self.template.factors is not None:
+            factors = Factors(*_ordered(found, names[:2], like[:2]))
+        m, v = (_ordered(arrays, names, like) for arrays in moments)
+        return replace(
+            self.template,
+            siren=replace(network, weights=weights, biases=biases),
+            moments=AdamState(m, v, step),
+            step=step,
+            history=tuple(pair for pair in sorted(self.history.items()) if pair[0] < step),
+            factors=factors,
+        )
 
 
 def train_on(
@@ -125,9 +135,6 @@ def train_on(
 ) -> TrainState:
     """Train as refimpl.train.train does, in float32, with the steps done by the executor's device."""
     train.check_recipe(recipe)
-    if recipe.rank > 0:
-        rule = "a device trains first layers in full"
-        raise InputError("rank", recipe.rank, rule, "use executor numpy, or rank 0")
     normalization = (
         dataset.normalization_of([noisy for noisy, _ in pairs]) if state is None else state.normalization
     )
@@ -165,18 +172,40 @@ def begin(executor: Executor, recipe: Recipe, data: Dataset, state: TrainState) 
         rule = "a device trains in float32"
         raise InputError("type of the state's numbers", str(state.siren.dtype), rule, "use executor numpy")
     omegas = recipe.omega_0_first, recipe.omega_0_hidden
-    kernel = compile_step(recipe.layer_widths, omegas, recipe.batch, recipe.window.size)
+    kernel = compile_step(recipe.layer_widths, omegas, recipe.batch, recipe.window.size, recipe.rank)
     device = executor.open_trainer(kernel, data.values, data.targets)
-    groups = (state.siren.weights + state.siren.biases, state.moments.m, state.moments.v)
-    device.load(state.step, *map(named, groups))
+    load(device, state)
     return Run(device, recipe, data, state.step, state.step, state, dict(state.history))
 
 
-def named(arrays: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Return weights W0, W1, ... and biases b0, b1, ... by name, from a state's order."""
+def load(device: Any, state: TrainState) -> None:
+    """Put a state on a device: what moves, and the first layer's weights, which may follow its factors."""
+    theta, m, v = map(named, (state.parameters, state.moments.m, state.moments.v))
+    device.load(state.step, {**theta, FIRST: state.siren.weights[0]}, m, v)
+
+
+def names_of(arrays: Sequence[NDArray[Any]]) -> list[str]:
+    """Return the names of weights W0, W1, ... and biases b0, b1, ... in a state's order.
+
+    One more of them than a weight and a bias a layer: the first weights are two factors.
+    """
     layers = len(arrays) // 2
-    names = [f"W{layer}" for layer in range(layers)] + [f"b{layer}" for layer in range(layers)]
-    return dict(zip(names, arrays, strict=True))
+    first = factor_names(FIRST) if len(arrays) % 2 else (FIRST,)
+    others = [f"W{layer}" for layer in range(1, layers)]
+    return [*first, *others, *(f"b{layer}" for layer in range(layers))]
+
+
+def named(arrays: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return a state's arrays by name; a factor (D_out, size, R) as a matrix (D_out, size R)."""
+    flat = (array.reshape(len(array), -1) if array.ndim == 3 else array for array in arrays)
+    return dict(zip(names_of(arrays), flat, strict=True))
+
+
+def _ordered(
+    found: Mapping[str, NDArray[np.float32]], names: Sequence[str], like: Sequence[NDArray[Any]]
+) -> tuple[NDArray[np.float32], ...]:
+    """Return arrays by name in this order, in the shapes of others."""
+    return tuple(found[name].reshape(array.shape) for name, array in zip(names, like, strict=True))
 
 
 def _block_end(step: int, end: int, recipe: Recipe, stops: Sequence[int]) -> int:

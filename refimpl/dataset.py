@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from .encoding import to_display
 from .errors import InputError
-from .frame import Frame
+from .frame import Frame, check_finite
 from .rng import counter, random_block
 from .vectors import vector
 
@@ -288,7 +288,11 @@ def known(values: Array) -> Array:
 
 
 def target_image(reference: Frame, normalization: Normalization) -> NDArray[np.float32]:
-    """Return the colours (H, W, 3) to learn: the reference's, encoded as the color feature is."""
+    """Return the colours (H, W, 3) to learn: the reference's, encoded as the color feature is.
+
+    What is no number is refused here: it would be learned.
+    """
+    check_finite("layer 'color' of the reference", reference["color"])
     return feature_image(reference, ("color",), normalization)
 
 
@@ -381,10 +385,12 @@ def build(
 
 
 def _check_pairs(pairs: Sequence[tuple[Frame, Frame]]) -> None:
-    """Refuse no pairs, and pairs whose pictures differ in size."""
+    """Refuse no pairs, pairs whose pictures differ in size, and noisy frames with what is no number."""
     if not pairs:
         raise InputError("training pairs", "none", "at least one", "give a noisy frame and its reference")
     for index, (noisy, reference) in enumerate(pairs):
+        for name, values in noisy.layers.items():
+            check_finite(f"pair {index}: layer {name!r}", values)
         sizes = [f"{frame.width}x{frame.height}" for frame in (noisy, reference)]
         if sizes[0] != sizes[1]:
             raise InputError(

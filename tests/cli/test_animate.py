@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ from PIL import Image
 
 from wamnet.cli import animate, images
 from wamnet.cli.images import LABEL_PX, read_png
-from wamnet.compiler.model_file import load_model
-from wamnet.refimpl import encoding
+from wamnet.compiler.model_file import load_model, save_model
+from wamnet.refimpl import encoding, factored
 from wamnet.refimpl.denoise import denoise
 from wamnet.refimpl.render import Job, render
 from wamnet.refimpl.scenes import canonical
@@ -62,6 +63,27 @@ def test_one_device_draws_by_one_pipeline(wamnet, tmp_path, monkeypatch, executo
         levels = np.abs(np.rint(255 * (one - apart)))
         assert levels.max() <= 1
         assert (levels > 0).mean() <= 0.01  # values within 1e-5 of a rounding limit: 255 x 2e-5 of all
+
+
+@pytest.mark.parametrize("name", ["numpy", "opencl", "opengl"])
+def test_a_cut_first_layer(wamnet, tmp_path, refused, executor_named, name) -> None:
+    """The pictures of the model whose first layer is expanded from its factors, up to one level."""
+    executor_named({"opengl": "opengl-egl"}.get(name, name))
+    network = load_model(tmp_path / "m.safetensors")
+    size, first = network.window.size, network.siren.weights[0]
+    low = factored.expand(factored.cut(first.astype(np.float64), size, 2)).astype(np.float32)
+    siren = replace(network.siren, weights=(low, *network.siren.weights[1:]))
+    save_model(tmp_path / "low.safetensors", replace(network, siren=siren))
+    devices = ("--executor", name, "--renderer", name)
+    assert wamnet("animate", "m.safetensors", *SHORT, *devices, "--rank", 2, "-o", "cut").status == 0
+    assert wamnet("animate", "low.safetensors", *SHORT, *devices, "-o", "low").status == 0
+    assert wamnet("animate", "m.safetensors", *SHORT, *devices, "-o", "full").status == 0
+    for picture in ("00000.png", "00001.png"):
+        cut, low, full = (read_png(tmp_path / folder / picture) for folder in ("cut", "low", "full"))
+        assert np.abs(np.rint(255 * (cut - low))).max() <= 1
+        assert np.abs(np.rint(255 * (cut - full))).max() > 1
+    text = "it holds something else: 00000.png"
+    assert text in refused("animate", "m.safetensors", *SHORT, *devices, "--rank", 1, "-o", "cut")
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".mp4"])
@@ -120,6 +142,8 @@ def test_what_a_killed_run_leaves_is_removed(wamnet, tmp_path) -> None:
         (["--fps", 0], "it must be finite and last; change it"),
         (["--fps", 1e9], "number of pictures is 8000000000: a film has 100000 at most"),
         (["--size", 0], "width is 0"),
+        (["--rank", 9999], "rank is 9999: a window of "),
+        (["--rank", -1], "rank is -1: a window of "),
         (["--scene", "nowhere"], "scene is nowhere"),
         (["--reference-spp", -1], "spp is -1"),
         (

@@ -220,6 +220,22 @@ def test_training_on_a_device(wamnet, refused, pair, tmp_path, executor_named) -
     assert "Invalid value for '--executor'" in refused("train", *pair, "--executor", "opengl", "--restart")
 
 
+def test_factors_are_trained_on_a_device(wamnet, pair, tmp_path, executor_named) -> None:
+    """From a model in full: train_on's model, to the bit; NumPy goes on from its checkpoint."""
+    device = executor_named("opencl")
+    assert wamnet("train", *pair, "--steps", 2, "-o", "full.safetensors").status == 0
+    more = ("--from", "full.safetensors", "--rank", 4, "--steps", 3, "-o", "cut.safetensors")
+    assert wamnet("train", *pair, *more, "--executor", "opencl").status == 0
+    recipe = train.choose_recipe("short", None, {"features": ("color", "normal"), "steps": 3, "rank": 4})
+    frames = exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr")
+    want = train_on(device, recipe, [frames], network=load_model(tmp_path / "full.safetensors").siren)
+    got = load_checkpoint(tmp_path / "cut.checkpoint.safetensors")
+    assert all((a == b).all() for a, b in zip(got.parameters, want.parameters, strict=True))
+    resumed = wamnet("train", *pair[:4], "--resume", "--steps", 5, "-o", "cut.safetensors")
+    assert resumed.status == 0
+    assert load_checkpoint(tmp_path / "cut.checkpoint.safetensors").step == 5
+
+
 def test_a_device_that_is_missing(refused, pair, monkeypatch) -> None:
     """The reason is told, and nothing is written."""
 

@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from wamnet.compiler import artifact as artifacts
 from wamnet.compiler import ir
 from wamnet.compiler.compile import TARGETS, analysed, compile_program, round_up
+from wamnet.compiler.emit_tiled import refused_by_vectors
+from wamnet.compiler.glsl_inlined import GLSLInlined
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.lower import lower
@@ -234,9 +236,31 @@ def test_private_bytes_are_those_of_the_declared_arrays():
 
 def test_too_many_output_channels_for_a_fragment():
     with pytest.raises(
-        CompileError, match=r"output has 5 channels: GLSL .* writes at most 4; compile for another"
+        CompileError, match=r"output has 33 channels: GLSL .* writes at most 32; compile for another"
     ):
-        compile_program(gathered(lambda x: x, channels=5), "opengl")
+        compile_program(gathered(lambda x: x, channels=33), "opengl")
+
+
+def test_a_schedule_that_writes_fewer_channels_gives_way():
+    """A language may have one form with several results and one without; no target has both yet."""
+    dialect = GLSLInlined()
+    dialect.max_output_channels = 4
+    w = np.ones((5, 5), np.float32)
+    assert "it writes 5 channels, of at most 4" in refused_by_vectors(
+        gathered(lambda x: x @ w, channels=5), dialect
+    )
+
+
+@pytest.mark.parametrize("channels", [1, 4, 5, 8, 11])
+def test_a_fragment_writes_four_channels_a_buffer(channels):
+    """One `result` as ever, or numbered ones: each is declared, begins as black, and is written."""
+    source = compile_program(gathered(lambda x: x * 2.0, channels=channels), "opengl").source
+    names = ["result"] if channels <= 4 else [f"result_{n}" for n in range(-(-channels // 4))]
+    for number, name in enumerate(names):
+        assert f"layout(location = {number}) out vec4 {name};" in source
+        assert f"    {name} = vec4(0.0, 0.0, 0.0, 1.0);" in source
+        assert f"{name}[i] = v" in source
+    assert source.count("layout(") == len(names)
 
 
 def test_division_by_what_may_be_zero_has_no_bound():

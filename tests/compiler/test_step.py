@@ -74,6 +74,19 @@ def test_golden_source(golden: Any) -> None:
     golden("train.step.cl", compile_step((2 * 2 * 3, 20, 3), (1.0, 10.0), 4, 2).source)
 
 
+def test_golden_source_of_factors(golden: Any) -> None:
+    golden("train.factors.step.cl", compile_step((2 * 2 * 3, 20, 3), (1.0, 10.0), 4, 2, 5).source)
+
+
+def test_factors_lie_before_the_squares() -> None:
+    """Rows (dy, r) of neurons, rows k of ranks; the matrix keeps its place, and has no transposed copy."""
+    places = compile_step((2 * 2 * 3, 20, 3), (1.0, 10.0), 4, 2, 5).places
+    vertical, horizontal = (places[name] for name in step.factor_names("W0"))
+    assert (vertical.rows, vertical.width, horizontal.rows, horizontal.width) == (2 * 5, 20, 6, 5)
+    assert list(places)[-3:] == [vertical.name, horizontal.name, step.SQUARES]
+    assert [slot.offset for slot in places.values()][1:] == [slot.end for slot in places.values()][:-1]
+
+
 def test_source_is_a_function_of_the_step() -> None:
     same, again = (compile_step(WIDTHS, (1.0, 10.0), 4, 3) for _ in range(2))
     assert same.source == again.source

@@ -176,10 +176,11 @@ def test_a_wrong_encoding_is_caught(executor_named, model_of, fault):
 # ---- what stays on the device --------------------------------------------------------------------------
 
 
-def test_nothing_is_read_back_or_uploaded_in_between_on_opencl(executor_named, model_of, monkeypatch):
+@pytest.mark.parametrize("rank", [0, 5])
+def test_nothing_is_read_back_or_uploaded_in_between_on_opencl(executor_named, model_of, monkeypatch, rank):
     executor, model = executor_named("opencl"), model_of(ALL, 3, "clamp")
     module, copied, uploaded = sys.modules[type(executor).__module__], [], []
-    with Pipeline(executor, scene("cornell"), model, (9, 21), settings=SETTINGS) as pipeline:
+    with Pipeline(executor, scene("cornell"), model, (9, 21), settings=SETTINGS, rank=rank) as pipeline:
         pipeline.run()
         real_copy, real_buffer = module.cl.enqueue_copy, module.cl.Buffer
 
@@ -204,10 +205,13 @@ def test_nothing_is_read_back_or_uploaded_in_between_on_opencl(executor_named, m
 
 
 @pytest.mark.parametrize("name", ["opengl-egl", "opengl-osmesa"])
-def test_nothing_is_read_back_or_uploaded_in_between_on_opengl(executor_named, model_of, monkeypatch, name):
+@pytest.mark.parametrize("rank", [0, 5])
+def test_nothing_is_read_back_or_uploaded_in_between_on_opengl(
+    executor_named, model_of, monkeypatch, name, rank
+):
     executor, model = executor_named(name), model_of(ALL, 3, "clamp")
     module, read, made = sys.modules[type(executor).__module__], [], []
-    with Pipeline(executor, scene("cornell"), model, (9, 21), settings=SETTINGS) as pipeline:
+    with Pipeline(executor, scene("cornell"), model, (9, 21), settings=SETTINGS, rank=rank) as pipeline:
         pipeline.run()
         kind, context = module.moderngl.Texture, module.moderngl.Context
         real_read, real_texture = kind.read, context.texture

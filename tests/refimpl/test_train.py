@@ -217,9 +217,17 @@ def test_frames_that_are_not_finite_leave_no_good_state() -> None:
     kept: list[TrainState] = []
     noisy, reference = pair(1)
     bad = Frame({"color": np.full_like(noisy["color"], np.nan)})
-    with pytest.raises(TrainingError, match="loss at step 0 is nan"):
+    with pytest.raises(InputError, match=r"pair 0: layer 'color' at x=0, y=0 .* is nan"):
         train.train(SMALL, [(bad, reference)], on_checkpoint=kept.append)
     assert kept == []
+
+
+def test_references_that_are_not_finite_are_refused() -> None:
+    """A denoiser may read NaN as 0; a network must not learn that."""
+    noisy, reference = pair(1)
+    bad = Frame({"color": np.full_like(reference["color"], np.inf)})
+    with pytest.raises(InputError, match=r"layer 'color' of the reference at x=0, y=0 .* is inf"):
+        train.train(SMALL, [(noisy, bad)])
 
 
 def test_a_good_state_before_the_bad_one_is_kept() -> None:

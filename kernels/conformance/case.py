@@ -17,8 +17,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...refimpl.errors import InputError
-from .numbers import to_json
+from .numbers import from_file, from_json, rounded_up, to_json
 
 VERSION = "1.0.0"
 """Version of format, behaviour and cases."""
@@ -31,13 +33,15 @@ FORMAT = "wamnet-vectors"
 class Output:
     """One expected output: a value, how far off each number may be, and where that bound comes from.
 
-    `bound` 0 asks for equality; `accepted` holds other values that are right too, where the spec leaves a choice.
+    `bound` 0 asks for equality; `accepted` holds other values that are right too, where rounding decides.
+    `welch`: the value is an estimate, and so is the answer (kinds/pictures.py).
     """
 
     value: Any
     bound: Any = 0.0
     source: str = "exact"
     accepted: tuple[Any, ...] = ()
+    welch: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -64,9 +68,14 @@ class Case:
 
 def _output_json(output: Output) -> dict[str, Any]:
     """Return an expected output in the form of JSON."""
-    data = {"value": to_json(output.value), "bound": to_json(output.bound), "source": output.source}
+    bound = rounded_up(output.bound)
+    if np.size(bound) > 1 and np.all(bound == np.ravel(bound)[0]):
+        bound = np.ravel(bound)[0]
+    data = {"value": to_json(output.value), "bound": to_json(bound), "source": output.source}
     if output.accepted:
         data["accepted"] = [to_json(value) for value in output.accepted]
+    if output.welch is not None:
+        data["welch"] = to_json(dict(output.welch))
     return data
 
 
@@ -74,7 +83,8 @@ def _output_json(output: Output) -> dict[str, Any]:
 class Kind:
     """A kind of case: its name, title, what its fields are, its cases, and the reference's answer.
 
-    `inputs` and `outputs` describe fields for the format page: type, shape, unit.
+    `inputs` and `outputs` describe fields for the format page: type, shape, unit. `files` are those that its
+    cases name, by path relative to the folder of vectors; `notes` say what else a reader must know.
     """
 
     name: str
@@ -83,24 +93,23 @@ class Kind:
     outputs: Mapping[str, str]
     make: Callable[[], Sequence[Case]]
     answer: Callable[[Mapping[str, Any]], Mapping[str, Any]]
-    profiles: tuple[str, ...] = field(default=("ieee", "exact"))
+    files: Callable[[], Mapping[str, bytes]] = field(default=lambda: {})
+    notes: str = ""
 
 
-def save(kind: Kind, folder: Path) -> Path:
-    """Write the vectors of a kind, one case a line, and return the file."""
+def text_of(kind: Kind) -> str:
+    """Return the vectors of a kind as text, one case a line."""
     lines = [json.dumps(case.to_json(), allow_nan=False) for case in kind.make()]
     head = {"format": FORMAT, "version": VERSION, "kind": kind.name, "title": kind.title}
     opening = json.dumps(head)[:-1]
-    path = folder / f"{kind.name}.json"
-    path.write_text(opening + ', "cases": [\n' + ",\n".join(lines) + "\n]}\n")
-    return path
+    return opening + ', "cases": [\n' + ",\n".join(lines) + "\n]}\n"
 
 
 def load(path: Path) -> tuple[str, list[Case]]:
-    """Return the kind's name and the cases of a file of vectors."""
+    """Return the kind's name and the cases of a file of vectors, with the paths of their files made absolute."""
     try:
         data = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(
             "file of vectors", str(path), f"it cannot be read ({error})", "fetch it again"
         ) from None
@@ -109,16 +118,41 @@ def load(path: Path) -> tuple[str, list[Case]]:
     if str(data.get("version")).split(".")[0] != VERSION.split(".")[0]:
         rule = f"this runner reads version {VERSION.split('.')[0]}"
         raise InputError(f"{path}: version", data.get("version"), rule, "update wamnet or the vectors")
-    return str(data["kind"]), [_case(item) for item in data["cases"]]
+    try:
+        return str(data["kind"]), [_case(item, path.parent) for item in data["cases"]]
+    except (KeyError, TypeError, AttributeError) as error:
+        rule = f"its cases must be as spec/vectors/schema.json says ({error!r})"
+        raise InputError("file of vectors", str(path), rule, "fetch it again") from None
 
 
-def _case(data: Mapping[str, Any]) -> Case:
+def _case(data: Mapping[str, Any], folder: Path) -> Case:
     """Return a case from JSON; numbers stay texts until they are compared."""
     expected = None
     if data["valid"]:
         expected = {
-            name: Output(o["value"], o["bound"], o["source"], tuple(o.get("accepted", ())))
+            name: Output(o["value"], o["bound"], o["source"], tuple(o.get("accepted", ())), o.get("welch"))
             for name, o in data["expected"].items()
         }
     flags, note = tuple(data["flags"]), data.get("note", "")
-    return Case(data["id"], data["clause"], data["input"], expected, flags, note)
+    inputs = {name: _placed(value, folder) for name, value in data["input"].items()}
+    return Case(str(data["id"]), str(data["clause"]), inputs, expected, flags, note)
+
+
+def _placed(value: Any, folder: Path) -> Any:
+    """Return an input with the path of its file, if it is one, made absolute."""
+    if isinstance(value, dict) and isinstance(value.get("file"), str):
+        return {**value, "file": str((folder / value["file"]).resolve())}
+    return value
+
+
+def given(value: Any) -> Any:
+    """Return an input as the reference takes it: numbers as arrays, files as what they hold, texts as they are."""
+    if isinstance(value, dict) and "file" in value:
+        return from_file(value, "input") if "shape" in value else Path(value["file"]).read_text()
+    if isinstance(value, (dict, bool)):
+        return value
+    try:
+        found = from_json(value, "input")
+    except InputError:
+        return value
+    return found if found.ndim else found[()]

@@ -2,16 +2,17 @@
 
 1. A function of the reference is called with float64 numbers that float32 holds exactly: the expected value.
 2. The same function, traced, has for each output a range of what single precision may give, under the
-   promises of profile `ieee` (compiler/ranges.py): its farther end is the bound [`bounded`]. Where a decision
-   is closer to its threshold than rounding, the range holds both ways, and the case has the flag `undecided`.
+   promises of profile `ieee` (compiler/ranges.py): its farther end is the bound [`Function.bounded`]. Where a
+   decision is closer to its threshold than rounding, either way is accepted; the flag is `undecided`.
 3. Cases are chosen numbers, edge cases first, and others from the project's own generator [`drawn`].
 """
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -83,25 +84,50 @@ class Function:
 
     def answer(self, inputs: Numbers) -> Numbers:
         """Return the reference's answer, in float64."""
-        return self.call({name: np.asarray(inputs[name], np.float64) for name in self.inputs}, np.float64)
+        lanes = {name: np.asarray(inputs[name], np.float64)[np.newaxis] for name in self.inputs}
+        return {name: np.asarray(value)[0] for name, value in self.call(lanes, np.float64).items()}
 
     def bounded(self, inputs: Numbers) -> tuple[dict[str, Output], bool]:
         """Return expected outputs with bounds, and whether some decision is undecided."""
         wanted = self.answer(inputs)
-        found = ranges.evaluate(self.program(), components(self.inputs, inputs))
-        outputs, sure = {}, True
+        given = components(self.inputs, inputs)
+        found = ranges.evaluate(self.program(), given)
+        if not all(bool(np.all(part.sure & part.known)) for part in found.values()):
+            return self._either(inputs, wanted, ranges.evaluate(self.program(), given, guided=True)), True
+        outputs = {}
         for name, field in self.outputs.items():
-            parts = [found[part] for part in names(name, field.count)]
             value = np.asarray(wanted[name], np.float64)
-            low, high = (
-                np.array([float(getattr(p, end)) for p in parts]).reshape(value.shape) for end in ENDS
-            )
+            low, high = (_ends(found, name, field, end).reshape(value.shape) for end in ENDS)
             outputs[name] = Output(value, np.maximum(high - value, value - low), SOURCE)
-            sure &= all(bool(np.all(part.sure)) for part in parts)
-        return outputs, not sure
+        return outputs, False
 
-    def program(self) -> Program:
-        """Return the traced function, of numbers and to numbers."""
+    def _either(
+        self, inputs: Numbers, wanted: Numbers, guided: Mapping[str, ranges.Range]
+    ) -> dict[str, Output]:
+        """Return outputs where a decision is undecided: all that the reference answers nearby.
+
+        Every input is moved by `NUDGE` either way. An answer that is farther off than `APART` is another one, and
+        accepted as well; what is nearer adds to the bound.
+        """
+        near = [self.answer(moved) for moved in _nudged(inputs)]
+        outputs = {}
+        for name, field in self.outputs.items():
+            value = np.asarray(wanted[name], np.float64)
+            low, high = (_ends(guided, name, field, end) for end in ENDS)
+            others, bound = list[Any](), float(np.max(high - low))
+            for other in (np.asarray(answers[name], np.float64) for answers in near):
+                least = min(float(np.max(np.abs(other - known))) for known in (value, *others))
+                if least <= APART * (1.0 + float(np.max(np.abs(other)))):
+                    bound = max(bound, least)
+                else:
+                    others.append(other)
+            assert np.isfinite(bound), f"{self.name}: no bound at {inputs}"
+            outputs[name] = Output(value, bound, EITHER, tuple(others))
+        return outputs
+
+    @cached_property
+    def _program(self) -> Program:
+        """The traced function."""
         inputs = {part: Type() for name, field in self.inputs.items() for part in names(name, field.count)}
 
         def call(*numbers: Any) -> dict[str, Any]:
@@ -109,6 +135,10 @@ class Function:
             return self.parts(given)
 
         return pipeline.run(trace(call, inputs), PASSES)
+
+    def program(self) -> Program:
+        """Return the traced function, of numbers and to numbers."""
+        return self._program
 
     def parts(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Return the components of the outputs for those of the inputs, by name, in float32."""
@@ -118,6 +148,33 @@ class Function:
         }
         return components(self.outputs, self.call(fields, np.float32))
 
+
+def _ends(
+    found: Mapping[str, ranges.Range], name: str, field: Field, end: str
+) -> NDArray[np.float64]:
+    """Return one end of the ranges of a field's components."""
+    return np.array([float(getattr(found[part], end)) for part in names(name, field.count)])
+
+
+def _nudged(inputs: Numbers) -> Iterator[dict[str, Any]]:
+    """Yield the inputs with one component moved, each in turn, either way."""
+    for name, value in inputs.items():
+        for index in np.ndindex(np.shape(value)):
+            for step in (-NUDGE, NUDGE):
+                moved = np.array(value, np.float64)
+                moved[index] += step * max(1.0, abs(float(moved[index])))
+                yield {**inputs, name: moved}
+
+
+NUDGE = 2.0**-20
+"""How far inputs are moved, relative to 1 or to their size, to see what is near an undecided decision: some
+roundings of single precision."""
+
+APART = 2.0**-10
+"""Answers that differ by more than this, relative to 1 or to their size, are two."""
+
+EITHER = "range of single precision with decisions as the reference takes them, or as it does 2^-20 away"
+"""Where the bounds of undecided cases come from."""
 
 ENDS = ("low", "high")
 """The ends of a range."""

@@ -4,11 +4,14 @@
 2. An array is a list of such, nested by its axes [`to_json`]; a truth value is a JSON one.
 3. Reading takes decimal numbers too, which are rounded to float64: programs without a hexadecimal format may
    answer with 17 significant digits [`from_json`].
+4. A picture may be a file: `{"file": PATH, "shape": [...]}`, raw little-endian float32 [`from_file`].
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +29,32 @@ def number_text(value: float) -> str:
     whole, _, fraction = mantissa.partition(".")
     fraction = fraction.rstrip("0")
     return f"{sign}0x{whole}{'.' + fraction if fraction else ''}p{exponent}"
+
+
+def is_number(value: Any) -> bool:
+    """Tell whether a JSON value is a number, as such or as text."""
+    try:
+        _float(value, "")
+    except InputError:
+        return False
+    return True
+
+
+def rounded_up(bound: Any) -> Any:
+    """Return bounds (...) rounded up to 8 bits: short texts, and no less than was proven."""
+    mantissa, exponent = np.frexp(np.asarray(bound, np.float64))
+    return np.ldexp(np.ceil(mantissa * 256.0), exponent - 8)
+
+
+def from_file(value: Mapping[str, Any], what: str) -> NDArray[np.float32]:
+    """Return the array (...) in the file that a JSON value names."""
+    try:
+        shape = tuple(int(side) for side in value["shape"])
+        found = np.fromfile(Path(str(value["file"])), "<f4")
+        return found.reshape(shape)
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        rule = f"it must name a file of little-endian float32 of its shape ({error})"
+        raise InputError(what, _shortened(value), rule, "see spec/conformance.md") from None
 
 
 def to_json(value: Any) -> Any:
@@ -47,7 +76,10 @@ def to_json(value: Any) -> Any:
 
 def from_json(value: Any, what: str) -> NDArray[Any]:
     """Return nested lists of numbers as an array: float64, or int64 where all are integers, or bool."""
-    flat = list(_leaves(value))
+    try:
+        flat = list(_leaves(value))
+    except RecursionError:
+        raise InputError(what, "nested too deeply", "it must be a list of numbers", "see spec") from None
     if flat and all(isinstance(leaf, bool) for leaf in flat):
         return np.array(value, np.bool_)
     if flat and all(isinstance(leaf, int) and not isinstance(leaf, bool) for leaf in flat):
@@ -72,7 +104,9 @@ def _array(value: Any, convert: Any, dtype: Any, what: str) -> NDArray[Any]:
 
     try:
         return np.array(converted(value), dtype)
-    except (ValueError, OverflowError):
+    except InputError:
+        raise
+    except (ValueError, OverflowError, RecursionError):
         rule = "lists must be of one length on each axis, integers below 2**63"
         raise InputError(
             what, _shortened(value), rule, "answer with the shape that the format page states"

@@ -10,11 +10,12 @@ import numpy as np
 
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_program
-from ...compiler.ir import Gather, Image, Type
+from ...compiler.ir import Gather, Image, Program, Type
 from ...compiler.passes import pipeline
 from ...compiler.profiles import profile_named
 from ...compiler.trace import trace
 from ...refimpl.dataset import Window
+from ...refimpl.errors import CompileError
 from ..executor import Executor
 from .functions import Function, components, names
 from .kinds import FUNCTIONS
@@ -46,15 +47,23 @@ class OnExecutor:
         """Return the kernels of a function: outputs three at a time, since a picture has few channels."""
         function = FUNCTIONS[kind]
         total = sum(max(count, 1) for count in (field.count for field in function.outputs.values()))
-        return [
-            compile_program(
-                _program(function, list(range(first, min(first + 3, total))), profile), self.executor.name, profile
-            )
-            for first in range(0, total, 3)
-        ]
+        threes = [list(range(first, min(first + 3, total))) for first in range(0, total, 3)]
+        return [self._kernel(_program(function, wanted), profile) for wanted in threes]
+
+    def _kernel(self, program: Program, profile: str) -> Artifact:
+        """Return the kernel of a program.
+
+        Where the ranges of the inputs leave the argument of a sine without bound, as a division does, there is
+        no bound over all inputs: sines are expanded before anything asks for one. Each case has its own.
+        """
+        try:
+            return compile_program(program, self.executor.name, profile)
+        except CompileError:
+            expanded = pipeline.run(pipeline.run(program, pipeline.COMMON), profile_named(profile).passes)
+            return compile_program(expanded, self.executor.name, profile)
 
 
-def _program(function: Function, wanted: list[int], profile: str) -> Any:
+def _program(function: Function, wanted: list[int]) -> Program:
     """Return the program of a pixel: inputs are its channels, outputs some of the function's numbers."""
     images = [
         Image(part, 1, field.low, field.high)
@@ -67,6 +76,4 @@ def _program(function: Function, wanted: list[int], profile: str) -> Any:
         found = list(function.parts({image.name: window[..., i] for i, image in enumerate(images)}).values())
         return np.stack([found[i] for i in wanted], axis=-1)
 
-    program = trace(call, {"window": Type(shape=(len(images),))}, gather)
-    # A range per case cannot be stated, so no bound either: sines are expanded before anything asks for one.
-    return pipeline.run(pipeline.run(program, pipeline.COMMON), profile_named(profile).passes)
+    return trace(call, {"window": Type(shape=(len(images),))}, gather)

@@ -16,8 +16,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TextIO
 
 from ...refimpl.errors import CompileError, InputError
+from .case import given
 from .kinds import KINDS
-from .numbers import from_json, to_json
+from .numbers import to_json
 
 Answer = Callable[[str, Mapping[str, Any], str], Mapping[str, Any]]
 """(kind, inputs, profile) -> outputs."""
@@ -51,15 +52,7 @@ def _answered(request: Mapping[str, Any], kinds: Sequence[str], answer: Answer) 
 
 def of_reference(kind: str, inputs: Mapping[str, Any], profile: str) -> Mapping[str, Any]:
     """Return the reference's answer."""
-    return KINDS[kind].answer({name: _value(value, name) for name, value in inputs.items()})
-
-
-def _value(value: Any, name: str) -> Any:
-    """Return an input as numbers, where it is some."""
-    if isinstance(value, (dict, bool)) or (isinstance(value, str) and "0x" not in value):
-        return value
-    found = from_json(value, name)
-    return found if found.ndim else found[()]
+    return KINDS[kind].answer({name: given(value) for name, value in inputs.items()})
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -68,16 +61,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--executor", default=REFERENCE)
-    given = parser.parse_args(arguments)
-    if given.executor == REFERENCE:
+    options = parser.parse_args(arguments)
+    if options.executor == REFERENCE:
         serve(sys.stdin, sys.stdout, "wamnet, reference", list(KINDS), of_reference)
         return
     from .. import open_executor
     from .on_executor import OnExecutor
 
-    with open_executor(given.executor) as executor:
+    with open_executor(options.executor) as executor:
         answers = OnExecutor(executor)
-        name = f"wamnet, {given.executor} ({executor.device})"
+        name = f"wamnet, {options.executor} ({executor.device})"
         serve(sys.stdin, sys.stdout, name, answers.kinds, answers.answer)
 
 

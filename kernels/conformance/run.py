@@ -14,12 +14,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...refimpl.errors import InputError
+from ..welch import sidak, welch_p
+from . import blocks
 from . import case as cases_module
 from .case import Case, Output
-from .numbers import from_json, number_text
+from .numbers import from_file, from_json, is_number, number_text
 from .protocol import NoAnswerError, Session
+
+Numbers = NDArray[Any]
 
 PASS, FAIL, UNSUPPORTED = "pass", "fail", "unsupported"
 """Verdicts of answers; the others are those of [`NoAnswerError`]."""
@@ -49,9 +54,13 @@ class Verdict:
         return {**asdict(self), "ratio": number_text(self.ratio)}
 
 
+SCHEMA = "schema.json"
+"""Name of the file beside the vectors that says how they are written."""
+
+
 def read_vectors(folder: Path) -> dict[str, list[Case]]:
     """Return all cases under a folder, by kind."""
-    paths = sorted(folder.glob("*.json"))
+    paths = sorted(path for path in folder.glob("*.json") if path.name != SCHEMA)
     if not paths:
         rule = "it holds no file of vectors"
         raise InputError("folder of vectors", str(folder), rule, "give spec/vectors or a copy of it")
@@ -112,33 +121,78 @@ def judge(kind: str, case: Case, answer: Mapping[str, Any]) -> Verdict:
     for name, expected in case.expected.items():
         if name not in outputs:
             return Verdict(case.id, kind, case.clause, FAIL, "the output is missing", name)
-        wrong, ratio = _compared(name, expected, outputs[name])
+        wrong, ratio = _compared(name, expected, outputs[name], outputs)
         if wrong:
             return Verdict(case.id, kind, case.clause, FAIL, *wrong, ratio)
         largest = max(largest, ratio)
     return Verdict(case.id, kind, case.clause, PASS, ratio=largest)
 
 
-def _compared(name: str, expected: Output, got: Any) -> tuple[tuple[str, str, str, str] | None, float]:
-    """Return (text, stage, expected, got) of the worst number beyond its bound, if any, and the largest ratio."""
-    if isinstance(expected.value, str) and "0x" not in expected.value:
+Wrong = tuple[str, str, str, str]
+"""What is wrong with an output: text, stage, what was expected, what was found."""
+
+
+def _compared(name: str, expected: Output, got: Any, outputs: Mapping[str, Any]) -> tuple[Wrong | None, float]:
+    """Return what is wrong with an output, if anything, and the largest error / bound."""
+    if isinstance(expected.value, str) and not is_number(expected.value):
         same = got in (expected.value, *expected.accepted)
         return (None if same else ("another text", name, expected.value, str(got)[:80])), 0.0
     try:
-        found = from_json(got, f"output {name}").astype(np.float64)
+        found = _read(name, got)
+        if expected.welch is not None:
+            return _as_likely(name, expected, found, _read("variance", outputs.get("variance")), outputs)
     except InputError as error:
         return (str(error), name, "", ""), np.inf
-    wanted = from_json(expected.value, name).astype(np.float64)
+    verdicts = [_nearness(name, expected, value, found) for value in (expected.value, *expected.accepted)]
+    return min(verdicts, key=lambda verdict: (verdict[0] is not None, verdict[1]))
+
+
+def _read(name: str, got: Any) -> Numbers:
+    """Return the numbers of an answer, which may be in a file."""
+    found = from_file(got, name) if isinstance(got, dict) else from_json(got, f"output {name}")
+    return found.astype(np.float64)
+
+
+def _nearness(name: str, expected: Output, value: Any, found: Numbers) -> tuple[Wrong | None, float]:
+    """Return what is wrong with numbers that should be within the bound of a value, and error / bound."""
+    wanted = from_json(value, name).astype(np.float64)
     if found.shape != wanted.shape:
         return (f"shape {found.shape}, not {wanted.shape}", name, "", ""), np.inf
     bound = np.broadcast_to(from_json(expected.bound, name).astype(np.float64), wanted.shape)
     with np.errstate(invalid="ignore"):
         error = np.where(found == wanted, 0.0, np.abs(found - wanted))
+    right = np.where(np.isnan(error), False, error <= bound)
     error = np.where(np.isnan(error), np.inf, error)
     ratio = np.divide(error, bound, out=np.where(error > 0, np.inf, 0.0), where=bound > 0)
-    if np.all(error <= bound):
+    if np.all(right):
         return None, float(ratio.max(initial=0.0))
-    worst = np.unravel_index(int(np.argmax(np.where(error <= bound, -1.0, ratio))), ratio.shape)
+    worst = np.unravel_index(int(np.argmax(np.where(right, -1.0, ratio))), ratio.shape)
     place = name + "".join(f"[{index}]" for index in worst)
     text = f"error {error[worst]:.3g}, bound {bound[worst]:.3g}"
     return (text, place, number_text(wanted[worst]), number_text(found[worst])), float(ratio[worst])
+
+
+def _as_likely(
+    name: str, expected: Output, mean: Numbers, variance: Numbers, outputs: Mapping[str, Any]
+) -> tuple[Wrong | None, float]:
+    """Hold block means of an estimated picture to those of the reference's, by Welch's test."""
+    assert expected.welch is not None
+    told = {key: from_json(value, key) for key, value in expected.welch.items()}
+    shape = tuple(int(side) for side in told["shape"])
+    if mean.shape != shape or variance.shape != shape:
+        return (f"shapes {mean.shape} and {variance.shape}, not {shape}", name, "", ""), np.inf
+    count, size = int(told["spp"]), int(told["block"])
+    own = int(_read("spp", outputs.get("spp", expected.welch["asked"])))
+    if own < 2:
+        return (f"{own} samples per pixel have no variance", name, "", ""), np.inf
+    mean, variance = blocks.mean_and_variance(mean, variance, size)
+    wanted = from_json(expected.value, name)
+    p = welch_p(mean, variance, own, wanted, told["variance"], count)
+    level = sidak(float(told["significance"]), p.size)
+    least = float(np.min(np.where(np.isnan(p), 0.0, p)))
+    if least >= level:
+        return None, 0.0
+    worst = np.unravel_index(int(np.argmin(np.where(np.isnan(p), 0.0, p))), p.shape)
+    place = name + "".join(f"[{index}]" for index in worst)
+    text = f"p-value {least:.3g} of a block of {size} x {size} pixels, at least {level:.3g} expected"
+    return (text, place, number_text(wanted[worst]), number_text(mean[worst])), np.inf

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 from ..case import Kind
 from ..functions import Function
-from . import light, numbers
+from . import light, materials, numbers, surfaces
 
-FUNCTIONS: Mapping[str, Function] = {f.name: f for f in (*numbers.FUNCTIONS, *light.FUNCTIONS)}
+FUNCTIONS: Mapping[str, Function] = {f.name: f for f in (*numbers.FUNCTIONS, *light.FUNCTIONS, *surfaces.FUNCTIONS, *materials.FUNCTIONS)}
 """Kinds that are functions of numbers, which executors can run."""
 
 KINDS: Mapping[str, Kind] = {

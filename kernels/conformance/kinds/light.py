@@ -212,5 +212,88 @@ PLANE = Function(
 )
 """Rays and a parallelogram."""
 
-FUNCTIONS = (RAY, DISK, HEMISPHERE, FRAME, SPHERE, PLANE)
+CAUCHY = Function(
+    "sampling.spherical_cauchy",
+    "Directions around +z, lobed by a concentration, with their density",
+    "SMP-7",
+    {**UNIFORM, "concentration": Field("concentration of the lobe", 0, 0.0, 1e6)},
+    {"direction": Field("unit direction", 3), "pdf": Field("density, 1/sr")},
+    lambda given, dtype: _cauchy(given),
+    [
+        ("no lobe: the whole sphere", {"u0": 0.5, "u1": 0.25, "concentration": 0.0}),
+        ("the axis", {"u0": 0.0, "u1": 0.5, "concentration": 400.0}),
+        ("the far end of the skirt", {"u0": 1 - 2.0**-24, "u1": 0.5, "concentration": 400.0}),
+        ("the narrowest lobe", {"u0": 0.5, "u1": 0.75, "concentration": 1e6}),
+    ],
+    lambda u: {**_pair(u), "concentration": 1000.0 * u[2] * u[2]},
+)
+"""The sky's lobe."""
+
+
+def _cauchy(given: Numbers) -> dict[str, Any]:
+    """Return a direction and its density."""
+    wi = sampling.sample_spherical_cauchy(given["u0"], given["u1"], given["concentration"])
+    return {"direction": wi, "pdf": sampling.spherical_cauchy_pdf(1.0 - wi[..., 2], given["concentration"])}
+
+
+SAMPLE_QUAD = Function(
+    "sampling.quad",
+    "Points of a parallelogram",
+    "SMP-3",
+    {
+        **UNIFORM,
+        "corner": Field("corner", 3, -10.0, 10.0),
+        "edge_u": Field("edge", 3, -10.0, 10.0),
+        "edge_v": Field("other edge", 3, -10.0, 10.0),
+    },
+    {"point": Field("point of the parallelogram", 3), "pdf": Field("density, 1/area")},
+    lambda given, dtype: {
+        "point": sampling.sample_quad(*(given[name] for name in ("u0", "u1", "corner", "edge_u", "edge_v"))),
+        "pdf": sampling.quad_pdf(given["edge_u"], given["edge_v"]),
+    },
+    [
+        (
+            "its corner",
+            {"u0": 0.0, "u1": 0.0, "corner": (1, 2, 3), "edge_u": (1, 0, 0), "edge_v": (0, 0, 1)},
+        ),
+        (
+            "edges that are not at right angles",
+            {"u0": 0.5, "u1": 0.75, "corner": (0, 0, 0), "edge_u": (2, 0, 0), "edge_v": (1, 1, 0)},
+        ),
+    ],
+    lambda u: {**_pair(u), "corner": 4.0 * u[2:5] - 2.0, "edge_u": u[5:8] + 0.5, "edge_v": _unit(u[8:11])},
+    draws=4,
+)
+"""Light sampling's points."""
+
+CUMULATIVE = (0.125, 0.125, 0.625, 1.0)
+"""Running sums of the probabilities of all draws: the second is 0."""
+
+DISCRETE = Function(
+    "sampling.discrete",
+    f"An index by the running sums {', '.join(map(str, CUMULATIVE))}",
+    "SMP-4",
+    {"u0": UNIFORM["u0"]},
+    {"index": Field("index, from 0"), "probability": Field("its probability")},
+    lambda given, dtype: _discrete(given["u0"], dtype),
+    [
+        ("the first", {"u0": 0.0}),
+        ("just below a running sum", {"u0": 0.125 - 2.0**-24}),
+        ("on a running sum: the next one that is not impossible", {"u0": 0.125}),
+        ("the last", {"u0": 1 - 2.0**-24}),
+    ],
+    lambda u: {"u0": u[0]},
+    draws=4,
+)
+"""Which light is sampled."""
+
+
+def _discrete(u: Any, dtype: Any) -> dict[str, Any]:
+    """Return the index as a float, and its probability."""
+    cumulative = np.asarray(CUMULATIVE, dtype)
+    index = sampling.sample_discrete(u, cumulative)
+    return {"index": index.astype(dtype), "probability": sampling.discrete_pdf(index, cumulative)}
+
+
+FUNCTIONS = (RAY, DISK, HEMISPHERE, CAUCHY, SAMPLE_QUAD, DISCRETE, FRAME, SPHERE, PLANE)
 """The functions of this module."""

@@ -33,14 +33,15 @@ FORMAT = "wamnet-vectors"
 class Output:
     """One expected output: a value, how far off each number may be, and where that bound comes from.
 
-    `bound` 0 asks for equality; `accepted` holds other values that are right too, where rounding decides.
+    `bound` 0 asks for equality; `accepted` holds other values that are right too, where rounding decides, each
+    a mapping with its own `value` and `bound`.
     `welch`: the value is an estimate, and so is the answer (kinds/pictures.py).
     """
 
     value: Any
     bound: Any = 0.0
     source: str = "exact"
-    accepted: tuple[Any, ...] = ()
+    accepted: tuple[Mapping[str, Any], ...] = ()
     welch: Mapping[str, Any] | None = None
 
 
@@ -68,15 +69,21 @@ class Case:
 
 def _output_json(output: Output) -> dict[str, Any]:
     """Return an expected output in the form of JSON."""
-    bound = rounded_up(output.bound)
-    if np.size(bound) > 1 and np.all(bound == np.ravel(bound)[0]):
-        bound = np.ravel(bound)[0]
-    data = {"value": to_json(output.value), "bound": to_json(bound), "source": output.source}
+    data = {"value": to_json(output.value), "bound": _bound_json(output.bound), "source": output.source}
     if output.accepted:
-        data["accepted"] = [to_json(value) for value in output.accepted]
+        data["accepted"] = [
+            {"value": to_json(other["value"]), "bound": _bound_json(other["bound"])} for other in output.accepted
+        ]
     if output.welch is not None:
         data["welch"] = to_json(dict(output.welch))
     return data
+
+
+def _bound_json(bound: Any) -> Any:
+    """Return bounds in the form of JSON, rounded up; those that are all one as that one."""
+    rounded = rounded_up(bound)
+    same = np.size(rounded) > 1 and np.all(rounded == np.ravel(rounded)[0])
+    return to_json(np.ravel(rounded)[0] if same else rounded)
 
 
 @dataclass(frozen=True)

@@ -122,7 +122,9 @@ class Function:
                 else:
                     others.append(other)
             assert np.isfinite(bound), f"{self.name}: no bound at {inputs}"
-            outputs[name] = Output(value, bound, EITHER, tuple(others))
+            bounds = [np.maximum(bound, ULP * np.abs(other)) for other in (value, *others)]
+            accepted = tuple({"value": v, "bound": b} for v, b in zip(others, bounds[1:], strict=True))
+            outputs[name] = Output(value, bounds[0], EITHER, accepted)
         return outputs
 
     @cached_property
@@ -175,6 +177,9 @@ APART = 2.0**-10
 
 EITHER = "range of single precision with decisions as the reference takes them, or as it does 2^-20 away"
 """Where the bounds of undecided cases come from."""
+
+ULP = 2.0**-23
+"""One ulp of float32, relative: the rounding of the answer itself."""
 
 ENDS = ("low", "high")
 """The ends of a range."""

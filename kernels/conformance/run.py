@@ -135,15 +135,15 @@ Wrong = tuple[str, str, str, str]
 def _compared(name: str, expected: Output, got: Any, outputs: Mapping[str, Any]) -> tuple[Wrong | None, float]:
     """Return what is wrong with an output, if anything, and the largest error / bound."""
     if isinstance(expected.value, str) and not is_number(expected.value):
-        same = got in (expected.value, *expected.accepted)
-        return (None if same else ("another text", name, expected.value, str(got)[:80])), 0.0
+        return (None if got == expected.value else ("another text", name, expected.value, str(got)[:80])), 0.0
     try:
         found = _read(name, got)
         if expected.welch is not None:
             return _as_likely(name, expected, found, _read("variance", outputs.get("variance")), outputs)
     except InputError as error:
         return (str(error), name, "", ""), np.inf
-    verdicts = [_nearness(name, expected, value, found) for value in (expected.value, *expected.accepted)]
+    ways = ({"value": expected.value, "bound": expected.bound}, *expected.accepted)
+    verdicts = [_nearness(name, way, found) for way in ways]
     return min(verdicts, key=lambda verdict: (verdict[0] is not None, verdict[1]))
 
 
@@ -153,12 +153,12 @@ def _read(name: str, got: Any) -> Numbers:
     return found.astype(np.float64)
 
 
-def _nearness(name: str, expected: Output, value: Any, found: Numbers) -> tuple[Wrong | None, float]:
+def _nearness(name: str, expected: Mapping[str, Any], found: Numbers) -> tuple[Wrong | None, float]:
     """Return what is wrong with numbers that should be within the bound of a value, and error / bound."""
-    wanted = from_json(value, name).astype(np.float64)
+    wanted = from_json(expected["value"], name).astype(np.float64)
     if found.shape != wanted.shape:
         return (f"shape {found.shape}, not {wanted.shape}", name, "", ""), np.inf
-    bound = np.broadcast_to(from_json(expected.bound, name).astype(np.float64), wanted.shape)
+    bound = np.broadcast_to(from_json(expected["bound"], name).astype(np.float64), wanted.shape)
     with np.errstate(invalid="ignore"):
         error = np.where(found == wanted, 0.0, np.abs(found - wanted))
     right = np.where(np.isnan(error), False, error <= bound)

@@ -356,6 +356,7 @@ def followed(view: View) -> Iterator[dict[str, Range]]:
             return
 
 
+@cache
 def _whole_cases() -> list[Case]:
     """Return whole paths."""
     cases: list[Case] = []

@@ -1,10 +1,7 @@
 """The project's own answers through the same door: `python -m wamnet.kernels.conformance.program`.
 
-    --executor reference   the reference in float64, or float32 with --single
-    --executor NAME        functions of numbers, traced, and run as kernels on an executor
-
-An executor answers the kinds that are functions: the function is compiled like a network's, its inputs are
-the channels of an image of one pixel.
+    --executor reference   the reference in float64
+    --executor NAME        kernels on an executor (on_executor.py)
 """
 
 from __future__ import annotations
@@ -15,7 +12,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TextIO
 
-from ...refimpl.errors import CompileError, InputError
+from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from .case import given
 from .kinds import KINDS
 from .numbers import to_json
@@ -68,10 +65,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     from .. import open_executor
     from .on_executor import OnExecutor
 
-    with open_executor(options.executor) as executor:
-        answers = OnExecutor(executor)
-        name = f"wamnet, {options.executor} ({executor.device})"
-        serve(sys.stdin, sys.stdout, name, answers.kinds, answers.answer)
+    try:
+        with open_executor(options.executor) as executor:
+            answers = OnExecutor(executor)
+            name = f"wamnet, {options.executor} ({executor.device})"
+            serve(sys.stdin, sys.stdout, name, answers.kinds, answers.answer)
+    except ExecutorUnavailable as error:
+        sys.exit(str(error))
 
 
 if __name__ == "__main__":

@@ -11,20 +11,33 @@
 
 from __future__ import annotations
 
+import io
 import json
+import os
 import queue
+import signal
 import subprocess
 import threading
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any
 
 PROTOCOL = 1
 """Version of the protocol."""
 
-LONGEST_LINE = 2**26
+LONGEST_LINE = 2**24
 """Most bytes of an answer: what is longer is no answer."""
+
+LINES_AHEAD = 4
+"""Most lines that are kept before they are asked for: an endless output must not fill the memory."""
+
+PATIENCE_S = 2.0
+"""Time in which a program ends by itself once its input has ended, in seconds."""
+
+WRITER = "writer"
+"""Name of threads that write."""
 
 KEPT_ERRORS = 2_000
 """Characters of a program's standard error that a verdict shows: the last ones."""
@@ -43,8 +56,10 @@ class _Child:
     """A running program with the lines that it prints, as they come; None is their end."""
 
     process: subprocess.Popen[bytes]
-    lines: queue.Queue[bytes | None]
-    errors: list[bytes]
+    lines: queue.Queue[bytes | None] = field(default_factory=lambda: queue.Queue(LINES_AHEAD))
+    errors: list[bytes] = field(default_factory=list)
+    threads: list[threading.Thread] = field(default_factory=list)
+    ended: threading.Event = field(default_factory=threading.Event)
 
 
 class Session:
@@ -66,23 +81,21 @@ class Session:
         """Return the answer to a request, or raise [`NoAnswerError`]."""
         answer = self._request(request)
         if answer.get("id") != request["id"]:
-            self._end()
-            raise NoAnswerError("garbage", f"the answer is to {answer.get('id')!r}, not to {request['id']!r}")
+            self._end(at_once=True)
+            found = repr(answer.get("id"))[:80]
+            raise NoAnswerError("garbage", f"the answer is to {found}, not to {request['id']!r}")
         return answer
 
     def _request(self, request: Mapping[str, Any]) -> Mapping[str, Any]:
         """Write a line and read one."""
         child = self._start()
+        # A program that does not read must not stop the runner.
+        self._thread(child, _write, json.dumps(request).encode() + b"\n")
         try:
-            assert child.process.stdin is not None
-            child.process.stdin.write(json.dumps(request).encode() + b"\n")
-            child.process.stdin.flush()
             line = child.lines.get(timeout=self.timeout_s)
         except queue.Empty:
-            self._end()
+            self._end(at_once=True)
             raise NoAnswerError("timeout", f"no answer within {self.timeout_s:g} s") from None
-        except OSError:
-            line = None
         if line is None:
             raise NoAnswerError("crash", self._last_words())
         return self._parsed(line)
@@ -94,7 +107,7 @@ class Session:
         except (ValueError, RecursionError):
             answer = None
         if not isinstance(answer, dict):
-            self._end()
+            self._end(at_once=True)
             raise NoAnswerError("garbage", f"the line is no JSON object: {line[:80]!r}")
         return answer
 
@@ -105,13 +118,24 @@ class Session:
         self._end()
         pipe = subprocess.PIPE
         try:
-            process = subprocess.Popen(self.command, stdin=pipe, stdout=pipe, stderr=pipe)
-        except OSError as error:
-            raise NoAnswerError("crash", f"{self.command[0]} cannot be started: {error.strerror}") from None
-        self._child = _Child(process, queue.Queue(), [])
+            # A group of its own: what the program starts ends with it.
+            process = subprocess.Popen(
+                self.command, bufsize=0, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
+            )
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise NoAnswerError("crash", f"{self.command[0]} cannot be started: {reason}") from None
+        self._child = _Child(process)
         for target in (_read_lines, _read_errors):
-            threading.Thread(target=target, args=(self._child,), daemon=True).start()
+            self._thread(self._child, target)
         return self._child
+
+    @staticmethod
+    def _thread(child: _Child, target: Callable[..., None], *arguments: Any) -> None:
+        """Start a thread that serves a program; those that are done are forgotten."""
+        thread = threading.Thread(target=target, args=(child, *arguments), daemon=True)
+        child.threads[:] = [known for known in child.threads if known.is_alive()] + [thread]
+        thread.start()
 
     def _last_words(self) -> str:
         """End the program and return its exit status and the end of its standard error."""
@@ -121,21 +145,26 @@ class Session:
         text = b"".join(child.errors).decode(errors="replace").strip()[-KEPT_ERRORS:]
         return f"it ended with status {child.process.returncode}" + (f"; it said: {text}" if text else "")
 
-    def _end(self) -> None:
-        """Close the program's input, and stop it if it does not end by itself."""
+    def _end(self, at_once: bool = False) -> None:
+        """Close the program's input, and stop it if it does not end by itself soon; or `at_once`."""
         child, self._child = self._child, None
         if child is None:
             return
-        assert child.process.stdin is not None
+        process = child.process
+        assert process.stdin is not None
+        if not any(thread.name == WRITER and thread.is_alive() for thread in child.threads):
+            process.stdin.close()
         try:
-            child.process.stdin.close()
-        except OSError:
-            pass
-        try:
-            child.process.wait(timeout=2.0)
+            process.wait(timeout=0.0 if at_once else PATIENCE_S)
         except subprocess.TimeoutExpired:
-            child.process.kill()
-            child.process.wait()
+            pass
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        child.ended.set()
+        for thread in child.threads:
+            thread.join(timeout=PATIENCE_S)
+        process.stdin.close()
 
     def __enter__(self) -> Session:
         return self
@@ -146,19 +175,36 @@ class Session:
         self._end()
 
 
+def _write(child: _Child, line: bytes) -> None:
+    """Write a request; a program that has ended is noticed by the end of its output."""
+    threading.current_thread().name = WRITER
+    assert child.process.stdin is not None
+    with suppress(OSError, ValueError):
+        while line:
+            line = line[child.process.stdin.write(line) :]
+
+
 def _read_lines(child: _Child) -> None:
     """Put the lines of a program into its queue as they come."""
     assert child.process.stdout is not None
-    with child.process.stdout as stream:
-        while line := stream.readline(LONGEST_LINE):
+    with io.BufferedReader(child.process.stdout) as stream:  # type: ignore[type-var]
+        while not child.ended.is_set() and (line := stream.readline(LONGEST_LINE)):
             if line.strip():
-                child.lines.put(line)
-    child.lines.put(None)
+                _put(child, line)
+    _put(child, None)
+
+
+def _put(child: _Child, line: bytes | None) -> None:
+    """Put a line into the queue, and wait for room unless the program was ended."""
+    while not child.ended.is_set():
+        with suppress(queue.Full):
+            child.lines.put(line, timeout=0.1)
+            return
 
 
 def _read_errors(child: _Child) -> None:
     """Keep the end of what a program says on standard error."""
     assert child.process.stderr is not None
     with child.process.stderr as stream:
-        while part := stream.read1(4096):  # type: ignore[attr-defined]
+        while part := stream.read(4096):
             child.errors[:] = [b"".join([*child.errors, part])[-KEPT_ERRORS:]]

@@ -26,8 +26,18 @@ from .protocol import NoAnswerError, Session
 
 Numbers = NDArray[Any]
 
-PASS, FAIL, UNSUPPORTED = "pass", "fail", "unsupported"
-"""Verdicts of answers; the others are those of [`NoAnswerError`]."""
+PASS, FAIL, UNSUPPORTED, TIMEOUT, CRASH, GARBAGE = VERDICTS = (
+    "pass",
+    "fail",
+    "unsupported",
+    "timeout",
+    "crash",
+    "garbage",
+)
+"""Verdicts: three of answers, and those of [`NoAnswerError`]."""
+
+MOST_TIMEOUTS = 3
+"""Cases of a kind that may run out of time before the others of this kind are given up."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +78,16 @@ def read_vectors(folder: Path) -> dict[str, list[Case]]:
 
 
 def chosen(cases: Mapping[str, Sequence[Case]], words: Sequence[str]) -> dict[str, list[Case]]:
-    """Return the cases whose id contains one of the words, or whose clause or flags are one; all without words."""
-    found = {
-        kind: [c for c in some if not words or any(w in c.id or w in (c.clause, *c.flags) for w in words)]
-        for kind, some in cases.items()
-    }
+    """Return the cases whose id holds one of the words, or whose clause or flag is one; all without words.
+
+    A word with a stroke is a whole id: random.block/1 is not random.block/10.
+    """
+
+    def wanted(case: Case) -> bool:
+        known = (case.id, case.clause, *case.flags)
+        return not words or any(word in known or ("/" not in word and word in case.id) for word in words)
+
+    found = {kind: [case for case in some if wanted(case)] for kind, some in cases.items()}
     return {kind: some for kind, some in found.items() if some}
 
 
@@ -82,15 +97,31 @@ def run(
     profile: str,
     on_progress: Callable[[int], None] = lambda count: None,
 ) -> Iterator[Verdict]:
-    """Yield a verdict for each case."""
-    known = session.hello()["kinds"]
+    """Yield a verdict for each case; of a kind that hangs, the cases after some are not asked."""
+    known = introduced(session)["kinds"]
     for kind, some in cases.items():
+        hung = 0
         for case in some:
             if kind not in known:
                 yield Verdict(case.id, kind, case.clause, UNSUPPORTED, "the program does not name this kind")
+            elif hung == MOST_TIMEOUTS:
+                text = f"not asked: {hung} cases of this kind had no answer in time"
+                yield Verdict(case.id, kind, case.clause, TIMEOUT, text)
             else:
-                yield _asked(session, kind, case, profile)
+                verdict = _asked(session, kind, case, profile)
+                hung += verdict.verdict == TIMEOUT
+                yield verdict
             on_progress(1)
+
+
+def introduced(session: Session) -> Mapping[str, Any]:
+    """Return what a program says of itself, or refuse it."""
+    try:
+        return session.hello()
+    except NoAnswerError as error:
+        rule = f"it must answer to hello ({error.verdict}: {error})"
+        way_out = "see spec/conformance.md; --timeout gives it more time"
+        raise InputError("--program", " ".join(session.command), rule, way_out) from None
 
 
 def _asked(session: Session, kind: str, case: Case, profile: str) -> Verdict:
@@ -116,7 +147,7 @@ def judge(kind: str, case: Case, answer: Mapping[str, Any]) -> Verdict:
         return Verdict(case.id, kind, case.clause, FAIL, text)
     outputs = answer.get("output")
     if not isinstance(outputs, dict):
-        return Verdict(case.id, kind, case.clause, "garbage", "the answer has no output")
+        return Verdict(case.id, kind, case.clause, GARBAGE, "the answer has no output")
     largest = 0.0
     for name, expected in case.expected.items():
         if name not in outputs:

@@ -170,7 +170,7 @@ MIS = Function(
     "transport.mis_weight",
     "Weights of two techniques",
     "LTR-5",
-    {"pdf": Field("density of the technique", 0, 0.0, 1e30), "other": Field("of the other one", 0, 0.0, 1e6)},
+    {"pdf": Field("density of the technique", 0, 0.0, 2e30), "other": Field("of the other one", 0, 0.0, 1e6)},
     {"balance": Field("weight by the balance heuristic"), "power": Field("by the power heuristic")},
     lambda given, dtype: {
         name: transport.mis_weight(transport.Settings(heuristic=name), given["pdf"], given["other"])

@@ -92,13 +92,16 @@ class Function:
         wanted = self.answer(inputs)
         given = components(self.inputs, inputs)
         found = ranges.evaluate(self.program(), given)
-        if not all(bool(np.all(part.sure & part.known)) for part in found.values()):
-            return self._either(inputs, wanted, ranges.evaluate(self.program(), given, guided=True)), True
-        outputs = {}
-        for name, field in self.outputs.items():
+        outputs, sure = {}, all(bool(np.all(part.sure & part.known)) for part in found.values())
+        for name, field in self.outputs.items() if sure else ():
             value = np.asarray(wanted[name], np.float64)
             low, high = (_ends(found, name, field, end).reshape(value.shape) for end in ENDS)
             outputs[name] = Output(value, np.maximum(high - value, value - low), SOURCE)
+            # Single precision may be sure of its way, and double precision go the other one.
+            outside = np.maximum(low - value, value - high)
+            sure &= bool(np.max(outside) <= APART * (1.0 + float(np.max(np.abs(value)))))
+        if not sure:
+            return self._either(inputs, wanted, ranges.evaluate(self.program(), given, guided=True)), True
         return outputs, False
 
     def _either(

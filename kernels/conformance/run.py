@@ -190,11 +190,13 @@ def _nearness(name: str, expected: Mapping[str, Any], found: Numbers) -> tuple[W
     if found.shape != wanted.shape:
         return (f"shape {found.shape}, not {wanted.shape}", name, "", ""), np.inf
     bound = np.broadcast_to(from_json(expected["bound"], name).astype(np.float64), wanted.shape)
-    with np.errstate(invalid="ignore"):
+    # What is no number, or no number away, is wrong.
+    with np.errstate(all="ignore"):
         error = np.where(found == wanted, 0.0, np.abs(found - wanted))
-    right = np.where(np.isnan(error), False, error <= bound)
-    error = np.where(np.isnan(error), np.inf, error)
-    ratio = np.divide(error, bound, out=np.where(error > 0, np.inf, 0.0), where=bound > 0)
+        error = np.where(np.isnan(error), np.inf, error)
+        right = (error <= bound) & (error < np.inf)
+        ratio = np.where(right & (error == 0), 0.0, np.where(right & (bound > 0), error / bound, np.inf))
+        ratio = np.where(~right & (bound > 0), error / bound, ratio)
     if np.all(right):
         return None, float(ratio.max(initial=0.0))
     worst = np.unravel_index(int(np.argmax(np.where(right, -1.0, ratio))), ratio.shape)

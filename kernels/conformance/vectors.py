@@ -36,7 +36,7 @@ def schema() -> dict[str, Any]:
         "required": ["value", "bound", "source"],
         "additionalProperties": False,
         "properties": {
-            "value": {"anyOf": [{"$ref": "#/$defs/numbers"}, {"type": ["string", "boolean"]}, LISTS]},
+            "value": {"anyOf": [{"$ref": "#/$defs/numbers"}, {"type": "boolean"}, TEXT]},
             "bound": {"$ref": "#/$defs/numbers"},
             "source": {"type": "string", "minLength": 1},
             "accepted": {"type": "array", "minItems": 1, "items": {"$ref": "#/$defs/accepted"}},
@@ -83,8 +83,8 @@ def schema() -> dict[str, Any]:
     }
 
 
-LISTS = {"type": "array", "items": {"type": "boolean"}}
-"""A list of truth values."""
+TEXT = {"type": "string", "pattern": "^(?!-?0x)"}
+"""A text; what begins like a number must be one."""
 
 
 def page() -> str:

@@ -39,63 +39,79 @@ REFERENCE = "reference"
 """Name that stands for the reference among the executors."""
 
 
+Program = Annotated[
+    str | None,
+    typer.Option("--program", metavar="CMD", help="Command of the program under test.", show_default=False),
+]
+Executor = Annotated[
+    str | None,
+    typer.Option(
+        "--executor",
+        metavar="NAME",
+        help="In its place an executor of this project (numpy, opencl, opengl), or [bold]reference[/].",
+        show_default=False,
+    ),
+]
+Words = Annotated[
+    list[str] | None,
+    typer.Option(
+        "-k",
+        metavar="WORD",
+        help="Only cases whose id holds this word, or whose clause or flag it is; repeat for more.",
+        show_default=False,
+    ),
+]
+Vectors = Annotated[
+    Path | None,
+    typer.Option("--vectors", metavar="DIR", help="Folder of vectors.", show_default="those of this wamnet"),
+]
+Track = Annotated[
+    Path | None,
+    typer.Option(
+        "--track",
+        metavar="FILE",
+        help="Keep the verdicts here, show what has changed, and fail only where it is worse.",
+        show_default=False,
+    ),
+]
+Timeout = Annotated[float, typer.Option("--timeout", help="Longest time for an answer, in seconds.")]
+Json = Annotated[
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write a report as JSON.", show_default=False),
+]
+Junit = Annotated[
+    Path | None,
+    typer.Option("--junit", metavar="FILE", help="Write a report as JUnit.", show_default=False),
+]
+Write = Annotated[
+    Path | None,
+    typer.Option(
+        "--write",
+        metavar="DIR",
+        help="Make the vectors anew with the reference, and end.",
+        show_default=False,
+    ),
+]
+
+
 def conformance(
-    program: Annotated[
-        str | None,
-        typer.Option("--program", metavar="CMD", help="Command of the program under test.", show_default=False),
-    ] = None,
-    executor: Annotated[
-        str | None,
-        typer.Option(
-            "--executor",
-            metavar="NAME",
-            help="In its place an executor of this project (numpy, opencl, opengl), or [bold]reference[/].",
-            show_default=False,
-        ),
-    ] = None,
+    program: Program = None,
+    executor: Executor = None,
     profile: options.Profile = "ieee",
-    words: Annotated[
-        list[str] | None,
-        typer.Option(
-            "-k",
-            metavar="WORD",
-            help="Only cases whose id holds this word, or whose clause, flag or whole id it is; repeat for more.",
-            show_default=False,
-        ),
-    ] = None,
-    vectors: Annotated[
-        Path | None,
-        typer.Option("--vectors", metavar="DIR", help="Folder of vectors.", show_default="those of this wamnet"),
-    ] = None,
-    track: Annotated[
-        Path | None,
-        typer.Option(
-            "--track",
-            metavar="FILE",
-            help="Keep the verdicts here, show what has changed, and fail only where it is worse.",
-            show_default=False,
-        ),
-    ] = None,
-    timeout: Annotated[float, typer.Option("--timeout", help="Longest time for an answer, in seconds.")] = 60.0,
-    as_json: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write a report as JSON.", show_default=False)
-    ] = None,
-    junit: Annotated[
-        Path | None,
-        typer.Option("--junit", metavar="FILE", help="Write a report as JUnit.", show_default=False),
-    ] = None,
-    write: Annotated[
-        Path | None,
-        typer.Option(
-            "--write", metavar="DIR", help="Make the vectors anew with the reference, and end.", show_default=False
-        ),
-    ] = None,
+    words: Words = None,
+    vectors: Vectors = None,
+    track: Track = None,
+    timeout: Timeout = 60.0,
+    as_json: Json = None,
+    junit: Junit = None,
+    write: Write = None,
 ) -> None:
     """Ask a program the questions of the spec's vectors, and hold its answers to their bounds.
 
-    The program reads one JSON request a line and writes one answer a line: spec/conformance.md says how, and has a
-    program of forty lines. Ends with status 1 if a case fails.
+    The program reads one JSON request a line and writes one answer a line: spec/conformance.md says how, and
+    has a program of forty lines. Ends with status 1 if a case fails.
     """
+    from ..compiler.profiles import profile_named
     from ..kernels.conformance import report, run
     from ..kernels.conformance import vectors as all_vectors
 
@@ -103,6 +119,7 @@ def conformance(
         _refuse_others(write, program, executor)
         say(f"wrote {all_vectors.write(write)} files to {write}")
         return
+    profile_named(profile)
     command = _command(program, executor)
     _check_options(timeout, [path for path in (track, as_json, junit) if path is not None])
     cases = run.chosen(run.read_vectors(vectors or all_vectors.FOLDER), words or ())
@@ -146,7 +163,9 @@ def _command(program: str | None, executor: str | None) -> list[str]:
         try:
             command = shlex.split(program)
         except ValueError as error:
-            raise InputError("--program", program, f"it is no command ({error})", "close quotation marks") from None
+            raise InputError(
+                "--program", program, f"it is no command ({error})", "close quotation marks"
+            ) from None
         if not command:
             raise InputError("--program", repr(program), "it is no command", "name a program")
         return command
@@ -211,7 +230,8 @@ def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:
     table(f"Conformance of {name}, profile {profile}", header, rows)
     failed = sum(verdict.failed for verdict in verdicts)
     passed = sum(verdict.verdict == PASS for verdict in verdicts)
-    say(f"{passed} of {len(verdicts)} cases passed, {failed} failed, {len(verdicts) - passed - failed} unsupported")
+    rest = len(verdicts) - passed - failed
+    say(f"{passed} of {len(verdicts)} cases passed, {failed} failed, {rest} unsupported")
 
 
 def _print_failures(failed: Sequence[Verdict], cases: Mapping[str, Sequence[Case]], again: str) -> None:

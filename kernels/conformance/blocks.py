@@ -13,8 +13,8 @@ Numbers = NDArray[Any]
 def mean_and_variance(mean: Numbers, variance: Numbers, size: int) -> tuple[Numbers, Numbers]:
     """Return block means (H / size, W / size, C) and the variances of one sample of a block.
 
-    A sample of a block is one of each of its pixels, which are independent: variances are averaged, and divided
-    by the number of pixels.
+    A sample of a block is one of each of its pixels, which are independent: variances are averaged, and
+    divided by the number of pixels.
     """
     return _averaged(mean, size), _averaged(variance, size) / size**2
 

@@ -33,8 +33,8 @@ FORMAT = "wamnet-vectors"
 class Output:
     """One expected output: a value, how far off each number may be, and where that bound comes from.
 
-    `bound` 0 asks for equality; `accepted` holds other values that are right too, where rounding decides, each
-    a mapping with its own `value` and `bound`.
+    `bound` 0 asks for equality; `accepted` holds other values that are right too, where rounding decides,
+    each a mapping with its own `value` and `bound`.
     `welch`: the value is an estimate, and so is the answer (kinds/pictures.py).
     """
 
@@ -72,7 +72,8 @@ def _output_json(output: Output) -> dict[str, Any]:
     data = {"value": to_json(output.value), "bound": _bound_json(output.bound), "source": output.source}
     if output.accepted:
         data["accepted"] = [
-            {"value": to_json(other["value"]), "bound": _bound_json(other["bound"])} for other in output.accepted
+            {"value": to_json(other["value"]), "bound": _bound_json(other["bound"])}
+            for other in output.accepted
         ]
     if output.welch is not None:
         data["welch"] = to_json(dict(output.welch))
@@ -100,7 +101,7 @@ class Kind:
     outputs: Mapping[str, str]
     make: Callable[[], Sequence[Case]]
     answer: Callable[[Mapping[str, Any]], Mapping[str, Any]]
-    files: Callable[[], Mapping[str, bytes]] = field(default=lambda: {})
+    files: Callable[[], Mapping[str, bytes]] = field(default=dict)
     notes: str = ""
 
 
@@ -113,7 +114,7 @@ def text_of(kind: Kind) -> str:
 
 
 def load(path: Path) -> tuple[str, list[Case]]:
-    """Return the kind's name and the cases of a file of vectors, with the paths of their files made absolute."""
+    """Return the kind's name and the cases of a file of vectors; paths in them are made absolute."""
     try:
         data = json.loads(path.read_text())
     except (OSError, ValueError, RecursionError) as error:
@@ -153,7 +154,7 @@ def _placed(value: Any, folder: Path) -> Any:
 
 
 def given(value: Any) -> Any:
-    """Return an input as the reference takes it: numbers as arrays, files as what they hold, texts as they are."""
+    """Return an input as the reference takes it: numbers as arrays, files as what they hold."""
     if isinstance(value, dict) and "file" in value:
         return from_file(value, "input") if "shape" in value else Path(value["file"]).read_text()
     if isinstance(value, (dict, bool)):

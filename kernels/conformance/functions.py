@@ -109,8 +109,8 @@ class Function:
     ) -> dict[str, Output]:
         """Return outputs where a decision is undecided: all that the reference answers nearby.
 
-        Every input is moved by `NUDGE` either way. An answer that is farther off than `APART` is another one, and
-        accepted as well; what is nearer adds to the bound.
+        Every input is moved by `NUDGE` either way. An answer that is farther off than `APART` is another one,
+        and accepted as well; what is nearer adds to the bound.
         """
         near = [self.answer(moved) for moved in _nudged(inputs)]
         outputs = {}
@@ -154,9 +154,7 @@ class Function:
         return components(self.outputs, self.call(fields, np.float32))
 
 
-def _ends(
-    found: Mapping[str, ranges.Range], name: str, field: Field, end: str
-) -> NDArray[np.float64]:
+def _ends(found: Mapping[str, ranges.Range], name: str, field: Field, end: str) -> NDArray[np.float64]:
     """Return one end of the ranges of a field's components."""
     return np.array([float(getattr(found[part], end)) for part in names(name, field.count)])
 

@@ -1,4 +1,4 @@
-"""Numbers as text that loses nothing: floats in hexadecimal, so that files can be read, compared and reviewed.
+"""Numbers as text that loses nothing: floats in hexadecimal, so that files can be compared and reviewed.
 
 1. A float is C's `%a`: `0x1.8p+1`; also `inf`, `-inf` and `nan` [`number_text`]. An integer is a JSON number.
 2. An array is a list of such, nested by its axes [`to_json`]; a truth value is a JSON one.

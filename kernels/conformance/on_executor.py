@@ -122,8 +122,8 @@ class OnExecutor:
     def _kernel(self, program: Program, profile: str) -> Artifact:
         """Return the kernel of a program.
 
-        Where the ranges of the inputs leave the argument of a sine without bound, as a division does, there is
-        no bound over all inputs: sines are expanded before anything asks for one. Each case has its own.
+        Where the ranges of the inputs leave the argument of a sine without bound, as a division does, there
+        is no bound over all inputs: sines are expanded before anything asks for one. Each case has its own.
         """
         try:
             return compile_program(program, self.executor.name, profile)

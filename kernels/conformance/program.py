@@ -1,7 +1,7 @@
 """The project's own answers through the same door: `python -m wamnet.kernels.conformance.program`.
 
-    --executor reference   the reference in float64
-    --executor NAME        kernels on an executor (on_executor.py)
+--executor reference   the reference in float64
+--executor NAME        kernels on an executor (on_executor.py)
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""How a program is asked: one JSON request a line on its standard input, one JSON answer a line on its output.
+"""How a program is asked: one JSON request a line on its input, one JSON answer a line on its output.
 
 1. The first request is `{"protocol": 1, "kind": "hello"}`; the answer names the program and the kinds that it
    knows: `{"program": "mine 1.0", "kinds": ["random.block", ...]}`.
-2. Then a request a case: `{"id": ..., "kind": ..., "profile": ..., "input": {...}}`. The answer repeats the id
-   and has `output`, or `refused` with a reason for an input that it will not take, or `unsupported`.
+2. Then a request a case: `{"id": ..., "kind": ..., "profile": ..., "input": {...}}`. The answer repeats the
+   id and has `output`, or `refused` with a reason for an input that it will not take, or `unsupported`.
 3. Images travel as files: an input `{"file": PATH, "shape": [...]}` is raw little-endian float32.
 4. The end of the input means: end. A program that crashes, hangs or prints something else gets a verdict for
    the case that it was asked, and is started again for the next [`Session.ask`].
@@ -154,10 +154,8 @@ class Session:
         assert process.stdin is not None
         if not any(thread.name == WRITER and thread.is_alive() for thread in child.threads):
             process.stdin.close()
-        try:
+        with suppress(subprocess.TimeoutExpired):
             process.wait(timeout=0.0 if at_once else PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            pass
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()

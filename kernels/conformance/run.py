@@ -1,4 +1,4 @@
-"""Verdicts: each case is asked, each answer is held to its bounds, and nothing that a program does is a traceback.
+"""Verdicts: each case is asked, each answer held to its bounds, and nothing a program does is a traceback.
 
 1. Cases are chosen by kind, clause, flag or part of their id [`chosen`].
 2. A verdict is one word [`Verdict`], with the first output that deviates, what was expected, what was found,
@@ -163,7 +163,9 @@ Wrong = tuple[str, str, str, str]
 """What is wrong with an output: text, stage, what was expected, what was found."""
 
 
-def _compared(name: str, expected: Output, got: Any, outputs: Mapping[str, Any]) -> tuple[Wrong | None, float]:
+def _compared(
+    name: str, expected: Output, got: Any, outputs: Mapping[str, Any]
+) -> tuple[Wrong | None, float]:
     """Return what is wrong with an output, if anything, and the largest error / bound."""
     if isinstance(expected.value, str) and not is_number(expected.value):
         return (None if got == expected.value else ("another text", name, expected.value, str(got)[:80])), 0.0

@@ -40,14 +40,17 @@ def schema() -> dict[str, Any]:
             "bound": {"$ref": "#/$defs/numbers"},
             "source": {"type": "string", "minLength": 1},
             "accepted": {"type": "array", "minItems": 1, "items": {"$ref": "#/$defs/accepted"}},
-            "welch": {"type": "object", "required": ["variance", "spp", "asked", "block", "shape", "significance"]},
+            "welch": {
+                "type": "object",
+                "required": ["variance", "spp", "asked", "block", "shape", "significance"],
+            },
         },
     }
     accepted = {
         "type": "object",
         "required": ["value", "bound"],
         "additionalProperties": False,
-        "properties": dict.fromkeys(("value", "bound"), {"$ref": "#/$defs/numbers"}),
+        "properties": {name: {"$ref": "#/$defs/numbers"} for name in ("value", "bound")},
     }
     case = {
         "type": "object",
@@ -60,7 +63,11 @@ def schema() -> dict[str, Any]:
             "note": {"type": "string", "minLength": 1},
             "valid": {"type": "boolean"},
             "input": {"type": "object", "minProperties": 1},
-            "expected": {"type": "object", "minProperties": 1, "additionalProperties": {"$ref": "#/$defs/output"}},
+            "expected": {
+                "type": "object",
+                "minProperties": 1,
+                "additionalProperties": {"$ref": "#/$defs/output"},
+            },
         },
         "if": {"properties": {"valid": {"const": True}}},
         "then": {"required": ["expected"]},
@@ -92,10 +99,10 @@ def page() -> str:
     lines = [
         "# Vectors",
         "",
-        f"Version {VERSION}. Written by `wamnet conformance --write spec/vectors`; this page too. How to use them, and",
-        "what the words mean: spec/conformance.md. The form of the files: schema.json beside this page.",
+        f"Version {VERSION}. Written by `wamnet conformance --write spec/vectors`; this page too. How to use them,",
+        "and what the words mean: spec/conformance.md. The form of the files: schema.json beside this page.",
         "",
-        "`float` is a number as text, hexadecimal (C's `%a`) or `inf`, `-inf`, `nan`; decimals are read as well.",
+        "`float` is a number as text, hexadecimal (C's `%a`) or `inf`, `-inf`, `nan`; decimals are read too.",
         "`[n]` are lists. `expected` is there where `valid` is true.",
     ]
     for kind in KINDS.values():
@@ -109,8 +116,11 @@ def _about(kind: Kind) -> list[str]:
     bad = sum(case.expected is None for case in cases)
     clauses = ", ".join(dict.fromkeys(case.clause for case in cases))
     counted = f"{len(cases)} cases" + (f", {bad} of them to be refused" if bad else "")
-    fields = [f"| {side} | `{name}` | {_cell(text)} |" for side, some in
-              (("input", kind.inputs), ("output", kind.outputs)) for name, text in some.items()]
+    fields = [
+        f"| {side} | `{name}` | {_cell(text)} |"
+        for side, some in (("input", kind.inputs), ("output", kind.outputs))
+        for name, text in some.items()
+    ]
     notes = [kind.notes, ""] if kind.notes else []
     return [
         f"## {kind.name}",
@@ -149,5 +159,7 @@ def write(folder: Path) -> int:
             path.write_bytes(content)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise InputError("folder of vectors", str(folder), f"it cannot be written ({reason})", "choose another") from None
+        raise InputError(
+            "folder of vectors", str(folder), f"it cannot be written ({reason})", "choose another"
+        ) from None
     return len(found)

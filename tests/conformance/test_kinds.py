@@ -1,4 +1,4 @@
-"""Kinds: the reference answers its own vectors, wrong references are caught, executors answer what they can."""
+"""Kinds: the reference answers its own vectors, wrong references are caught, executors pass."""
 
 from __future__ import annotations
 
@@ -33,11 +33,14 @@ from wamnet.refimpl.materials import conductor, dielectric
 def judged(kind: str, answer) -> list[run.Verdict]:
     """Hold the answers of a function (kind, inputs, profile) to the vectors of a kind, without a process."""
     _, cases = case.load(vectors.FOLDER / f"{kind}.json")
-    requests = [json.dumps({"id": c.id, "kind": kind, "profile": "ieee", "input": dict(c.inputs)}) for c in cases]
+    requests = [
+        json.dumps({"id": c.id, "kind": kind, "profile": "ieee", "input": dict(c.inputs)}) for c in cases
+    ]
     answers = io.StringIO()
     program.serve(requests, answers, "here", [kind], answer)
     return [
-        run.judge(kind, c, json.loads(line)) for c, line in zip(cases, answers.getvalue().splitlines(), strict=True)
+        run.judge(kind, c, json.loads(line))
+        for c, line in zip(cases, answers.getvalue().splitlines(), strict=True)
     ]
 
 
@@ -56,7 +59,13 @@ def biased(function):
 
 
 MUTANTS = {
-    "counters in another order": (rng, "random_block", lambda s, p, n, b: rng.pcg4d(p, b, n, s), "random.block", "RNG-3"),
+    "counters in another order": (
+        rng,
+        "random_block",
+        lambda s, p, n, b: rng.pcg4d(p, b, n, s),
+        "random.block",
+        "RNG-3",
+    ),
     "floats of 23 bits": (rng, "MANTISSA_BITS", 23, "random.block", "RNG-3"),
     "gamma of 2.2": (encoding, "GAMMA", 2.2, "encoding.display", "ENC-5"),
     "epsilon of 1e-7": (adam, "EPSILON", 1e-7, "adam.step", "ADM-1"),
@@ -77,7 +86,13 @@ MUTANTS = {
         "path.arrive",
         "LTR-2",
     ),
-    "the other heuristic": (transport, "HEURISTICS", {"balance": 2, "power": 1}, "transport.mis_weight", "LTR-5"),
+    "the other heuristic": (
+        transport,
+        "HEURISTICS",
+        {"balance": 2, "power": 1},
+        "transport.mis_weight",
+        "LTR-5",
+    ),
     "roulette at 0.9": (transport, "ROULETTE_LIMIT", 0.5, "path.scatter", "LTR-7"),
     "a sky upside down": (
         environment,
@@ -89,7 +104,13 @@ MUTANTS = {
     "F without its fifth power": (conductor, "schlick", lambda r, c: r, "material.conductor", "CDR-3"),
     "half of Fresnel": (dielectric, "fresnel", lambda c, f, r: 0.0 * c, "material.dielectric", "DIE-4"),
     "NaN of a frame kept": (dataset, "known", lambda values: values, "image.features", "DAT-10"),
-    "borders the other way": (dataset, "BORDERS", {"clamp": "reflect", "zero": "constant"}, "image.window", "DAT-5"),
+    "borders the other way": (
+        dataset,
+        "BORDERS",
+        {"clamp": "reflect", "zero": "constant"},
+        "image.window",
+        "DAT-5",
+    ),
     "the centre one pixel off": (
         dataset.Window,
         "before",
@@ -173,19 +194,22 @@ def test_blocks_are_means_of_their_pixels():
 
 
 def test_a_decision_on_its_threshold_is_accepted_either_way():
-    """x^2 is near 2 where x is near sqrt(2): float32 rounds it to 2, and float64 to less."""
+    """x is just below sqrt(3): float32 rounds x^2 to 3, float64 to less."""
     step = Function(
         "k",
         "t",
         "RNG-3",
         {"x": Field("number")},
         {"y": Field("1 or 2")},
-        lambda given, dtype: {"y": np.where(given["x"] * given["x"] < 2.0, 1.0 + 0.0 * given["x"], 2.0)},
-        [("near", {"x": 2.0**0.5}), ("far", {"x": 1.0})],
+        lambda given, dtype: {"y": np.where(given["x"] * given["x"] < 3.0, 1.0 + 0.0 * given["x"], 2.0)},
+        [("near", {"x": 3.0**0.5}), ("far", {"x": 1.0})],
     )
     near, far = step.cases()
     assert near.flags == ("undecided",)
-    values = {float(near.expected["y"].value), *(float(other["value"]) for other in near.expected["y"].accepted)}
+    values = {
+        float(near.expected["y"].value),
+        *(float(other["value"]) for other in near.expected["y"].accepted),
+    }
     assert values == {1.0, 2.0}
     assert (far.flags, far.expected["y"].accepted, float(far.expected["y"].bound)) == ((), (), 0.0)
 
@@ -202,7 +226,14 @@ def test_an_executor_passes_all_that_it_supports(executor_named, name):
         assert set(count) == {"pass"}, kind
 
 
-SOME = ("random.block", "sine", "sampling.concentric_disk", "intersection.box", "material.dielectric", "picture.denoised")
+SOME = (
+    "random.block",
+    "sine",
+    "sampling.concentric_disk",
+    "intersection.box",
+    "material.dielectric",
+    "picture.denoised",
+)
 """Kinds that every executor is asked for here; the command asks for all."""
 
 

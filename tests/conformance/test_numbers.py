@@ -10,7 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.kernels.conformance.numbers import from_file, from_json, is_number, number_text, rounded_up, to_json
+from wamnet.kernels.conformance.numbers import (
+    from_file,
+    from_json,
+    is_number,
+    number_text,
+    rounded_up,
+    to_json,
+)
 from wamnet.refimpl.errors import InputError
 
 
@@ -22,9 +29,16 @@ def test_a_float_comes_back_to_the_bit(value):
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(1.5, "0x1.8p+0"), (0.0, "0x0p+0"), (-0.0, "-0x0p+0"), (2.0**-1074, "0x0.0000000000001p-1022"), (1.0, "0x1p+0"),
-     (-math.inf, "-inf"), (math.nan, "nan")],
-)  # fmt: skip
+    [
+        (1.5, "0x1.8p+0"),
+        (0.0, "0x0p+0"),
+        (-0.0, "-0x0p+0"),
+        (2.0**-1074, "0x0.0000000000001p-1022"),
+        (1.0, "0x1p+0"),
+        (-math.inf, "-inf"),
+        (math.nan, "nan"),
+    ],
+)
 def test_texts_are_short(value, text):
     assert number_text(value) == text
 
@@ -40,7 +54,9 @@ def test_arrays_keep_shape_and_kind():
     assert from_json([True, False], "x").dtype == np.bool_
 
 
-@pytest.mark.parametrize("value", ["word", None, {}, ["0x1p+0", "a"], "0x", "0xp+1", [[1.5], [1.5, 2.5]], [10**30]])
+@pytest.mark.parametrize(
+    "value", ["word", None, {}, ["0x1p+0", "a"], "0x", "0xp+1", [[1.5], [1.5, 2.5]], [10**30]]
+)
 def test_what_is_no_number_is_refused(value):
     with pytest.raises(InputError, match=r"it must be a number|lists must be of one length"):
         from_json(value, "x")
@@ -57,12 +73,14 @@ def test_lists_that_are_nested_too_deeply_are_refused():
 
 
 def test_numbers_are_told_from_words():
-    assert [is_number(v) for v in (1, "inf", "0x1p+0", "1e3", "color", None, True)] == [True] * 4 + [False] * 3
+    assert [is_number(v) for v in (1, "inf", "0x1p+0", "1e3", "color", None, True)] == [True] * 4 + [
+        False
+    ] * 3
 
 
 @given(st.floats(0.0, 1e30))
 def test_bounds_are_rounded_up_to_8_bits(bound):
-    """The mantissa has 8 bits, so the bound grows by less than 2^-7 of itself; denormals keep what they have."""
+    """The mantissa has 8 bits, so the bound grows by less than 2^-7 of itself; denormals keep theirs."""
     found = float(rounded_up(bound))
     assert bound <= found <= bound * (1 + 2.0**-7) + 2.0**-1074
     assert len(number_text(found)) <= len("0x1.fep-1000")
@@ -77,9 +95,16 @@ def test_a_picture_may_be_a_file(tmp_path):
 
 @pytest.mark.parametrize(
     "value",
-    [{"file": "a.f32"}, {"file": "a.f32", "shape": [7]}, {"file": "a.f32", "shape": ["a"]}, {"file": "b.f32", "shape": [6]},
-     {"shape": [6]}, {"file": "a.f32", "shape": 6}, {"file": "a\0b", "shape": [6]}],
-)  # fmt: skip
+    [
+        {"file": "a.f32"},
+        {"file": "a.f32", "shape": [7]},
+        {"file": "a.f32", "shape": ["a"]},
+        {"file": "b.f32", "shape": [6]},
+        {"shape": [6]},
+        {"file": "a.f32", "shape": 6},
+        {"file": "a\0b", "shape": [6]},
+    ],
+)
 def test_other_files_are_refused(tmp_path, monkeypatch, value):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.f32").write_bytes(bytes(24))

@@ -24,10 +24,22 @@ WRONG = {
         "RNG-3",
         "fail",
     ),
-    "counters in another order": ('("pixel", "sample",', '("sample", "pixel",', "random.block/7", "RNG-3", "fail"),
+    "counters in another order": (
+        '("pixel", "sample",',
+        '("sample", "pixel",',
+        "random.block/7",
+        "RNG-3",
+        "fail",
+    ),
     "floats of 23 bits": ("(word >> 8) / 2**24", "(word >> 9) / 2**23", "random.block", "RNG-3", "fail"),
     "a gamma of 2.2": ("1 / 2.4", "1 / 2.2", "encoding.display", "ENC-5", "fail"),
-    "no clip": ("min(max(float.fromhex(given[\"linear\"]), 0.0), 1.0)", "float.fromhex(given[\"linear\"])", "encoding.display/3", "ENC-5", "fail"),
+    "no clip": (
+        'min(max(float.fromhex(given["linear"]), 0.0), 1.0)',
+        'float.fromhex(given["linear"])',
+        "encoding.display/3",
+        "ENC-5",
+        "fail",
+    ),
     "the line too long": ("0.0031308", "0.3", "encoding.display", "ENC-5", "fail"),
     "NaN": ('{"encoded": 12.92', '{"encoded": float("nan") * 12.92', "encoding.display", "ENC-5", "fail"),
     "another shape": ('"words": words', '"words": [words]', "random.block", "RNG-3", "fail"),
@@ -35,7 +47,13 @@ WRONG = {
     "texts for numbers": ('"words": words', '"words": ["a"] * 4', "random.block", "RNG-3", "fail"),
     "null for numbers": ('"words": words', '"words": None', "random.block", "RNG-3", "fail"),
     "an object for numbers": ('"words": words', '"words": {"file": 3}', "random.block", "RNG-3", "fail"),
-    "integers of a thousand digits": ('"words": words', '"words": [10**999] * 4', "random.block", "RNG-3", "fail"),
+    "integers of a thousand digits": (
+        '"words": words',
+        '"words": [10**999] * 4',
+        "random.block",
+        "RNG-3",
+        "fail",
+    ),
     "lists of lists of lists": (
         "print(json.dumps(answer)",
         'print(json.dumps(answer).replace("words\\": [", "words\\": [" + "[" * 500 + "]" * 500 + ",")',
@@ -44,8 +62,20 @@ WRONG = {
         "fail",
     ),
     "an output left out": ('"words": words, ', "", "random.block", "RNG-3", "fail"),
-    "a valid input refused": (ANSWER, '{"id": request["id"], "refused": "no"}', "random.block", "RNG-3", "fail"),
-    "no answer to this case": (ANSWER, '{"id": request["id"], "unsupported": "no"}', "random.block", "RNG-3", "unsupported"),
+    "a valid input refused": (
+        ANSWER,
+        '{"id": request["id"], "refused": "no"}',
+        "random.block",
+        "RNG-3",
+        "fail",
+    ),
+    "no answer to this case": (
+        ANSWER,
+        '{"id": request["id"], "unsupported": "no"}',
+        "random.block",
+        "RNG-3",
+        "unsupported",
+    ),
     "neither output nor refusal": (ANSWER, '{"id": request["id"]}', "random.block", "RNG-3", "garbage"),
     "another id": ('request["id"]', '"mine"', "random.block", "RNG-3", "garbage"),
     "an id that is a list": ('request["id"]', "[1]", "random.block", "RNG-3", "garbage"),
@@ -95,21 +125,24 @@ def test_a_program_that_hangs_is_given_up(program, verdicts):
 
 def test_output_without_end_fills_no_memory(program, verdicts):
     endless = ("print(json.dumps(answer), flush=True)", 'print(json.dumps(answer) + "x" * 2**25, flush=True)')
-    greeting = ('"kinds": list(KINDS)}', '"kinds": list(KINDS)}; print(json.dumps(answer), flush=True); continue')
+    greeting = (
+        '"kinds": list(KINDS)}',
+        '"kinds": list(KINDS)}; print(json.dumps(answer), flush=True); continue',
+    )
     found = verdicts(program(endless, greeting), ["random.block/0"], 20.0)
     assert [v.verdict for v in found] == ["garbage"]
 
 
 def test_a_program_that_does_not_read(tmp_path):
     """A request larger than a pipe's buffer of 64 KiB must not stop the runner."""
-    with Session([sys.executable, "-c", "import time; time.sleep(60)"], 0.5) as session:
-        with pytest.raises(NoAnswerError, match="no answer within"):
-            session.ask({"id": "a", "input": "x" * 2**20})
+    request = {"id": "a", "input": "x" * 2**20}
+    with Session(["sleep", "60"], 0.5) as session, pytest.raises(NoAnswerError, match="no answer within"):
+        session.ask(request)
 
 
 def test_what_a_program_has_started_ends_with_it(verdicts, tmp_path):
     """The grandchild holds the program's output open: the session must not wait for it."""
-    script = "sleep 60 & while read line; do echo '{\"kinds\": [\"random.block\"]}'; done"
+    script = 'sleep 60 & while read line; do echo \'{"kinds": ["random.block"]}\'; done'
     found = verdicts(["sh", "-c", script], ["random.block/0"])
     assert [v.verdict for v in found] == ["garbage"]
 
@@ -129,11 +162,15 @@ def test_programs_that_do_not_introduce_themselves_are_refused(verdicts, command
         verdicts(command, ["random.block"], 1.0)
 
 
-ACCEPTS = 'KINDS = {**dict.fromkeys(("metric.mse", "file.model", "file.scene"), lambda given: {"value": 0.0}), '
+ACCEPTS = (
+    'KINDS = {**dict.fromkeys(("metric.mse", "file.model", "file.scene"), lambda given: {"value": 0.0}), '
+)
 """A program that takes everything."""
 
 
-@pytest.mark.parametrize(("kind", "clause"), [("metric.mse", "MET-1"), ("file.model", "MOD-6"), ("file.scene", "SCN-7")])
+@pytest.mark.parametrize(
+    ("kind", "clause"), [("metric.mse", "MET-1"), ("file.model", "MOD-6"), ("file.scene", "SCN-7")]
+)
 def test_a_program_that_takes_what_is_invalid(program, verdicts, kind, clause):
     found = verdicts(program(("KINDS = {", ACCEPTS)), [kind])
     wrong = [v for v in found if v.text == "the input is invalid and must be refused"]

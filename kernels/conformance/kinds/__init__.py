@@ -8,10 +8,21 @@ from ..case import Kind
 from ..functions import Function
 from . import files, images, light, materials, network, numbers, paths, pictures, surfaces
 
-FUNCTIONS: Mapping[str, Function] = {f.name: f for f in (*numbers.FUNCTIONS, *light.FUNCTIONS, *surfaces.FUNCTIONS, *materials.FUNCTIONS)}
+FUNCTIONS: Mapping[str, Function] = {
+    f.name: f for f in (*numbers.FUNCTIONS, *light.FUNCTIONS, *surfaces.FUNCTIONS, *materials.FUNCTIONS)
+}
 """Kinds that are functions of numbers, which executors can run."""
 
 KINDS: Mapping[str, Kind] = {
-    kind.name: kind for kind in (*numbers.KINDS, *paths.KINDS, *network.KINDS, *images.KINDS, *files.KINDS, *pictures.KINDS, *(function.kind() for function in FUNCTIONS.values()))
+    kind.name: kind
+    for kind in (
+        *numbers.KINDS,
+        *paths.KINDS,
+        *network.KINDS,
+        *images.KINDS,
+        *files.KINDS,
+        *pictures.KINDS,
+        *(function.kind() for function in FUNCTIONS.values()),
+    )
 }
 """Kinds by name."""

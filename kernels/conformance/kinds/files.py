@@ -49,7 +49,7 @@ def model_from(content: bytes) -> Model:
 
 
 def digest(model: Model) -> str:
-    """Return the SHA-256 of all parameters, layer by layer weights before biases, as little-endian float64."""
+    """Return the SHA-256 of all parameters as little-endian float64: layer by layer weights, then biases."""
     parts = (p for pair in zip(model.siren.weights, model.siren.biases, strict=True) for p in pair)
     return hashlib.sha256(b"".join(np.ascontiguousarray(p, "<f8").tobytes() for p in parts)).hexdigest()
 
@@ -281,8 +281,8 @@ KINDS = (
         "Model files",
         {"content": "text, the file's bytes in base64"},
         {
-            "digest": "text, SHA-256 in hexadecimal of all parameters as little-endian float64: layer by layer, "
-            "weights in C order, then biases",
+            "digest": "text, SHA-256 in hexadecimal of all parameters as little-endian float64: "
+            "layer by layer, weights in C order, then biases",
             "widths": "integer[L + 1]",
             "features": "text, names with commas",
             "window": "integer, its size",

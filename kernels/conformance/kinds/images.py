@@ -1,8 +1,8 @@
 """Kinds of images: features, windows at borders, draws of pixels, metrics.
 
-Features and metrics are computed in float64 (DAT-3, MET-1): their bounds are roundings of float64, and of the one
-rounding to float32. u = 2^-53 and gamma(n) = n u / (1 - n u) for n roundings, Higham, "Accuracy and Stability of
-Numerical Algorithms", 2002, section 3.1.
+Features and metrics are computed in float64 (DAT-3, MET-1): their bounds are roundings of float64, and of the
+one rounding to float32. u = 2^-53 and gamma(n) = n u / (1 - n u) for n roundings, Higham, "Accuracy and
+Stability of Numerical Algorithms", 2002, section 3.1.
 """
 
 from __future__ import annotations
@@ -68,8 +68,10 @@ def _features(inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 def bad_layers(height: int, width: int, index: int) -> dict[str, Array]:
     """Return the layers of a small frame with NaN, infinities, negatives and a firefly."""
-    layers = {name: single(noise(index + i, (height, width, layer.channels)) * 1.5 - 0.25)
-              for i, (name, layer) in enumerate(LAYERS.items())}
+    layers = {
+        name: single(noise(index + i, (height, width, layer.channels)) * 1.5 - 0.25)
+        for i, (name, layer) in enumerate(LAYERS.items())
+    }
     flat = layers["color"].reshape(-1)
     flat[:6] = (np.nan, np.inf, -np.inf, 1e6, -3.0, 0.0)
     layers["normal"].reshape(-1)[:2] = (np.nan, 7.0)
@@ -77,8 +79,12 @@ def bad_layers(height: int, width: int, index: int) -> dict[str, Array]:
     return layers
 
 
-SCALES = {"exposure_stops": 0.5, "depth_scale": 0.75, "position_center": np.array([0.25, -0.5, 0.5]),
-          "position_scale": 0.5}
+SCALES = {
+    "exposure_stops": 0.5,
+    "depth_scale": 0.75,
+    "position_center": np.array([0.25, -0.5, 0.5]),
+    "position_scale": 0.5,
+}
 """The scales of the cases."""
 
 FEATURE_ROWS = (
@@ -99,8 +105,11 @@ def _feature_cases() -> list[Case]:
         inputs = {**{n: v for n, v in layers.items() if n in wanted}, "features": names, **SCALES}
         expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}
         cases.append(Case(f"image.features/{len(cases)}", clause, inputs, expected, (), note))
-    for names, note in (("color,depth", "a layer is missing"), ("color,color", "a feature twice"),
-                        ("colour", "an unknown feature")):
+    for names, note in (
+        ("color,depth", "a layer is missing"),
+        ("color,color", "a feature twice"),
+        ("colour", "an unknown feature"),
+    ):
         inputs = {"color": layers["color"], "features": names, **SCALES}
         cases.append(Case(f"image.features/{len(cases)}", "DAT-9", inputs, None, (), note))
     return cases
@@ -132,7 +141,7 @@ WINDOW_ROWS = (
 
 
 def _window_cases() -> list[Case]:
-    """Return windows; channel c of the pixel at column x and row y holds 100 y + 10 x + c where that is short."""
+    """Return windows; channel c of the pixel (x, y) holds 100 y + 10 x + c."""
     cases = []
     for height, width, size, border, x, y, note in WINDOW_ROWS:
         row, column, channel = np.indices((height, width, 2 if size < 12 else 1))
@@ -189,8 +198,8 @@ def _psnr_bound(value: float, count: int) -> float:
 def _ssim_bound(value: float, count: int, largest: float = 1.0) -> float:
     """Means of 121 products lose gamma(32) of the squares' size; the least denominator is c2 = 9e-4.
 
-    Numerator and denominator of the structure each are off by 4 gamma(32) largest^2, and the quotient by the sum of
-    both over c2; the luminance by less. Windows are averaged.
+    Numerator and denominator of the structure each are off by 4 gamma(32) largest^2, and the quotient by the
+    sum of both over c2; the luminance by less. Windows are averaged.
     """
     return 16.0 * gamma(32) * largest**2 / (metrics.K2**2) + gamma(count + 8)
 
@@ -245,7 +254,11 @@ PAIRS = (
 def _small() -> list[tuple[str, Array, Array]]:
     """Return small pictures given in the case itself: SSIM refuses them."""
     return [
-        ("one pixel that differs by one bit", np.array([[[0.5, 0.5, 0.5]]]), np.array([[[0.5, 0.5, 0.5 + 2**-24]]])),
+        (
+            "one pixel that differs by one bit",
+            np.array([[[0.5, 0.5, 0.5]]]),
+            np.array([[[0.5, 0.5, 0.5 + 2**-24]]]),
+        ),
         ("negative and huge radiance", np.array([[[-2.0, 1e6, 0.0]]]), np.array([[[1.0, 1e-3, 0.0]]])),
     ]
 
@@ -257,7 +270,9 @@ def _metric_cases(name: str) -> list[Case]:
 
     def add(image: Any, reference: Any, value: float | None, note: str, rule: str = clause) -> None:
         text = "roundings of float64, any order"
-        expected = None if value is None else {"value": Output(value, bound(value, int(np.prod(SHAPE))), text)}
+        expected = (
+            None if value is None else {"value": Output(value, bound(value, int(np.prod(SHAPE))), text)}
+        )
         inputs = {"image": image, "reference": reference}
         cases.append(Case(f"metric.{name}/{len(cases)}", rule, inputs, expected, (), note))
 
@@ -289,6 +304,7 @@ def _metric(name: str) -> Kind:
 
 
 LAYER_FIELDS = {name: f"float[H][W][{layer.channels}]" for name, layer in LAYERS.items()}
+"""What the layers of a frame are, for the page."""
 
 KINDS = (
     Kind(
@@ -318,7 +334,12 @@ KINDS = (
     Kind(
         "image.draws",
         "Pixels that training draws",
-        {"seed": "integer", "stream": "integer", "count": "integer", "shapes": "integer[F][2], heights and widths"},
+        {
+            "seed": "integer",
+            "stream": "integer",
+            "count": "integer",
+            "shapes": "integer[F][2], heights and widths",
+        },
         {"frame": "integer[count]", "y": "integer[count], row", "x": "integer[count], column"},
         _draw_cases,
         _draws,

@@ -27,8 +27,8 @@ def _ray(given: Numbers, dtype: Any) -> dict[str, Any]:
 
 RAY = Function(
     "camera.ray",
-    f"Rays of a camera at {CAMERA.position} that looks at {CAMERA.look_at}, {CAMERA.vertical_fov_deg:g} degrees high, "
-    f"image {WIDTH} x {HEIGHT}",
+    f"Rays of a camera at {CAMERA.position} that looks at {CAMERA.look_at}, "
+    f"{CAMERA.vertical_fov_deg:g} degrees high, image {WIDTH} x {HEIGHT}",
     "CAM-2",
     {
         "x": Field("column", high=WIDTH),
@@ -233,7 +233,10 @@ CAUCHY = Function(
 def _cauchy(given: Numbers) -> dict[str, Any]:
     """Return a direction and its density."""
     wi = sampling.sample_spherical_cauchy(given["u0"], given["u1"], given["concentration"])
-    return {"direction": wi, "pdf": sampling.spherical_cauchy_pdf(1.0 - wi[..., 2], given["concentration"])}
+    # 1 - cos is half the squared chord to the axis, which keeps its digits (environment.py).
+    x, y, z = wi[..., 0], wi[..., 1], wi[..., 2] - 1.0
+    versine = 0.5 * (x * x + y * y + z * z)
+    return {"direction": wi, "pdf": sampling.spherical_cauchy_pdf(versine, given["concentration"])}
 
 
 SAMPLE_QUAD = Function(

@@ -83,7 +83,10 @@ MIRROR = Function(
     {**VERTEX, **CHOICES},
     GONE_ON,
     lambda given, dtype: _sampled(Mirror, given),
-    [("straight down", _at(0.5, 0.5, wo=(0.0, 1.0, 0.0))), ("grazing", _at(0.5, 0.5, wo=(1.0, 2.0**-20, 0.0)))],
+    [
+        ("straight down", _at(0.5, 0.5, wo=(0.0, 1.0, 0.0))),
+        ("grazing", _at(0.5, 0.5, wo=(1.0, 2.0**-20, 0.0))),
+    ],
     _vertex,
     draws=4,
 )
@@ -112,7 +115,11 @@ CONDUCTOR_VALUE = Function(
     "material.conductor_value",
     "What light from a direction is worth at a rough metal, and the density of that direction",
     "CDR-2",
-    {**VERTEX, "wi": Field("unit direction to the light, above the surface", 3, -1.0), "roughness": ROUGHNESS},
+    {
+        **VERTEX,
+        "wi": Field("unit direction to the light, above the surface", 3, -1.0),
+        "roughness": ROUGHNESS,
+    },
     {"value": Field("f cos, for a throughput of 1", 3), "pdf": Field("density of wi, 1/sr")},
     lambda given, dtype: _valued(given),
     [
@@ -135,8 +142,11 @@ def _above(u: Any) -> Any:
 def _valued(given: Numbers) -> dict[str, Any]:
     """Return value and density."""
     site, wi = _site(given, parameter=given["roughness"]), given["wi"]
-    cosine = np.maximum((site.normal[..., 0] * wi[..., 0] + site.normal[..., 1] * wi[..., 1])
-                        + site.normal[..., 2] * wi[..., 2], 0.0)
+    cosine = np.maximum(
+        (site.normal[..., 0] * wi[..., 0] + site.normal[..., 1] * wi[..., 1])
+        + site.normal[..., 2] * wi[..., 2],
+        0.0,
+    )
     color, factor = Conductor.value(site, wi, cosine)
     return {"value": color * factor[..., np.newaxis], "pdf": Conductor.pdf(site, wi, cosine)}
 
@@ -152,9 +162,7 @@ DIELECTRIC = Function(
         "outside": Field("1: the normal points out of the body, 0: into it"),
     },
     GONE_ON,
-    lambda given, dtype: _sampled(
-        Dielectric, given, parameter=given["ior"], outside=given["outside"] > 0.5
-    ),
+    lambda given, dtype: _sampled(Dielectric, given, parameter=given["ior"], outside=given["outside"] > 0.5),
     [
         ("in, refracted", _at(0, 0, 0.9, ior=1.5, outside=1)),
         ("in, mirrored", _at(0, 0, 0.0, ior=1.5, outside=1)),

@@ -1,6 +1,6 @@
 """Kinds of the network: initial parameters, activations layer by layer, derivatives, Adam over several steps.
 
-Bounds are those of compiler/bounds.py (PRO-6) at the case's own inputs, and for Adam ranges from step to step.
+Bounds are those of compiler/bounds.py (PRO-6) at the case's own inputs, and for Adam ranges, step by step.
 """
 
 from __future__ import annotations
@@ -74,7 +74,11 @@ def _init(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parameters in float32."""
     widths = [int(width) for width in np.ravel(inputs["widths"])]
     drawn_ones = siren.init(
-        widths, float(inputs["omega_0_first"]), float(inputs["omega_0_hidden"]), int(inputs["seed"]), np.float32
+        widths,
+        float(inputs["omega_0_first"]),
+        float(inputs["omega_0_hidden"]),
+        int(inputs["seed"]),
+        np.float32,
     )
     return {name: value for name, value in _as_inputs(drawn_ones).items() if not name.startswith("omega")}
 
@@ -84,7 +88,10 @@ def _init_cases() -> list[Case]:
     cases = []
     for index, (widths, first, hidden) in enumerate(SIZES):
         inputs = {"widths": np.array(widths), "omega_0_first": first, "omega_0_hidden": hidden, "seed": index}
-        expected = {name: Output(value, 0.0, "exact, rounded once to float32") for name, value in _init(inputs).items()}
+        expected = {
+            name: Output(value, 0.0, "exact, rounded once to float32")
+            for name, value in _init(inputs).items()
+        }
         cases.append(Case(f"network.init/{index}", "SIR-5", inputs, expected))
     return cases
 
@@ -93,7 +100,7 @@ def _init_cases() -> list[Case]:
 
 
 def activations(network: Siren, x: Any) -> dict[str, Any]:
-    """Return what each layer gives, the last one's being the network's value; `x` (..., D_in) may be traced."""
+    """Return what each layer gives, the last one the network's value; `x` (..., D_in) may be traced."""
     found = {}
     for layer in range(len(network.weights)):
         part = Siren(
@@ -119,9 +126,11 @@ def _forward_cases() -> list[Case]:
     rows = [(index, note) for index in range(len(SIZES)) for note in ("", "zeros", "an input of a firefly")]
     for number, (index, note) in enumerate(rows):
         network, n_in = _network(index), SIZES[index][0][0]
-        x = {"": _numbers(number, (n_in,)), "zeros": np.zeros(n_in)}.get(note, _numbers(number, (n_in,), 40.0))
+        x = {"": _numbers(number, (n_in,)), "zeros": np.zeros(n_in)}.get(
+            note, _numbers(number, (n_in,), 40.0)
+        )
         inputs = {**_as_inputs(network), "x": x}
-        program = analysed(trace(lambda v: activations(network, v), {"x": Type(shape=(n_in,))}))
+        program = analysed(trace(lambda v, known=network: activations(known, v), {"x": Type(shape=(n_in,))}))
         found = bounds.at_inputs(program, {"x": x[np.newaxis]}, EMITTED_SINE)
         expected = {
             name: Output(value, np.broadcast_to(found[name], (1, value.size))[0], POSTERIORI)
@@ -240,6 +249,7 @@ NETWORK = {
     "omega_0_first": "float",
     "omega_0_hidden": "float",
 }
+"""What a network is, for the page."""
 
 KINDS = (
     Kind(

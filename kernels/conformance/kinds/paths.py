@@ -1,7 +1,7 @@
 """Kinds of paths: one step of a path from its state to the next, and whole paths with every vertex.
 
-1. A step is a function of a state: from the camera [`START`], to the next surface [`ARRIVE`], and away from it
-   [`SCATTER`]. Its bound is the range of what single precision may give (compiler/ranges.py), at that state.
+1. A step is a function of a state: from the camera [`start`], to the next surface [`arrive`], and away from
+   it [`scatter`]. Its bound is the range of what single precision may give (compiler/ranges.py), at that state.
 2. A whole path is the steps one after another, each from the range of the one before: the bound grows from
    vertex to vertex. A case ends before the first vertex of which a decision is not sure [`followed`].
 """
@@ -49,7 +49,10 @@ CHAIN = "ranges of single precision under profile ieee, from step to step (compi
 """Where the bounds of whole paths come from."""
 
 SCENE_FIELD = "scene file (SCN-6)"
+"""What a scene is, for the page."""
+
 SETTINGS_FIELD = "object: max_depth, roulette_depth (or null), strategy, heuristic, sampler (LTR-6 to LTR-9)"
+"""What settings are, for the page."""
 
 State = dict[str, NDArray[Any]]
 
@@ -172,7 +175,14 @@ def _flat(inputs: Mapping[str, Any], values: Values) -> dict[str, Any]:
 
 def _counted(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the counters by the names of programs."""
-    names = {"seed": "seed", "pixel": "pixel", "sample_number": "sample", "x": "x", "y": "y", "depth": "depth"}
+    names = {
+        "seed": "seed",
+        "pixel": "pixel",
+        "sample_number": "sample",
+        "x": "x",
+        "y": "y",
+        "depth": "depth",
+    }
     found = {name: rng.counter(int(inputs[own])) for name, own in names.items() if own in inputs}
     sizes = {name: np.array([inputs[name]], np.float32) for name in ("width", "height") if name in inputs}
     return {**found, **sizes}
@@ -224,8 +234,12 @@ class View:
         return {
             "scene": {"file": _file(self.scene)},
             "settings": asdict(self.settings),
-            **{"width": SIZE_PX, "height": SIZE_PX, "x": self.x, "y": self.y},
-            **{"seed": SEED, "sample": self.sample},
+            "width": SIZE_PX,
+            "height": SIZE_PX,
+            "x": self.x,
+            "y": self.y,
+            "seed": SEED,
+            "sample": self.sample,
         }
 
 
@@ -268,7 +282,14 @@ def _steps() -> Found:
         given = view.inputs()
         programs = programs_of(view.scene, view.settings)
         wanted = start(_with_scene(given, view))
-        _add(found.start, "path.start", "CAM-3", given, wanted, ranges.evaluate(programs.start, _counted(given)))
+        _add(
+            found.start,
+            "path.start",
+            "CAM-3",
+            given,
+            wanted,
+            ranges.evaluate(programs.start, _counted(given)),
+        )
         kept = {name: given[name] for name in ("scene", "settings")}
         counters = {"seed": SEED, "pixel": wanted.pop("pixel"), "sample": view.sample}
         one = np.ones(3)
@@ -279,7 +300,14 @@ def _steps() -> Found:
             sent = ranges.evaluate(programs.arrive, _flat(state, PATH))
             _add(found.arrive, "path.arrive", "LTR-2", {**kept, **state}, wanted, sent)
             surface = {name: _rounded(wanted[name]) for name in SURFACE}
-            inputs = {**kept, **counters, "depth": depth, **state, "radiance": _rounded(wanted["radiance"]), **surface}
+            inputs = {
+                **kept,
+                **counters,
+                "depth": depth,
+                **state,
+                "radiance": _rounded(wanted["radiance"]),
+                **surface,
+            }
             wanted = scatter(_with_scene(inputs, view))
             flat = {**_flat(inputs, PATH), **_flat(inputs, SURFACE), **_counted(inputs)}
             sent = ranges.evaluate(programs.scatter, flat)
@@ -347,10 +375,15 @@ def followed(view: View) -> Iterator[dict[str, Range]]:
     state = dict(ranges.evaluate(programs.start, counters))
     for depth in range(MOST_VERTICES):
         state |= ranges.evaluate(programs.arrive, state)
-        if not all(np.all(state[name].sure & state[name].known) for name in {**kinds(PATH), **kinds(SURFACE)}):
+        if not all(
+            np.all(state[name].sure & state[name].known) for name in {**kinds(PATH), **kinds(SURFACE)}
+        ):
             return
         yield dict(state)
-        state = {**state, **ranges.evaluate(programs.scatter, {**state, **counters, "depth": rng.counter(depth)})}
+        state = {
+            **state,
+            **ranges.evaluate(programs.scatter, {**state, **counters, "depth": rng.counter(depth)}),
+        }
         alive = state.pop("alive")
         if not (np.all(alive.sure) and np.all(alive.low)):
             return
@@ -385,7 +418,11 @@ def _whole_cases() -> list[Case]:
 
 
 COUNTED = {"seed": "integer below 2^32", "sample": "integer below 2^32"}
+"""Counters, for the page."""
+
 PLACED = {"width": "pixels", "height": "pixels", "x": "column", "y": "row"}
+"""A pixel, for the page."""
+
 OF_PATH = {
     "origin": "float[3]",
     "direction": "float[3], unit",
@@ -393,6 +430,8 @@ OF_PATH = {
     "radiance": "float[3], gathered so far",
     "pdf": "float, density of the direction, 1/sr; 1e30 at the camera",
 }
+"""A state, for the page."""
+
 OF_SURFACE = {
     "point": "float[3]",
     "normal": "float[3]",
@@ -400,7 +439,10 @@ OF_SURFACE = {
     "t": "float, distance; 1e30 for none",
     "surface": "integer, number of the surface (ISC-1)",
 }
+"""A surface, for the page."""
+
 GIVEN = {"scene": SCENE_FIELD, "settings": SETTINGS_FIELD}
+"""What all paths are given, for the page."""
 
 KINDS = (
     Kind(
@@ -424,7 +466,14 @@ KINDS = (
     Kind(
         "path.scatter",
         "A path leaves a surface: light sample, new direction, roulette",
-        {**GIVEN, **COUNTED, "pixel": "integer below 2^32", "depth": "scatterings before", **OF_PATH, **OF_SURFACE},
+        {
+            **GIVEN,
+            **COUNTED,
+            "pixel": "integer below 2^32",
+            "depth": "scatterings before",
+            **OF_PATH,
+            **OF_SURFACE,
+        },
         {"alive": "whether it goes on; if not, only radiance is asked for", **OF_PATH},
         lambda: _steps().scatter,
         scatter,

@@ -3,8 +3,8 @@
 1. A denoised picture has a bound at each pixel: the network's at its window (compiler/bounds.py), for encoded
    features that may be one ulp of float32 off [`_denoise_cases`].
 2. A rendered picture is an estimate. The answer holds the mean of each pixel and the variance of one sample;
-   both are averaged over blocks of pixels, and the blocks' means are compared by Welch's test with those of the
-   reference (welch.py) [`_render_cases`].
+   both are averaged over blocks of pixels, and the blocks' means are compared by Welch's test with those of
+   the reference (welch.py) [`_render_cases`].
 """
 
 from __future__ import annotations
@@ -119,10 +119,24 @@ def _render_cases() -> list[Case]:
     """Return small renders of three scenes."""
     cases = []
     for index, name in enumerate(("cornell", "glossy", "daylight")):
-        settings = {"max_depth": 3, "roulette_depth": None, "strategy": "mis", "heuristic": "power", "sampler": "pcg4d"}
-        own = {"width": SIZE_PX, "height": SIZE_PX, "spp": REFERENCE_SPP, "seed": 1000 + index, "settings": settings}
+        settings = {
+            "max_depth": 3,
+            "roulette_depth": None,
+            "strategy": "mis",
+            "heuristic": "power",
+            "sampler": "pcg4d",
+        }
+        own = {
+            "width": SIZE_PX,
+            "height": SIZE_PX,
+            "spp": REFERENCE_SPP,
+            "seed": 1000 + index,
+            "settings": settings,
+        }
         found = _render({**own, "scene": paths.scene_text(name)})
-        mean, variance = blocks.mean_and_variance(found["mean"].astype(np.float64), found["variance"], BLOCK_PX)
+        mean, variance = blocks.mean_and_variance(
+            found["mean"].astype(np.float64), found["variance"], BLOCK_PX
+        )
         welch = {
             "variance": variance,
             "spp": REFERENCE_SPP,
@@ -159,7 +173,11 @@ KINDS = (
             "spp": "samples per pixel",
             "seed": "integer",
         },
-        {"mean": "float[H][W][3], linear radiance", "variance": "float[H][W][3], of one sample", "spp": "integer"},
+        {
+            "mean": "float[H][W][3], linear radiance",
+            "variance": "float[H][W][3], of one sample",
+            "spp": "integer",
+        },
         _render_cases,
         _render,
         paths.files,

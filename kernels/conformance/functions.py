@@ -39,7 +39,7 @@ class Field(NamedTuple):
     """An input or output: what it is, its components (0: a number), and the least and largest value given."""
 
     text: str
-    count: int = 0
+    size: int = 0
     low: float = 0.0
     high: float = 1.0
 
@@ -64,7 +64,7 @@ class Function:
     def kind(self) -> Kind:
         """Return the kind of case."""
         fields = [
-            {name: f"{_shape(field.count)}, {field.text}" for name, field in side.items()}
+            {name: f"{_shape(field.size)}, {field.text}" for name, field in side.items()}
             for side in (self.inputs, self.outputs)
         ]
         return Kind(self.name, self.title, fields[0], fields[1], self.cases, self.answer)
@@ -133,7 +133,7 @@ class Function:
     @cached_property
     def _program(self) -> Program:
         """The traced function."""
-        inputs = {part: Type() for name, field in self.inputs.items() for part in names(name, field.count)}
+        inputs = {part: Type() for name, field in self.inputs.items() for part in names(name, field.size)}
 
         def call(*numbers: Any) -> dict[str, Any]:
             given = dict(zip(inputs, numbers, strict=True))
@@ -148,7 +148,7 @@ class Function:
     def parts(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Return the components of the outputs for those of the inputs, by name, in float32."""
         fields = {
-            name: vectors.vector(*(given[part] for part in names(name, f.count))) if f.count else given[name]
+            name: vectors.vector(*(given[part] for part in names(name, f.size))) if f.size else given[name]
             for name, f in self.inputs.items()
         }
         return components(self.outputs, self.call(fields, np.float32))
@@ -156,7 +156,7 @@ class Function:
 
 def _ends(found: Mapping[str, ranges.Range], name: str, field: Field, end: str) -> NDArray[np.float64]:
     """Return one end of the ranges of a field's components."""
-    return np.array([float(getattr(found[part], end)) for part in names(name, field.count)])
+    return np.array([float(getattr(found[part], end)) for part in names(name, field.size)])
 
 
 def _nudged(inputs: Numbers) -> Iterator[dict[str, Any]]:
@@ -203,8 +203,8 @@ def components(fields: Mapping[str, Field], values: Numbers) -> dict[str, Any]:
     """Return the components of fields by name."""
     found = {}
     for name, field in fields.items():
-        for axis, part in enumerate(names(name, field.count)):
-            found[part] = values[name][..., axis] if field.count else values[name]
+        for axis, part in enumerate(names(name, field.size)):
+            found[part] = values[name][..., axis] if field.size else values[name]
     return found
 
 

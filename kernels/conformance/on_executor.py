@@ -70,8 +70,8 @@ class OnExecutor:
         found = np.concatenate([self.executor.run(kernel, images)[0, 0] for kernel in kernels])
         outputs, at = {}, 0
         for name, field in function.outputs.items():
-            outputs[name] = found[at : at + field.count] if field.count else found[at]
-            at += max(field.count, 1)
+            outputs[name] = found[at : at + field.size] if field.size else found[at]
+            at += max(field.size, 1)
         return outputs
 
     def _vertices(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
@@ -80,7 +80,7 @@ class OnExecutor:
             int(inputs[name]) for name in ("x", "y", "width", "height", "sample", "seed")
         )
         part = Part(width, height, y, 1, sample, 1, seed)
-        rows = []
+        rows: list[dict[str, Any]] = []
         for depth in range(inputs["settings"]["max_depth"] + 1):
             settings = json.dumps({**inputs["settings"], "max_depth": depth})
             kernel = self._path_kernel(inputs["scene"], settings, profile)
@@ -107,15 +107,15 @@ class OnExecutor:
 
     def _rendered(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
         """Return mean and variance of each pixel."""
-        counts = {name: int(inputs[name]) for name in ("width", "height", "spp", "seed")}
-        job = Job(**counts, settings=Settings(**inputs["settings"]))
+        width, height, spp, seed = (int(inputs[name]) for name in ("width", "height", "spp", "seed"))
+        job = Job(width, height, spp, seed, Settings(**inputs["settings"]))
         found = render_on(self.executor, scene_module.from_json(inputs["scene"]), job, profile=profile)
         return {"mean": found.frame["color"], "variance": found.color_variance, "spp": job.spp}
 
     def _compile(self, kind: str, profile: str) -> list[Artifact]:
         """Return the kernels of a function: outputs three at a time, since a picture has few channels."""
         function = FUNCTIONS[kind]
-        total = sum(max(count, 1) for count in (field.count for field in function.outputs.values()))
+        total = sum(max(size, 1) for size in (field.size for field in function.outputs.values()))
         threes = [list(range(first, min(first + 3, total))) for first in range(0, total, 3)]
         return [self._kernel(_program(function, wanted), profile) for wanted in threes]
 
@@ -145,7 +145,7 @@ def _program(function: Function, wanted: list[int]) -> Program:
     images = [
         Image(part, 1, field.low, field.high)
         for name, field in function.inputs.items()
-        for part in names(name, field.count)
+        for part in names(name, field.size)
     ]
     gather = Gather(Window(1, "clamp"), tuple(images))
 

@@ -93,8 +93,8 @@ def to_junit(program: str, verdicts: Sequence[Verdict]) -> str:
         failures, skipped = known.found.get(FAIL, 0), known.found.get(UNSUPPORTED, 0)
         errors = sum(v.failed for v in some) - failures
         numbers = {"tests": known.cases, "failures": failures, "errors": errors, "skipped": skipped}
-        attributes = {name: str(number) for name, number in numbers.items()}
-        suite = ElementTree.SubElement(root, "testsuite", name=known.kind, **attributes)
+        attributes = {"name": known.kind, **{name: str(number) for name, number in numbers.items()}}
+        suite = ElementTree.SubElement(root, "testsuite", attributes)
         for v in some:
             element = ElementTree.SubElement(suite, "testcase", classname=v.kind, name=v.id)
             if v.verdict != PASS:

@@ -99,8 +99,9 @@ def page() -> str:
     lines = [
         "# Vectors",
         "",
-        f"Version {VERSION}. Written by `wamnet conformance --write spec/vectors`; this page too. How to use them,",
-        "and what the words mean: spec/conformance.md. The form of the files: schema.json beside this page.",
+        f"Version {VERSION}. Written by `wamnet conformance --write spec/vectors`; this page too.",
+        "How to use them, and what the words mean: spec/conformance.md.",
+        "The form of the files: schema.json beside this page.",
         "",
         "`float` is a number as text, hexadecimal (C's `%a`) or `inf`, `-inf`, `nan`; decimals are read too.",
         "`[n]` are lists. `expected` is there where `valid` is true.",

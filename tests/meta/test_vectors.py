@@ -1,7 +1,7 @@
 """House rules about vectors: clauses that they name exist, and a report of clauses that nothing proves.
 
-The report is `golden/clauses_without_proof.txt` of the tests: a clause that no vector names, and no test either, by
-its number or by a name of its code. It can only change where a commit shows it.
+The report is `golden/clauses_without_proof.txt` of the tests: a clause that no vector names, and no test
+either, by its number or by a name of its code. It can only change where a commit shows it.
 """
 
 from __future__ import annotations

@@ -182,7 +182,7 @@ BAD: Mapping[str, Callable[[], bytes]] = {
 
 def _model_cases() -> list[Case]:
     """Return good and bad files."""
-    cases = []
+    cases: list[Case] = []
     for note, content in [*GOOD.items(), *BAD.items()]:
         inputs = {"content": base64.b64encode(content()).decode()}
         expected = {name: Output(value) for name, value in _model(inputs).items()} if note in GOOD else None
@@ -265,7 +265,7 @@ FIRST_OF_VALUES = "an angle of 180 degrees"
 
 def _scene_cases() -> list[Case]:
     """Return good and bad scenes."""
-    cases, names = [], list(SCENE_BAD)
+    cases, names = list[Case](), list(SCENE_BAD)
     for note, text in [*SCENE_GOOD.items(), *SCENE_BAD.items()]:
         inputs = {"text": text()}
         expected = {name: Output(v) for name, v in _scene(inputs).items()} if note in SCENE_GOOD else None

@@ -55,8 +55,10 @@ def frame_of(layers: Mapping[str, Any]) -> Frame:
 def normalization_of(inputs: Mapping[str, Any]) -> Normalization:
     """Return the scales of a case."""
     x, y, z = (float(value) for value in inputs["position_center"])
-    scales = (float(inputs[name]) for name in ("exposure_stops", "depth_scale"))
-    return Normalization(*scales, (x, y, z), float(inputs["position_scale"]))
+    stops, depth, position = (
+        float(inputs[name]) for name in ("exposure_stops", "depth_scale", "position_scale")
+    )
+    return Normalization(stops, depth, (x, y, z), position)
 
 
 def _features(inputs: Mapping[str, Any]) -> dict[str, Any]:
@@ -98,7 +100,7 @@ FEATURE_ROWS = (
 
 def _feature_cases() -> list[Case]:
     """Return feature images of a frame with bad pixels; one without a needed layer is refused."""
-    cases = []
+    cases: list[Case] = []
     layers = bad_layers(2, 3, 50)
     for names, clause, note in FEATURE_ROWS:
         wanted = {dataset.FEATURES[name].layer for name in names.split(",")}
@@ -142,7 +144,7 @@ WINDOW_ROWS = (
 
 def _window_cases() -> list[Case]:
     """Return windows; channel c of the pixel (x, y) holds 100 y + 10 x + c."""
-    cases = []
+    cases: list[Case] = []
     for height, width, size, border, x, y, note in WINDOW_ROWS:
         row, column, channel = np.indices((height, width, 2 if size < 12 else 1))
         image = 100 * row + 10 * column + channel
@@ -163,13 +165,14 @@ def _window_cases() -> list[Case]:
 def _draws(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return frame, row and column of draws."""
     shapes = [(int(h), int(w)) for h, w in np.asarray(inputs["shapes"])]
-    counts = (int(inputs[name]) for name in ("seed", "stream", "count"))
-    return dict(zip(("frame", "y", "x"), dataset.sample_pixels(*counts, shapes), strict=True))
+    seed, stream, count = (int(inputs[name]) for name in ("seed", "stream", "count"))
+    found = dataset.sample_pixels(seed, stream, count, shapes)
+    return dict(zip(("frame", "y", "x"), found, strict=True))
 
 
 def _draw_cases() -> list[Case]:
     """Return draws from one and from three frames."""
-    cases = []
+    cases: list[Case] = []
     for seed, stream, shapes in ((0, 0, [(8, 8)]), (3, 19_999, [(64, 64), (1, 7), (480, 640)])):
         inputs = {"seed": seed, "stream": stream, "count": 10, "shapes": np.array(shapes)}
         expected = {name: Output(value) for name, value in _draws(inputs).items()}

@@ -20,8 +20,8 @@ WIDTH, HEIGHT = 97, 64
 def _ray(given: Numbers, dtype: Any) -> dict[str, Any]:
     """Return origin and direction."""
     basis = camera.camera_basis(CAMERA, dtype)
-    place = (given[name] for name in ("x", "y", "u", "v"))
-    origin, direction = camera.camera_ray(basis, *place, WIDTH, HEIGHT)
+    x, y, u, v = (given[name] for name in ("x", "y", "u", "v"))
+    origin, direction = camera.camera_ray(basis, x, y, u, v, WIDTH, HEIGHT)
     return {"origin": origin, "direction": direction}
 
 

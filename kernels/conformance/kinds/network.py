@@ -6,6 +6,7 @@ Bounds are those of compiler/bounds.py (PRO-6) at the case's own inputs, and for
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -130,7 +131,7 @@ def _forward_cases() -> list[Case]:
             note, _numbers(number, (n_in,), 40.0)
         )
         inputs = {**_as_inputs(network), "x": x}
-        program = analysed(trace(lambda v, known=network: activations(known, v), {"x": Type(shape=(n_in,))}))
+        program = analysed(trace(partial(activations, network), {"x": Type(shape=(n_in,))}))
         found = bounds.at_inputs(program, {"x": x[np.newaxis]}, EMITTED_SINE)
         expected = {
             name: Output(value, np.broadcast_to(found[name], (1, value.size))[0], POSTERIORI)
@@ -160,7 +161,7 @@ def _gradient_cases() -> list[Case]:
         network = _network(index)
         x, target = _numbers(20 + index, (EXAMPLES, widths[0])), _numbers(30 + index, (EXAMPLES, widths[-1]))
         inputs = {**_as_inputs(network), "x": x, "target": target}
-        step = step_of(lambda v, known=network: siren.forward(known, v), widths[0], widths[-1], EXAMPLES)
+        step = step_of(partial(siren.forward, network), widths[0], widths[-1], EXAMPLES)
         errors = sum_errors(step, x, target)
         expected = {}
         for name, value in _gradient(inputs).items():
@@ -181,7 +182,7 @@ def _gradient_cases() -> list[Case]:
 
 def _adam(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return parameters and moments (K, n) after each step."""
-    theta = (np.asarray(inputs["theta"], np.float64),)
+    theta: tuple[Array, ...] = (np.asarray(inputs["theta"], np.float64),)
     state, rows = adam.init(theta), []
     for gradient in np.asarray(inputs["gradients"], np.float64):
         theta, state = adam.step(theta, (gradient,), state, float(inputs["learning_rate"]))

@@ -28,7 +28,10 @@ def _block(inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 def _blocks() -> list[Case]:
     """Return blocks at the ends of the counters, one counter at a time, and others."""
-    rows = [("zeros", (0, 0, 0, 0)), ("all at their end: products wrap", (LAST,) * 4)]
+    rows: list[tuple[str, tuple[int, ...]]] = [
+        ("zeros", (0, 0, 0, 0)),
+        ("all at their end: products wrap", (LAST,) * 4),
+    ]
     rows += [(f"only {name} at its end", tuple(LAST * (name == n) for n in COUNTERS)) for name in COUNTERS]
     rows += [
         ("the order of the counters matters", (9, 10, 11, 12)),
@@ -83,7 +86,8 @@ SRGB = Function(
 def _adam(given: Mapping[str, Any], dtype: Any) -> dict[str, Any]:
     """Return parameter and moments after a step."""
     grown = (given["growth_1"], given["growth_2"])
-    theta, m, v = adam.update(*(given[n] for n in ("theta", "g", "m", "v", "learning_rate")), grown)
+    theta, g, m, v = (given[name] for name in ("theta", "g", "m", "v"))
+    theta, m, v = adam.update(theta, g, m, v, given["learning_rate"], grown)
     return {"theta": theta, "m": m, "v": v}
 
 

@@ -1,7 +1,8 @@
 """Kinds of paths: one step of a path from its state to the next, and whole paths with every vertex.
 
 1. A step is a function of a state: from the camera [`start`], to the next surface [`arrive`], and away from
-   it [`scatter`]. Its bound is the range of what single precision may give (compiler/ranges.py), at that state.
+   it [`scatter`]. Its bound is the range of what single precision may give at that state
+   (compiler/ranges.py).
 2. A whole path is the steps one after another, each from the range of the one before: the bound grows from
    vertex to vertex. A case ends before the first vertex of which a decision is not sure [`followed`].
 """
@@ -15,7 +16,6 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....compiler import ranges
 from ....compiler.lower_scene import PATH, SURFACE, PathPrograms, Values, kinds, lower_scene
@@ -54,7 +54,7 @@ SCENE_FIELD = "scene file (SCN-6)"
 SETTINGS_FIELD = "object: max_depth, roulette_depth (or null), strategy, heuristic, sampler (LTR-6 to LTR-9)"
 """What settings are, for the page."""
 
-State = dict[str, NDArray[Any]]
+State = dict[str, Any]
 
 
 class World(NamedTuple):
@@ -134,7 +134,7 @@ def start(inputs: Mapping[str, Any]) -> State:
     counters = Counters(rng.counter(int(inputs["seed"])), pixel, rng.counter(int(inputs["sample"])))
     size = float(inputs["width"]), float(inputs["height"])
     path = render.start(at.basis, x, y, *size, counters, np.float64, at.world.settings.sampler)
-    return {"pixel": int(pixel[0]), "origin": path.origin[0], "direction": path.direction[0]}  # type: ignore[dict-item]
+    return {"pixel": int(pixel[0]), "origin": path.origin[0], "direction": path.direction[0]}
 
 
 def arrive(inputs: Mapping[str, Any]) -> State:
@@ -149,15 +149,16 @@ def scatter(inputs: Mapping[str, Any]) -> State:
     """Return how a path leaves a surface; of one that ends, only the light it has gathered."""
     at = world_of(inputs["scene"], inputs["settings"])
     of_surface = _lanes(SURFACE, inputs)
-    surface = Surface(*(of_surface[name] for name in ("point", "normal", "reflectance")), None, None)
+    point, normal, reflectance = (of_surface[name] for name in ("point", "normal", "reflectance"))
+    surface = Surface(point, normal, reflectance, None, None)
     hit = Hit(of_surface["t"], of_surface["surface"])
     path = Path(**_lanes(PATH, inputs))
     found, alive = transport.scatter(
         at.world, path, surface, hit, rng.counter(int(inputs["depth"])), _counters(inputs)
     )
     if not alive[0]:
-        return {"alive": np.False_, "radiance": found.radiance[0]}  # type: ignore[dict-item]
-    return {"alive": np.True_, **{name: getattr(found, name)[0] for name in PATH}}  # type: ignore[dict-item]
+        return {"alive": np.False_, "radiance": found.radiance[0]}
+    return {"alive": np.True_, **{name: getattr(found, name)[0] for name in PATH}}
 
 
 # ---- bounds ---------------------------------------------------------------------------------------------

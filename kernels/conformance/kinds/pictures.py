@@ -108,8 +108,8 @@ def _bound(model: Model, frame: Frame, picture: Any) -> Any:
 
 def _render(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return mean and variance of each pixel."""
-    counts = {name: int(inputs[name]) for name in ("width", "height", "spp", "seed")}
-    job = Job(**counts, settings=paths.settings_of(inputs["settings"]), dtype="float32")
+    width, height, spp, seed = (int(inputs[name]) for name in ("width", "height", "spp", "seed"))
+    job = Job(width, height, spp, seed, paths.settings_of(inputs["settings"]))
     found = render(scene_module.from_json(inputs["scene"]), job)
     return {"mean": found.frame["color"], "variance": found.color_variance, "spp": job.spp}
 

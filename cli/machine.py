@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
@@ -23,10 +24,10 @@ def describe() -> dict[str, str]:
     }
 
 
-def versions() -> dict[str, str]:
-    """Return the versions of the packages that matter, where they are installed."""
+def versions(others: Sequence[str] = ()) -> dict[str, str]:
+    """Return the versions of the packages that matter, and of others, where they are installed."""
     found = {}
-    for name in PACKAGES:
+    for name in (*PACKAGES, *others):
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:

@@ -19,7 +19,7 @@ from typing import Annotated, Any
 import typer
 
 from ..refimpl.errors import WamnetError
-from . import animate, compare, conformance, dataset, demo, denoise, render, train
+from . import animate, bench, certify, compare, conformance, dataset, demo, denoise, render, train
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
 
@@ -53,9 +53,11 @@ _register(render.scene, render.SCENE_EXAMPLES)
 _register(dataset.dataset, dataset.EXAMPLES)
 _register(train.train, train.EXAMPLES)
 _register(compile_model, COMPILE_EXAMPLES, "compile")
+_register(certify.certify, certify.EXAMPLES)
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)
 _register(animate.animate, animate.EXAMPLES)
+_register(bench.bench, bench.EXAMPLES)
 _register(denoise.executors, denoise.EXECUTORS_EXAMPLES)
 _register(conformance.conformance, conformance.EXAMPLES)
 _register(demo.demo, demo.EXAMPLES)

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import machine, plots
+from . import bench_report, machine, plots
 from .compare import scores_as_data
 from .outputs import write_text
 
@@ -32,9 +33,16 @@ PICTURES = ("noisy", "denoised", "reference", "normal")
 """Pictures of a test frame that the report shows, by the ends of their files' names."""
 
 
-def write(output: Path, plan: Plan, results: Results, command: str) -> None:
-    """Write `report.json` and `report.html` into the folder that has the pictures."""
+def write(
+    output: Path, plan: Plan, results: Results, command: str, bench: Mapping[str, Any] | None = None
+) -> None:
+    """Write `report.json` and `report.html` into the folder that has the pictures.
+
+    `bench`: what `cli/bench.py: measure` has found, which both then hold too.
+    """
     data = facts(plan, results, command)
+    if bench is not None:
+        data["bench"] = bench
     write_text(output / "report.json", json.dumps(data, indent=2, allow_nan=False) + "\n")
     folder = output / FOLDER
     pictures = [
@@ -109,6 +117,16 @@ def _error_maps(frame: Unseen, stops: float) -> dict[str, Any]:
     return {"input": error_map(noisy, target), "denoised": error_map(frame.denoised, target)}
 
 
+def bench_section(bench: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the page shows of a benchmark, plots as embedded pictures."""
+    found = bench_report.section(bench)
+    shown = {
+        name: {theme: _embedded(png) for theme, png in pictures.items()}
+        for name, pictures in found["plots"].items()
+    }
+    return {**found, "plots": shown}
+
+
 def page(data: dict[str, Any], pictures: list[dict[str, str]], drawn: dict[str, Any]) -> str:
     """Return the report as one HTML page."""
     import jinja2
@@ -116,7 +134,8 @@ def page(data: dict[str, Any], pictures: list[dict[str, str]], drawn: dict[str, 
     text = resources.files(__package__).joinpath("report.html.jinja").read_text(encoding="utf-8")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     environment.filters["number"] = _number
-    return environment.from_string(text).render(**data, pictures=pictures, plots=drawn)
+    bench = bench_section(data["bench"]) if data.get("bench") else None
+    return environment.from_string(text).render(**{**data, "bench": bench}, pictures=pictures, plots=drawn)
 
 
 def _number(value: float | None, digits: int = 3) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ..compiler.schedules import PLAIN
 from ..refimpl.errors import CompileError, ExecutorUnavailable
 
 if TYPE_CHECKING:
@@ -61,42 +62,44 @@ def run_one(name: str, kernel: Artifact, model: Model, frame: Frame, truth: Any)
 
     The kernel runs twice and the second time counts: drivers put off work until the first run.
     """
+    from ..compiler.compile import compile_program
+    from ..compiler.lower import lower
     from ..kernels import denoise_on, open_executor
     from ..refimpl.metrics import largest_error
 
     with open_executor(name) as executor:
+        schedule = executor.schedule_for((frame.height, frame.width))
+        made = compile_program(lower(model), name, kernel.profile, schedule).manifest
         first = denoise_on(executor, model, frame)
         second = denoise_on(executor, model, frame)
-    everywhere = kernel.manifest["bound"]["output"]
+    everywhere = made["bound"]["output"]
     run = Run(
         name,
         second.device,
         first.seconds_compile,
         second.seconds_run,
         largest_error(second.image, truth),
-        frame_bound(model, frame, name, kernel.profile),
+        frame_bound(model, frame, name, kernel.profile, made["schedule"]["name"]),
         max(everywhere) if everywhere else None,
     )
     return second.image, run
 
 
-def frame_bound(model: Model, frame: Frame, target: str, profile: str) -> float | None:
-    """Return the compiler's bound on the largest error in this frame, or None where it has none."""
+def frame_bound(model: Model, frame: Frame, target: str, profile: str, schedule: str = PLAIN) -> float | None:
+    """Return the compiler's bound on a kernel's largest error in this frame, or None where it has none."""
     import numpy as np
 
     from ..compiler import bounds
-    from ..compiler.compile import analysed, sine_contract
+    from ..compiler.compile import analysed, schedule_named, sine_contract
     from ..compiler.lower import lower
-    from ..refimpl import dataset
+    from ..kernels.denoise_on import images_of
 
     program, sine = analysed(lower(model)), sine_contract(profile, target)
-    padded = dataset.pad(dataset.feature_image(frame, model.features, model.normalization), model.window)
-    margin = model.window.size - 1
+    images, chosen = images_of(model, frame), schedule_named(target, schedule)
     rows = max(1, BLOCK_NUMBERS // (frame.width * model.siren.widths[0]))
     largest = 0.0
     for top in range(0, frame.height, rows):
-        strip = padded[top : min(top + rows, frame.height) + margin]
-        windows = dataset.all_windows(strip, model.window).astype(np.float64)
-        (errors,) = bounds.at_inputs(program, {"window": windows}, sine).values()
+        found = chosen.enclosures(program, sine, images, slice(top, top + rows))
+        (errors,) = bounds.output_errors(program, found).values()
         largest = max(largest, float(errors.max()))
     return largest if np.isfinite(largest) else None

@@ -14,25 +14,28 @@ import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 import numpy as np
 
 from ..refimpl.errors import CompileError
-from . import artifact, bounds, ir, profiles, schedules
+from . import artifact, bounds, certificate, ir, profiles, schedules
 from .artifact import Artifact
+from .c import C
 from .dialect import Dialect
 from .emit import kernel_gather, output_channels
+from .enclosure import round_up as round_up
 from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
 from .glsl_inlined import GLSL_LADDER
-from .ir import OUTPUT_ENCODING, Gather, Program
+from .ir import LEAST, OUTPUT_ENCODING, Gather, Program
 from .opencl import OpenCL
+from .opencl_fourier import OPENCL_FOURIER
 from .opencl_tiled import OPENCL_LADDER
 from .passes import pipeline
 from .profiles import Profile, SineContract
 from .schedules import PLAIN, Pick, Plain, Printed, Schedule, pick
+from .sums import is_split
 
 
 @dataclass(frozen=True)
@@ -77,11 +80,14 @@ TARGETS: Mapping[str, Target] = {
             SineContract("np.sin, whose documentation promises nothing", None),
             (Printed(),),
         ),
-        _dialect_target(OpenCL(), *OPENCL_LADDER),
+        _dialect_target(OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER),
         _dialect_target(GLSL(), *GLSL_LADDER),
     )
 }
-"""All targets, by the name of the executor that runs them."""
+"""All targets of paths, encodings and denoisers, by the name of the executor that runs them."""
+
+DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C())}
+"""All targets of denoisers: those, and C, which is made to be pasted."""
 
 
 KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
@@ -92,20 +98,31 @@ JSON_INFO = ("normalization", "recipe")
 """Which of them are JSON texts."""
 
 
+AGAINST = "float64 reference, same float32 weights and images"
+"""What a bound compares a kernel with."""
+
+AGAINST_PINNED = f"{AGAINST}, where weights below {LEAST!r} are 0"
+"""The same for an exact kernel."""
+
+SUMS = "sums      over the window: a partial sum for each image and row of taps, in any order; then these"
+"""What a header says where the bound rests on partial sums [sums.py]."""
+
+
 @dataclass(frozen=True)
 class Bound:
     """A-priori promise: `output` bounds each channel's error, None where an operation promises nothing.
 
-    `sines` holds the range of each sine's argument.
+    `sines` holds the range of each sine's argument; `proof` the steps of a certificate, if it has one.
     """
 
     output: tuple[float, ...] | None
     sines: tuple[tuple[float, float], ...]
+    proof: certificate.Proof | None = None
 
 
-def analysed(program: Program) -> Program:
+def analysed(program: Program, profile: str = "ieee") -> Program:
     """Return the program that bounds speak about: after the common passes, each sine one node."""
-    return pipeline.run(program, pipeline.COMMON)
+    return pipeline.run(program, (*pipeline.COMMON, *profiles.profile_named(profile).common))
 
 
 def sine_contract(profile: str, target: str) -> SineContract:
@@ -113,16 +130,16 @@ def sine_contract(profile: str, target: str) -> SineContract:
     return profiles.profile_named(profile).sine or target_named(target).native_sine
 
 
-def bound_over_images(program: Program, profile: str, target: str, cut: Cut | None = None) -> Bound:
+def bound_over_images(
+    program: Program, profile: str, target: str, cut: Cut | None = None, schedule: Schedule | None = None
+) -> Bound:
     """Return the bound of an analysed program over all that its images can hold, or refuse it.
 
-    `cut`: it is run as these two passes.
+    `cut`: it is run as these two passes; `schedule`: not the plain one.
     """
     contract = sine_contract(profile, target)
-    if cut:
-        found = over_images(cut, contract)
-    else:
-        found = bounds.enclose(program, {"window": bounds.window_box(kernel_gather(program))}, contract)
+    chosen = schedule or target_named(target).schedules[0]
+    found = over_images(cut, contract) if cut else chosen.enclosures(program, contract)
     if profiles.profile_named(profile).sine is not None:
         _check_sizes(program, found)
     sines = [index for index, node in enumerate(program.nodes) if node.op == "sin"]
@@ -134,8 +151,10 @@ def bound_over_images(program: Program, profile: str, target: str, cut: Cut | No
         if contract.error is not None and not bounds.argument_reach(argument).max() <= contract.domain:
             _refuse_domain(number + 1, len(sines), index, ranges[-1], contract)
     errors = bounds.output_errors(program, found)[program.outputs[0][0]]
-    known = all(math.isfinite(error) for error in errors)
-    return Bound(tuple(float(e) for e in errors) if known else None, tuple(ranges))
+    if not all(math.isfinite(error) for error in errors):
+        return Bound(None, tuple(ranges))
+    proof = None if cut else certificate.prove(program, found, contract)
+    return Bound(proof.bound if proof else tuple(float(e) for e in errors), tuple(ranges), proof)
 
 
 def _check_sizes(program: Program, found: Sequence[bounds.Enclosure]) -> None:
@@ -166,9 +185,19 @@ def _refuse_domain(
 
 def target_named(name: str) -> Target:
     """Return the target, or say which ones there are."""
+    if name not in DENOISERS:
+        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(DENOISERS)}")
+    return DENOISERS[name]
+
+
+def target_of_pipelines(name: str) -> Target:
+    """Return a target that has kernels of all kinds, or refuse one whose kernels denoise alone."""
+    found = target_named(name)
     if name not in TARGETS:
-        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(TARGETS)}")
-    return TARGETS[name]
+        raise CompileError(
+            f"target {name} has denoisers alone; for other kernels there are {', '.join(TARGETS)}"
+        )
+    return found
 
 
 def compile_program(
@@ -181,9 +210,11 @@ def compile_program(
     """
     chosen = target_named(target)
     kernel_gather(program)
-    common = analysed(program)
+    common = analysed(program, profile)
     if not rank:
-        return _compiled(common, chosen, profile, schedule, bound_over_images(common, profile, target))
+        picked = _picked(common, chosen, profile, schedule).schedule
+        bound = bound_over_images(common, profile, target, schedule=picked)
+        return _compiled(common, chosen, profile, schedule, bound)
     if chosen.most is not None and rank > chosen.most:
         raise CompileError(
             f"rank {rank}: the image between both passes has as many channels, and {chosen.language} "
@@ -249,6 +280,17 @@ def _compiled(
     return _assemble(common, emitted, chosen, promised, bound, picked, source)
 
 
+def schedule_named(target: str, name: str) -> Schedule:
+    """Return the schedule of this name of a target."""
+    return {schedule.name: schedule for schedule in target_named(target).schedules}[name]
+
+
+def _picked(common: Program, chosen: Target, profile: str, schedule: str) -> Pick:
+    """Return the schedule of an analysed program."""
+    emitted = pipeline.run(common, profiles.profile_named(profile).passes)
+    return pick(chosen.schedules, schedule, emitted)
+
+
 def _header(program: Program, target: Target, profile: Profile, bound: Bound, picked: Pick) -> list[str]:
     """Return the lines of the comment at the top of the source."""
     gather, channels = kernel_gather(program), output_channels(program)
@@ -257,7 +299,7 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound, pi
         for i in gather.images
     ]
     encoding = dict(program.info).get(OUTPUT_ENCODING)
-    arguments = picked.schedule.arguments.format(channels=channels).split("\n")
+    arguments = _arguments(picked, channels).split("\n")
     rows, columns = gather.rows, gather.columns
     tap = f"{rows // 2}" if rows == columns else f"({rows // 2}, {columns // 2})"
     return [
@@ -271,10 +313,17 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound, pi
         f"profile   {profile.name}: {profile.text}",
         f"sine      {sine_contract(profile.name, target.name).text}",
         f"bound     {_bound_text(bound)}",
+        *([SUMS] if is_split(gather) and type(picked.schedule).enclosures is Schedule.enclosures else []),
         *([] if picked.schedule.name == PLAIN else [f"schedule  {schedules.text(picked.manifest())}"]),
         f"arguments {arguments[0]}",
         *(f"          {line}" for line in arguments[1:]),
     ]
+
+
+def _arguments(picked: Pick, channels: int) -> str:
+    """Return how a kernel is called."""
+    columns, rows = picked.extent
+    return picked.schedule.arguments.format(channels=channels, columns=columns, rows=rows)
 
 
 def _weight_lines(program: Program, schedule: Schedule) -> list[str]:
@@ -290,16 +339,6 @@ def _bound_text(bound: Bound) -> str:
     if bound.output is None:
         return "none: for some images an operation of this program promises nothing on this target"
     return f"|output - float64 reference| <= {round_up(max(bound.output)):g} for all images in these ranges"
-
-
-def round_up(value: float, digits: int = 3) -> float:
-    """Return the smallest number of so many significant decimal digits that is not below `value`."""
-    if value == 0 or not math.isfinite(value):
-        return value
-    # Decimals hold every float64 exactly, and the float64 nearest to one above `value` is not below it.
-    exact = Decimal(value)
-    unit = Decimal(1).scaleb(exact.adjusted() - digits + 1)
-    return float(exact.quantize(unit, ROUND_CEILING))
 
 
 def _assemble(
@@ -325,7 +364,7 @@ def _assemble(
         "entry_point": target.entry,
         "profile": {"name": profile.name, "text": profile.text},
         "sine": asdict_finite(sine_contract(profile.name, target.name)),
-        "passes": [*pipeline.COMMON, *profile.passes],
+        "passes": [*pipeline.COMMON, *profile.common, *profile.passes],
         "window": _window(gather),
         "images": [asdict(image) for image in gather.images],
         "output": {
@@ -333,11 +372,12 @@ def _assemble(
             "channels": output_channels(emitted),
             "encoding": dict(emitted.info).get(OUTPUT_ENCODING, ""),
         },
-        "arguments": schedule.arguments.format(channels=output_channels(emitted)),
+        "arguments": _arguments(picked, output_channels(emitted)),
         "bound": {
             "output": bound.output and [round_up(error) for error in bound.output],
-            "against": "float64 reference, same float32 weights and images",
+            "against": AGAINST_PINNED if emitted.exact else AGAINST,
         },
+        "certificate": artifact.CERTIFICATE_NAME if bound.proof else None,
         "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],
         "info": {name: _info_value(name, text) for name, text in emitted.info if name in KEPT_INFO},
         "files": {
@@ -353,7 +393,12 @@ def _assemble(
         },
     }
     manifest = json.loads(json.dumps(manifest, allow_nan=False))
-    return Artifact(target.name, profile.name, target.entry, source, source_name, emitted, weights, manifest)
+    proven = None
+    if bound.proof:
+        sine = sine_contract(profile.name, target.name)
+        proven = certificate.certificate(common, bound.proof, sine, schedule, emitted, manifest)
+    names = (target.name, profile.name, target.entry)
+    return Artifact(*names, source, source_name, emitted, weights, manifest, certificate=proven)
 
 
 def _window(gather: Gather) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
 1. Nodes are grouped in their order [`schedule`]: neighbouring elementwise nodes of one shape share a loop, an
    affine node is a loop nest of its own.
-2. An affine node that reads the window accumulates straight from the images, tap by tap; the window vector
-   exists only if something else reads it [`_over_window`].
+2. An affine node that reads the window accumulates straight from the images, a partial sum for each row of
+   taps of an image [sums.py]; the window vector exists only if something else reads it [`_over_window`].
 3. A value that another group reads is an array `v<number>`; a number, or a value that only its own loop
    reads, is a variable `t<number>`; numbers are those of the printed program.
 
@@ -17,9 +17,10 @@ from dataclasses import dataclass, field
 
 from ..refimpl.errors import CompileError
 from .dialect import Dialect
-from .ir import Gather, Node, Program, users
+from .ir import Gather, Image, Node, Program, users
 from .lines import Lines
 from .ops import LOOPS, OPS
+from .sums import is_split
 from .weights import layout, tables
 
 BORDERS: Mapping[str, tuple[str, str]] = {
@@ -77,16 +78,17 @@ def emit(
     _check_channels(program, dialect)
     body = body or Body(program, dialect, gather)
     images = [dialect.image_declaration.format(image=i.name, channels=i.channels) for i in gather.images]
-    defines = [*_window_defines(gather), *body.defines()]
+    defines = [*(dialect.exact if program.exact else ()), *_window_defines(gather), *body.defines()]
     declared = [dialect.table_declaration(name, array) for name, array in tables(program).items()]
     begin = dialect.begin.format(
         defines="\n".join([*defines, *declared]),
         entry=dialect.entry,
         images=dialect.image_separator.join(images),
         image=gather.images[0].name,
+        names=", ".join(f"image_{i.name}" for i in gather.images),
         results=_each_result(dialect.result_declaration, program, dialect),
         starts=_each_result(dialect.result_start, program, dialect),
-        unordered=dialect.unordered[bounded],
+        unordered=dialect.unordered[bounded or program.exact],
     )
     comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
     return "\n".join([*comment, begin, *body.text(), dialect.end.format()]) + "\n"
@@ -101,8 +103,16 @@ def _each_result(template: str, program: Program, dialect: Dialect) -> str:
 def private_bytes(program: Program) -> int:
     """Return the bytes of the arrays that a kernel declares for each pixel."""
     body = Body(program, Dialect(), kernel_gather(program))
-    shapes = [program.nodes[index].type.shape for index in body.group_of if body.declares(index)]
-    return sum(4 * shape[0] for shape in shapes)
+    parts = [index for index in _split(program) if index in body.group_of]
+    arrays = [*filter(body.declares, body.group_of), *parts]
+    return sum(4 * program.nodes[index].type.shape[0] for index in arrays)
+
+
+def _split(program: Program) -> list[int]:
+    """Return the indices of the affine maps that add up partial sums over the window [sums.py]."""
+    nodes = program.nodes
+    found = [i for i, node in enumerate(nodes) if node.op == "affine" and nodes[node.args[0]].op == "input"]
+    return found if is_split(kernel_gather(program)) else []
 
 
 def kernel_gather(program: Program) -> Gather:
@@ -227,17 +237,24 @@ class Body(Lines):
         neurons = f"for (int j = 0; j < {n_out}; ++j) {{"
         self._nest([neurons], [f"v{index}[j] = {start};"])
         if source.op == "input":
+            sums, zero, add = f"v{index}", [], []
+            if is_split(self.gather):
+                sums = f"part{index}"
+                zero, add = [f"{sums}[j] = 0.0f;"], [f"v{index}[j] += {sums}[j];"]
+                self._line(f"{self.dialect.variable('float32')} {sums}[{n_out}];")
             self._over_window(
-                lambda tap: self._accumulate(index, neurons, _plus(weight.offset, f"({tap}) * {n_out}", "j"))
+                lambda tap: self._accumulate(sums, neurons, _plus(weight.offset, f"({tap}) * {n_out}", "j")),
+                lambda: self._nest([neurons] if zero else [], zero),
+                lambda: self._nest([neurons] if add else [], add),
             )
         else:
-            inner = self._accumulate(index, neurons, _plus(weight.offset, f"i * {n_out}", "j"))
+            inner = self._accumulate(f"v{index}", neurons, _plus(weight.offset, f"i * {n_out}", "j"))
             value = f"float value = {self._read(node.args[0], 'i')};"
             self._nest([f"for (int i = 0; i < {n_in}; ++i) {{"], [value, *inner])
 
-    def _accumulate(self, index: int, neurons: str, weight: str) -> list[str]:
-        """Return the loop that adds `value` times one row of weights to all neurons."""
-        return [neurons, f"    v{index}[j] += {self._weight(weight)} * value;", "}"]
+    def _accumulate(self, sums: str, neurons: str, weight: str) -> list[str]:
+        """Return the loop that adds `value` times one row of weights to all neurons' sums."""
+        return [neurons, f"    {sums}[j] += {self._weight(weight)} * value;", "}"]
 
     def _elementwise(self, group: tuple[int, ...]) -> None:
         """Write the operations of a group, in a loop when they work on vectors."""
@@ -250,6 +267,8 @@ class Body(Lines):
                 self._line(self._declaration(index))
         statements = []
         for index in group:
+            if self._fuses(index):
+                continue
             kind = self.dialect.variable(self.program.nodes[index].type.dtype)
             statements.append(f"{kind} t{index} = {self._expression(index, lane)};")
             if shape and self._is_array(index):
@@ -264,6 +283,10 @@ class Body(Lines):
         operands = [self._read(arg, lane, self.group_of[index]) for arg in node.args]
         return self.dialect.expression(node, self.program.nodes[node.args[-1]].type.dtype, operands)
 
+    def _fuses(self, index: int) -> bool:
+        """Return whether a value has no name, but stands in the only expression that reads it."""
+        return False
+
     def _outputs(self) -> None:
         """Write the only output to the result."""
         index = self.program.outputs[0][1]
@@ -271,35 +294,53 @@ class Body(Lines):
         self._comment(f"output {self.program.outputs[0][0]}")
         store, results = self.dialect.store, self.dialect.results(channels)
         if not self.program.nodes[index].type.shape:
-            self._line(store.format(result=results[0], channels=1, i="0", value=self._read(index, "")))
+            value = self._written(self._read(index, ""))
+            self._line(store.format(result=results[0], channels=1, i="0", value=value))
             return
         each = self.dialect.channels_per_result or channels
         for first, result in zip(range(0, channels, each), results, strict=True):
-            line = store.format(
-                result=result, channels=channels, i="i", value=self._read(index, _plus(first, "i"))
-            )
+            value = self._written(self._read(index, _plus(first, "i")))
+            line = store.format(result=result, channels=channels, i="i", value=value)
             self._nest([f"for (int i = 0; i < {min(each, channels - first)}; ++i) {{"], [line])
+
+    def _written(self, value: str) -> str:
+        """Return the text of a number as it is written: an exact program has one zero."""
+        return f"{value} == 0.0f ? 0.0f : {value}" if self.program.exact else value
 
     # ---- the window --------------------------------------------------------------------------------------
 
-    def _over_window(self, body: Callable[[str], list[str]]) -> None:
-        """Write the loops over taps and channels that set `value`; `body` takes the index into the window."""
-        (before, value), names = BORDERS[self.gather.window.border], self.sides
-        self._open(f"for (int dy = 0; dy < {names.rows}; ++dy) {{")
-        self._line(f"int row = clamp(y + dy - {names.row}, 0, height - 1);")
-        self._open(f"for (int dx = 0; dx < {names.columns}; ++dx) {{")
-        self._line(f"int column = clamp(x + dx - {names.column}, 0, width - 1);")
-        if before:
-            self._line(before.format(sides=names))
-        self._line(f"int tap = (dy * {names.columns} + dx) * {self.gather.channels};")
-        first = 0
-        for image in self.gather.images:
-            pixel = self.dialect.pixel.format(image=image.name, channels=image.channels)
-            lines = [f"float value = {value.format(pixel=pixel)};", *body(_plus("tap", first, "c"))]
-            self._nest([f"for (int c = 0; c < {image.channels}; ++c) {{"], lines)
-            first += image.channels
-        self._close()
-        self._close()
+    def _over_window(
+        self,
+        body: Callable[[str], list[str]],
+        before: Callable[[], None] = lambda: None,
+        after: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Write the loops over images, rows of taps, taps and channels that set `value`.
+
+        `body` takes the index into the window; `before` and `after` write what stands around an image's row.
+        """
+        (inside, value), names = BORDERS[self.gather.window.border], self.sides
+        for group in self.gather.groups:
+            self._open(f"for (int dy = 0; dy < {names.rows}; ++dy) {{")
+            self._line(f"int row = {self.dialect.clamp}(y + dy - {names.row}, 0, height - 1);")
+            before()
+            self._open(f"for (int dx = 0; dx < {names.columns}; ++dx) {{")
+            self._line(f"int column = {self.dialect.clamp}(x + dx - {names.column}, 0, width - 1);")
+            if inside:
+                self._line(inside.format(sides=names))
+            self._line(f"int tap = (dy * {names.columns} + dx) * {self.gather.channels};")
+            for image, first in group:
+                self._channels(image, value, body(_plus("tap", first, "c")))
+            self._close()
+            after()
+            self._close()
+
+    def _channels(self, image: Image, value: str, lines: list[str]) -> None:
+        """Write the loop over an image's channels at a tap."""
+        pixel = self.dialect.pixel.format(image=image.name, channels=image.channels)
+        kept = [f"value = {self.dialect.kept('value')};"] if self.program.exact else []
+        value = f"float value = {value.format(pixel=pixel)};"
+        self._nest([f"for (int c = 0; c < {image.channels}; ++c) {{"], [value, *kept, *lines])
 
     # ---- values ------------------------------------------------------------------------------------------
 
@@ -311,7 +352,7 @@ class Body(Lines):
         if node.op == "parameter":
             return self._weight(_plus(self.slots[str(node["name"])].offset, lane))
         if not node.type.shape or self.group_of[index] == group:
-            return f"t{index}"
+            return self._expression(index, lane) if self._fuses(index) else f"t{index}"
         return self._element(index, lane)
 
     def _element(self, index: int, lane: str) -> str:
@@ -324,7 +365,10 @@ class Body(Lines):
 
     def _declaration(self, index: int) -> str:
         """Return the declaration of the array of a value."""
-        return f"{self._type(index)} v{index}[{self.program.nodes[index].type.shape[0]}];"
+        kind, node = self._type(index), self.program.nodes[index]
+        # Sums of an exact program have one order too.
+        kind = self.dialect.variable(node.type.dtype) if self.program.exact else kind
+        return f"{kind} v{index}[{node.type.shape[0]}];"
 
     def declares(self, index: int) -> bool:
         """Return whether the kernel has an array for this value."""

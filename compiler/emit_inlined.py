@@ -25,6 +25,7 @@ from .emit import Body, emit, kernel_gather
 from .emit_tiled import refused_by_vectors
 from .ir import Node, Program
 from .schedules import Schedule
+from .sums import is_split
 from .weights import Slot
 
 LARGEST_WEIGHTS = 2**16
@@ -97,11 +98,13 @@ class InlinedBody(Body):
         """Return the function that reads a pixel under the border rule."""
         kind, border = _vector(channels), self.gather.window.border
         value = {"clamp": "texel", "zero": f"at == nearest ? texel : {kind}(0.0f)"}[border]
+        kept = [f"    texel{i} = {self.dialect.kept(f'texel{i}')};" for i in _components(channels)]
         return [
             f"{kind} tap_{name}(ivec2 at)",
             "{",
             f"    ivec2 nearest = clamp(at, ivec2(0), textureSize(image_{name}, 0) - 1);",
             f"    {kind} texel = texelFetch(image_{name}, nearest, 0).{'rgba'[:channels]};",
+            *(kept if self.program.exact else []),
             f"    return {value};",
             "}",
         ]
@@ -157,37 +160,55 @@ class InlinedBody(Body):
         self._comment(f"%{index}: affine map {node['weight']} from {matrix.shape[1]} to {numbers}")
         for vector in range(self.vectors(index)):
             start = self._numbers(self.program.parameters[str(bias)], vector) if bias else "vec4(0.0f)"
-            self._line(f"vec4 v{index}_{vector} = {start};")
+            qualifier = self.dialect.qualifiers["float32"] if self.program.exact else ""
+            self._line(f"{qualifier}vec4 v{index}_{vector} = {start};")
         if source.op == "input":
             self._windowed(index, matrix)
         else:
             for first in range(0, matrix.shape[1], 4):
                 columns = matrix[:, first : first + 4]
                 held = f"v{node.args[0]}_{first // 4}.{COMPONENTS[columns.shape[1] - 1]}"
-                self._multiply(index, columns, held)
+                self._multiply(f"v{index}", columns, held)
 
     def _windowed(self, index: int, matrix: NDArray[np.float32]) -> None:
-        """Write the products of all taps."""
-        gather, first = self.gather, 0
-        for image in self.gather.images:
+        """Write the products of all taps: a partial sum for each row of taps of an image."""
+        gather, vectors, split = self.gather, range(self.vectors(index)), is_split(self.gather)
+        for image in gather.images:
             self._line(f"{_vector(image.channels)} {image.name}_{index};")
-        for tap in range(gather.rows * gather.columns):
+        if split:
+            parts = ", ".join(f"part{index}_{vector}" for vector in vectors)
+            self._line(f"{self.dialect.variable('float32')} {parts};")
+        sums, taps = f"part{index}" if split else f"v{index}", range(gather.rows * gather.columns)
+        for group, tap in ((group, tap) for group in gather.groups for tap in taps):
             row, column = divmod(tap, gather.columns)
             dy, dx = row - gather.rows // 2, column - gather.columns // 2
-            for image in self.gather.images:
-                name = f"{image.name}_{index}"
+            for image, first in group:
+                name, start = f"{image.name}_{index}", tap * gather.channels + first
                 self._line(f"{name} = tap_{image.name}(ivec2(x, y) + ivec2({dx}, {dy}));")
-                self._multiply(index, matrix[:, first : first + image.channels], name)
-                first += image.channels
+                opens = split and column == 0 and first == group[0][1]
+                columns = matrix[:, start : start + image.channels]
+                self._multiply(sums, columns, name, "=" if opens else "+=")
+            if split and column == gather.columns - 1:
+                for vector in vectors:
+                    self._line(f"v{index}_{vector} += part{index}_{vector};")
 
-    def _multiply(self, index: int, columns: NDArray[np.float32], value: str) -> None:
-        """Write the additions of columns (D_out, k) times `value` with k components to all vectors."""
+    def _multiply(self, sums: str, columns: NDArray[np.float32], value: str, operator: str = "+=") -> None:
+        """Write the additions of columns (D_out, k) times `value` with k components to all vectors.
+
+        A product of a matrix and a vector adds up in an order of its own: an exact program has one column
+        after another.
+        """
         count = columns.shape[1]
+        if self.program.exact and count > 1:
+            for i, part in enumerate(_components(count)):
+                each = columns[:, i : i + 1], f"{value.partition('.')[0]}{part}"
+                self._multiply(sums, *each, operator if i == 0 else "+=")
+            return
         kind = "vec4" if count == 1 else f"mat{count}x4"
-        for vector in range(self.vectors(index)):
+        for vector in range(-(-columns.shape[0] // 4)):
             numbers = [n for column in columns.T for n in _filled(column, vector)]
             constant = f"{kind}({', '.join(map(self._literal, numbers))})"
-            self._line(f"v{index}_{vector} += {constant} * {value};")
+            self._line(f"{sums}_{vector} {operator} {constant} * {value};")
 
     def _outputs(self) -> None:
         """Write the only output."""
@@ -196,7 +217,8 @@ class InlinedBody(Body):
         channels = self.program.nodes[index].type.shape[0]
         for vector, result in enumerate(self.dialect.results(channels)):
             components = COMPONENTS[min(4, channels - 4 * vector) - 1]
-            self._line(f"{result}.{components} = v{index}_{vector}.{components};")
+            for part in components if self.program.exact else (components,):
+                self._line(f"{result}.{part} = {self._written(f'v{index}_{vector}.{part}')};")
 
     def _element(self, index: int, lane: str) -> str:
         """Return the name of a value inside a function."""
@@ -207,6 +229,11 @@ class InlinedBody(Body):
         if self.program.nodes[index].op == "parameter":
             return f"v{index}"
         return super()._read(index, lane, group)
+
+
+def _components(count: int) -> list[str]:
+    """Return the selectors of each component of a float or vector of so many."""
+    return [""] if count == 1 else [f".{letter}" for letter in "xyzw"[:count]]
 
 
 def _vector(components: int) -> str:

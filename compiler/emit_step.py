@@ -6,7 +6,8 @@
    stay in registers [`_affine`]. Windows are read where they lie, in the images.
 3. A sum over examples of left right^T is done for some inputs at once [`_product`]: its part for these stays
    in registers while the examples go by. Sums go on from tile to tile; each work item has its own.
-4. Neighbouring elementwise nodes share a loop [`_elementwise`].
+4. Neighbouring elementwise nodes share a loop [`_elementwise`]. One operation on a value that is kept is
+   computed again in each loop that reads it: an array would cost more.
 5. The second kernel adds up the work items' sums in their order, and applies Adam to whole vectors
    [`update_text`]. The order of every sum is fixed: a device gives the same bits in every run.
 
@@ -74,7 +75,7 @@ class _Step(Lines):
         offset = 0
         self.arrays: dict[int, int] = {}
         for index in sorted(self.group_of):
-            if self._is_array(index):
+            if self._is_array(index) and not self._again(index):
                 self.arrays[index] = offset
                 offset += TILE * self._vectors(index)
         self.scratch_vectors = offset
@@ -106,6 +107,13 @@ class _Step(Lines):
         outside = any(self.group_of[reader] != self.group_of[index] for reader in self.readers[index])
         return outside or index in self.summed
 
+    def _again(self, index: int) -> bool:
+        """Return whether other loops compute a value again: one operation on one value that is kept."""
+        node = self.program.nodes[index]
+        read = {arg for arg in node.args if self.program.nodes[arg].op not in ("constant", "parameter")}
+        cheap = OPS[node.op].elementwise and len(read) == 1 and read <= self.arrays.keys()
+        return cheap and index not in self.summed
+
     def _vectors(self, index: int) -> int:
         """Return the vectors of a value."""
         return vectors_for(self.program.nodes[index].type.shape[0])
@@ -126,6 +134,8 @@ class _Step(Lines):
             return f"{array}[{slot.offset} + j]"
         if self.group_of[index] == group:
             return f"t{index}"
+        if self._again(index):
+            return f"({self._expression(index, group)})"
         if index not in self.arrays:
             raise CompileError(f"%{index}: the window is read by affine maps alone in a training kernel")
         return f"v{index}[e * {self._vectors(index)} + j]"
@@ -200,14 +210,17 @@ class _Step(Lines):
         self._open("for (int e = 0; e < filled; ++e) {")
         self._open(f"for (int j = 0; j < {vectors}; ++j) {{")
         for index in group:
-            node = self.program.nodes[index]
-            operands = [self._read(arg, number) for arg in node.args]
-            kind = self.program.nodes[node.args[-1]].type.dtype
-            text = self.dialect.expression(node, kind, operands)
-            self._line(f"{self.dialect.variable(node.type.dtype)} t{index} = {text};")
+            kind = self.dialect.variable(self.program.nodes[index].type.dtype)
+            self._line(f"{kind} t{index} = {self._expression(index, number)};")
             if index in self.arrays:
                 self._line(f"v{index}[e * {vectors} + j] = t{index};")
         self._close(2)
+
+    def _expression(self, index: int, group: int) -> str:
+        """Return the text of an elementwise operation inside `group`."""
+        node = self.program.nodes[index]
+        operands = [self._read(arg, group) for arg in node.args]
+        return self.dialect.expression(node, self.program.nodes[node.args[-1]].type.dtype, operands)
 
     # ---- sums --------------------------------------------------------------------------------------------
 

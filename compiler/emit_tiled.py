@@ -25,10 +25,11 @@ from numpy.typing import NDArray
 
 from . import weights
 from .dialect import Dialect
-from .emit import BORDERS, Body, emit, kernel_gather, output_channels
-from .ir import Gather, Node, Program
+from .emit import BORDERS, Body, emit, kernel_gather, output_channels, schedule
+from .ir import Node, Program
 from .ops import OPS
 from .schedules import Schedule
+from .sums import is_split
 from .weights import Slot
 
 LARGEST_PRIVATE = 2**19
@@ -55,15 +56,28 @@ def refused_by_vectors(program: Program, dialect: Dialect) -> str:
             continue
         if not OPS[node.op].elementwise or node.op not in dialect.operations:
             return f"%{index} is {node.op}, which has no form on vectors"
-        if node.type.dtype != "float32" or not node.type.shape:
-            return f"%{index} is {node.type}: vectors hold float32[n]"
+        if node.type.dtype not in dialect.types or not node.type.shape:
+            return f"%{index} is {node.type}: vectors hold float32[n] and bool[n]"
+    if reason := _truth_between_loops(program):
+        return reason
     output = program.nodes[program.outputs[0][1]]
     if (channels := output_channels(program)) > dialect.max_output_channels:
         return f"it writes {channels} channels, of at most {dialect.max_output_channels}"
-    if any(node.op != "affine" for node in _readers_of_window(program)):
+    if any(node.op != "affine" for node in readers_of_window(program)):
         return "something besides an affine map reads the window"
     if output.op in ("constant", "parameter", "input"):
         return "the output is not computed"
+    return ""
+
+
+def _truth_between_loops(program: Program) -> str:
+    """Return which truth value another loop would have to read from an array, or nothing."""
+    group_of = {index: number for number, group in enumerate(schedule(program)) for index in group}
+    for reader, node in enumerate(program.nodes):
+        for index in node.args:
+            known = program.nodes[index]
+            if known.type.dtype == "bool" and group_of.get(index) != group_of[reader]:
+                return f"%{index} is {known.type}, which %{reader} in another loop reads"
     return ""
 
 
@@ -90,7 +104,7 @@ class Tiled(Schedule):
         """Return why this schedule cannot hold the program, or nothing."""
         if reason := refused_by_vectors(program, self.dialect):
             return reason
-        used = _readers_of_window(program)
+        used = readers_of_window(program)
         if _matrices(used) & _matrices(node for node in program.nodes if node not in used):
             return "a matrix is applied to the window and to a layer, which need it in two orders"
         if (found := self.private_bytes(program)) > LARGEST_PRIVATE:
@@ -114,35 +128,41 @@ class Tiled(Schedule):
         slots: dict[str, Slot] = {}
         offset = 0
         for name, array in weights.weights(program).items():
-            blocks = self.blocks(array.shape[0])
-            shape: tuple[int, ...] = (blocks.total * self.lanes,)
-            if array.ndim == 2:
-                shape = (blocks.count, array.shape[1], blocks.vectors * self.lanes)
+            shape = self._shape(program, name, array.shape)
             slots[name] = Slot(name, shape, offset)
             offset += int(np.prod(shape))
         return slots
 
     def pack(self, program: Program) -> NDArray[np.float32]:
         """Return the weights (count,) as `layout` places them."""
-        gather, windowed = kernel_gather(program), _matrices(_readers_of_window(program))
-        pieces = [np.zeros(0, np.float32)]
-        for name, slot in self.layout(program).items():
-            rows = np.atleast_2d(program.parameters[name].T)  # (D_in, D_out), or (1, D_out)
-            if name in windowed:
-                rows = rows[_image_by_image(gather)]
-            blocks = self.blocks(rows.shape[1])
-            filled = np.zeros((len(rows), blocks.total * self.lanes), np.float32)
-            filled[:, : rows.shape[1]] = rows
-            by_block = filled.reshape(len(rows), blocks.count, -1).transpose(1, 0, 2)
-            pieces.append(by_block.reshape(slot.shape).ravel())
-        return np.concatenate(pieces)
+        slots = self.layout(program).items()
+        pieces = [self._stored(program, name, slot.shape).ravel() for name, slot in slots]
+        return np.concatenate([np.zeros(0, np.float32), *pieces])
+
+    def _shape(self, program: Program, name: str, shape: tuple[int, ...]) -> tuple[int, ...]:
+        """Return the shape of a stored parameter of a given shape."""
+        blocks = self.blocks(shape[0])
+        if len(shape) == 2:
+            return (blocks.count, shape[1], blocks.vectors * self.lanes)
+        return (blocks.total * self.lanes,)
+
+    def _stored(self, program: Program, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
+        """Return a parameter in its stored shape."""
+        rows = np.atleast_2d(program.parameters[name].T)  # (D_in, D_out), or (1, D_out)
+        if name in _matrices(readers_of_window(program)):
+            rows = rows[kernel_gather(program).by_image]
+        blocks = self.blocks(rows.shape[1])
+        filled = np.zeros((len(rows), blocks.total * self.lanes), np.float32)
+        filled[:, : rows.shape[1]] = rows
+        by_block = filled.reshape(len(rows), blocks.count, -1).transpose(1, 0, 2)
+        return by_block.reshape(shape)
 
     def _body(self, program: Program) -> TiledBody:
         """Return the writer of the kernel's statements."""
         return TiledBody(program, self.dialect, kernel_gather(program), tile=self)
 
 
-def _readers_of_window(program: Program) -> list[Node]:
+def readers_of_window(program: Program) -> list[Node]:
     """Return the nodes that read the window."""
     inputs = {index for index, node in enumerate(program.nodes) if node.op == "input"}
     return [node for node in program.nodes if inputs & set(node.args)]
@@ -151,13 +171,6 @@ def _readers_of_window(program: Program) -> list[Node]:
 def _matrices(nodes: Iterable[Node]) -> set[str]:
     """Return the names of the matrices that affine maps among these nodes apply."""
     return {str(node["weight"]) for node in nodes if node.op == "affine"}
-
-
-def _image_by_image(gather: Gather) -> NDArray[np.intp]:
-    """Return the window's indices (n_inputs,): image by image, in each tap by tap, channel by channel."""
-    taps = np.arange(gather.n_inputs).reshape(-1, gather.channels)
-    ends = np.cumsum([image.channels for image in gather.images])[:-1]
-    return np.concatenate([part.ravel() for part in np.split(taps, ends, axis=1)])
 
 
 @dataclass
@@ -203,7 +216,7 @@ class TiledBody(Body):
         self._open("if (within) {")
         source = f"image_{name}[(row * width + left) * {channels} + i]"
         loop = f"for (int i = 0; i < PATCH_WIDTH * {channels}; ++i) {{"
-        self._nest([loop], [f"to_{name}[i] = {source};"])
+        self._nest([loop], self._put(f"to_{name}[i]", source))
         self._close()
         self._open("else {")
         self._open("for (int dx = 0; dx < PATCH_WIDTH; ++dx) {")
@@ -211,9 +224,15 @@ class TiledBody(Body):
         if before:
             self._line(before.format(sides=self.sides))
         loop = f"for (int c = 0; c < {channels}; ++c) {{"
-        self._nest([loop], [f"to_{name}[dx * {channels} + c] = {value.format(pixel=pixel)};"])
+        self._nest([loop], self._put(f"to_{name}[dx * {channels} + c]", value.format(pixel=pixel)))
         self._close()
         self._close()
+
+    def _put(self, place: str, value: str) -> list[str]:
+        """Return the lines that copy one number of an image."""
+        if not self.program.exact:
+            return [f"{place} = {value};"]
+        return [f"float value = {value};", f"{place} = {self.dialect.kept('value')};"]
 
     def _affine(self, index: int, node: Node) -> None:
         """Write v = W x + b for all pixels, block by block."""
@@ -231,28 +250,36 @@ class TiledBody(Body):
         starts = [self._bias(str(bias), f"{at}{j}") if bias else "(vector)(0.0f)" for j in each]
         self._pixels([f"sum[p][{j}] = {start};" for j, start in zip(each, starts, strict=True)])
         if source.op == "input":
-            for image in self.gather.images:
-                self._open(f"for (int dy = 0; dy < {self.sides.rows}; ++dy) {{")
-                patch = f"patch_{image.name} + dy * PATCH_WIDTH * {image.channels}"
-                self._line(f"const float *row = {patch};")
-                self._multiply(
-                    blocks, f"{self.sides.columns} * {image.channels}", f"row[p * {image.channels} + i]"
-                )
-                self._close()
+            self._windowed(blocks)
         else:
             held = self.tile.blocks(source.type.shape[0]).total
             self._multiply(blocks, str(n_in), f"v{node.args[0]}.number[p * {held} * LANES + i]")
         self._pixels([f"v{index}.all[p * {blocks.total} + {at}{j}] = sum[p][{j}];" for j in each])
         self._close()
 
-    def _multiply(self, blocks: Blocks, inputs: str, value: str) -> None:
+    def _windowed(self, blocks: Blocks) -> None:
+        """Write the sums over the window: a partial sum for each image and row, which stays in registers."""
+        each, split = range(blocks.vectors), is_split(self.gather)
+        for image in self.gather.images:
+            self._open(f"for (int dy = 0; dy < {self.sides.rows}; ++dy) {{")
+            self._line(f"const float *row = patch_{image.name} + dy * PATCH_WIDTH * {image.channels};")
+            if split:
+                self._line(f"vector part[PIXELS][{blocks.vectors}];")
+                self._pixels([f"part[p][{j}] = (vector)(0.0f);" for j in each])
+            inputs = f"{self.sides.columns} * {image.channels}"
+            self._multiply(blocks, inputs, f"row[p * {image.channels} + i]", "part" if split else "sum")
+            if split:
+                self._pixels([f"sum[p][{j}] += part[p][{j}];" for j in each])
+            self._close()
+
+    def _multiply(self, blocks: Blocks, inputs: str, value: str, sums: str = "sum") -> None:
         """Write the loop over inputs: each one's row of a block of weights, times its value at each pixel."""
         each = range(blocks.vectors)
         self._open(f"for (int i = 0; i < {inputs}; ++i) {{")
         for j in each:
             self._line(f"vector w{j} = w[{j}];")
         self._line(f"w += {blocks.vectors};")
-        self._pixels([f"float value = {value};", *(f"sum[p][{j}] += w{j} * value;" for j in each)])
+        self._pixels([f"float value = {value};", *(f"{sums}[p][{j}] += w{j} * value;" for j in each)])
         self._close()
 
     def _pixels(self, lines: list[str]) -> None:
@@ -267,12 +294,20 @@ class TiledBody(Body):
         held = self.tile.blocks(channels).total
         self._comment(f"output {name}")
         value = f"v{index}.number[p * {held} * LANES + i]"
-        line = self.dialect.store.format(channels=channels, i="i", value=value)
+        line = self.dialect.store.format(channels=channels, i="i", value=self._written(value))
         loops = [
             "for (int p = 0; p < PIXELS && x + p < width; ++p) {",
             f"for (int i = 0; i < {channels}; ++i) {{",
         ]
         self._nest(loops, [line])
+
+    def _fuses(self, index: int) -> bool:
+        """Return whether this is a product that one sum reads: compilers fuse what one expression holds."""
+        if self.program.nodes[index].op != "multiply" or len(self.readers[index]) != 1:
+            return False
+        (reader,) = self.readers[index]
+        inside = self.group_of.get(reader) == self.group_of[index] and not self._is_array(index)
+        return inside and self.program.nodes[reader].op in ("add", "subtract")
 
     # ---- values ------------------------------------------------------------------------------------------
 

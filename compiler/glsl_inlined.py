@@ -19,7 +19,7 @@ void main()
     int x = int(gl_FragCoord.x);
     int y = int(gl_FragCoord.y);
 {{starts}}"""
-    types = {"float32": "vec4"}
+    types = {"float32": "vec4", "bool": "bvec4"}
     arguments = "\n".join(
         line
         for line in GLSL.arguments.split("\n")
@@ -33,6 +33,16 @@ void main()
         **{name: GLSL.operations[name] for name in ("sqrt", "sin", "cos", "floor")},
         "minimum": "min(vec4({0}), vec4({1}))",
         "maximum": "max(vec4({0}), vec4({1}))",
+        **{
+            name: f"{text}(vec4({{0}}), vec4({{1}}))"
+            for name, text in (
+                ("less", "lessThan"),
+                ("less_equal", "lessThanEqual"),
+                ("greater", "greaterThan"),
+                ("greater_equal", "greaterThanEqual"),
+            )
+        },
+        "select": "mix(vec4({2}), vec4({1}), {0})",
     }
 
 

@@ -13,6 +13,7 @@ from .opencl import OpenCL
 BEGIN = """\
 {defines}
 typedef float@lanes@ vector;
+typedef int@lanes@ mask;
 #define MINIMUM(a, b) ((vector)(b) < (vector)(a) ? (vector)(b) : (vector)(a))
 #define MAXIMUM(a, b) ((vector)(b) > (vector)(a) ? (vector)(b) : (vector)(a))
 #ifdef __has_builtin
@@ -51,18 +52,22 @@ class OpenCLTiled(OpenCL):
 
     def __init__(self, lanes: int) -> None:
         self.begin = BEGIN.replace("@lanes@", str(lanes))
-        self.types = {"float32": "vector"}
+        self.types = {"float32": "vector", "bool": "mask"}
         self.operations = {
             **{name: OpenCL.operations[name] for name in KEPT},
             "absolute": f"as_float{lanes}(as_int{lanes}({{0}}) & 0x7fffffff)",
             "minimum": "MINIMUM({0}, {1})",
             "maximum": "MAXIMUM({0}, {1})",
             "floor": "FLOOR({0})",
+            "select": "{0} ? (vector)({1}) : (vector)({2})",
         }
 
 
-KEPT = ("add", "subtract", "multiply", "divide", "negative", "reciprocal", "sqrt", "sin", "cos")
-"""Operations that are written for a vector as they are for a number."""
+KEPT = (
+    *("add", "subtract", "multiply", "divide", "negative", "reciprocal", "sqrt", "sin", "cos"),
+    *("less", "less_equal", "greater", "greater_equal"),
+)
+"""Operations that are written for a vector as for a number; truth is an integer with all bits set."""
 
 
 def _tiled(name: str, lanes: int, pixels: int, idea: str) -> Tiled:

@@ -3,7 +3,10 @@
 1. Rounding: the relative error of each class of operations that targets may make [`RELATIVE_ERROR`].
 2. Sine: an absolute error on a domain, or no promise [`SineContract`]. Profile `ieee` emits its own sine;
    `native` calls the target's, whose promise stands in the target's dialect [`sine_contract`].
-3. The passes that turn the common program into the one that is emitted [`Profile`].
+3. The passes that bounds see after the common ones, and those that turn the program into the one that is
+   emitted [`Profile`].
+4. Profile `ieee` has its sine in other degrees too, under names of their own: a trade of speed for error
+   [`with_degree`]. In `exact` no number is denormal, which is proven for one degree.
 
 Sources: OpenCL C 1.2 specification, section 7.4 (divide 2.5 ulp, sqrt 3 ulp, sin 4 ulp, exp2 and log2 3 ulp,
 full profile); GLSL 4.60 specification, section 4.7.1 (+ - * correctly rounded, a / b 2.5 ulp for 2**-126 <=
@@ -16,10 +19,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..refimpl.errors import CompileError
 from . import sine
+from .ir import LEAST
 from .ops import Rounding
 
 UNIT_ROUNDOFF = 2.0**-24
@@ -60,23 +64,49 @@ class SineContract:
 
 @dataclass(frozen=True)
 class Profile:
-    """A promise: `sine` None means the target's own, `passes` run after the common ones."""
+    """A promise: `sine` None means the target's own, `passes` run after bounds are computed.
+
+    `common` run before that, after the passes that all profiles share.
+    """
 
     name: str
     text: str
     sine: SineContract | None
     passes: tuple[str, ...]
+    common: tuple[str, ...] = ()
 
 
-EMITTED_SINE = SineContract(
-    f"emitted, odd polynomial of degree {sine.DEGREE}", sine.POLYNOMIALS[sine.DEGREE].error, sine.DOMAIN
+def emitted_sine(degree: int = sine.DEGREE) -> SineContract:
+    """Return what a sine of compiler/sine.py promises."""
+    text = f"emitted, odd polynomial of degree {degree}"
+    return SineContract(text, sine.POLYNOMIALS[degree].error, sine.DOMAIN)
+
+
+def emitted_cosine(degree: int = sine.DEGREE) -> SineContract:
+    """Return what a cosine of compiler/sine.py promises; denoisers have none, a sine's derivative does."""
+    return replace(
+        emitted_sine(degree), error=sine.POLYNOMIALS[degree].cosine_error, domain=sine.COSINE_DOMAIN
+    )
+
+
+EMITTED_SINE = emitted_sine()
+"""The sine of the degree in use."""
+
+EMITTED_COSINE = emitted_cosine()
+"""The cosine of the degree in use."""
+
+EXPAND_SINE = "expand_sine"
+"""The pass that emits the sine of the degree in use; that of another degree has its number behind it."""
+
+DEGREE_WORD = "-sine"
+"""What stands between a profile's name and the degree of its sine, where that is not the one in use."""
+
+EXACT_SINE = SineContract(
+    f"{EMITTED_SINE.text}, 0 where the reduced argument is below {LEAST:g}",
+    sine.POLYNOMIALS[sine.DEGREE].error + LEAST,
+    sine.DOMAIN,
 )
-"""The sine of compiler/sine.py."""
-
-EMITTED_COSINE = SineContract(
-    f"emitted, odd polynomial of degree {sine.DEGREE}", sine.COSINE_ERROR, sine.COSINE_DOMAIN
-)
-"""The cosine of compiler/sine.py; denoisers have none, the derivative of a sine does."""
+"""The sine of compiler/sine.py in which no number is denormal."""
 
 PROFILES: Mapping[str, Profile] = {
     profile.name: profile
@@ -85,7 +115,14 @@ PROFILES: Mapping[str, Profile] = {
             "ieee",
             "any order of summation, fused multiply-add allowed, emitted sine",
             EMITTED_SINE,
-            ("expand_sine", "fold", "eliminate_dead"),
+            (EXPAND_SINE, "fold", "eliminate_dead"),
+        ),
+        Profile(
+            "exact",
+            "the same bits on every target: one order of summation, every operation rounded, emitted sine",
+            EXACT_SINE,
+            (EXPAND_SINE, "fold", "eliminate_dead"),
+            ("pin",),
         ),
         Profile(
             "native", "any order of summation, fused multiply-add allowed, the target's own sine", None, ()
@@ -95,8 +132,47 @@ PROFILES: Mapping[str, Profile] = {
 """All profiles, by name."""
 
 
+def unpinned(name: str, what: str) -> Profile:
+    """Return the profile of programs that no pass pins, or refuse `exact`."""
+    found = profile_named(name)
+    if found.common:
+        raise CompileError(
+            f"{what} divide and take roots, which targets round differently: profile {name} holds denoisers; "
+            "use profile ieee"
+        )
+    return found
+
+
 def profile_named(name: str) -> Profile:
-    """Return the profile, or say which ones there are."""
-    if name not in PROFILES:
-        raise CompileError(f"profile {name!r} does not exist; there are: {', '.join(PROFILES)}")
-    return PROFILES[name]
+    """Return the profile, or say which ones there are; `ieee-sine7` is `ieee` with a sine of degree 7."""
+    if name in PROFILES:
+        return PROFILES[name]
+    base, _, degree = name.partition(DEGREE_WORD)
+    if base in PROFILES and _has_degrees(PROFILES[base]) and degree in map(str, sine.POLYNOMIALS):
+        return with_degree(PROFILES[base], int(degree))
+    others = [
+        f"{profile.name}{DEGREE_WORD}{degree}"
+        for profile in PROFILES.values()
+        for degree in sine.POLYNOMIALS
+        if _has_degrees(profile) and degree != sine.DEGREE
+    ]
+    known = ", ".join([*PROFILES, *others])
+    raise CompileError(f"profile {name!r} does not exist; there are: {known}")
+
+
+def _has_degrees(profile: Profile) -> bool:
+    """Return whether a profile has its sine in other degrees."""
+    return profile.sine is not None and not profile.common
+
+
+def with_degree(profile: Profile, degree: int) -> Profile:
+    """Return the profile with an emitted sine of this degree: what it costs and how far it is off differ."""
+    if degree == sine.DEGREE:
+        return profile
+    expand = f"{EXPAND_SINE}_{degree}"
+    return replace(
+        profile,
+        name=f"{profile.name}{DEGREE_WORD}{degree}",
+        sine=emitted_sine(degree),
+        passes=tuple(expand if name == EXPAND_SINE else name for name in profile.passes),
+    )

@@ -1,10 +1,11 @@
 """Schedules: ways to order the work of one program in a kernel, as data beside the program.
 
-A schedule never changes what is computed, only in which order and from where: sums are reordered and fused,
-which the bound of every profile allows (spec/profiles.md, PRO-1), so one bound holds for all schedules of a
-target. A target lists its schedules as rungs of a ladder, the plain one first [`compile.TARGETS`]; each rung
-adds one idea to the one before. A schedule that cannot hold a program says why, and the plain one takes its
-place [`pick`]: it holds every program.
+In exact arithmetic a schedule never changes what is computed, only in which order and from where. Most
+reorder and fuse sums, which the bound of every profile allows (spec/profiles.md, PRO-1), so that one bound
+holds for them; one that computes sums in another way states its own [`Schedule.enclosures`]. A target lists
+its schedules as rungs of a ladder, the plain one first [`compile.TARGETS`]; each rung adds one idea to one
+before. A schedule that cannot hold a program says why, and the one that it names instead takes its place, at
+last the plain one, which holds every program [`pick`].
 
 The layout of the weights belongs to the schedule: kernels walk through them in order.
 """
@@ -19,33 +20,66 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..refimpl import dataset
 from ..refimpl.errors import CompileError
-from . import ir, weights
+from . import bounds, ir, weights
+from .bounds import Enclosure
 from .dialect import Dialect
-from .emit import emit, private_bytes
-from .ir import Program
+from .emit import emit, kernel_gather, private_bytes
+from .ir import Gather, Program
+from .profiles import SineContract
 from .weights import Slot
+
+Images = Mapping[str, NDArray[np.float32]]
+
+ALL = slice(None)
+"""All rows of a picture."""
 
 PLAIN = "plain"
 """Name of the schedule that every target has: the kernel that is made to be read."""
+
+
+def windows(gather: Gather, images: Images, rows: slice = ALL) -> NDArray[np.float64]:
+    """Return the windows (rows, W, n) of given images (H, W, C)."""
+    joined = np.concatenate([images[image.name] for image in gather.images], axis=-1, dtype=np.float64)
+    first, end, _ = rows.indices(len(joined))
+    padded = dataset.pad(joined, gather.window, gather.axes)[first : end + gather.rows - 1]
+    found: NDArray[np.float64] = dataset.all_windows(padded, gather.window, gather.axes)
+    return found
 
 
 class Schedule(ABC):
     """One way to order a kernel's work; `idea` is the sentence that sets this rung apart from the last.
 
     `arguments` says how to call the kernel, `pixels` how many neighbours of a row a work item computes,
-    `order` how a matrix lies among the weights.
+    `order` how a matrix lies among the weights; `instead` names the schedule of programs that it refuses.
     """
 
     name: str
     idea: str
     arguments: str
     pixels: int = 1
+    instead: str = PLAIN
     order: str = "matrices input-major: D_in x D_out, in C order"
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
         return ""
+
+    def extent(self, program: Program) -> tuple[int, int]:
+        """Return the columns and rows of pixels that a work item computes."""
+        return self.pixels, 1
+
+    def enclosures(
+        self, program: Program, sine: SineContract, images: Images | None = None, rows: slice = ALL
+    ) -> list[Enclosure]:
+        """Return the enclosure of every node of an analysed program in this schedule's arithmetic.
+
+        For all images in their ranges, or for given ones (H, W, C), then for each pixel of some `rows`.
+        """
+        gather = kernel_gather(program)
+        box = bounds.window_box(gather) if images is None else (windows(gather, images, rows),) * 2
+        return bounds.enclose(program, {"window": box}, sine)
 
     @abstractmethod
     def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
@@ -105,11 +139,14 @@ class Pick:
 
     schedule: Schedule
     asked: str
+    extent: tuple[int, int]
     reason: str = ""
 
     def manifest(self) -> Mapping[str, Any]:
         """Return what a manifest says about it."""
-        found = {"name": self.schedule.name, "idea": self.schedule.idea, "pixels": self.schedule.pixels}
+        columns, rows = self.extent
+        found = {"name": self.schedule.name, "idea": self.schedule.idea, "pixels": columns}
+        found = {**found, "rows": rows} if rows > 1 else found
         return {**found, "asked": self.asked, "reason": self.reason} if self.reason else found
 
 
@@ -120,9 +157,12 @@ def text(picked: Mapping[str, Any]) -> str:
 
 
 def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:
-    """Return the schedule of this name, or the first where that cannot hold the program, with the reason."""
+    """Return the schedule of this name, or the one in its place that holds the program, with the reason."""
     known = {schedule.name: schedule for schedule in schedules}
     if name not in known:
         raise CompileError(f"schedule {name!r} does not exist for this target; there are: {', '.join(known)}")
-    reason = known[name].refusal(program)
-    return Pick(schedules[0], name, reason) if reason else Pick(known[name], name)
+    chosen, first = known[name], ""
+    while chosen is not schedules[0] and (reason := chosen.refusal(program)):
+        first = first or reason
+        chosen = known[chosen.instead]
+    return Pick(chosen, name, chosen.extent(program), first)

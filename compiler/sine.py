@@ -1,4 +1,4 @@
-"""The emitted sine: additions, multiplications and floor, with a proven absolute error on a domain.
+"""The emitted sines: additions, multiplications, floor and a selection, with proven absolute errors.
 
 For |x| <= DOMAIN, u = 2**-24:
 
@@ -12,40 +12,48 @@ For |x| <= DOMAIN, u = 2**-24:
    most u (2 |r| + 4096 |P3|) + 4096 * 1.3e-13, which sin passes on times |cos r|; |r cos r| <= 0.5611 on
    the range.
 3. sin(x) = (-1)**k sin(r); the sign is 1 - 2 (k - 2 floor(k / 2)), exact.
-4. sin(r) ~ r + r (z q(z)), z = r r: odd, with float32 coefficients; approximation error
+4. sin(r) ~ r + r (z q(z)), z = r r: odd, of degree 3 to 13, with float32 coefficients; approximation error
    `approximation_error` (proven by experiments/sine_coefficients.py). Its rounding is bounded by the
-   compiler's own rules (bounds.py), which hold with and without fused multiply-add: the term r z q is below
-   0.573 and carries 4 to 5 roundings, the last addition one.
+   compiler's own rules (bounds.py), which hold with and without fused multiply-add. Below degree 7 the first
+   coefficient is not 1, which makes the absolute error smaller and gives up the relative one near 0.
 5. The result is clamped to [-1, 1], which cannot move it away from sin(x).
+6. Beyond the domain both functions are +0, of infinities and NaN they are NaN: step 2 would mean nothing
+   there, and differ where products are fused. The sine of a zero of either sign is +0: with k = 0 the
+   differences of step 2 turn -0 into +0.
 
-The sum is below `error`; tests/compiler/test_sine.py adds it up over small intervals of r and compares.
-Results below 2**-126 may be flushed to zero, which adds at most that.
+The sum is below `error`; the script adds it up over small intervals of r, and tests/compiler/test_sine.py
+compares. Results below 2**-126 may be flushed to zero, which adds at most that.
+
+The sine of profile `exact` [`exact_sine`] replaces r by 0 where |r| < 2**-40, which moves the result by less
+than that, so that no number in it is denormal (below 2**-126): |z| >= 2**-80, |z q| >= 2**-83, since every
+step of Horner's rule stays between its coefficient and half of that, |r (z q)| >= 2**-123, and the result is
+at least 2**-41, or 0. The reduction is of multiples of 2**-126 if x is one, and x / pi is not smaller if
+|x| >= 2**-124.
 
 The cosine, for |x| <= COSINE_DOMAIN: k = floor(x / pi + 1), h = k - 1/2, x = h pi + r and cos(x) = (-1)**k
 sin(r). The steps are the same with h for k: h has 12 bits for |k| < 2**11, and |x / pi - h| < 1/2 + 6.1e-4
 since the sum is smaller. One thing differs: h is never 0, so where |x| < 1 the first difference is rounded
-too, to 2**-24 at most (|r| < 2); there |cos r| = |sin(x)| <= 0.842. Its bound is `COSINE_ERROR`.
+too, to 2**-24 at most (|r| < 2); there |cos r| = |sin(x)| <= 0.842. Its bound is `cosine_error`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from .ir import LEAST
+
 DOMAIN = 12800.0
-"""Largest |x| for which the proof holds, in radians: k needs 12 bits; beyond it the result means nothing."""
+"""Largest |x| for which the proof holds, in radians: k needs 12 bits; beyond it the sine is 0."""
 
 R_MAX = 1.5735
 """Largest |reduced argument|, in radians: pi / 2 and the error of choosing k (step 1)."""
 
 COSINE_DOMAIN = 6400.0
 """Largest |x| for which the cosine's proof holds, in radians: k - 1/2 needs 12 bits."""
-
-COSINE_ERROR = 2.5e-7
-"""Bound of |cosine(x) - cos(x)| on its domain; tests/compiler/test_sine.py adds its parts up."""
 
 INVERSE_PI = float.fromhex("0x1.45f306p-2")
 """1 / pi, rounded to float32."""
@@ -63,51 +71,99 @@ PI_REST = 1.3e-13
 
 @dataclass(frozen=True)
 class Polynomial:
-    """sin(r) on [-R_MAX, R_MAX]: `coefficients` of r, r^3, ..., all float32, the first one 1.
+    """sin(r) on [-R_MAX, R_MAX]: `coefficients` of r, r^3, ..., all float32.
 
-    `approximation_error` bounds |p - sin| in exact arithmetic, `error` the whole emitted sine (steps 1 to 5).
+    `approximation_error` bounds |p - sin| in exact arithmetic, `error` the whole emitted sine (steps 1 to 5),
+    `cosine_error` the whole emitted cosine.
     """
 
     coefficients: tuple[float, ...]
     approximation_error: float
     error: float
+    cosine_error: float
+
+
+def _polynomial(
+    coefficients: str, approximation_error: float, error: float, cosine_error: float
+) -> Polynomial:
+    """Return a polynomial whose coefficients are hexadecimal numbers."""
+    numbers = tuple(map(float.fromhex, coefficients.split()))
+    return Polynomial(numbers, approximation_error, error, cosine_error)
 
 
 POLYNOMIALS: Mapping[int, Polynomial] = {
-    11: Polynomial(
-        tuple(
-            float.fromhex(text)
-            for text in (
-                "0x1p+0",
-                "-0x1.555556p-3",
-                "0x1.111132p-7",
-                "-0x1.a0221p-13",
-                "0x1.72915ap-19",
-                "-0x1.b0e152p-26",
-            )
-        ),
-        approximation_error=1.16e-9,
-        error=2.5e-7,
+    3: _polynomial(
+        "0x1.f88ad8p-1 -0x1.23d14cp-3",
+        approximation_error=0.00453,
+        error=0.00453,
+        cosine_error=0.00453,
+    ),
+    5: _polynomial(
+        "0x1.ffd7dap-1 -0x1.5348eap-3 0x1.ec490ap-8",
+        approximation_error=6.86e-05,
+        error=6.88e-05,
+        cosine_error=6.88e-05,
+    ),
+    7: _polynomial(
+        "0x1p+0 -0x1.55501ep-3 0x1.10601p-7 -0x1.83b822p-13",
+        approximation_error=8.95e-07,
+        error=1.1e-06,
+        cosine_error=1.1e-06,
+    ),
+    9: _polynomial(
+        "0x1p+0 -0x1.555548p-3 0x1.110e58p-7 -0x1.9f5ccep-13 0x1.5ccedcp-19",
+        approximation_error=4.92e-09,
+        error=2.08e-07,
+        cosine_error=2.08e-07,
+    ),
+    11: _polynomial(
+        "0x1p+0 -0x1.555556p-3 0x1.111132p-7 -0x1.a0221p-13 0x1.72915ap-19 -0x1.b0e154p-26",
+        approximation_error=2.75e-10,
+        error=2.03e-07,
+        cosine_error=2.03e-07,
+    ),
+    13: _polynomial(
+        "0x1p+0 -0x1.555556p-3 0x1.111142p-7 -0x1.a02d8ap-13 0x1.7566dep-19 -0x1.2337fep-25 0x1.608abap-30",
+        approximation_error=1.61e-10,
+        error=2.03e-07,
+        cosine_error=2.03e-07,
     ),
 }
-"""Polynomials by degree."""
+"""Polynomials by degree; the errors are the script's, rounded up."""
 
 DEGREE = 11
-"""The degree in use: its approximation error is far below one rounding."""
+"""The degree in use unless another is asked for: its approximation error is far below one rounding."""
 
 
 def sine(x: Any, degree: int = DEGREE) -> Any:
     """Return sin(x) for x (...) in [-DOMAIN, DOMAIN], as the kernels compute it; may be traced."""
     # Reduce to r in [-R_MAX, R_MAX], x = k pi + r.
     k = np.floor(x * INVERSE_PI + 0.5)
-    return _signed(k, reduce(x, k), degree)
+    return _within(DOMAIN, x, _signed(k, reduce(x, k), degree))
+
+
+def exact_sine(x: Any) -> Any:
+    """Return sin(x) as `sine` does, 0 where the reduced argument is below LEAST; may be traced.
+
+    For x in [-DOMAIN, DOMAIN] alone: exact programs are refused where an argument may be another.
+    """
+    k = np.floor(x * INVERSE_PI + 0.5)
+    r = reduce(x, k)
+    # 1 where |r| is large enough, else 0: operations that all targets have, on vectors too.
+    kept = np.minimum(np.floor(np.absolute(r) * (1.0 / LEAST)), 1.0)
+    return _signed(k, r * kept, DEGREE)
 
 
 def cosine(x: Any, degree: int = DEGREE) -> Any:
     """Return cos(x) for x (...) in [-COSINE_DOMAIN, COSINE_DOMAIN], as the kernels compute it."""
     # Reduce to r in [-R_MAX, R_MAX], x = (k - 1/2) pi + r.
     k = np.floor(x * INVERSE_PI + 1.0)
-    return _signed(k, reduce(x, k - 0.5), degree)
+    return _within(COSINE_DOMAIN, x, _signed(k, reduce(x, k - 0.5), degree))
+
+
+def _within(domain: float, x: Any, value: Any) -> Any:
+    """Return `value` (...) where |x| <= domain, else +0 for a number x and NaN for an infinity or NaN."""
+    return np.where(np.absolute(x) <= domain, value, x - x)
 
 
 def _signed(k: Any, r: Any, degree: int) -> Any:
@@ -124,13 +180,22 @@ def reduce(x: Any, k: Any) -> Any:
 
 
 def polynomial(r: Any, degree: int = DEGREE) -> Any:
-    """Return the polynomial near sin(r), r (...), by Horner's rule in z = r r."""
-    first, *inner, last = POLYNOMIALS[degree].coefficients[1:]
+    """Return the polynomial near sin(r), r (...)."""
+    return horner(r, POLYNOMIALS[degree].coefficients)
+
+
+def horner(r: Any, coefficients: Sequence[float]) -> Any:
+    """Return c1 r + c3 r^3 + ..., r (...), by Horner's rule in z = r r.
+
+    A first coefficient of 1 is kept out of the sum: r (1 + z q) would round 1 + z q, where r + r (z q) rounds
+    the small term and the result.
+    """
+    first, *others = coefficients
     z = r * r
-    q = last
-    for coefficient in reversed([first, *inner]):
+    q = others[-1]
+    for coefficient in reversed(others[:-1]):
         q = z * q + coefficient
-    return r + r * (z * q)
+    return r + r * (z * q) if first == 1.0 else r * (z * q + first)
 
 
 def reduction_error(r: Any) -> Any:

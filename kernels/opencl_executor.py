@@ -25,7 +25,7 @@ from ..compiler.path_kernel import PathArtifact
 from ..compiler.step_kernel import StepKernel
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import Executor, Images, Part, black, images_of, keep
+from .executor import INDEX_LIMIT, Executor, Images, Part, black, images_of, keep
 from .opencl_trainer import OpenCLTrainer
 from .passes import PICTURE, Passes
 
@@ -39,14 +39,12 @@ TILE_LOCAL_SIZE = (1, 1)
 """The same for kernels whose items compute several pixels: they are groups by themselves, and need no second
 loop around them."""
 
-CPU_SCHEDULES = {16: "tile16", 8: "tile8"}
-"""Schedule of a denoiser by the floats in a vector register of a processor; others have registers of 4."""
+CPU_SCHEDULES = {16: "fft32", 8: "tile8"}
+"""Schedule of a denoiser by the floats in a vector register of a processor; others have registers of 4. What
+the first one refuses, `tile16` takes."""
 
 STACK_BYTES = 2**20
 """Most bytes of a group's arrays on a processor: half the smallest stack that glibc gives a thread."""
-
-INDEX_LIMIT = 2**31
-"""Numbers of an image must be fewer: the kernel's indices are `int`."""
 
 PATH_LOCAL_SIZE = {1: (8, 8), 2: (1, 1)}
 """Work items (x, y) in a group of a path kernel: one path each, or (2) vectors of paths, which are groups by
@@ -61,12 +59,12 @@ BUILD_OPTIONS = ("-cl-std=CL1.2",)
 
 @dataclass(frozen=True)
 class _Built:
-    """A kernel on the device, its weights, work items (x, y) in a group, and pixels of an item."""
+    """A kernel on the device, its weights, work items (x, y) in a group, columns and rows of an item."""
 
     kernel: Any
     weights: Any
     local: tuple[int, int]
-    pixels: int
+    extent: tuple[int, int]
 
 
 class OpenCLExecutor(Executor):
@@ -119,8 +117,9 @@ class OpenCLExecutor(Executor):
         program = self._compiled(artifact.source)
         # An empty buffer is no buffer.
         weights = artifact.weights if artifact.weights.size else np.zeros(1, np.float32)
-        kernel, pixels = getattr(program, artifact.entry_point), artifact.manifest["schedule"]["pixels"]
-        built = _Built(kernel, self._copied(weights), local_size, pixels)
+        kernel, schedule = getattr(program, artifact.entry_point), artifact.manifest["schedule"]
+        extent = (schedule["pixels"], schedule.get("rows", 1))
+        built = _Built(kernel, self._copied(weights), local_size, extent)
         keep(self._built, artifact.digest, built)
 
     def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
@@ -210,7 +209,8 @@ class OpenCLExecutor(Executor):
         size: tuple[int, int],
     ) -> None:
         """Start a built kernel on images of `size` (height, width) that are on the device."""
-        items = (-(-size[1] // built.pixels), size[0])
+        columns, rows = built.extent
+        items = (-(-size[1] // columns), -(-size[0] // rows))
         numbers = (np.int32(size[1]), np.int32(size[0]))
         places = _whole(items, built.local)
         built.kernel(self._queue, places, built.local, *inputs, built.weights, output, *numbers)

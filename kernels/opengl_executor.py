@@ -101,7 +101,10 @@ class OpenGLExecutor(Executor):
 
     def __init__(self, context: str | None = None) -> None:
         kind, self._context = _open(context or os.environ.get(CONTEXT_VARIABLE) or "auto")
-        self.device = f"{self._context.info['GL_RENDERER']} through {kind}"
+        # Enter it and leave it: EGL would take it for the current one also after OSMesa has made its own
+        # current, and do nothing when it is asked to change.
+        with self._context:
+            self.device = f"{self._context.info['GL_RENDERER']} through {kind}"
         if SOFTWARE in self.device:
             self.schedule, self.schedule_pixels = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
         self._built: dict[str, _Built] = {}

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from ...refimpl.errors import CompileError
 from ..ir import Program
+from ..profiles import EXPAND_SINE
+from ..sine import POLYNOMIALS
 from ..verify import verify
 from .eliminate_dead import eliminate_dead
 from .expand_sine import expand_sine
 from .expand_tables import expand_tables
 from .fold import fold, fold_float32
 from .fuse_bias import fuse_bias
+from .pin import pin
 from .scalarize import scalarize
 
 PASSES: Mapping[str, Callable[[Program], Program]] = {
@@ -20,7 +24,9 @@ PASSES: Mapping[str, Callable[[Program], Program]] = {
     "scalarize": scalarize,
     "expand_tables": expand_tables,
     "fuse_bias": fuse_bias,
-    "expand_sine": expand_sine,
+    "pin": pin,
+    EXPAND_SINE: expand_sine,
+    **{f"{EXPAND_SINE}_{degree}": partial(expand_sine, degree=degree) for degree in POLYNOMIALS},
     "eliminate_dead": eliminate_dead,
 }
 """All passes, by name."""

@@ -13,7 +13,7 @@ from wamnet.compiler import bounds, ops
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.profiles import EMITTED_COSINE, EMITTED_SINE, SineContract
-from wamnet.compiler.sine import COSINE_DOMAIN, COSINE_ERROR, cosine
+from wamnet.compiler.sine import COSINE_DOMAIN, cosine
 from wamnet.compiler.trace import trace
 from wamnet.refimpl.dataset import Window
 
@@ -363,7 +363,7 @@ def test_a_cosine_with_a_contract_has_a_bound(a, width, shift, error):
     if abs(a) + width / 2 + off <= COSINE_DOMAIN - 2:
         assert abs(np.float64(cosine(kernels)) - np.cos(exact)) <= found.error
         # A slope of at most 1 passes `off` on; the contract's own error comes once, flushing is far below it.
-        assert found.error <= off + 2 * COSINE_ERROR
+        assert found.error <= off + 2 * EMITTED_COSINE.error
 
 
 def test_a_cosine_without_a_contract_has_none():

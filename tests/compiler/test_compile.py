@@ -14,12 +14,13 @@ from hypothesis import strategies as st
 
 from wamnet.compiler import artifact as artifacts
 from wamnet.compiler import ir
-from wamnet.compiler.compile import TARGETS, analysed, compile_program, round_up
+from wamnet.compiler.compile import DENOISERS, analysed, compile_program, round_up
 from wamnet.compiler.emit_tiled import refused_by_vectors
 from wamnet.compiler.glsl_inlined import GLSLInlined
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.lower import lower
+from wamnet.compiler.profiles import PROFILES
 from wamnet.compiler.trace import trace
 from wamnet.compiler.weights import layout, pack
 from wamnet.refimpl import dataset, siren
@@ -47,8 +48,8 @@ def test_golden_program(golden):
     golden("denoise.analysed.ir.txt", ir.text(analysed(lower(model()))))
 
 
-@pytest.mark.parametrize("profile", ["ieee", "native"])
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("target", DENOISERS)
 def test_golden_source(golden, target, profile):
     artifact = compile_program(lower(model()), target, profile)
     golden(f"{profile}.{artifact.source_name}", artifact.source)
@@ -145,7 +146,7 @@ def test_failure_at_the_second_name_leaves_whole_files_and_the_old_manifest(tmp_
     assert (tmp_path / "denoise.cl").read_text() == two.source
     assert (tmp_path / "weights.bin").read_bytes() == artifacts.weight_bytes(one)
     assert (tmp_path / "manifest.json").read_text() == artifacts.manifest_text(one)
-    assert len(list(tmp_path.iterdir())) == 3
+    assert len(list(tmp_path.iterdir())) == 4
 
 
 def test_two_writers_at_once_leave_whole_files(tmp_path):
@@ -156,16 +157,18 @@ def test_two_writers_at_once_leave_whole_files(tmp_path):
             assert (tmp_path / "denoise.cl").read_text() in {kernel.source for kernel in kernels}
     texts = {artifacts.manifest_text(kernel) for kernel in kernels}
     assert (tmp_path / "manifest.json").read_text() in texts
-    assert len(list(tmp_path.iterdir())) == 3
+    assert len(list(tmp_path.iterdir())) == 4
 
 
 # ---- refusals ------------------------------------------------------------------------------------------
 
 
 def test_unknown_target_and_profile():
-    with pytest.raises(CompileError, match="target 'metal' does not exist; there are: numpy, opencl, opengl"):
+    with pytest.raises(
+        CompileError, match="target 'metal' does not exist; there are: numpy, opencl, opengl, c"
+    ):
         compile_program(lower(model()), "metal")
-    with pytest.raises(CompileError, match="profile 'fast' does not exist; there are: ieee, native"):
+    with pytest.raises(CompileError, match="profile 'fast' does not exist; there are: ieee, exact, native"):
         compile_program(lower(model()), "opencl", "fast")
 
 
@@ -189,7 +192,7 @@ def test_sine_that_may_leave_its_domain_is_refused():
         (lambda x: np.maximum(x * 3e38 + 3e38, 0.0), r"add \(%3\) may hold numbers up to 6e\+38"),
     ],
 )
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", DENOISERS)
 def test_numbers_that_may_overflow_are_refused(target, function, message):
     with pytest.raises(CompileError, match=message):
         compile_program(gathered(function), target)
@@ -214,7 +217,7 @@ def test_the_target_s_own_sine_has_no_domain():
     assert max(artifact.manifest["bound"]["output"]) < 1
 
 
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", DENOISERS)
 def test_program_without_a_window_or_with_two_outputs_is_refused(target):
     with pytest.raises(CompileError, match="has 1 outputs and no gathered window: a kernel needs one output"):
         compile_program(trace(lambda x: x, {"window": Type()}), target)
@@ -230,8 +233,8 @@ def test_a_bound_needs_precise_and_no_bound_does_not():
 def test_private_bytes_are_those_of_the_declared_arrays():
     for target in ("opencl", "opengl"):
         artifact = compile_program(lower(model()), target)
-        declared = re.findall(r"float v\d+\[(\d+)\];", artifact.source)
-        assert artifact.manifest["private_bytes"] == 4 * sum(map(int, declared)) == 56
+        declared = re.findall(r"(?:float|PRECISE float) (?:v|part)\d+\[(\d+)\];", artifact.source)
+        assert artifact.manifest["private_bytes"] == 4 * sum(map(int, declared)) == 72
 
 
 def test_too_many_output_channels_for_a_fragment():

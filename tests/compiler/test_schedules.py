@@ -79,7 +79,7 @@ OPENCL_PLAIN = TARGETS["opencl"].schedules[0]
 
 
 def test_unknown_schedule_is_told_with_the_known_ones():
-    known = "plain, vector16, tile16, tile8, tile4"
+    known = "plain, vector16, tile16, tile8, tile4, fft32"
     with pytest.raises(CompileError, match=f"schedule 'tile3' does not exist for this target; .*: {known}$"):
         compile_program(small(), "opencl", schedule="tile3")
     with pytest.raises(CompileError, match=r"schedule 'tile16' does not exist .*: plain"):
@@ -94,7 +94,11 @@ SHARED = gathered(lambda x: np.sin(x @ W.T) @ W.T)
 
 REFUSED = {
     "component": (gathered(lambda x: x[..., 0] * 2.0), "%1 is component, which has no form on vectors"),
-    "select": (gathered(lambda x: np.where(x @ W.T < 0.5, x, 2.0)), "%3 is less, which has no form"),
+    "equal": (gathered(lambda x: np.where(x @ W.T == 0.5, 1.0, x @ W.T)), "%3 is equal, which has no form"),
+    "truth": (
+        gathered(lambda x: np.where((y := x @ W.T) < 0.5, np.sin(y) @ rounded(3, 3).T, y)),
+        r"%\d+ is bool\[3\], which %\d+ in another loop reads",
+    ),
     "window": (gathered(lambda x: x * 2.0), "something besides an affine map reads the window"),
     "output": (gathered(lambda x: x), "the output is not computed"),
     "shared": (SHARED, "a matrix is applied to the window and to a layer, which need it in two orders"),

@@ -9,7 +9,7 @@
 #define WINDOW_RUN 6
 #define COUNT 73
 #define SUMS 74
-#define SCRATCH 896
+#define SCRATCH 768
 #define LOSS_TERMS 12.0f
 #define PRODUCT 0
 #define PRODUCT_END 24
@@ -61,13 +61,12 @@ void wamnet_step(
         }
         __global float16 *restrict v1 = scratch + 0;
         __global float16 *restrict v2 = scratch + 64;
-        __global float16 *restrict v4 = scratch + 192;
-        __global float16 *restrict v45 = scratch + 320;
-        __global float16 *restrict v46 = scratch + 448;
-        __global float16 *restrict v48 = scratch + 512;
-        __global float16 *restrict v50 = scratch + 576;
-        __global float16 *restrict v51 = scratch + 640;
-        __global float16 *restrict v82 = scratch + 768;
+        __global float16 *restrict v50 = scratch + 192;
+        __global float16 *restrict v51 = scratch + 320;
+        __global float16 *restrict v53 = scratch + 384;
+        __global float16 *restrict v55 = scratch + 448;
+        __global float16 *restrict v56 = scratch + 512;
+        __global float16 *restrict v90 = scratch + 640;
 
         /* %1: the targets */
         for (int e = 0; e < filled; ++e) {
@@ -121,11 +120,10 @@ void wamnet_step(
             v2[(e + 7) * 2 + 0] = s7_0; v2[(e + 7) * 2 + 1] = s7_1;
         }
 
-        /* %4 to %45: elementwise on 20 numbers */
+        /* %4 to %50: elementwise on 20 numbers */
         for (int e = 0; e < filled; ++e) {
             for (int j = 0; j < 2; ++j) {
                 float16 t4 = v2[e * 2 + j] * (float16)(0.318309873f);
-                v4[e * 2 + j] = t4;
                 float16 t6 = t4 + (float16)(0.5f);
                 float16 t7 = floor_float16(t6);
                 float16 t9 = t7 * (float16)(3.14160156f);
@@ -141,7 +139,7 @@ void wamnet_step(
                 float16 t22 = (float16)(2.0f) * t21;
                 float16 t24 = (float16)(1.0f) - t22;
                 float16 t25 = t16 * t16;
-                float16 t27 = t25 * (float16)(-2.51969414e-08f);
+                float16 t27 = t25 * (float16)(-2.51969432e-08f);
                 float16 t29 = t27 + (float16)(2.76094511e-06f);
                 float16 t30 = t25 * t29;
                 float16 t32 = t30 + (float16)(-0.000198427704f);
@@ -155,27 +153,31 @@ void wamnet_step(
                 float16 t42 = t24 * t41;
                 float16 t43 = (float16)(1.0f) < t42 ? (float16)(1.0f) : t42;
                 float16 t45 = t43 < (float16)(-1.0f) ? (float16)(-1.0f) : t43;
-                v45[e * 2 + j] = t45;
+                float16 t46 = as_float16(as_int16(v2[e * 2 + j]) & 0x7fffffff);
+                int16 t48 = t46 <= (float16)(12800.0f);
+                float16 t49 = v2[e * 2 + j] - v2[e * 2 + j];
+                float16 t50 = t48 ? t45 : t49;
+                v50[e * 2 + j] = t50;
             }
         }
 
-        /* %46: affine map W1 from 20 to 3 */
+        /* %51: affine map W1 from 20 to 3 */
         for (int e = 0; e < filled; e += 8) {
-            __global const float *x0 = (__global const float *)(v45 + (e + 0) * 2);
+            __global const float *x0 = (__global const float *)(v50 + (e + 0) * 2);
             float16 s0_0 = theta[46];
-            __global const float *x1 = (__global const float *)(v45 + (e + 1) * 2);
+            __global const float *x1 = (__global const float *)(v50 + (e + 1) * 2);
             float16 s1_0 = theta[46];
-            __global const float *x2 = (__global const float *)(v45 + (e + 2) * 2);
+            __global const float *x2 = (__global const float *)(v50 + (e + 2) * 2);
             float16 s2_0 = theta[46];
-            __global const float *x3 = (__global const float *)(v45 + (e + 3) * 2);
+            __global const float *x3 = (__global const float *)(v50 + (e + 3) * 2);
             float16 s3_0 = theta[46];
-            __global const float *x4 = (__global const float *)(v45 + (e + 4) * 2);
+            __global const float *x4 = (__global const float *)(v50 + (e + 4) * 2);
             float16 s4_0 = theta[46];
-            __global const float *x5 = (__global const float *)(v45 + (e + 5) * 2);
+            __global const float *x5 = (__global const float *)(v50 + (e + 5) * 2);
             float16 s5_0 = theta[46];
-            __global const float *x6 = (__global const float *)(v45 + (e + 6) * 2);
+            __global const float *x6 = (__global const float *)(v50 + (e + 6) * 2);
             float16 s6_0 = theta[46];
-            __global const float *x7 = (__global const float *)(v45 + (e + 7) * 2);
+            __global const float *x7 = (__global const float *)(v50 + (e + 7) * 2);
             float16 s7_0 = theta[46];
             __global const float16 *w = theta + 26;
             for (int i = 0; i < 20; ++i) {
@@ -190,44 +192,44 @@ void wamnet_step(
                 s6_0 += w0 * x6[i];
                 s7_0 += w0 * x7[i];
             }
-            v46[(e + 0) * 1 + 0] = s0_0;
-            v46[(e + 1) * 1 + 0] = s1_0;
-            v46[(e + 2) * 1 + 0] = s2_0;
-            v46[(e + 3) * 1 + 0] = s3_0;
-            v46[(e + 4) * 1 + 0] = s4_0;
-            v46[(e + 5) * 1 + 0] = s5_0;
-            v46[(e + 6) * 1 + 0] = s6_0;
-            v46[(e + 7) * 1 + 0] = s7_0;
+            v51[(e + 0) * 1 + 0] = s0_0;
+            v51[(e + 1) * 1 + 0] = s1_0;
+            v51[(e + 2) * 1 + 0] = s2_0;
+            v51[(e + 3) * 1 + 0] = s3_0;
+            v51[(e + 4) * 1 + 0] = s4_0;
+            v51[(e + 5) * 1 + 0] = s5_0;
+            v51[(e + 6) * 1 + 0] = s6_0;
+            v51[(e + 7) * 1 + 0] = s7_0;
         }
 
-        /* %47 to %50: elementwise on 3 numbers */
+        /* %52 to %55: elementwise on 3 numbers */
         for (int e = 0; e < filled; ++e) {
             for (int j = 0; j < 1; ++j) {
-                float16 t47 = v46[e * 1 + j] - v1[e * 1 + j];
-                float16 t48 = t47 * t47;
-                v48[e * 1 + j] = t48;
-                float16 t50 = t47 * (float16)(0.166666672f);
-                v50[e * 1 + j] = t50;
+                float16 t52 = v51[e * 1 + j] - v1[e * 1 + j];
+                float16 t53 = t52 * t52;
+                v53[e * 1 + j] = t53;
+                float16 t55 = t52 * (float16)(0.166666672f);
+                v55[e * 1 + j] = t55;
             }
         }
 
-        /* %51: affine map W1.T from 3 to 20 */
+        /* %56: affine map W1.T from 3 to 20 */
         for (int e = 0; e < filled; e += 8) {
-            __global const float *x0 = (__global const float *)(v50 + (e + 0) * 1);
+            __global const float *x0 = (__global const float *)(v55 + (e + 0) * 1);
             float16 s0_0 = (float16)(0.0f), s0_1 = (float16)(0.0f);
-            __global const float *x1 = (__global const float *)(v50 + (e + 1) * 1);
+            __global const float *x1 = (__global const float *)(v55 + (e + 1) * 1);
             float16 s1_0 = (float16)(0.0f), s1_1 = (float16)(0.0f);
-            __global const float *x2 = (__global const float *)(v50 + (e + 2) * 1);
+            __global const float *x2 = (__global const float *)(v55 + (e + 2) * 1);
             float16 s2_0 = (float16)(0.0f), s2_1 = (float16)(0.0f);
-            __global const float *x3 = (__global const float *)(v50 + (e + 3) * 1);
+            __global const float *x3 = (__global const float *)(v55 + (e + 3) * 1);
             float16 s3_0 = (float16)(0.0f), s3_1 = (float16)(0.0f);
-            __global const float *x4 = (__global const float *)(v50 + (e + 4) * 1);
+            __global const float *x4 = (__global const float *)(v55 + (e + 4) * 1);
             float16 s4_0 = (float16)(0.0f), s4_1 = (float16)(0.0f);
-            __global const float *x5 = (__global const float *)(v50 + (e + 5) * 1);
+            __global const float *x5 = (__global const float *)(v55 + (e + 5) * 1);
             float16 s5_0 = (float16)(0.0f), s5_1 = (float16)(0.0f);
-            __global const float *x6 = (__global const float *)(v50 + (e + 6) * 1);
+            __global const float *x6 = (__global const float *)(v55 + (e + 6) * 1);
             float16 s6_0 = (float16)(0.0f), s6_1 = (float16)(0.0f);
-            __global const float *x7 = (__global const float *)(v50 + (e + 7) * 1);
+            __global const float *x7 = (__global const float *)(v55 + (e + 7) * 1);
             float16 s7_0 = (float16)(0.0f), s7_1 = (float16)(0.0f);
             __global const float16 *w = transposed + 0;
             for (int i = 0; i < 3; ++i) {
@@ -242,66 +244,68 @@ void wamnet_step(
                 s6_0 += w0 * x6[i]; s6_1 += w1 * x6[i];
                 s7_0 += w0 * x7[i]; s7_1 += w1 * x7[i];
             }
-            v51[(e + 0) * 2 + 0] = s0_0; v51[(e + 0) * 2 + 1] = s0_1;
-            v51[(e + 1) * 2 + 0] = s1_0; v51[(e + 1) * 2 + 1] = s1_1;
-            v51[(e + 2) * 2 + 0] = s2_0; v51[(e + 2) * 2 + 1] = s2_1;
-            v51[(e + 3) * 2 + 0] = s3_0; v51[(e + 3) * 2 + 1] = s3_1;
-            v51[(e + 4) * 2 + 0] = s4_0; v51[(e + 4) * 2 + 1] = s4_1;
-            v51[(e + 5) * 2 + 0] = s5_0; v51[(e + 5) * 2 + 1] = s5_1;
-            v51[(e + 6) * 2 + 0] = s6_0; v51[(e + 6) * 2 + 1] = s6_1;
-            v51[(e + 7) * 2 + 0] = s7_0; v51[(e + 7) * 2 + 1] = s7_1;
+            v56[(e + 0) * 2 + 0] = s0_0; v56[(e + 0) * 2 + 1] = s0_1;
+            v56[(e + 1) * 2 + 0] = s1_0; v56[(e + 1) * 2 + 1] = s1_1;
+            v56[(e + 2) * 2 + 0] = s2_0; v56[(e + 2) * 2 + 1] = s2_1;
+            v56[(e + 3) * 2 + 0] = s3_0; v56[(e + 3) * 2 + 1] = s3_1;
+            v56[(e + 4) * 2 + 0] = s4_0; v56[(e + 4) * 2 + 1] = s4_1;
+            v56[(e + 5) * 2 + 0] = s5_0; v56[(e + 5) * 2 + 1] = s5_1;
+            v56[(e + 6) * 2 + 0] = s6_0; v56[(e + 6) * 2 + 1] = s6_1;
+            v56[(e + 7) * 2 + 0] = s7_0; v56[(e + 7) * 2 + 1] = s7_1;
         }
 
-        /* %52 to %82: elementwise on 20 numbers */
+        /* %57 to %90: elementwise on 20 numbers */
         for (int e = 0; e < filled; ++e) {
             for (int j = 0; j < 2; ++j) {
-                float16 t52 = v4[e * 2 + j] + (float16)(1.0f);
-                float16 t53 = floor_float16(t52);
-                float16 t54 = t53 - (float16)(0.5f);
-                float16 t55 = t54 * (float16)(3.14160156f);
-                float16 t56 = v2[e * 2 + j] - t55;
-                float16 t57 = t54 * (float16)(-8.9071691e-06f);
-                float16 t58 = t56 - t57;
-                float16 t59 = t54 * (float16)(-1.74122761e-09f);
-                float16 t60 = t58 - t59;
-                float16 t61 = (float16)(0.5f) * t53;
-                float16 t62 = floor_float16(t61);
-                float16 t63 = (float16)(2.0f) * t62;
-                float16 t64 = t53 - t63;
-                float16 t65 = (float16)(2.0f) * t64;
-                float16 t66 = (float16)(1.0f) - t65;
-                float16 t67 = t60 * t60;
-                float16 t68 = t67 * (float16)(-2.51969414e-08f);
-                float16 t69 = t68 + (float16)(2.76094511e-06f);
-                float16 t70 = t67 * t69;
-                float16 t71 = t70 + (float16)(-0.000198427704f);
-                float16 t72 = t67 * t71;
-                float16 t73 = t72 + (float16)(0.00833334867f);
-                float16 t74 = t67 * t73;
-                float16 t75 = t74 + (float16)(-0.166666672f);
-                float16 t76 = t67 * t75;
-                float16 t77 = t60 * t76;
-                float16 t78 = t60 + t77;
-                float16 t79 = t66 * t78;
-                float16 t80 = (float16)(1.0f) < t79 ? (float16)(1.0f) : t79;
-                float16 t81 = t80 < (float16)(-1.0f) ? (float16)(-1.0f) : t80;
-                float16 t82 = v51[e * 2 + j] * t81;
-                v82[e * 2 + j] = t82;
+                float16 t57 = (v2[e * 2 + j] * (float16)(0.318309873f)) + (float16)(1.0f);
+                float16 t58 = floor_float16(t57);
+                float16 t59 = t58 - (float16)(0.5f);
+                float16 t60 = t59 * (float16)(3.14160156f);
+                float16 t61 = v2[e * 2 + j] - t60;
+                float16 t62 = t59 * (float16)(-8.9071691e-06f);
+                float16 t63 = t61 - t62;
+                float16 t64 = t59 * (float16)(-1.74122761e-09f);
+                float16 t65 = t63 - t64;
+                float16 t66 = (float16)(0.5f) * t58;
+                float16 t67 = floor_float16(t66);
+                float16 t68 = (float16)(2.0f) * t67;
+                float16 t69 = t58 - t68;
+                float16 t70 = (float16)(2.0f) * t69;
+                float16 t71 = (float16)(1.0f) - t70;
+                float16 t72 = t65 * t65;
+                float16 t73 = t72 * (float16)(-2.51969432e-08f);
+                float16 t74 = t73 + (float16)(2.76094511e-06f);
+                float16 t75 = t72 * t74;
+                float16 t76 = t75 + (float16)(-0.000198427704f);
+                float16 t77 = t72 * t76;
+                float16 t78 = t77 + (float16)(0.00833334867f);
+                float16 t79 = t72 * t78;
+                float16 t80 = t79 + (float16)(-0.166666672f);
+                float16 t81 = t72 * t80;
+                float16 t82 = t65 * t81;
+                float16 t83 = t65 + t82;
+                float16 t84 = t71 * t83;
+                float16 t85 = (float16)(1.0f) < t84 ? (float16)(1.0f) : t84;
+                float16 t86 = t85 < (float16)(-1.0f) ? (float16)(-1.0f) : t85;
+                int16 t88 = (as_float16(as_int16(v2[e * 2 + j]) & 0x7fffffff)) <= (float16)(6400.0f);
+                float16 t89 = t88 ? t86 : (v2[e * 2 + j] - v2[e * 2 + j]);
+                float16 t90 = v56[e * 2 + j] * t89;
+                v90[e * 2 + j] = t90;
             }
         }
 
-        /* sum of %48: squares */
+        /* sum of %53: squares */
         {
             __global float16 *out = sums + 73 + 0;
             float16 s0_0 = begins ? (float16)(0.0f) : out[0];
             for (int n = 0; n < count; ++n) {
-                const float16 d0 = v48[n * 1 + 0];
+                const float16 d0 = v53[n * 1 + 0];
                 s0_0 += d0;
             }
             s0_0.s3 = s0_0.s4 = s0_0.s5 = s0_0.s6 = s0_0.s7 = s0_0.s8 = s0_0.s9 = s0_0.sa = s0_0.sb = s0_0.sc = s0_0.sd = s0_0.se = s0_0.sf = 0.0f; out[0] = s0_0;
         }
 
-        /* sum of %82 x %0: W0 */
+        /* sum of %90 x %0: W0 */
         for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
             {
                 const int k = 0;
@@ -321,8 +325,8 @@ void wamnet_step(
                     float16 s5_1 = begins ? (float16)(0.0f) : out[11];
                     for (int n = 0; n < count; ++n) {
                         __global const float *x = values + corner[n] + dy * row[n] + k;
-                        const float16 d0 = v82[n * 2 + 0];
-                        const float16 d1 = v82[n * 2 + 1];
+                        const float16 d0 = v90[n * 2 + 0];
+                        const float16 d1 = v90[n * 2 + 1];
                         s0_0 += d0 * x[0]; s0_1 += d1 * x[0];
                         s1_0 += d0 * x[1]; s1_1 += d1 * x[1];
                         s2_0 += d0 * x[2]; s2_1 += d1 * x[2];
@@ -346,12 +350,12 @@ void wamnet_step(
             }
         }
 
-        /* sum of %82: b0 */
+        /* sum of %90: b0 */
         {
             __global float16 *out = sums + 24 + 0;
             float16 s0_0 = begins ? (float16)(0.0f) : out[0];
             for (int n = 0; n < count; ++n) {
-                const float16 d0 = v82[n * 2 + 0];
+                const float16 d0 = v90[n * 2 + 0];
                 s0_0 += d0;
             }
             out[0] = s0_0;
@@ -360,13 +364,13 @@ void wamnet_step(
             __global float16 *out = sums + 24 + 0;
             float16 s0_1 = begins ? (float16)(0.0f) : out[1];
             for (int n = 0; n < count; ++n) {
-                const float16 d1 = v82[n * 2 + 1];
+                const float16 d1 = v90[n * 2 + 1];
                 s0_1 += d1;
             }
             s0_1.s4 = s0_1.s5 = s0_1.s6 = s0_1.s7 = s0_1.s8 = s0_1.s9 = s0_1.sa = s0_1.sb = s0_1.sc = s0_1.sd = s0_1.se = s0_1.sf = 0.0f; out[1] = s0_1;
         }
 
-        /* sum of %50 x %45: W1 */
+        /* sum of %55 x %50: W1 */
         for (int k = 0; k < 12; k += 12) {
             {
                 __global float16 *out = sums + 26 + (k) * 1;
@@ -383,8 +387,8 @@ void wamnet_step(
                 float16 s10_0 = begins ? (float16)(0.0f) : out[10];
                 float16 s11_0 = begins ? (float16)(0.0f) : out[11];
                 for (int n = 0; n < count; ++n) {
-                    __global const float *x = (__global const float *)(v45 + n * 2) + k;
-                    const float16 d0 = v50[n * 1 + 0];
+                    __global const float *x = (__global const float *)(v50 + n * 2) + k;
+                    const float16 d0 = v55[n * 1 + 0];
                     s0_0 += d0 * x[0];
                     s1_0 += d0 * x[1];
                     s2_0 += d0 * x[2];
@@ -425,8 +429,8 @@ void wamnet_step(
                 float16 s6_0 = begins ? (float16)(0.0f) : out[6];
                 float16 s7_0 = begins ? (float16)(0.0f) : out[7];
                 for (int n = 0; n < count; ++n) {
-                    __global const float *x = (__global const float *)(v45 + n * 2) + k;
-                    const float16 d0 = v50[n * 1 + 0];
+                    __global const float *x = (__global const float *)(v50 + n * 2) + k;
+                    const float16 d0 = v55[n * 1 + 0];
                     s0_0 += d0 * x[0];
                     s1_0 += d0 * x[1];
                     s2_0 += d0 * x[2];
@@ -447,12 +451,12 @@ void wamnet_step(
             }
         }
 
-        /* sum of %50: b1 */
+        /* sum of %55: b1 */
         {
             __global float16 *out = sums + 46 + 0;
             float16 s0_0 = begins ? (float16)(0.0f) : out[0];
             for (int n = 0; n < count; ++n) {
-                const float16 d0 = v50[n * 1 + 0];
+                const float16 d0 = v55[n * 1 + 0];
                 s0_0 += d0;
             }
             s0_0.s3 = s0_0.s4 = s0_0.s5 = s0_0.s6 = s0_0.s7 = s0_0.s8 = s0_0.s9 = s0_0.sa = s0_0.sb = s0_0.sc = s0_0.sd = s0_0.se = s0_0.sf = 0.0f; out[0] = s0_0;

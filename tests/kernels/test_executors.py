@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from contextlib import ExitStack
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +15,10 @@ from hypothesis import strategies as st
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.interpret import interpret
+from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.lower import lower
-from wamnet.kernels import denoise_on
+from wamnet.compiler.trace import trace
+from wamnet.kernels import denoise_on, open_executor
 from wamnet.refimpl import dataset, denoise, frame
 from wamnet.refimpl.errors import CompileError, InputError
 
@@ -57,20 +60,20 @@ def cases(draw):
 
 @settings(max_examples=EXAMPLES)
 @given(case=cases())
-def test_error_is_within_the_bound(executor, kit, case):
+def test_error_is_within_the_bound(denoiser, kit, case):
     network = kit.network(case["widths"], case["omegas"], case["seed"], case["scale"])
     program = kit.denoiser(network, case["channels"], case["size"], case["border"])
     (seen,) = interpret(program, {"window": kit.windows(program, case["images"])}, np.float64).values()
     assert ((seen > 0) & (seen < 1)).all()
-    assert kit.excess(executor, program, case["images"]) <= 1
+    assert kit.excess(denoiser, program, case["images"]) <= 1
 
 
-def test_the_paper_s_network(executor, kit):
+def test_the_paper_s_network(denoiser, kit):
     network = kit.network([864, 32, 32, 32, 32, 3], (3.0, 3.0))
     program = kit.denoiser(network, {"color": 3, "normal": 3}, 12, "clamp")
     random = np.random.default_rng(5)
     images = {name: random.uniform(-1, 1, (13, 17, 3)).astype(np.float32) for name in ("color", "normal")}
-    assert kit.excess(executor, program, images) <= 1
+    assert kit.excess(denoiser, program, images) <= 1
 
 
 def test_target_s_own_sine_on_opencl(executor_named, kit):
@@ -91,13 +94,13 @@ def test_target_s_own_sine_without_promise_runs_but_has_no_bound(executor_named,
     assert "promises nothing" in artifact.source
 
 
-def test_row_0_is_the_top_row_and_columns_are_not_mirrored(executor, kit):
+def test_row_0_is_the_top_row_and_columns_are_not_mirrored(denoiser, kit):
     image = np.arange(5 * 7, dtype=np.float32).reshape(5, 7, 1) / 64
-    artifact = compile_program(kit.program(lambda x: x * 1.0, {"a": 1}), executor.name)
-    assert np.array_equal(executor.run(artifact, {"a": image}), image)
+    artifact = compile_program(kit.program(lambda x: x * 1.0, {"a": 1}), denoiser.name)
+    assert np.array_equal(denoiser.run(artifact, {"a": image}), image)
 
 
-def test_denoise_on_equals_the_definition(executor, kit):
+def test_denoise_on_equals_the_definition(denoiser, kit):
     """Whole frames: the float64 `denoise` is the reference, the bound the a-priori one, over all images."""
     random = np.random.default_rng(7)
     network = kit.network([54, 8, 3], (3.0, 3.0))
@@ -108,10 +111,10 @@ def test_denoise_on_equals_the_definition(executor, kit):
             "normal": random.uniform(-1, 1, (6, 11, 3)).astype(np.float32),
         }
     )
-    result = denoise_on(executor, model, noisy)
-    bound = compile_program(lower(model), executor.name).manifest["bound"]["output"]
+    result = denoise_on(denoiser, model, noisy)
+    bound = compile_program(lower(model), denoiser.name).manifest["bound"]["output"]
     assert result.image.shape == (6, 11, 3)
-    assert result.device == executor.device
+    assert result.device == denoiser.device
     assert (np.abs(result.image - denoise.denoise(model, noisy, np.float64)) <= bound).all()
 
 
@@ -349,3 +352,21 @@ def test_too_large_a_texture_is_refused(executor_named, kit):
         InputError, match="texture for 'a' is 100000 x 1 with 1 channels: this OpenGL takes at most"
     ):
         executor.run(artifact, {"a": np.zeros((1, 100000, 1), np.float32)})
+
+
+def test_two_contexts_that_open_before_either_runs(executor_named):
+    """EGL took its context for the current one, and drew in OSMesa: black, or another kernel's picture."""
+    kinds = ("egl", "osmesa")
+    for kind in kinds:
+        executor_named(f"opengl-{kind}")  # or the test is skipped
+    gather = Gather(dataset.Window(1, "clamp"), (Image("a", 1, 0.0, 1.0),))
+    artifacts = [
+        compile_program(trace(lambda x, f=factor: x * f, {"window": Type(shape=(1,))}, gather), "opengl")
+        for factor in (2.0, 3.0)
+    ]
+    with ExitStack() as opened:
+        found = [opened.enter_context(open_executor("opengl", context=kind)) for kind in kinds]
+        for executor in found:
+            for artifact, factor in zip(artifacts, (2.0, 3.0), strict=True):
+                picture = executor.run(artifact, {"a": np.full((2, 2, 1), 0.25, np.float32)})
+                assert np.array_equal(picture, np.full((2, 2, 1), 0.25 * factor, np.float32))

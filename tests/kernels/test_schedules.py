@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from wamnet.compiler import emit_fourier
 from wamnet.compiler.compile import TARGETS, compile_program
 from wamnet.compiler.lower import lower
 from wamnet.kernels import denoise_on, opencl_executor
@@ -19,9 +20,9 @@ LADDER = [(t.name, s.name) for t in TARGETS.values() for s in t.schedules[1:]]
 """All schedules besides the plain ones, with their targets."""
 
 
-LARGEST = {"inlined": (3, 10)}
-"""Largest window and layer by schedule: Mesa compiles two thousand weights a second. The other schedules'
-layers may have more neurons than a block."""
+LARGEST = {"inlined": (3, 10), "fft32": (20, 32)}
+"""Largest window and layer by schedule: Mesa compiles two thousand weights a second; a tile's sums must fit
+the stack. The other schedules' layers may have more neurons than a block."""
 
 
 @st.composite
@@ -46,6 +47,12 @@ def images_of(case):
         name: random.uniform(-2, 2, (*case["shape"], n)).astype(np.float32)
         for name, n in case["channels"].items()
     }
+
+
+@pytest.fixture(autouse=True)
+def _spectra_of_small_windows(monkeypatch):
+    """Let the Fourier schedule hold what is faster without it."""
+    monkeypatch.setattr(emit_fourier, "COST", 0.0)
 
 
 def executor_of(executor_named, target):
@@ -128,12 +135,48 @@ def test_a_wrong_tile_is_caught(executor_named, kit, schedule, fault):
     assert kit.excess(executor, program, images, kit.with_source(artifact, *FAULTS[fault])) > 1
 
 
+FOURIER_FAULTS = {
+    "twiddle": ("* 0.382683426f", "* 0.4f"),
+    "border": ("clamp(top, 0, height - 1)", "clamp(top, 1, height - 1)"),
+    "lane": ("PLACE(tile * PAIRS + 1", "PLACE(tile * PAIRS + 0"),
+    "conjugate": ("b - d;", "b + d;"),
+    "opposite": ("product[t * 2 + 1][2 * g] =", "product[t * 2 + 1][2 * f] ="),
+    "product": ("imaginary[t][1] += w1 * b;", "imaginary[t][1] -= w1 * b;"),
+    "middle": ("if (opposite != k)", "if (opposite > k + 2)"),
+    "rows": ("(tile * OUT + line) * STRIDE", "(tile * OUT + (line ^ 1)) * STRIDE"),
+    "block": ("int x = tile_x + block * PIXELS;", "int x = tile_x + (block ^ 1) * PIXELS;"),
+}
+"""Pieces of a kernel of spectra, and what makes it wrong; none leaves an array."""
+
+
+@pytest.mark.parametrize("fault", FOURIER_FAULTS)
+def test_a_wrong_spectrum_is_caught(executor_named, kit, fault):
+    executor = executor_named("opencl")
+    program = kit.denoiser(kit.network([150, 20, 3], (3.0, 3.0)), {"a": 6}, 5, "clamp")
+    images = {"a": np.random.default_rng(8).uniform(-2, 2, (37, 75, 6)).astype(np.float32)}
+    artifact = compile_program(program, "opencl", "ieee", "fft32")
+    assert kit.excess(executor, program, images, artifact) <= 1
+    assert kit.excess(executor, program, images, kit.with_source(artifact, *FOURIER_FAULTS[fault])) > 1
+
+
+@pytest.mark.parametrize("border", dataset.BORDERS)
+@pytest.mark.parametrize("shape", [(1, 1), (2, 64), (43, 22)])
+def test_pictures_smaller_than_a_tile_and_beyond_one(executor_named, kit, border, shape):
+    """Tiles of 21 x 21 pixels, two side by side; 12 channels, of which one image has an odd number."""
+    program = kit.denoiser(kit.network([1728, 32, 3], (3.0, 3.0)), {"a": 5, "b": 7}, 12, border)
+    random = np.random.default_rng(2)
+    images = {name: random.uniform(-2, 2, (*shape, n)).astype(np.float32) for name, n in (("a", 5), ("b", 7))}
+    artifact = compile_program(program, "opencl", "ieee", "fft32")
+    assert artifact.manifest["schedule"]["name"] == "fft32"
+    assert kit.excess(executor_named("opencl"), program, images, artifact) <= 1
+
+
 INLINED_FAULTS = {
     "tap": ("ivec2(x, y) + ivec2(-2, 1)", "ivec2(x, y) + ivec2(-1, 1)"),
     "border": ("clamp(at, ivec2(0)", "clamp(at, ivec2(1)"),
-    "vector": ("v1_1 += mat3x4", "v1_0 += mat3x4"),
+    "vector": ("v1_1 += part1_1", "v1_0 += part1_1"),
     "omega": ("= 3.0f * v1", "= 2.0f * v1"),
-    "components": ("v46_1.x;", "v46_0.x;"),
+    "components": ("_1.x;", "_0.x;"),
 }
 """Pieces of an inlined kernel, and what makes it wrong."""
 

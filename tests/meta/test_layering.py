@@ -8,10 +8,19 @@ from collections.abc import Iterator
 
 import pytest
 
+PEERS = {
+    "torch": "kernels/bench/peer_torch.py",
+    "onnx": "kernels/bench/peer_onnxruntime.py",
+    "onnxruntime": "kernels/bench/peer_onnxruntime.py",
+    "tinygrad": "kernels/bench/peer_tinygrad.py",
+    "pyoidn": "kernels/bench/peer_oidn.py",
+}
+"""Packages that the benchmark compares with, and the only file of each."""
+
 ALLOWED = {
     "refimpl": {"numpy"},
     "compiler": {"numpy", "safetensors"},
-    "kernels": {"numpy", "pyopencl", "pocl", "moderngl"},
+    "kernels": {"numpy", "pyopencl", "pocl", "moderngl", *PEERS},
     "cli": {
         "numpy",
         "OpenEXR",
@@ -78,6 +87,18 @@ def test_devices_are_used_in_kernels_only(house):
         if name.partition(".")[0] in {"pyopencl", "moderngl", "pocl"}
     ]
     house.refuse(wrong, "Only kernels/ talks to devices: call wamnet.kernels.open_executor instead.")
+
+
+def test_peers_are_used_in_their_file_only(house):
+    """And when they are asked for: nothing that is installed needs them."""
+    wrong = []
+    for source in house.parts():
+        at_import = {id(node) for node in source.tree.body}
+        for node, name in imports(source):
+            place = PEERS.get(name.partition(".")[0])
+            if place and (place != source.path or id(node) in at_import):
+                wrong.append(source.at(node, name))
+    house.refuse(wrong, "A peer is imported in its file of kernels/bench, by the function that opens it.")
 
 
 def test_no_bare_imports(house):

@@ -10,7 +10,7 @@ import numpy as np
 
 from wamnet.compiler import bounds
 from wamnet.compiler.artifact import Artifact
-from wamnet.compiler.compile import analysed, compile_program, sine_contract
+from wamnet.compiler.compile import analysed, compile_program, schedule_named, sine_contract
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import Gather, Image, Program, Type, sha256
 from wamnet.compiler.trace import trace
@@ -66,7 +66,9 @@ class Kit:
         windows = self.windows(program, images)
         (expected,) = interpret(program, {"window": windows}, np.float64).values()
         contract = sine_contract(artifact.profile, artifact.target)
-        (bound,) = bounds.at_inputs(analysed(program), {"window": windows}, contract).values()
+        schedule = schedule_named(artifact.target, artifact.manifest["schedule"]["name"])
+        enclosed = schedule.enclosures(analysed(program), contract, images)
+        (bound,) = bounds.output_errors(analysed(program), enclosed).values()
         found = executor.run(artifact, images).astype(np.float64)
         expected, bound = (_per_pixel(array, found.shape[:2]) for array in (expected, bound))
         assert np.isfinite(bound).all(), "a bound that is infinite holds for every kernel"

@@ -1,0 +1,414 @@
+"""The Fourier schedule: sums over the window as products of spectra, tile by tile; then the tiled schedule.
+
+1. A work item computes `tiles` tiles side by side, each of OUT x OUT pixels, OUT = POINTS - WINDOW_SIZE + 1:
+   those whose windows lie in POINTS x POINTS pixels of the images (overlap-save: what wraps around is not
+   computed). Its patch is gathered row by row, under the border rule [`FourierBody._rows_forward`].
+2. Two channels are one complex number, and a vector holds such pairs of all tiles: `LANES` transforms at
+   once, none of which needs a shuffle. Rows are transformed as they come, columns when they are needed.
+3. A column k and its mirror image -k give both channels' spectra; each is multiplied with the spectra of the
+   neurons' weights and summed over channels, with all tiles' sums in registers [`_products`].
+4. The sums of neurons j and j + LANES are one complex number again: one inverse transform of the columns, of
+   whose rows OUT are kept, and one of each row give both [`_column_back`].
+5. What a row of all tiles gives goes through the other layers as in the tiled schedule, PIXELS at a time.
+
+The transforms are functions of the source, written by `fourier.transform` on names [`codelet`]. Weights are
+transformed when they are packed, in float64 [`fourier.spectrum`]. The bound is that of fourier.py.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import bounds, fourier
+from .bounds import Enclosure
+from .dialect import Dialect
+from .emit import BORDERS, kernel_gather
+from .emit_tiled import LARGEST_PRIVATE, Tiled, TiledBody, readers_of_window, refused_by_vectors
+from .ir import Node, Program
+from .profiles import SineContract
+from .schedules import ALL, Images, windows
+
+COST = 3.0
+"""Times that an operation of a transform takes of one of the direct sum: 2.6, as measured on an AMD EPYC with
+tiles of 32; most of its operands are loaded and stored."""
+
+PARTS = 2
+"""Numbers of a complex one: its real and its imaginary part."""
+
+
+PRODUCTS = {
+    "real": (("+", 0, "a"), ("-", 1, "b"), ("+", 2, "c"), ("-", 3, "d")),
+    "imaginary": (("+", 1, "a"), ("+", 0, "b"), ("+", 3, "c"), ("+", 2, "d")),
+}
+"""What each part adds up: sign, two vectors of weights, and part of a pair's spectra a + i b and c + i d."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Pairs of channels, vectors that hold all tiles' pairs, pairs of vectors of neurons, rows of a tile."""
+
+    pairs: int
+    inputs: int
+    neurons: int
+    out: int
+
+
+class Fourier(Tiled):
+    """Tiles of `points` x `points` pixels, `tiles` side by side."""
+
+    instead = "tile16"
+    order = (
+        "vectors filled up with zeros; the spectrum of the matrix that reads the window: columns of "
+        "frequencies 0 to points / 2, pairs of vectors of neurons, rows of frequencies, pairs of channels, "
+        "(real, imaginary) of the first and of the second channel, two vectors of neurons; other "
+        "matrices block by block of neurons: blocks x D_in x neurons"
+    )
+
+    def __init__(
+        self, name: str, idea: str, dialect: Dialect, lanes: int, pixels: int, points: int, tiles: int
+    ) -> None:
+        super().__init__(name, idea, dialect, lanes, pixels, vectors=2)
+        self.points, self.tiles = points, tiles
+
+    def sizes(self, program: Program) -> Sizes:
+        """Return the sizes of a program's kernel."""
+        gather, (layer,) = kernel_gather(program), readers_of_window(program)
+        pairs = -(-gather.channels // 2)
+        neurons = -(-layer.type.shape[0] // (2 * self.lanes))
+        return Sizes(pairs, -(-self.tiles * pairs // self.lanes), neurons, self.points - gather.rows + 1)
+
+    def extent(self, program: Program) -> tuple[int, int]:
+        """Return the columns and rows of pixels that a work item computes."""
+        out = self.sizes(program).out
+        return self.tiles * out, out
+
+    def enclosures(
+        self, program: Program, sine: SineContract, images: Images | None = None, rows: slice = ALL
+    ) -> list[Enclosure]:
+        """Return the enclosure of every node: the sums over the window are those of spectra."""
+        gather, plan = kernel_gather(program), (self.points, self.lanes)
+        if images is None:
+            norm = fourier.largest_norm(gather, self.points)
+            return fourier.enclose(program, sine, bounds.window_box(gather), norm, plan)
+        found = windows(gather, images, rows)
+        joined = np.concatenate([images[image.name] for image in gather.images], axis=-1, dtype=np.float64)
+        norms = fourier.tile_norms(joined, gather.window, self.points)[rows]
+        return fourier.enclose(program, sine, (found, found), norms, plan)
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        gather, readers = kernel_gather(program), readers_of_window(program)
+        if program.exact:
+            return "sums from spectra are rounded in another order than profile exact states"
+        if reason := refused_by_vectors(program, self.dialect):
+            return reason
+        if len(readers) != 1:
+            return f"{len(readers)} affine maps read the window, not one"
+        if gather.axes != (0, 1) or gather.rows >= self.points:
+            return f"a window of {gather.rows} x {gather.columns} pixels in a tile of {self.points}"
+        names = [node["weight"] for node in program.nodes if node.op == "affine"]
+        if names.count(readers[0]["weight"]) != 1:
+            return "a matrix is applied to the window and to a layer"
+        if (found := self.private_bytes(program)) > LARGEST_PRIVATE:
+            return f"its arrays take {found} bytes a work item, of at most {LARGEST_PRIVATE}"
+        direct, spectra = self.operations(program)
+        if COST * spectra > direct:
+            return f"the direct sum takes {direct:.0f} operations on vectors a pixel, spectra {spectra:.0f}"
+        return ""
+
+    def operations(self, program: Program) -> tuple[float, float]:
+        """Return the operations on vectors, a pixel, of the direct sum over the window and of this one."""
+        (layer,), s, n = readers_of_window(program), self.sizes(program), self.points
+        direct = kernel_gather(program).n_inputs * -(-layer.type.shape[0] // self.lanes)
+        products = (n // 2 + 1) * n * s.pairs * 16 * self.tiles * s.neurons
+        # The split-radix algorithm takes 4 n log2(n) - 6 n + 8 operations.
+        one = 4 * n * (n.bit_length() - 1) - 6 * n + 8
+        transforms = s.inputs * (2 * n + 2) + self.tiles * s.neurons * (n + s.out)
+        return direct, (products + one * transforms) / (self.tiles * s.out**2)
+
+    def private_bytes(self, program: Program) -> int:
+        """Return the bytes of the arrays of a work item."""
+        s, n = self.sizes(program), self.points
+        body = self._body(program)
+        shapes = [program.nodes[index].type.shape for index in body.group_of if body.declares(index)]
+        hidden = sum(self.blocks(shape[0]).total * self.pixels for shape in shapes)
+        blocks = -(-self.tiles * s.out // self.pixels)
+        vectors = {
+            "row": s.inputs * n * PARTS,
+            "rows": s.inputs * n * (n + 1) * PARTS,
+            "columns": 2 * n * PARTS,
+            "spectra": s.inputs * n * 2 * PARTS,
+            "products": 2 * self.tiles * n * PARTS,
+            "back": self.tiles * s.neurons * s.out * (n + 1) * PARTS,
+            "sums": blocks * self.pixels * s.neurons * PARTS,
+        }
+        return 4 * self.lanes * (sum(vectors.values()) + hidden)
+
+    def _shape(self, program: Program, name: str, shape: tuple[int, ...]) -> tuple[int, ...]:
+        """Return the shape of a stored parameter of a given shape."""
+        (layer,), s = readers_of_window(program), self.sizes(program)
+        if name != layer["weight"]:
+            return super()._shape(program, name, shape)
+        return (self.points // 2 + 1, s.neurons, self.points, s.pairs, 2, PARTS, 2 * self.lanes)
+
+    def _stored(self, program: Program, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
+        """Return a parameter in its stored shape."""
+        (layer,) = readers_of_window(program)
+        if name != layer["weight"]:
+            return super()._stored(program, name, shape)
+        return self._spectra(program, name, kernel_gather(program).rows, shape)
+
+    def _spectra(self, program: Program, name: str, size: int, shape: tuple[int, ...]) -> NDArray[np.float32]:
+        """Return the spectra of the windowed matrix, in float32, as `layout` says."""
+        columns, groups, n, pairs = shape[:4]
+        matrix = program.parameters[name].astype(np.float64)
+        spectra = fourier.spectrum(matrix, size, n).transpose(2, 1, 3, 0)[:columns]
+        filled = np.zeros((columns, n, 2 * pairs, groups * 2 * self.lanes), np.complex128)
+        filled[:, :, : spectra.shape[2], : spectra.shape[3]] = spectra
+        # Channel j of the first half and channel j of the second are a pair.
+        split = filled.reshape(columns, n, 2, pairs, groups, 2 * self.lanes).transpose(0, 4, 1, 3, 2, 5)
+        both = np.stack([split.real, split.imag], axis=5)
+        return both.astype(np.float32).reshape(shape)
+
+    def _body(self, program: Program) -> FourierBody:
+        """Return the writer of the kernel's statements."""
+        return FourierBody(program, self.dialect, kernel_gather(program), tile=self)
+
+
+class Statements:
+    """Assignments in the order in which they are made, each to a new name."""
+
+    def __init__(self, dialect: Dialect) -> None:
+        self.dialect = dialect
+        self.made: list[tuple[str, tuple[str, ...]]] = []
+
+    def assign(self, template: str, *operands: Named) -> Named:
+        """Return a new name for an expression of names."""
+        self.made.append((template, tuple(operand.name for operand in operands)))
+        return Named(f"t{len(self.made) - 1}", self)
+
+    def needed(self, outputs: list[str]) -> list[str]:
+        """Return the assignments on which outputs depend; a product that one sum reads stands in the sum."""
+        wanted, kept, readers = set(outputs), [], Counter(outputs)
+        for number, (_, operands) in reversed(list(enumerate(self.made))):
+            if f"t{number}" in wanted:
+                wanted.update(operands)
+                readers.update(operands)
+                kept.append(number)
+        texts: dict[str, str] = {}
+        lines = []
+        for number in kept[::-1]:
+            (template, operands), name = self.made[number], f"t{number}"
+            text = template.format(*(texts.get(operand, operand) for operand in operands))
+            if "*" in template and readers[name] == 1 and name not in outputs and "[" not in template:
+                texts[name] = text
+            else:
+                lines.append(f"vector {name} = {text};")
+        return lines
+
+
+@dataclass(frozen=True)
+class Named:
+    """A number that a statement computes."""
+
+    name: str
+    statements: Statements
+
+    def __add__(self, other: Named) -> Named:
+        return self.statements.assign("{0} + {1}", self, other)
+
+    def __sub__(self, other: Named) -> Named:
+        return self.statements.assign("{0} - {1}", self, other)
+
+    def __mul__(self, factor: float) -> Named:
+        return self.statements.assign(f"{{0}} * {self.statements.dialect.literal(factor)}", self)
+
+
+def codelet(dialect: Dialect, name: str, points: int, kept: int, sign: int) -> list[str]:
+    """Return the function that transforms `points` numbers and keeps the first `kept`."""
+    statements = Statements(dialect)
+    places = [(f"from[{PARTS * k} * step]", f"from[{PARTS * k} * step + 1]") for k in range(points)]
+    inputs = [(statements.assign(real), statements.assign(imaginary)) for real, imaginary in places]
+    found = fourier.transform(inputs, sign)[:kept]
+    lines = statements.needed([part.name for number in found for part in number])
+    for k, number in enumerate(found):
+        for i, part in enumerate(number):
+            lines.append(f"to[{PARTS * k} * leap{' + 1' * i}] = {part.name};")
+    head = f"void {name}(const vector *from, int step, vector *to, int leap)"
+    return [head, "{", *(f"    {line}" for line in lines), "}"]
+
+
+@dataclass
+class FourierBody(TiledBody):
+    """The statements of a kernel with Fourier transforms."""
+
+    tile: Fourier = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.sizes = self.tile.sizes(self.program)
+
+    def defines(self) -> list[str]:
+        """Return the sizes, and the functions that transform rows and columns."""
+        tile, s = self.tile, self.sizes
+        return [
+            f"#define POINTS {tile.points} /* rows and columns of a tile with what its windows reach */",
+            "#define OUT (POINTS - WINDOW_SIZE + 1) /* rows and columns of a tile's pixels */",
+            f"#define TILES {tile.tiles} /* neighbours in a row that a work item computes */",
+            f"#define PIXELS {tile.pixels} /* pixels of a row that go through the layers together */",
+            f"#define LANES {tile.lanes} /* numbers in a vector */",
+            f"#define PAIRS {s.pairs} /* of channels */",
+            f"#define INPUTS {s.inputs} /* vectors that hold the pairs of all tiles */",
+            f"#define NEURONS {s.neurons} /* pairs of vectors of neurons */",
+            "#define STRIDE (2 * (POINTS + 1)) /* vectors from row to row: not a multiple of 4096 bytes */",
+            *codelet(tile.dialect, "forward", tile.points, tile.points, -1),
+            *codelet(tile.dialect, "backward", tile.points, s.out, 1),
+        ]
+
+    def _prepare(self) -> None:
+        """Write everything up to the loop over rows and blocks of pixels."""
+        self._rows_forward()
+        self._columns()
+        self._comment("rows back, and the other layers")
+        blocks = -(-self.tile.tiles * self.sizes.out // self.tile.pixels)
+        self._line(f"vector sums[{blocks} * PIXELS * NEURONS * 2];")
+        self._open("for (int line = 0; line < OUT && tile_y + line < height; ++line) {")
+        self._open("for (int tile = 0; tile < TILES * NEURONS; ++tile) {")
+        self._line("int at = (tile / NEURONS * OUT * NEURONS + tile % NEURONS) * 2;")
+        self._line("backward(back + (tile * OUT + line) * STRIDE, 1, sums + at, NEURONS);")
+        self._close()
+        self._line("int y = tile_y + line;")
+        self._open(f"for (int block = 0; block < {blocks}; ++block) {{")
+        self._line("int x = tile_x + block * PIXELS;")
+        self._line("int last = min(tile_x + TILES * OUT, width);")
+
+    def _rows_forward(self) -> None:
+        """Write the gathering and transformation of rows."""
+        self._comment("rows of the images around the tiles, transformed")
+        self._union("row", "INPUTS * POINTS * 2")
+        self._line("vector rows[INPUTS * POINTS * STRIDE];")
+        self._nest(["for (int i = 0; i < INPUTS * POINTS * 2; ++i) {"], ["row.all[i] = (vector)(0.0f);"])
+        self._open("for (int dy = 0; dy < POINTS; ++dy) {")
+        self._line("int top = tile_y + dy - WINDOW_CENTRE;")
+        self._line("int row_y = clamp(top, 0, height - 1);")
+        self._open("for (int tile = 0; tile < TILES; ++tile) {")
+        self._open("for (int dx = 0; dx < POINTS; ++dx) {")
+        self._line("int left = tile_x + tile * OUT + dx - WINDOW_CENTRE;")
+        self._line("int column = clamp(left, 0, width - 1);")
+        if self.gather.window.border == "zero":
+            self._line("bool inside = row_y == top && column == left;")
+        first = 0
+        for image in self.gather.images:
+            for c in range(image.channels):
+                part, pair = divmod(first + c, self.sizes.pairs)
+                value = f"image_{image.name}[(row_y * width + column) * {image.channels} + {c}]"
+                value = BORDERS[self.gather.window.border][1].format(pixel=value)
+                self._line(f"row.number[PLACE(tile * PAIRS + {pair}, dx * 2 + {part})] = {value};")
+            first += image.channels
+        self._close(2)
+        call = "forward(row.all + i * POINTS * 2, 1, rows + (i * POINTS + dy) * STRIDE, 1);"
+        self._nest(["for (int i = 0; i < INPUTS; ++i) {"], [call])
+        self._close()
+
+    def _columns(self) -> None:
+        """Write the loop over columns of frequencies: forward, products with the weights, back."""
+        self._comment("columns: transformed, multiplied with the weights' spectra, transformed back")
+        slot = self.slots[str(readers_of_window(self.program)[0]["weight"])]
+        self._line("vector column[POINTS * 2];")
+        self._line("vector mirror[POINTS * 2];")
+        self._union("spectra", "INPUTS * POINTS * 4")
+        self._line("vector product[TILES * 2][POINTS * 2];")
+        self._line("vector back[TILES * NEURONS * OUT * STRIDE];")
+        self._line(f"__global const vector *w = {self._vectors(slot.offset)};")
+        self._open("for (int k = 0; k <= POINTS / 2; ++k) {")
+        self._line("int opposite = (POINTS - k) % POINTS;")
+        self._open("for (int i = 0; i < INPUTS; ++i) {")
+        self._line("forward(rows + i * POINTS * STRIDE + 2 * k, POINTS + 1, column, 1);")
+        self._line("forward(rows + i * POINTS * STRIDE + 2 * opposite, POINTS + 1, mirror, 1);")
+        self._open("for (int f = 0; f < POINTS; ++f) {")
+        self._line("int g = (POINTS - f) % POINTS;")
+        self._line("vector a = column[2 * f], b = column[2 * f + 1];")
+        self._line("vector c = mirror[2 * g], d = mirror[2 * g + 1];")
+        self._line("vector *to = spectra.all + (i * POINTS + f) * 4;")
+        for number, value in enumerate(("a + c", "b - d", "b + d", "c - a")):
+            self._line(f"to[{number}] = {value};")
+        self._close(2)
+        self._open("for (int q = 0; q < NEURONS; ++q) {")
+        self._products()
+        self._open("for (int tile = 0; tile < TILES; ++tile) {")
+        self._line("vector *to = back + (tile * NEURONS + q) * OUT * STRIDE;")
+        self._line("backward(product[tile * 2], 1, to + 2 * k, POINTS + 1);")
+        self._open("if (opposite != k) {")
+        self._line("backward(product[tile * 2 + 1], 1, to + 2 * opposite, POINTS + 1);")
+        self._close(4)
+
+    def _union(self, name: str, vectors: str) -> None:
+        """Write the declaration of an array of vectors that can be read number by number."""
+        self._line(f"union {{ vector all[{vectors}]; float number[{vectors} * LANES]; }} {name};")
+
+    def _products(self) -> None:
+        """Write the products of a column of frequencies for all tiles."""
+        self._open("for (int f = 0; f < POINTS; ++f) {")
+        self._line("vector real[TILES][2];")
+        self._line("vector imaginary[TILES][2];")
+        self._line("#pragma unroll")
+        zeros = [f"{name}[t][{v}] = (vector)(0.0f);" for name in ("real", "imaginary") for v in range(2)]
+        self._nest(["for (int t = 0; t < TILES; ++t) {"], zeros)
+        self._line("for (int pair = 0; pair < PAIRS; ++pair) {")
+        self.depth += 1
+        for j in range(8):
+            self._line(f"vector w{j} = w[{j}];")
+        self._line("w += 8;")
+        self._line("#pragma unroll")
+        self._open("for (int t = 0; t < TILES; ++t) {")
+        self._line("const float *x = spectra.number + SPECTRUM(t * PAIRS + pair, f);")
+        self._line("float a = x[0], b = x[LANES], c = x[2 * LANES], d = x[3 * LANES];")
+        for v in range(2):
+            for part, terms in PRODUCTS.items():
+                for sign, weight, value in terms:
+                    self._line(f"{part}[t][{v}] {sign}= w{2 * weight + v} * {value};")
+        self._close(2)
+        self._line("int g = (POINTS - f) % POINTS;")
+        self._line("#pragma unroll")
+        lines = [
+            "product[t * 2][2 * f] = real[t][0] - imaginary[t][1];",
+            "product[t * 2][2 * f + 1] = imaginary[t][0] + real[t][1];",
+            "product[t * 2 + 1][2 * g] = real[t][0] + imaginary[t][1];",
+            "product[t * 2 + 1][2 * g + 1] = real[t][1] - imaginary[t][0];",
+        ]
+        self._nest(["for (int t = 0; t < TILES; ++t) {"], lines)
+        self._close()
+
+    def _affine(self, index: int, node: Node) -> None:
+        """Write the copy of the sums of a block of pixels, or what the tiled schedule does."""
+        if self.program.nodes[node.args[0]].op != "input":
+            super()._affine(index, node)
+            return
+        blocks, bias = self.tile.blocks(node.type.shape[0]), node.get("bias")
+        self._declare(index, f"%{index}: the sums, and their bias")
+        lines = []
+        for j in range(blocks.total):
+            add = f" + {self._bias(str(bias), str(j))}" if bias else ""
+            lines.append(f"v{index}.all[p * {blocks.total} + {j}] = from[p * NEURONS * 2 + {j}]{add};")
+        self._line("const vector *from = sums + block * PIXELS * NEURONS * 2;")
+        self._nest(["for (int p = 0; p < PIXELS; ++p) {"], lines)
+
+    def _outputs(self) -> None:
+        """Write the output of each pixel of the block that lies in the tiles and in the image."""
+        name, index = self.program.outputs[0]
+        channels = self.program.nodes[index].type.shape[0]
+        held = self.tile.blocks(channels).total
+        self._comment(f"output {name}")
+        line = self.dialect.store.format(
+            channels=channels, i="i", value=f"v{index}.number[p * {held} * LANES + i]"
+        )
+        loops = [
+            "for (int p = 0; p < PIXELS && x + p < last; ++p) {",
+            f"for (int i = 0; i < {channels}; ++i) {{",
+        ]
+        self._nest(loops, [line])
+        self._close(2)

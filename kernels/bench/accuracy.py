@@ -1,0 +1,123 @@
+"""How far a contender's picture is from the reference in float64, and what its quality on unseen frames is.
+
+1. The reference is computed on a crop at the picture's first corner, whose pixels see the border [`Crop`].
+   It is the full network's, whatever a variant leaves out [`Crop.full`]; beside it stands the function that a
+   variant computes, whose distance is rounding alone, with a bound [`Crop.rounding`].
+2. The error is a difference of colours in [0, 1]: the largest, the mean, and the largest in units in the last
+   place of the reference [`errors`].
+3. Quality is PSNR and SSIM against a reference frame, and what is lost of the full network's [`quality`].
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler import bounds
+from ...compiler.compile import analysed
+from ...compiler.factor import at_images, factor, product
+from ...compiler.interpret import interpret
+from ...compiler.ir import Program
+from ...compiler.lower import lower
+from ...compiler.profiles import EMITTED_SINE
+from ...refimpl import dataset, metrics
+from ...refimpl.denoise import Model, denoise
+from ...refimpl.frame import Frame
+from ..executor import Images
+from .contender import Variant
+
+Array = NDArray[np.float64]
+
+CROP_PX = 48
+"""Rows and columns of the crop."""
+
+ULP_FLOOR = 2.0**-10
+"""Colours below this, a quarter of an 8-bit step, are measured in its units: near black units vanish."""
+
+
+class Crop:
+    """The first corner of a picture, with what its windows see."""
+
+    def __init__(self, model: Model, images: Images) -> None:
+        """Keep the corner of the images (H, W, C) and compute the full network there in float64."""
+        self.model = model
+        height, width = next(iter(images.values())).shape[:2]
+        self.rows, self.columns = min(CROP_PX, height), min(CROP_PX, width)
+        after = model.window.after
+        self.images = {
+            name: np.ascontiguousarray(image[: self.rows + after, : self.columns + after])
+            for name, image in images.items()
+        }
+        joined = np.concatenate(list(self.images.values()), axis=-1)
+        self.windows = dataset.all_windows(dataset.pad(joined, model.window), model.window)
+        self.full = self.interpreted(lower(model))
+        self._rounding: dict[Variant, tuple[Array, float]] = {}
+
+    def interpreted(self, program: Program) -> Array:
+        """Return the output (rows, columns, 3) of a program of one window, in float64."""
+        (found,) = interpret(program, {"window": self.windows}, np.float64).values()
+        crop: Array = self.cut(found)
+        return crop
+
+    def rounding(self, variant: Variant) -> tuple[Array, float]:
+        """Return what a variant computes in float64, and the largest bound of a kernel's rounding."""
+        if variant not in self._rounding:
+            self._rounding[variant] = self._rounded(variant)
+        return self._rounding[variant]
+
+    def _rounded(self, variant: Variant) -> tuple[Array, float]:
+        """Compute both: profile `ieee` has one sine for all targets."""
+        program, contract = analysed(variant.program(self.model)), EMITTED_SINE
+        if variant.rank:
+            whole = factor(program, variant.rank)
+            found = bounds.output_errors(program, at_images(whole, contract, self.images, of_cut=False))
+            program = product(whole)
+        else:
+            found = bounds.at_inputs(program, {"window": self.windows}, contract)
+        (bound,) = found.values()
+        return self.interpreted(program), float(self.cut(bound).max())
+
+    def cut(self, picture: NDArray[Any]) -> Any:
+        """Return the crop of a picture (H, W, C)."""
+        return picture[: self.rows, : self.columns]
+
+
+def errors(picture: NDArray[Any], reference: Array) -> dict[str, float]:
+    """Return the largest and the mean difference of two pictures, and the largest in ulp; NaN stays NaN."""
+    difference = np.abs(np.asarray(picture, np.float64) - reference)
+    unit = np.spacing(np.maximum(np.abs(reference), ULP_FLOOR).astype(np.float32)).astype(np.float64)
+    return {
+        "max": float(difference.max()),
+        "mean": float(difference.mean()),
+        "ulp": float((difference / unit).max()),
+    }
+
+
+def full_quality(model: Model, pairs: Sequence[tuple[Frame, Frame]]) -> list[tuple[float, float]]:
+    """Return PSNR and SSIM of the full network's pictures, by the reference."""
+    return [_scores(model, denoise(model, noisy), clean) for noisy, clean in pairs]
+
+
+def quality(
+    model: Model,
+    pairs: Sequence[tuple[Frame, Frame]],
+    full: Sequence[tuple[float, float]],
+    picture_of: Callable[[Frame], NDArray[Any]],
+) -> dict[str, float]:
+    """Return the mean PSNR (dB) and SSIM over the pairs, and what is lost of the full network's."""
+    scores = [_scores(model, picture_of(noisy), clean) for noisy, clean in pairs]
+    count = len(scores)
+    psnr, ssim = (math.fsum(score[k] for score in scores) / count for k in (0, 1))
+    full_psnr, full_ssim = (math.fsum(score[k] for score in full) / count for k in (0, 1))
+    return {"psnr_db": psnr, "ssim": ssim, "psnr_loss_db": full_psnr - psnr, "ssim_loss": full_ssim - ssim}
+
+
+def _scores(model: Model, picture: NDArray[Any], clean: Frame) -> tuple[float, float]:
+    """Return PSNR and SSIM of a display-encoded picture (H, W, 3); SSIM is NaN where a frame is too small."""
+    target = dataset.target_image(clean, model.normalization)
+    small = min(target.shape[:2]) < metrics.WINDOW_SIZE_PX
+    return metrics.psnr(picture, target), math.nan if small else metrics.ssim(picture, target)

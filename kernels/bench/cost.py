@@ -1,0 +1,103 @@
+"""What a way to denoise should cost: a time predicted from operations, sines and bytes.
+
+1. A way is a list of stages that run one after another: a kernel, or an operation of a library that reads and
+   writes whole pictures [`Stage`].
+2. A stage takes as long as its arithmetic or its memory, whichever is longer: S. Williams, A. Waterman and
+   D. Patterson, "Roofline: An Insightful Visual Performance Model for Multicore Architectures",
+   Communications of the ACM 52(4), 2009, figure 1 [`predicted_seconds`]
+
+       pixels * max(pixel + products / products_per_s + sines / sines_per_s, bytes / bytes_per_s)
+
+3. The rates are measured [rates.py]: on programs that are not those whose time is predicted.
+
+Departure from the source: sines are counted apart from products, because one takes as long as many of those.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...compiler.artifact import Artifact
+from ...compiler.emit import kernel_gather, output_channels
+from ...compiler.ir import Program
+from ...refimpl.dataset import channels_of
+from ...refimpl.denoise import Model
+
+FLOAT_BYTES = 4
+"""Bytes of a float32."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What one pass over a picture does for a pixel: products with their sums, sines, bytes of memory."""
+
+    products: float
+    sines: float
+    bytes: float
+
+
+@dataclass(frozen=True)
+class Rates:
+    """What a device does in a second, and the seconds that a pixel takes besides."""
+
+    products_per_s: float
+    sines_per_s: float
+    bytes_per_s: float
+    pixel_s: float = 0.0
+
+
+def predicted_seconds(stages: Sequence[Stage], rates: Rates, pixels: int) -> float | None:
+    """Return the time of a picture; None without stages, or where a rate is not positive."""
+    known = (rates.products_per_s, rates.sines_per_s, rates.bytes_per_s)
+    if not stages or not all(rate > 0.0 for rate in known):
+        return None
+    return pixels * sum(
+        max(
+            rates.pixel_s + stage.products / rates.products_per_s + stage.sines / rates.sines_per_s,
+            stage.bytes / rates.bytes_per_s,
+        )
+        for stage in stages
+    )
+
+
+def products_of(program: Program) -> int:
+    """Return the multiplications of a pixel that belong to matrices."""
+    affine = [node for node in program.nodes if node.op == "affine"]
+    return sum(program.parameters[str(node["weight"])].size for node in affine)
+
+
+def sines_of(program: Program) -> int:
+    """Return the sines of a pixel, in a program whose sines are single nodes."""
+    return sum(math.prod(node.type.shape) for node in program.nodes if node.op == "sin")
+
+
+def fused(artifact: Artifact, sines: int) -> tuple[Stage, ...]:
+    """Return the stages of compiled kernels: each reads its images and writes one; the last has the sines."""
+    stages = []
+    for kernel in artifact.kernels:
+        channels = kernel_gather(kernel.program).channels + output_channels(kernel.program)
+        of_kernel = sines if kernel is artifact else 0
+        stages.append(Stage(products_of(kernel.program), of_kernel, FLOAT_BYTES * channels))
+    return tuple(stages)
+
+
+def layered(model: Model, fuses: bool) -> tuple[Stage, ...]:
+    """Return the stages of a library that runs a network layer by layer, each reading and writing memory.
+
+    `fuses`: factor and sine are one pass over the numbers of a layer, and not two.
+    """
+    widths, stages = model.siren.widths, []
+    read = channels_of(model.features)
+    for layer, weight in enumerate(model.siren.weights):
+        neurons = widths[layer + 1]
+        stages.append(Stage(weight.size, 0, FLOAT_BYTES * (read + neurons)))
+        elementwise = Stage(0, 0, FLOAT_BYTES * 2 * neurons)
+        if layer < len(model.siren.weights) - 1:
+            stages += [] if fuses else [elementwise]
+            stages.append(Stage(0, neurons, elementwise.bytes))
+        else:
+            stages.append(elementwise)
+        read = neurons
+    return tuple(stages)

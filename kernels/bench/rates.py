@@ -1,0 +1,212 @@
+"""What the machine and each executor do in a second, by measurements that take no answer into account.
+
+1. The machine: a product of two square matrices by NumPy's BLAS (`sgemm`), a triad a = b + s c of arrays
+   that no cache holds, counted as three passes as in J. McCalpin's STREAM ("Memory Bandwidth and Machine
+   Balance in Current High Performance Computers", IEEE TCCA Newsletter, 1995), and NumPy's sine; the last two
+   in a thread for each core [`machine_ways`, `limits_of`].
+2. An executor with a schedule: three small programs of its own [`probes`]: a window of 2 x 2, one of 6 x 6,
+   and the first one with a chain of sines, on a picture so large that they take milliseconds [`probed`].
+   Differences of their times give products and sines a second, and what is left of the first one's time is
+   that of a pixel [`rates_of`].
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.artifact import Artifact
+from ...compiler.compile import compile_program
+from ...compiler.ir import Gather, Image, Program, Type
+from ...compiler.trace import trace
+from ...refimpl import rng
+from ...refimpl.dataset import Window
+from ..executor import Executor, Images
+from ..measure import Times, in_turns
+from .cost import FLOAT_BYTES, Rates, products_of, sines_of
+
+MATRIX = 4096
+"""Rows and columns of the matrices whose product is the machine's rate: larger ones are hardly faster."""
+
+TRIAD_NUMBERS = 2**25
+"""Numbers of each array of the triad: three times 128 MiB, more than caches hold."""
+
+BLOCK_NUMBERS = 2**14
+"""Numbers of a block of 64 KiB: the triad's first half stays in a core's cache until the second."""
+
+SINE_BLOCKS = 256
+"""Blocks of which NumPy's sine is taken: 4 million numbers."""
+
+PROBE_PX = (128, 256, 512)
+"""Widths and heights of the pictures on which small programs run: the first that takes long enough."""
+
+PROBE_S = 4e-3
+"""What is long enough for the least of them: far above the time that starts a kernel."""
+
+PROBE_NEURONS = 32
+"""Numbers of the small programs' only layer: the paper's."""
+
+PROBE_SINES = 8
+"""Sines one after another in the third program."""
+
+SGEMM, TRIAD, SINE = "sgemm", "triad", "sine"
+"""Names of the machine's measurements."""
+
+ROUNDS = 3
+"""Times that a small program runs; the median counts."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The machine: operations (two a product), bytes and sines a second."""
+
+    flops_per_s: float
+    bytes_per_s: float
+    sines_per_s: float
+
+    @property
+    def rates(self) -> Rates:
+        """Return what a library could do at best: the arithmetic of sgemm, NumPy's sine, no other cost."""
+        return Rates(self.flops_per_s / 2, self.sines_per_s, self.bytes_per_s)
+
+
+def cores() -> int:
+    """Return the cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def machine_ways(scale: int = 1) -> Mapping[str, Callable[[], None]]:
+    """Return the machine's measurements by name; a `scale` of 2 halves each length."""
+    side, count = MATRIX // scale, TRIAD_NUMBERS // scale
+    left, product = np.full((side, side), 0.5, np.float32), np.empty((side, side), np.float32)
+    b, c, a = (np.full(count, value, np.float32) for value in (1.0, 2.0, 0.0))
+    # Arguments between -3 and 3, as those of hidden layers are.
+    angles = np.linspace(-3.0, 3.0, BLOCK_NUMBERS, dtype=np.float32)
+
+    def sgemm() -> None:
+        np.matmul(left, left, out=product)
+
+    def triad(block: slice) -> None:
+        np.multiply(c[block], np.float32(3.0), out=a[block])
+        np.add(a[block], b[block], out=a[block])
+
+    def sine(block: slice) -> None:
+        np.sin(angles, out=a[block])
+
+    starts = range(0, count, BLOCK_NUMBERS)
+    blocks = [slice(start, start + BLOCK_NUMBERS) for start in starts]
+    return {
+        SGEMM: sgemm,
+        TRIAD: partial(_in_threads, triad, blocks),
+        SINE: partial(_in_threads, sine, blocks[:SINE_BLOCKS]),
+    }
+
+
+def limits_of(times: Mapping[str, Times], scale: int = 1) -> Limits:
+    """Return the machine's rates from the times of [`machine_ways`]."""
+    side, count = MATRIX // scale, TRIAD_NUMBERS // scale
+    sines = min(SINE_BLOCKS * BLOCK_NUMBERS, count)
+    return Limits(
+        2.0 * side**3 / times[SGEMM].median,
+        3.0 * FLOAT_BYTES * count / times[TRIAD].median,
+        sines / times[SINE].median,
+    )
+
+
+def _in_threads(work: Callable[[slice], None], blocks: list[slice]) -> None:
+    """Do all blocks, a part of them in each thread; NumPy lets other threads run meanwhile."""
+    count = cores()
+    share = math.ceil(len(blocks) / count)
+
+    def part(first: int) -> None:
+        for block in blocks[first : first + share]:
+            work(block)
+
+    with ThreadPoolExecutor(count) as pool:
+        list(pool.map(part, range(0, len(blocks), share)))
+
+
+# ---- executors --------------------------------------------------------------------------------------------
+
+
+def probes() -> Mapping[str, Program]:
+    """Return the three small programs by name."""
+    return {"small": _probe(2, 0), "window": _probe(6, 0), "sines": _probe(2, PROBE_SINES)}
+
+
+def probe_images(size: int) -> Images:
+    """Return the two images (size, size, 3) that the small programs read."""
+    ramp = np.linspace(0.0, 1.0, size * size * 3, dtype=np.float32).reshape(size, size, 3)
+    return {"a": ramp, "b": ramp[::-1].copy()}
+
+
+def probed(executor: Executor, schedule: str, pause_s: float) -> tuple[dict[str, Times], int]:
+    """Return the times of the small programs by name, and the size of the picture on which they ran."""
+    made = {name: compile_program(p, executor.name, "ieee", schedule) for name, p in probes().items()}
+    for size in PROBE_PX:
+        images = probe_images(size)
+        for artifact in made.values():
+            executor.build(artifact, (size, size))
+        ways = {name: partial(_alone, executor, artifact, images) for name, artifact in made.items()}
+        least = min(ways["small"](), ways["small"]())
+        if least >= PROBE_S or size == PROBE_PX[-1]:
+            break
+    return in_turns(ways, ROUNDS, warm=1, pause_s=pause_s), size
+
+
+def rates_of(times: Mapping[str, Times], pixels: int, bytes_per_s: float) -> Rates:
+    """Return the rates behind the times of [`probes`]; products whose time drowns in noise have rate NaN."""
+    programs, per_pixel = probes(), {name: found.median / pixels for name, found in times.items()}
+    more = products_of(programs["window"]) - products_of(programs["small"])
+    products = _rate(more, per_pixel["window"] - per_pixel["small"])
+    # Sines whose time drowns in noise cost nothing that could be seen.
+    waited = max(0.0, per_pixel["sines"] - per_pixel["small"])
+    sines = sines_of(programs["sines"]) / waited if waited > 0.0 else math.inf
+    rest = per_pixel["small"] - products_of(programs["small"]) / products
+    return Rates(products, sines, bytes_per_s, max(0.0, rest))
+
+
+def _alone(executor: Executor, artifact: Artifact, images: Images) -> float:
+    """Return the seconds of a built kernel: without copies, where the executor can tell."""
+    alone = getattr(executor, "kernel_seconds", None)
+    if alone:
+        return float(alone(artifact, images))
+    start = time.perf_counter()
+    executor.run(artifact, images)
+    return time.perf_counter() - start
+
+
+def _rate(count: float, seconds: float) -> float:
+    """Return count / seconds; NaN where the difference of two times is not positive."""
+    return count / seconds if seconds > 0.0 else math.nan
+
+
+def _probe(window: int, sines: int) -> Program:
+    """Trace a layer of a window, a chain of sines, and three sums."""
+    gather = Gather(Window(window), (Image("a", 3, 0.0, 1.0), Image("b", 3, 0.0, 1.0)))
+    first = _weights(1, (PROBE_NEURONS, gather.n_inputs)) / np.float32(gather.n_inputs)
+    last = _weights(2, (3, PROBE_NEURONS)) / np.float32(PROBE_NEURONS)
+
+    def pixel(x: Any) -> Any:
+        x = np.matmul(x, first.T)
+        for _ in range(sines):
+            x = np.sin(x)
+        return np.matmul(x, last.T)
+
+    return trace(pixel, {"window": Type(shape=(gather.n_inputs,))}, gather)
+
+
+def _weights(stream: int, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Return numbers (D_out, D_in) in [0, 1)."""
+    pixels = rng.counter(np.arange(math.prod(shape)))
+    found: NDArray[np.float32] = rng.uniforms(rng.counter(stream), pixels, rng.counter(0), rng.counter(0))[0]
+    return found.reshape(shape)

@@ -1,0 +1,94 @@
+"""What is denoised and by which network: a model and a frame of its features, of any size.
+
+Without a model it is the paper's network with its initial weights, and without a data set the frame is noise.
+A frame is laid out again and again until it fills the picture: times do not depend on what it shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...refimpl import dataset, rng, siren
+from ...refimpl.denoise import Model
+from ...refimpl.errors import InputError
+from ...refimpl.frame import LAYERS, Frame
+from ..denoise_on import images_of
+from ..executor import Images
+
+HIDDEN = (32, 32, 32, 32, 3)
+"""The paper's layers after the window."""
+
+OMEGA_0 = 3.0
+"""omega_0 of the network without a model: that of the presets."""
+
+FEATURES = ("color", "normal")
+"""What the paper's network sees."""
+
+NOISE_PX = 256
+"""Width and height of the noise that is repeated."""
+
+LARGEST_PX = 8192
+"""Largest width and height of a picture: 6 channels of it are 1.6 GB."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """A frame, and the encoded feature images (H, W, C) that the model reads of it."""
+
+    frame: Frame
+    images: Images
+
+    @property
+    def pixels(self) -> int:
+        """Return the number of pixels."""
+        return self.frame.height * self.frame.width
+
+
+def paper_model(features: Sequence[str] = FEATURES) -> Model:
+    """Return the paper's network for these features, with its initial weights."""
+    dataset.check_features(features)
+    window = dataset.Window(12, "clamp")
+    widths = [dataset.n_inputs(features, window), *HIDDEN]
+    network = siren.init(widths, OMEGA_0, OMEGA_0, seed=1, dtype=np.float32)
+    return Model(network, tuple(features), window, dataset.Normalization())
+
+
+def given(model: Model, frame: Frame) -> Given:
+    """Return a frame with the images that the model reads."""
+    return Given(frame, images_of(model, frame))
+
+
+def noise(size: int) -> Frame:
+    """Return all layers (size, size, C) of numbers in [0, 1), or in [-1, 1) for directions."""
+    check_size(size)
+    layers = {}
+    for number, layer in enumerate(LAYERS.values()):
+        side = min(size, NOISE_PX)
+        pixels = rng.counter(np.arange(side * side))
+        words = rng.uniforms(rng.counter(1), pixels, rng.counter(number), rng.counter(0))
+        values = np.stack(words[: layer.channels], axis=-1).reshape(side, side, -1)
+        signed = layer.name in ("normal", "direction", "position")
+        layers[layer.name] = 2 * values - 1 if signed else values
+    return filled(Frame(layers), size)
+
+
+def filled(frame: Frame, size: int) -> Frame:
+    """Return a frame (size, size) that repeats this one."""
+    check_size(size)
+    rows, columns = (-(-size // length) for length in (frame.height, frame.width))
+
+    def repeated(values: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.ascontiguousarray(np.tile(values, (rows, columns, 1))[:size, :size], np.float32)
+
+    return Frame({name: repeated(values) for name, values in frame.layers.items()}, frame.info)
+
+
+def check_size(size: int) -> None:
+    """Refuse a size of which no picture is made."""
+    if not 1 <= size <= LARGEST_PX:
+        rule = f"it must be from 1 to {LARGEST_PX} pixels"
+        raise InputError("size of the picture", size, rule, "for example --size 1024")

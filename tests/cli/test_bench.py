@@ -1,0 +1,293 @@
+"""Tests of `wamnet bench`: its files, its refusals, an interrupt, and the report's section."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from wamnet.cli import bench, bench_report, plots, report
+from wamnet.kernels.bench import contest, rates
+
+SPEC = Path(__file__).resolve().parents[2] / "spec" / "bench.md"
+"""The chapter that documents the keys of the result."""
+
+NAMES_AS_KEYS = ("machine", "versions", "rates", "limits_rounds_s")
+"""Keys whose entries are named after things: there is no list of them."""
+
+
+@pytest.fixture
+def here(samples, tmp_path, monkeypatch):
+    """Put a model into the working folder, and let the machine be measured on little."""
+    shutil.copy(samples / "model.safetensors", tmp_path / "model.safetensors")
+    monkeypatch.setattr(rates, "MATRIX", 32)
+    monkeypatch.setattr(rates, "TRIAD_NUMBERS", 2 * rates.BLOCK_NUMBERS)
+    monkeypatch.setattr(rates, "PROBE_PX", (8,))
+    monkeypatch.setattr(contest, "PROBE_PAUSE_S", 0.0)
+    return tmp_path
+
+
+@pytest.fixture
+def found(wamnet, here):
+    """Run the benchmark on the interpreter at two sizes, and return its data and what it said."""
+    outcome = wamnet(
+        *("bench", "model.safetensors", "--only", "numpy:*", "--repeats", 2),
+        *("--size", 16, "--sizes", "8,16", "-o", "made/speed"),
+    )  # fmt: skip
+    assert outcome.status == 0, outcome.err
+    return json.loads((here / "made/speed/bench.json").read_text()), outcome
+
+
+def test_the_result_is_written_in_all_forms(found, here) -> None:
+    data, outcome = found
+    assert data["schema"] == "wamnet-bench-1"
+    assert data["interrupted"] is False
+    assert data["command"].startswith("wamnet ")
+    assert [row["name"] for row in data["contenders"]] == ["numpy:plain"]
+    assert data["front"] == {"error": ["numpy:plain"], "quality": []}
+    assert [entry["size_px"] for entry in data["sizes"]] == [8]
+    folder = here / "made/speed"
+    assert sorted(p.name for p in folder.iterdir()) == [
+        "bench-error.png",
+        "bench-sizes.png",
+        "bench.json",
+        "bench.md",
+    ]
+    for path in folder.glob("*.png"):
+        assert path.read_bytes().startswith(b"\x89PNG")
+    text = (folder / "bench.md").read_text()
+    assert re.search(r"^\| numpy:plain \* \| [\d.,]+ \| [\d.,]+ - [\d.,]+ \| ", text, re.M)
+    assert re.search(r"^\| contender \| 8, ms \(predicted\) \| 16, ms \(predicted\) \|$", text, re.M)
+    assert "numpy:plain *" in outcome.out
+    assert "results: made/speed/bench.json, made/speed/bench.md" in outcome.out
+
+
+def keys_of(value, skip: bool = False) -> set[str]:
+    """Return all keys of nested data, but names of things."""
+    if isinstance(value, list):
+        return set().union(*(keys_of(item) for item in value), set())
+    if not isinstance(value, dict):
+        return set()
+    own = set() if skip else set(value)
+    return own.union(*(keys_of(item, key in NAMES_AS_KEYS) for key, item in value.items()))
+
+
+def test_every_key_is_documented(found) -> None:
+    documented = set(re.findall(r"`(\w+)`", SPEC.read_text()))
+    assert keys_of(found[0]) - documented == set()
+
+
+def test_predicted_stands_beside_measured(found) -> None:
+    """In the table and on the plot, where there is a prediction."""
+    data, _ = found
+    heads, _ = bench_report.speed_table(data)
+    assert heads[1:4] == ("ms", "range", "predicted, ms")
+    (point,) = bench_report.points(data, "error", "max")
+    assert point.predicted_ms == data["contenders"][0]["predicted_ms"]
+    assert point.ms == data["contenders"][0]["ms"]["median"]
+    assert point.is_kernel
+    assert point.on_front
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--size", "0"], "size of the picture is 0: it must be from 1 to 8192 pixels"),
+        (["--sizes", "64,9000"], "size of the picture is 9000"),
+        (["--sizes", "64 128"], "--sizes is 64 128: it must be whole numbers with commas"),
+        (["--repeats", "0"], "--repeats is 0: it must be from 1 to 1000"),
+        (["--budget", "nan"], "--budget is nan: it must be positive and finite"),
+        (["--budget", "0"], "--budget is 0.0: it must be positive and finite"),
+        (["--features", "color,colour"], "feature name is colour"),
+        (["model.safetensors", "--features", "color"], "--features is color: a model says itself"),
+        (["--dataset", "cubes"], "--dataset is cubes: the quality of a network that is not trained"),
+        (["model.safetensors", "--dataset", "cubes"], "data set is cubes: it has no manifest.json"),
+        (["none.safetensors"], "none.safetensors"),
+    ],
+)
+def test_bad_input_is_refused(refused, here, arguments, message) -> None:
+    assert message in refused("bench", *arguments, "--only", "numpy:plain")
+
+
+def test_unknown_contenders_are_refused(wamnet, here) -> None:
+    outcome = wamnet("bench", "--only", "numpy:plain,nobody", "-o", "speed")
+    assert outcome.status == 2
+    assert "name of a contender is nobody: it matches none of numpy:plain, opencl:plain" in outcome.err
+
+
+def test_an_output_that_is_a_file_is_refused(refused, here) -> None:
+    (here / "file").write_text("mine")
+    assert "output folder is file: it is a file" in refused("bench", "-o", "file")
+
+
+def test_without_matplotlib_nothing_is_measured(refused, here, monkeypatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
+    assert "pip install 'wamnet[report]'" in refused("bench")
+
+
+def test_an_interrupt_leaves_what_was_measured(wamnet, here, monkeypatch) -> None:
+    """After the first round: files are there, and say that the run was interrupted."""
+    monkeypatch.setattr(contest.Contest, "_judge", lambda self: (_ for _ in ()).throw(KeyboardInterrupt))
+    outcome = wamnet(
+        "bench", "model.safetensors", "--only", "numpy:plain", "--repeats", 1, "--size", 8, "-o", "speed"
+    )
+    assert outcome.status == 130
+    assert "wamnet: what was measured until then is in speed" in outcome.err
+    data = json.loads((here / "speed/bench.json").read_text())
+    assert data["interrupted"] is True
+    assert len(data["contenders"][0]["ms"]["rounds"]) == 1
+    assert "interrupted: this is what was measured until then" in (here / "speed/bench.md").read_text()
+
+
+def test_absent_peers_are_named(wamnet, here, monkeypatch) -> None:
+    """In the result, in its text, and on the terminal, with the extra that brings them."""
+    monkeypatch.setattr("wamnet.kernels.bench.contender.find_spec", lambda name: None)
+    only = "numpy:plain,torch*,oidn*,onnx*,tinygrad"
+    outcome = wamnet("bench", "model.safetensors", "--only", only, "--size", 8, "--repeats", 1, "-o", "s")
+    assert outcome.status == 0
+    lines = outcome.out.splitlines()
+    for name, package in (("torch", "torch"), ("oidn:fast", "pyoidn"), ("tinygrad", "tinygrad, pyopencl")):
+        line = f"{name}: missing, not installed: {package}; pip install 'wamnet[peers]'"
+        assert line in lines
+        assert f"* {line}" in (here / "s/bench.md").read_text().splitlines()
+
+
+def test_quality_comes_from_a_data_set(wamnet, here) -> None:
+    """The kernel that is the network loses less than rounding can: 1e-4 dB."""
+    made = wamnet("dataset", "cornell", "--frames", 1, "--test", 1, "--size", 16, "--spp", 4, "-o", "set")
+    assert made.status == 0, made.err
+    outcome = wamnet(
+        *("bench", "model.safetensors", "--dataset", "set", "--only", "numpy:plain,opencl:*:rank8"),
+        *("--executor", "numpy", "--size", 16, "--repeats", 1, "-o", "speed"),
+    )
+    assert outcome.status == 0, outcome.err
+    data = json.loads((here / "speed/bench.json").read_text())
+    assert data["unseen_frames"] == 1
+    assert [row["name"] for row in data["contenders"]] == ["numpy:plain"]
+    quality = data["contenders"][0]["quality"]
+    # A picture that moves by d moves its PSNR by at most 20 log10(1 + d / rmse) dB: with d below 1e-6 and
+    # an rmse above 1e-1 (the network is not trained) that is less than 1e-4.
+    assert abs(quality["psnr_loss_db"]) <= 1e-4
+    assert (here / "speed/bench-quality.png").is_file()
+    assert "PSNR loss, dB" in (here / "speed/bench.md").read_text()
+
+
+# ---- texts and plots of planted data -----------------------------------------------------------------------
+
+
+def row(name: str, **facts) -> dict:
+    found = {"name": name, "text": name, "kind": "kernel", "state": "measured", "reason": "", "ms": None}
+    return {**found, "kernel_ms": None, "caches": "nothing", **facts}
+
+
+def planted(**facts) -> dict:
+    """Return a result of three contenders: two with times, one without."""
+    ms = {"median": 2.0, "min": 1.0, "max": 3.0, "spread": 1.0, "rounds": [1.0, 2.0, 3.0]}
+    rows = [
+        row("slow", ms={**ms, "median": 5000.0}, error={"max": 1e-7}, of_sgemm=1.5, kind="peer"),
+        row("fast", ms=ms, error={"max": 1e-3}, predicted_ms=4.0),
+        row("none", state="missing", reason="not here"),
+        row("zero", ms=ms, error={"max": None}),
+    ]
+    data = {
+        "contenders": rows,
+        "front": {"error": ["fast", "slow"], "quality": []},
+        "sizes": [{"size_px": 512, "contenders": [row("slow", reason="left out: so slow", state="skipped")]}],
+        "size_px": 256,
+        "network": {"widths": [4, 3], "features": ["color"]},
+        "machine": {"processor": "a <b>"},
+        "versions": {},
+        "limits": None,
+        "unseen_frames": 0,
+        "interrupted": False,
+        "command": "wamnet bench",
+    }
+    return {**data, **facts}
+
+
+def test_notes_say_loudly_what_was_left_out() -> None:
+    lines = bench_report.notes(planted(interrupted=True))
+    assert lines[:2] == ["none: missing, not here", "slow at 512: left out: so slow"]
+    assert lines[2].startswith("a kernel is faster than sgemm: ")
+    assert lines[3].startswith("interrupted")
+
+
+def test_rows_are_sorted_and_have_dashes() -> None:
+    _, rows = bench_report.speed_table(planted())
+    assert [cells[0] for cells in rows] == ["fast *", "zero", "slow *"]
+    assert rows[1][-1] == "–"
+    assert rows[2][1] == "5,000"
+
+
+@pytest.mark.parametrize("theme", [plots.LIGHT, plots.DARK, plots.PAPER])
+def test_plots_of_any_data(theme) -> None:
+    """Also of one point, of losses below 0, and of nothing."""
+    assert set(bench_report.draw(planted(), theme)) == {"error", "sizes"}
+    assert bench_report.draw(planted(contenders=[], sizes=[]), theme) == {}
+    quality = planted(
+        contenders=[row("a", ms={"median": 2.0}, quality={"psnr_loss_db": -0.25})],
+        front={"error": [], "quality": ["a"]},
+        sizes=[],
+    )
+    assert set(bench_report.draw(quality, theme)) == {"quality"}
+
+
+def page(**facts) -> str:
+    """Return the demo's report of as little as it takes."""
+    picture = dict.fromkeys(report.PICTURES, "data:,")
+    scores = {"metrics": {"PSNR": 1.0, "SSIM": 1.0}, "notes": {}}
+    data = {
+        "schema": "",
+        "command": "wamnet demo",
+        "plan": {
+            "scene": "cornell",
+            "renderer": "numpy",
+            "trainer": "numpy",
+            "size_px": 8,
+            "reference_spp": 4,
+        },
+        "model": {"features": ["color"], "window": {"size": 2}, "parameters": 7, "widths": [4, 3]},
+        "unseen": [{"time_s": 0.5, "input": scores, "denoised": scores}],
+        "train_times_s": [0.0],
+        "denoised_by": "numpy",
+        "runs": [],
+        "training": {"steps": 1, "seconds_per_step": None, "history": [], "recipe": {}},
+        "seconds": {"rendering": 1.0},
+        "machine": {},
+        "versions": {},
+        **facts,
+    }
+    maps = {name: {"light": "data:,", "dark": "data:,"} for name in ("input", "denoised")}
+    drawn = {"errors": [maps], "training": {"light": "data:,", "dark": "data:,"}}
+    return report.page(data, [picture], drawn)
+
+
+def test_the_report_has_a_section_when_it_is_given_a_result() -> None:
+    """With plots inside the file, names as they are, and nothing without a result."""
+    text = page(bench=planted())
+    assert "<h2>Speed against error</h2>" in text
+    assert "<th>fast *</th>" in text
+    assert "none: missing, not here" in text
+    assert text.count("data:image/png;base64,") == 4
+    assert "Speed against error" not in page()
+
+
+def test_the_report_writes_the_result_into_its_data(monkeypatch, tmp_path) -> None:
+    """`report.write(..., bench=...)` puts it into both files."""
+    given = {}
+    monkeypatch.setattr(report, "facts", lambda *_: {"schema": "x"})
+    monkeypatch.setattr(report, "draw", lambda results: {})
+    monkeypatch.setattr(report, "page", lambda data, *_: given.update(data) or "page")
+    results = type("Results", (), {"unseen": ()})()
+    report.write(tmp_path, None, results, "wamnet demo", bench=planted())
+    assert json.loads((tmp_path / "report.json").read_text())["bench"]["size_px"] == 256
+    assert given["bench"]["size_px"] == 256
+
+
+def test_a_reduced_run_is_reduced() -> None:
+    """Smaller, fewer rounds, and a budget for each: what it takes by default."""
+    assert bench.QUICK.keys() == bench.USUAL.keys()
+    assert all(bench.QUICK[key] < bench.USUAL[key] for key in bench.QUICK)

@@ -1,0 +1,323 @@
+"""Transforms, sums from spectra, and their bound: against numpy.fft, direct sums, and planted faults."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.compiler import bounds, emit_fourier, fourier, profiles
+from wamnet.compiler.compile import analysed, compile_program, round_up, sine_contract
+from wamnet.compiler.emit_tiled import LARGEST_PRIVATE
+from wamnet.compiler.ir import Gather, Image, Type
+from wamnet.compiler.opencl_fourier import OPENCL_FOURIER, fourier_schedule
+from wamnet.compiler.passes import pipeline
+from wamnet.compiler.trace import trace
+from wamnet.refimpl import dataset, siren
+from wamnet.refimpl.denoise import denoise_pixel
+from wamnet.refimpl.errors import CompileError
+
+POWERS = (1, 2, 4, 8, 16, 32, 64)
+"""Lengths of transforms."""
+
+(FFT32,) = OPENCL_FOURIER
+CONTRACT = sine_contract("ieee", "opencl")
+
+
+def pairs_of(numbers):
+    """Return (real, imaginary) of each complex number of an array (n, ...)."""
+    return list(zip(numbers.real, numbers.imag, strict=True))
+
+
+def complexes(pairs):
+    return np.array([real + 1j * imaginary for real, imaginary in pairs])
+
+
+def exact(points, sign):
+    """Return the transform by numpy.fft, in float64."""
+    numbers = np.asarray(points, np.complex128)
+    return np.fft.fft(numbers, axis=0) if sign < 0 else np.fft.ifft(numbers, axis=0) * len(points)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("n", POWERS)
+def test_a_transform_is_numpy_s(n, sign) -> None:
+    random = np.random.default_rng(n)
+    points = random.normal(size=(n, 7)) + 1j * random.normal(size=(n, 7))
+    found = complexes(fourier.transform(pairs_of(points), sign))
+    # Both are off by less than 20 u of float64 of the norm, which is sqrt(n) |x|.
+    assert np.abs(found - exact(points, sign)).max() <= 40 * 2.0**-53 * np.sqrt(n) * np.linalg.norm(points)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("n", POWERS[1:])
+def test_a_transform_in_float32_is_within_its_bound(n, sign) -> None:
+    random = np.random.default_rng(n)
+    points = (random.normal(size=(n, 500)) + 1j * random.normal(size=(n, 500))).astype(np.complex64)
+    computed = complexes(fourier.transform(pairs_of(points), sign)).astype(np.complex128)
+    wanted = exact(points, sign)
+    error, norm = (np.linalg.norm(a, axis=0) for a in (computed - wanted, wanted))
+    found = fourier.of_transform(n)
+    assert (error <= found.relative * norm + found.absolute).all()
+    # Not far from it either: the largest of many is within a factor of 40 of what no input exceeds.
+    assert error.max() >= found.relative * norm[error.argmax()] / 40
+
+
+def test_the_bound_of_underflow_is_that_of_flushed_numbers() -> None:
+    """Numbers near 2^-126, in an arithmetic that flushes what is smaller: the absolute part is needed."""
+    random = np.random.default_rng(3)
+    points = ((random.normal(size=32) + 1j * random.normal(size=32)) * 2.0**-126).astype(np.complex64)
+    flushed = np.where(np.abs(points.real) < 2.0**-126, 0, points.real) + 1j * np.where(
+        np.abs(points.imag) < 2.0**-126, 0, points.imag
+    )
+    error = np.linalg.norm(exact(flushed, -1) - exact(points, -1))
+    found = fourier.of_transform(32)
+    assert found.relative * np.linalg.norm(exact(points, -1)) < error <= found.absolute
+
+
+def test_a_wrong_twiddle_factor_breaks_the_bound(monkeypatch) -> None:
+    """A factor that is off by 100 u, and a wave of which a quarter passes through it."""
+    turned = fourier._turned
+
+    def wrong(z, k, n):
+        a, b = turned(z, k, n)
+        return (a * (1 + 100 * 2.0**-24), b) if (n, k) == (32, 3) else (a, b)
+
+    wave = np.exp(-2j * np.pi * 3 * np.arange(32) / 32)
+    found, wanted = fourier.of_transform(32), exact(wave, 1)
+    right = np.linalg.norm(complexes(fourier.transform(pairs_of(wave), 1)) - wanted)
+    monkeypatch.setattr(fourier, "_turned", wrong)
+    error = np.linalg.norm(complexes(fourier.transform(pairs_of(wave), 1)) - wanted)
+    assert right < found.relative * np.linalg.norm(wanted) + found.absolute < error
+
+
+def direct(tile, matrix, size):
+    """Return the sums (out, out, D_out) of a tile's windows, in float64."""
+    views = np.lib.stride_tricks.sliding_window_view(tile.astype(np.float64), (size, size), axis=(0, 1))
+    taps = matrix.reshape(len(matrix), size, size, -1)
+    return np.einsum("yxcij,nijc->yxn", views, taps)
+
+
+def drawn(points, size, channels, neurons, seed):
+    """Return a tile in float32 and a matrix of float32 numbers in float64."""
+    random = np.random.default_rng(seed)
+    tile = random.uniform(-2, 2, (points, points, channels)).astype(np.float32)
+    matrix = random.uniform(-1, 1, (neurons, size * size * channels)).astype(np.float32)
+    return tile, matrix.astype(np.float64)
+
+
+@given(
+    points=st.sampled_from([4, 8, 16]),
+    size=st.integers(1, 4),
+    channels=st.integers(1, 5),
+    neurons=st.integers(1, 5),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_sums_from_spectra_are_the_direct_ones(points, size, channels, neurons, seed) -> None:
+    tile, matrix = drawn(points, size, channels, neurons, seed)
+    wanted = direct(tile, matrix, size)
+    # In float64: some hundreds of u of the norms.
+    whole = tile.astype(np.float64)
+    norms = np.linalg.norm(whole) * np.linalg.norm(matrix)
+    assert np.abs(fourier.sums(whole, matrix, size) - wanted).max() <= 500 * 2.0**-53 * norms
+    computed = fourier.sums(tile, matrix, size)
+    assert computed.dtype == np.float32
+    # `sums` pairs neurons at half of the layer, as many lanes do.
+    of = fourier.layer(matrix, size, points, -(-neurons // 2))
+    bound, _ = fourier.deviation(of, np.linalg.norm(tile.astype(np.float64)))
+    assert (np.abs(computed - wanted) <= bound).all()
+
+
+def test_the_bound_of_the_paper_s_layer_is_below_that_of_direct_sums() -> None:
+    """865 terms in any order, against transforms of 32 points."""
+    tile, matrix = drawn(32, 12, 6, 32, 1)
+    tile = np.sign(tile)
+    bound, _ = fourier.deviation(fourier.layer(matrix, 12, 32, 16), np.linalg.norm(tile.astype(np.float64)))
+    worst = bounds.gamma(865) * np.abs(matrix).sum(axis=1)
+    assert bound.max() < worst.min()
+    error = np.abs(fourier.sums(tile, matrix, 12) - direct(tile, matrix, 12)).max(axis=(0, 1))
+    assert (error <= bound).all()
+
+
+def test_tiles_of_one_neuron_more() -> None:
+    """The norms of a pair are of both neurons; the second one may be padding."""
+    matrix = np.array([[3.0], [4.0], [12.0]])
+    found = fourier.layer(matrix, 1, 8, 1)
+    assert found.norms == pytest.approx([7.0, 7.0, 12.0], rel=1e-9)
+    assert found.gains == pytest.approx([5.0, 5.0, 12.0], rel=1e-9)
+
+
+@pytest.mark.parametrize("border", dataset.BORDERS)
+@pytest.mark.parametrize("shape", [(1, 1), (3, 17), (13, 6)])
+def test_norms_are_those_of_the_tiles_that_kernels_gather(border, shape) -> None:
+    window, points = dataset.Window(4, border), 8
+    image = np.random.default_rng(1).normal(size=(*shape, 2))
+    out, found = points - window.size + 1, fourier.tile_norms(image, window, points)
+    # Pad by more than a tile on all sides, by the border rule.
+    mode = {"clamp": "edge", "zero": "constant"}[border]
+    padded = np.pad(image, ((20, 20), (20, 20), (0, 0)), mode=mode)
+    for y in range(shape[0]):
+        for x in range(shape[1]):
+            top, left = (20 + at // out * out - window.size // 2 for at in (y, x))
+            tile = padded[top : top + points, left : left + points]
+            assert found[y, x] == pytest.approx(np.linalg.norm(tile), rel=1e-12)
+
+
+# ---- the schedule ----------------------------------------------------------------------------------------
+
+
+def program(widths=(96, 20, 3), channels=6, size=4, border="clamp"):
+    network = siren.init(list(widths), 3.0, 3.0, seed=1, dtype=np.float32)
+    gather = Gather(dataset.Window(size, border), (Image("a", channels, -2.0, 2.0),))
+    kind = {"window": Type(shape=(gather.n_inputs,))}
+    return analysed(trace(lambda window: denoise_pixel(network, window), kind, gather))
+
+
+def paper(channels=6, size=12, hidden=32):
+    return program((size * size * channels, hidden, 32, 3), channels, size)
+
+
+def test_the_manifest_states_the_bound_of_spectra() -> None:
+    found, tiled = (compile_program(paper(), "opencl", "ieee", name) for name in ("fft32", "tile16"))
+    assert found.manifest["schedule"]["name"] == "fft32"
+    assert (found.manifest["schedule"]["pixels"], found.manifest["schedule"]["rows"]) == (42, 21)
+    errors = bounds.output_errors(paper(), FFT32.enclosures(paper(), CONTRACT))["color"]
+    assert found.manifest["bound"]["output"] == [round_up(error) for error in errors]
+    assert found.manifest["bound"] != tiled.manifest["bound"]
+    assert f"<= {max(found.manifest['bound']['output']):g} for all images" in found.source
+    assert "Global size: at least (ceil(width / 42), ceil(height / 21))" in found.source
+
+
+def test_rows_of_a_picture_have_the_bounds_of_the_picture() -> None:
+    image = {"a": np.random.default_rng(1).uniform(-2, 2, (45, 4, 6)).astype(np.float32)}
+    whole = FFT32.enclosures(paper(), CONTRACT, image)[-1].error
+    rows = [slice(top, top + 20) for top in (0, 20, 40)]
+    parts = [FFT32.enclosures(paper(), CONTRACT, image, some)[-1].error for some in rows]
+    assert whole.shape == (45, 4, 3)
+    assert np.array_equal(np.concatenate(parts), whole)
+
+
+REFUSED = {
+    "small": (lambda: paper(size=3), "tile16", r"the direct sum takes 108 operations .*, spectra 7\d"),
+    "large": (lambda: paper(size=32, channels=1), "tile16", "a window of 32 x 32 pixels in a tile of 32"),
+    "private": (
+        lambda: paper(hidden=100),
+        "tile16",
+        rf"its arrays take \d+ bytes a work item, of at most {LARGEST_PRIVATE}",
+    ),
+    "component": (
+        lambda: trace(
+            lambda x: x[..., 0] * 2.0,
+            {"window": Type(shape=(3,))},
+            Gather(dataset.Window(1), (Image("a", 3, 0.0, 1.0),)),
+        ),
+        "plain",
+        "%1 is component, which has no form on vectors",
+    ),
+}
+"""Programs that the schedule does not hold, what takes its place, and the reason."""
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_it_does_not_hold_is_tiled_with_the_reason(case) -> None:
+    make, instead, reason = REFUSED[case]
+    found = compile_program(make(), "opencl", "ieee", "fft32").manifest["schedule"]
+    assert (found["name"], found["asked"]) == (instead, "fft32")
+    assert re.match(reason, found["reason"])
+
+
+TWICE = np.linspace(-0.1, 0.1, 36**2, dtype=np.float32).reshape(36, 36)
+"""A matrix that fits a window of 6 x 6 pixels and a layer."""
+
+
+@pytest.mark.parametrize(
+    ("function", "reason"),
+    [
+        (lambda x: np.sin(x @ TWICE.T) @ TWICE.T, "a matrix is applied to the window and to a layer"),
+        (lambda x: x @ TWICE.T + x @ TWICE[::-1].T, "2 affine maps read the window, not one"),
+    ],
+)
+def test_two_readers_are_refused(function, reason) -> None:
+    gather = Gather(dataset.Window(6), (Image("a", 1, 0.0, 1.0),))
+    assert FFT32.refusal(trace(function, {"window": Type(shape=(36,))}, gather)).startswith(reason)
+
+
+def test_windows_along_one_axis_are_refused() -> None:
+    found = compile_program(paper(), "opencl", "ieee", "fft32", rank=4).manifest
+    assert found["schedule"]["reason"] == "a window of 12 x 1 pixels in a tile of 32"
+    assert found["schedule"]["name"] == "tile16"
+
+
+def test_sums_that_may_overflow_are_refused() -> None:
+    network = siren.init([150, 32, 3], 3.0, 3.0, seed=1, dtype=np.float32)
+    gather = Gather(dataset.Window(5), (Image("a", 6, -1e38, 1e38),))
+    traced = trace(lambda x: denoise_pixel(network, x), {"window": Type(shape=(150,))}, gather)
+    found = FFT32.enclosures(analysed(traced), CONTRACT)
+    index = next(i for i, node in enumerate(analysed(traced).nodes) if node.op == "affine")
+    assert found[index].overflows
+    assert np.isinf(found[index].error).all()
+    with pytest.raises(CompileError, match=r"affine \(layer 0, %\d\) may hold numbers up to"):
+        compile_program(traced, "opencl", "ieee", "fft32")
+
+
+def emitted(program):
+    return pipeline.run(program, profiles.profile_named("ieee").passes)
+
+
+def test_private_bytes_are_those_of_its_arrays() -> None:
+    """Read the sizes of all arrays in the source; those of sums in registers are not counted."""
+    made = emitted(paper())
+    source = FFT32.emit(made, [], True)
+    sizes = dict(re.findall(r"#define ([A-Z_]+) (\d+)", source))
+    sizes |= {"OUT": "21", "STRIDE": "66"}
+    body = source[source.index("__kernel") :]
+    found = re.findall(r"vector (\w+)\[([^]]+)\](?:\[([^]]+)\])?;", body)
+    kept = [f"({a}) * ({b or 1})" for name, a, b in found if name not in ("real", "imaginary", "sum")]
+    numbers = [eval(re.sub("[A-Z_]+", lambda word: sizes[word[0]], text), {}) for text in kept]
+    # Row, rows, column, mirror, spectra, product, back, sums, and an array between two layers each.
+    assert len(numbers) == 8 + 6
+    assert FFT32.private_bytes(made) == 64 * sum(numbers)
+
+
+def test_golden_spectra(golden) -> None:
+    """Tiles of 4 x 4 points, vectors of 4 numbers, blocks of 2 pixels."""
+    network = siren.init([12, 5, 2], 3.0, 3.0, seed=1, dtype=np.float32)
+    gather = Gather(dataset.Window(2, "zero"), (Image("i0", 2, -1.0, 1.0), Image("i1", 1, -1.0, 1.0)))
+    first, last = network.weights
+    function = lambda x: np.sin(x @ first.T) @ last.T  # noqa: E731
+    traced = trace(function, {"window": Type(shape=(12,))}, gather)
+    tiny = fourier_schedule("fft4", 4, 1, lanes=4, pixels=2)
+    golden("fft4.denoise.cl", tiny.emit(analysed(traced), ["a tiny kernel"], True))
+
+
+@given(channels=st.integers(1, 7), size=st.integers(1, 5), neurons=st.integers(1, 40))
+def test_every_spectrum_lies_where_the_kernel_reads_it(channels, size, neurons) -> None:
+    """Read the array as the kernel's loops do."""
+    made = emitted(program((size * size * channels, neurons, 3), channels, size))
+    slots, packed, s = FFT32.layout(made), FFT32.pack(made), FFT32.sizes(made)
+    assert all(slot.offset % FFT32.lanes == 0 for slot in slots.values())
+    slot = next(slot for slot in slots.values() if len(slot.shape) == 7)
+    stored = packed[slot.offset :][: np.prod(slot.shape)].reshape(slot.shape)
+    matrix = made.parameters[slot.name].astype(np.float64)
+    spectra = fourier.spectrum(matrix, size, 32).astype(np.complex64)
+    for n in range(neurons):
+        q, lane = divmod(n, 32)
+        for c in range(channels):
+            half, pair = divmod(c, s.pairs)
+            found = stored[:, q, :, pair, half, :, lane]  # column, row of frequencies, part
+            assert np.array_equal(found[..., 0] + 1j * found[..., 1], spectra[n, :, :17, c].T)
+    half = spectra[:, :, :17]
+    assert np.count_nonzero(stored) == np.count_nonzero(half.real) + np.count_nonzero(half.imag)
+
+
+def test_operations_are_those_of_the_text() -> None:
+    """The count by which a schedule is chosen: 456 sums and products of a transform of 32 numbers."""
+    lines = emit_fourier.codelet(FFT32.dialect, "f", 32, 32, 1)
+    computed = [line for line in lines if "vector t" in line and "from[" not in line]
+    assert sum(line.count(f" {sign} ") for line in computed for sign in "+-*") == 456
+    one, spectra = FFT32.operations(emitted(paper()))
+    assert one == 864 * 2
+    assert spectra == (17 * 32 * 3 * 16 * 2 + 456 * (66 + 2 * (32 + 21))) / (2 * 21**2)

@@ -1,0 +1,370 @@
+"""The run: contenders compute what they should, and none that fails or dawdles spoils it for others."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from wamnet.kernels.bench import accuracy, contenders, contest, rates, workload
+from wamnet.kernels.bench.contender import FULL, Contender, Opened, Tools, Variant
+from wamnet.kernels.bench.cost import Stage
+from wamnet.refimpl import siren
+from wamnet.refimpl.dataset import Normalization, Window
+from wamnet.refimpl.denoise import Model, denoise
+from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
+from wamnet.refimpl.frame import Frame
+
+SIZE = 20
+"""Width and height of pictures: more than a window, less than a crop."""
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    """Return a network of colour and normal in a window of 4 x 4, with outputs around 0.5."""
+    network = siren.init((4 * 4 * 6, 8, 3), 2.0, 2.0, seed=5, dtype=np.float32)
+    return Model(network, ("color", "normal"), Window(4, "clamp"), Normalization())
+
+
+@pytest.fixture(autouse=True)
+def small_machine(monkeypatch) -> None:
+    """Let the machine be measured on little."""
+    monkeypatch.setattr(rates, "MATRIX", 32)
+    monkeypatch.setattr(rates, "TRIAD_NUMBERS", 2 * rates.BLOCK_NUMBERS)
+    monkeypatch.setattr(rates, "PROBE_PX", (8,))
+
+
+def fake(name: str, open_it: Callable[..., Opened], **facts) -> Contender:
+    return Contender(name, "a fake", open_it, **{"packages": (), **facts})
+
+
+def by_reference(model: Model, **facts) -> Opened:
+    """Return a contender that is the reference."""
+    return Opened(lambda given: denoise(model, given.frame), "here", **facts)
+
+
+def run(model: Model, taking_part, **facts) -> dict:
+    request = contest.Request(model, SIZE, **{"repeats": 2, "pause_s": 0.0, **facts})
+    with Tools() as tools:
+        found = contest.Contest(request, taking_part, tools)
+        found.run()
+        data = found.as_data()
+    json.dumps(data, allow_nan=False)
+    return data
+
+
+def rows(data: dict) -> dict[str, dict]:
+    return {row["name"]: row for row in data["contenders"]}
+
+
+def names_on(executor) -> list[Contender]:
+    """Return the plain kernel of an executor, others of OpenCL, and one of a rank."""
+    found = [contenders.kernel(executor.name, "plain")]
+    if executor.name == "opencl":
+        found += [contenders.kernel("opencl", name) for name in ("vector16", "tile4")]
+    return [*found, contenders.kernel(executor.name, "plain", Variant("rank3", "cut", rank=3))]
+
+
+def test_kernels_are_within_their_bound(executor, model) -> None:
+    """Rounding is bounded for all; what a rank leaves out counts in the error, and not in the rounding."""
+    found = rows(run(model, names_on(executor)))
+    for row in found.values():
+        assert row["state"] == "measured", row["reason"]
+        assert row["rounding"]["max"] <= row["rounding"]["bound"]
+        assert len(row["ms"]["rounds"]) == 2
+        if row["name"].endswith("rank3"):
+            assert row["error"]["max"] > row["rounding"]["bound"]
+        else:
+            assert row["error"]["max"] == row["rounding"]["max"]
+
+
+def test_counts_are_those_of_the_network(model) -> None:
+    """96 x 8 + 8 x 3 products, 8 sines, 6 channels in and 3 out."""
+    row = rows(run(model, [contenders.kernel("numpy", "plain")]))["numpy:plain"]
+    assert (row["products"], row["sines"], row["bytes"]) == (96 * 8 + 24, 8, 4 * 9)
+    flops = 2 * row["products"] * SIZE * SIZE / (1e-3 * row["ms"]["median"])
+    # A quotient of the same numbers in another order: a few roundings of float64.
+    assert abs(row["gflops"] * 1e9 - flops) <= 2.0**-48 * flops
+
+
+def test_error_sees_a_wrong_pixel(model) -> None:
+    """A picture that is off by 1/4 in one channel of one pixel: largest 1/4, mean 1/4 over all numbers."""
+
+    def spoilt(tools, model, size):
+        def run(given):
+            picture = denoise(model, given.frame, np.float64)
+            picture[0, 0, 1] += 0.25
+            return picture
+
+        return Opened(run, "here")
+
+    error = rows(run(model, [fake("spoilt", spoilt)]))["spoilt"]["error"]
+    # The reference is the program's, whose weights are the same: sums in another order, in float64.
+    assert abs(error["max"] - 0.25) <= 1e-12
+    assert abs(error["mean"] - 0.25 / (3 * SIZE * SIZE)) <= 1e-12
+
+
+def test_error_that_is_no_number_is_on_no_front(model) -> None:
+    def broken(tools, model, size):
+        return Opened(lambda given: np.full((SIZE, SIZE, 3), np.nan), "here")
+
+    data = run(model, [fake("broken", broken), fake("good", lambda t, m, s: by_reference(m))])
+    assert rows(data)["broken"]["error"] == {"max": None, "mean": None, "ulp": None}
+    assert data["front"]["error"] == ["good"]
+
+
+def test_ulp_has_a_floor() -> None:
+    """At 1 a float32's unit is 2^-23; near black that of 2^-10, which is 2^-33."""
+    reference = np.array([1.0, 0.0])
+    assert accuracy.errors(np.array([1.0 + 2.0**-23, 0.0]), reference)["ulp"] == 1.0
+    assert accuracy.errors(np.array([1.0, 2.0**-33]), reference)["ulp"] == 1.0
+    assert math.isnan(accuracy.errors(reference * np.nan, reference)["max"])
+
+
+@pytest.mark.parametrize(
+    ("error", "state"),
+    [
+        (CompileError("no such kernel"), "failed"),
+        (InputError("size", 1, "too small", "grow"), "failed"),
+        (MemoryError(), "failed"),
+        (ExecutorUnavailable("nowhere"), "missing"),
+        (RuntimeError("its own way to fail"), "failed"),
+    ],
+)
+@pytest.mark.parametrize("late", [True, False])
+def test_one_that_fails_is_named_and_others_go_on(model, error, state, late) -> None:
+    """When it is opened, or in a round after good frames."""
+
+    def failing(tools, model, size):
+        if not late:
+            raise error
+        opened, frames = by_reference(model), iter(range(3))
+
+        def run(given):
+            if next(frames) == 2:
+                raise error
+            return opened.run(given)
+
+        return Opened(run, "here")
+
+    data = run(model, [fake("bad", failing), fake("good", lambda t, m, s: by_reference(m))], sizes=(8,))
+    assert rows(data)["bad"]["state"] == state
+    assert rows(data)["bad"]["reason"].endswith(str(error) or "MemoryError")
+    assert len(rows(data)["good"]["ms"]["rounds"]) == 2
+
+
+def test_a_bug_of_a_kernel_s_is_no_row(model) -> None:
+    """What is not one of this package's errors is a bug there, and ends the run."""
+
+    def failing(tools, model, size):
+        raise RuntimeError("a bug")
+
+    with pytest.raises(RuntimeError, match="a bug"):
+        run(model, [fake("kernel", failing, executor="numpy")])
+
+
+def test_an_interrupt_leaves_what_was_measured(model) -> None:
+    """In the second round: the first one's times stay, and who was not reached is pending."""
+    frames = iter(range(100))
+
+    def opened(tools, model, size):
+        reference = by_reference(model)
+
+        def run(given):
+            if next(frames) == 3:
+                raise KeyboardInterrupt
+            return reference.run(given)
+
+        return Opened(run, "here")
+
+    with Tools() as tools:
+        request = contest.Request(model, SIZE, repeats=3, pause_s=0.0, sizes=(8,))
+        found = contest.Contest(request, [fake("a", opened)], tools)
+        with pytest.raises(KeyboardInterrupt):
+            found.run()
+        row = rows(found.as_data())["a"]
+    assert row["state"] == "measured"
+    assert len(row["ms"]["rounds"]) == 1
+
+
+def test_an_interrupt_at_once_leaves_all_pending(model) -> None:
+    with Tools() as tools:
+        found = contest.Contest(contest.Request(model), [contenders.kernel("numpy", "plain")], tools)
+        data = found.as_data()
+    assert rows(data)["numpy:plain"]["state"] == "pending"
+    assert data["limits"] is None
+
+
+def test_what_is_predicted_to_dawdle_is_left_out_loudly(model) -> None:
+    """A kernel of 10^18 products a pixel is not run."""
+
+    def open_it(tools, model, size):
+        def never(given):
+            raise AssertionError
+
+        return Opened(never, "here", stages=(Stage(1e18, 0, 0),))
+
+    data = run(model, [fake("endless", open_it, executor="numpy")])
+    row = rows(data)["endless"]
+    assert row["state"] == "skipped"
+    assert row["reason"].startswith("left out: a frame would take ")
+    assert row["reason"].endswith("s by the cost model, more than --budget 30 s")
+
+
+def test_a_slow_one_has_one_frame(model) -> None:
+    """With a budget that no frame meets; other sizes are left out, with the reason."""
+    data = run(model, [fake("slow", lambda t, m, s: by_reference(m))], budget_s=1e-9, sizes=(40,))
+    row = rows(data)["slow"]
+    assert len(row["ms"]["rounds"]) == 1
+    assert row["reason"].startswith("one frame alone: it took ")
+    (grown,) = data["sizes"]
+    assert grown["size_px"] == 40
+    assert "by its time at another size, more than --budget 1e-09 s" in grown["contenders"][0]["reason"]
+    assert grown["contenders"][0]["ms"] is None
+
+
+def test_sizes_grow(model) -> None:
+    """Predictions grow with the pixels: four times as many at twice the size."""
+    data = run(model, [contenders.kernel("numpy", "plain")], sizes=(2 * SIZE, SIZE, 8))
+    assert [entry["size_px"] for entry in data["sizes"]] == [8, 2 * SIZE]
+    large, main = data["sizes"][1]["contenders"][0], data["contenders"][0]
+    assert large["state"] == "measured"
+    assert len(large["ms"]["rounds"]) == 2
+    assert large["predicted_ms"] == (main["predicted_ms"] and 4 * main["predicted_ms"])
+
+
+def test_quality_is_a_loss_against_the_full_network(model) -> None:
+    """The full network loses exactly 0; who returns the reference has no finite PSNR, and an SSIM of 1."""
+    frame = workload.noise(SIZE)
+    clean = Frame({"color": workload.noise(2 * SIZE)["color"][SIZE:, SIZE:]})
+
+    def perfect(tools, model, size):
+        return Opened(lambda given: clean["color"], "here", display=lambda c: _encoded(model, clean))
+
+    taking_part = [
+        fake("same", lambda t, m, s: by_reference(m)),
+        fake("perfect", perfect, variant=None),
+    ]
+    data = run(model, taking_part, pairs=((frame, clean), (frame, clean)))
+    same, best = rows(data)["same"]["quality"], rows(data)["perfect"]["quality"]
+    assert (same["psnr_loss_db"], same["ssim_loss"]) == (0.0, 0.0)
+    assert best["psnr_db"] is None
+    # SSIM of equal pictures is 1 up to the rounding of its means in float64.
+    assert abs(best["ssim"] - 1.0) <= 1e-9
+    assert "error" not in rows(data)["perfect"]
+    assert data["front"]["quality"] == ["same"]
+    assert data["unseen_frames"] == 2
+
+
+def _encoded(model: Model, clean: Frame) -> np.ndarray:
+    from wamnet.refimpl.dataset import target_image
+
+    return target_image(clean, model.normalization)
+
+
+def test_turns_are_taken(model) -> None:
+    """After a first and a second frame each, one frame of each in every round."""
+    order: list[str] = []
+
+    def noting(name):
+        def open_it(tools, model, size):
+            reference = by_reference(model)
+
+            def run(given):
+                order.append(name)
+                return reference.run(given)
+
+            return Opened(run, "here")
+
+        return fake(name, open_it)
+
+    run(model, [noting("a"), noting("b")])
+    assert order == ["a", "b", "a", "b", "a", "b", "a", "b"]
+
+
+# ---- the list of contenders --------------------------------------------------------------------------------
+
+
+def test_names_are_unique_and_schedules_complete() -> None:
+    from wamnet.compiler.compile import TARGETS
+
+    with Tools() as tools:
+        everybody = contenders.of_machine(tools, SIZE)
+        few = contenders.of_machine(tools, SIZE, quick=True)
+    names = [each.name for each in everybody]
+    assert len(set(names)) == len(names)
+    assert {f"{t.name}:{s.name}" for t in TARGETS.values() for s in t.schedules} <= set(names)
+    assert {each.name for each in few} < set(names)
+
+
+def test_an_executor_that_is_missing_is_in_the_list(monkeypatch, model) -> None:
+    """And says in its row what is missing."""
+
+    def missing(self, name):
+        raise ExecutorUnavailable(f"{name}: not here")
+
+    monkeypatch.setattr(Tools, "executor", missing)
+    with Tools() as tools:
+        everybody = contenders.of_machine(tools, SIZE)
+    data = run(model, contenders.chosen(everybody, ["opencl:plain"], []))
+    assert rows(data)["opencl:plain"]["reason"] == "opencl: not here"
+    assert rows(data)["opencl:plain"]["state"] == "missing"
+
+
+def test_choice_by_name_and_executor() -> None:
+    everybody = [contenders.kernel(n, "plain") for n in ("numpy", "opencl")]
+    everybody.append(fake("peer", lambda t, m, s: by_reference(m)))
+    names = lambda only, executors: [c.name for c in contenders.chosen(everybody, only, executors)]  # noqa: E731
+    assert names([], []) == ["numpy:plain", "opencl:plain", "peer"]
+    assert names(["open*", "peer"], []) == ["opencl:plain", "peer"]
+    assert names([], ["numpy"]) == ["numpy:plain", "peer"]
+    with pytest.raises(InputError, match=r"name of a contender is nobody: it matches none of numpy:plain"):
+        names(["nobody"], [])
+
+
+# ---- what is denoised --------------------------------------------------------------------------------------
+
+
+def test_the_paper_s_network() -> None:
+    assert workload.paper_model().siren.widths == (864, 32, 32, 32, 32, 3)
+    twelve = workload.paper_model(("color", "normal", "albedo", "position"))
+    assert twelve.siren.widths[0] == 1728
+
+
+@pytest.mark.parametrize("size", [1, 7, 300])
+def test_noise_fills_the_picture_within_the_ranges(size) -> None:
+    """It repeats every 256 pixels, and all features can be encoded."""
+    frame = workload.noise(size)
+    assert (frame.height, frame.width) == (size, size)
+    shown = workload.given(workload.paper_model(("color", "normal", "position")), frame)
+    assert shown.pixels == size * size
+    assert (frame["color"][256:, :10] == frame["color"][: max(0, size - 256), :10]).all()
+    assert float(frame["normal"].min()) < 0.0 or size < 7
+
+
+@pytest.mark.parametrize("size", [0, -1, 8193])
+def test_sizes_without_a_picture_are_refused(size) -> None:
+    with pytest.raises(InputError, match=r"size of the picture is -?\d+: it must be from 1 to 8192"):
+        workload.noise(size)
+
+
+def test_the_crop_is_the_picture_s_corner(monkeypatch, model) -> None:
+    """Its pixels see the border above and to the left, and pixels of the picture on the other sides."""
+    monkeypatch.setattr(accuracy, "CROP_PX", 9)
+    shown = workload.given(model, workload.noise(SIZE))
+    crop = accuracy.Crop(model, shown.images)
+    assert crop.full.shape == (9, 9, 3)
+    whole = denoise(model, shown.frame, np.float64)
+    # The same sums in another order, in float64.
+    assert np.abs(crop.full - crop.cut(whole)).max() <= 1e-12
+
+
+def test_variants_are_data() -> None:
+    """A kernel of a variant is named after it; the whole network is not."""
+    assert contenders.kernel("opencl", "tile16").name == "opencl:tile16"
+    variant = contenders.VARIANTS[0]
+    assert contenders.kernel("opencl", "tile16", variant).name == f"opencl:tile16:{variant.name}"
+    assert FULL not in contenders.VARIANTS

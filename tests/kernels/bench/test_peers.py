@@ -1,0 +1,111 @@
+"""Peers compute the network's function, within what float32 may do to it; those that are absent say so.
+
+A peer that is not installed is skipped, with the text that the benchmark prints.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wamnet.compiler import bounds
+from wamnet.compiler.compile import analysed
+from wamnet.compiler.lower import lower
+from wamnet.compiler.profiles import SineContract
+from wamnet.kernels.bench import contenders, workload
+from wamnet.kernels.bench.contender import Tools
+from wamnet.refimpl import dataset, siren
+from wamnet.refimpl.dataset import Normalization, Window
+from wamnet.refimpl.denoise import Model, denoise
+from wamnet.refimpl.errors import ExecutorUnavailable
+from wamnet.refimpl.frame import Frame
+
+pytestmark = pytest.mark.filterwarnings("default")
+"""Warnings of a peer are none of ours."""
+
+LIBRARY_SINE = SineContract("4 ulp, as OpenCL asks of a library", 4 * 2.0**-24)
+"""A sine of a library: an ulp of a number in [-1, 1] is at most 2^-24, and libraries promise 1 to 4."""
+
+SAME_FUNCTION = [peer for peer in contenders.PEERS if peer.variant]
+"""Peers that compute the network."""
+
+
+def opened(peer, model, size):
+    """Return the open peer with its tools, or skip."""
+    tools = Tools()
+    try:
+        peer.prepare(tools)
+        return tools, peer.open(tools, model, size)
+    except ExecutorUnavailable as error:
+        pytest.skip(str(error))
+
+
+@pytest.mark.parametrize("border", ["clamp", "zero"])
+@pytest.mark.parametrize("peer", SAME_FUNCTION, ids=lambda peer: peer.name)
+def test_a_peer_computes_the_network(peer, border) -> None:
+    """On an oblong picture, smaller than twice the window: the bound is that of the program in float32.
+
+    It holds for every order of summation and for fused sums, and so for every library that rounds to nearest.
+    """
+    network = siren.init((5 * 5 * 6, 8, 6, 3), 2.0, 3.0, seed=7, dtype=np.float32)
+    model = Model(network, ("color", "normal"), Window(5, border), Normalization())
+    whole = workload.noise(9)
+    frame = Frame({name: layer[:7] for name, layer in whole.layers.items()})
+    shown = workload.given(model, frame)
+    tools, runner = opened(peer, model, 9)
+    with tools:
+        for _ in range(2):
+            picture = runner.display(runner.run(shown))
+        runner.close()
+    joined = np.concatenate(list(shown.images.values()), axis=-1)
+    windows = dataset.all_windows(dataset.pad(joined, model.window), model.window)
+    (bound,) = bounds.at_inputs(analysed(lower(model)), {"window": windows}, LIBRARY_SINE).values()
+    assert picture.shape == (7, 9, 3)
+    assert (np.abs(picture - denoise(model, frame, np.float64)) <= bound).all()
+
+
+@pytest.mark.parametrize("peer", [p for p in contenders.PEERS if not p.variant], ids=lambda peer: peer.name)
+def test_another_denoiser_makes_a_picture(peer) -> None:
+    """A flat grey picture with flat features stays grey: what it returns is linear, and then encoded."""
+    layers = {name: np.full((32, 32, 3), 0.5, np.float32) for name in ("color", "albedo")}
+    frame = Frame({**layers, "normal": np.zeros((32, 32, 3), np.float32) + np.float32([0, 0, 1])})
+    model = workload.paper_model()
+    tools, runner = opened(peer, model, 32)
+    with tools:
+        picture = runner.display(runner.run(workload.given(model, frame)))
+    assert picture.shape == (32, 32, 3)
+    # sRGB of 0.5 is 0.735; a network trained on pictures moves a flat one by less than a tenth.
+    assert np.abs(picture - 0.735).max() <= 0.1
+
+
+def test_absent_peers_are_named_with_the_extra(monkeypatch) -> None:
+    monkeypatch.setattr("wamnet.kernels.bench.contender.find_spec", lambda name: None)
+    for peer in contenders.PEERS:
+        text = f"not installed: {', '.join(peer.packages)}; pip install 'wamnet[peers]'"
+        assert peer.missing() == text
+        with pytest.raises(ExecutorUnavailable, match="not installed: "):
+            peer.prepare(Tools())
+
+
+def test_a_peer_that_breaks_when_it_is_opened_is_missing() -> None:
+    from wamnet.kernels.bench.contender import told_as_missing
+
+    with (
+        pytest.raises(ExecutorUnavailable, match="it does not run here: no such symbol"),
+        told_as_missing("it"),
+    ):
+        raise OSError("no such symbol\nand more")
+    with pytest.raises(KeyboardInterrupt), told_as_missing("it"):
+        raise KeyboardInterrupt
+
+
+def test_first_runs_are_those_of_another_process(monkeypatch) -> None:
+    """The interpreter's has two; one that fails has none."""
+    from wamnet.kernels.bench import first_run
+
+    network = siren.init((2 * 2 * 3, 4, 3), 3.0, 3.0, seed=1, dtype=np.float32)
+    model = Model(network, ("color",), Window(2), Normalization())
+    never, later = first_run.first_runs("numpy:plain", model)
+    assert never is not None
+    assert later is not None
+    assert first_run.first_runs("nobody", model) == (None, None)

@@ -1,0 +1,166 @@
+"""The emitted sines on each executor: at hard points, beyond their domain; the command that measures."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.compiler import sine
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.ir import Gather, Image, Type
+from wamnet.compiler.trace import trace
+from wamnet.refimpl.dataset import Window
+
+DEGREES = sorted(sine.POLYNOMIALS)
+NUMPY = 2.0**-50
+"""What NumPy's float64 sine may be off: tests/compiler/test_sine.py."""
+
+KINDS = {"sine": (np.sin, sine.DOMAIN, "error"), "cosine": (np.cos, sine.COSINE_DOMAIN, "cosine_error")}
+"""Each function with its domain, and the name of its bound."""
+
+
+@pytest.fixture(scope="module")
+def patch_of_module():
+    with pytest.MonkeyPatch.context() as patch:
+        yield patch
+
+
+@pytest.fixture(scope="module")
+def script(patch_of_module):
+    """The command that measures sines."""
+    path = Path(__file__).parents[2] / "experiments" / "sines.py"
+    spec = importlib.util.spec_from_file_location("sines", path)
+    module = importlib.util.module_from_spec(spec)
+    patch_of_module.setitem(sys.modules, "sines", module)  # dataclasses look there
+    spec.loader.exec_module(module)
+    return module
+
+
+def values(executor, kind, degree, x):
+    """Return what the executor computes (N,) at x (N,)."""
+    function, domain, _ = KINDS[kind]
+    gather = Gather(Window(1, "clamp"), (Image("a", 1, -domain, domain),))
+    program = trace(lambda window: function(window), {"window": Type(shape=(1,))}, gather)
+    artifact = compile_program(program, executor.name, f"ieee-sine{degree}")
+    return unchecked(executor, artifact, np.asarray(x, np.float32).reshape(-1, 1, 1)).reshape(-1)
+
+
+def unchecked(executor, artifact, image):
+    """Run on an image that may break its range: `run` would refuse it."""
+    executor.build(artifact, image.shape[:2])
+    with np.errstate(all="ignore"):
+        return executor._run(artifact, {"a": image})
+
+
+def hard(domain):
+    """Return float32 neighbours (N,) of some k pi / 4 up to the domain, ends, denormals, both zeros."""
+    k = np.concatenate([np.arange(300), np.linspace(300, domain / np.pi * 4, 900).astype(int)])
+    near = np.concatenate([k * (np.pi / 4), [domain, 1.0, 0.0, 1e-40, 2.0**-126, 2.0**-149]]).astype(
+        np.float32
+    )
+    near = np.concatenate([near, *(np.nextafter(near, np.float32(end)) for end in (np.inf, -np.inf))])
+    near = np.concatenate([near, -near])
+    return near[np.abs(near) <= domain]
+
+
+@pytest.mark.parametrize("degree", DEGREES)
+@pytest.mark.parametrize("kind", KINDS)
+def test_hard_arguments_on_executor(executor, kind, degree):
+    function, domain, name = KINDS[kind]
+    x = hard(domain)
+    found = values(executor, kind, degree, x)
+    off = np.abs(found - function(x.astype(np.float64)))
+    assert np.max(off) + NUMPY <= getattr(sine.POLYNOMIALS[degree], name)
+    assert np.max(np.abs(found)) <= 1
+
+
+@given(data=st.data())
+def test_any_argument_on_executor(executor, data):
+    """Sixteen numbers of all sizes at a time; NumPy's own values of the same function are as near."""
+    kind, degree = data.draw(st.sampled_from(sorted(KINDS))), data.draw(st.sampled_from(DEGREES))
+    function, domain, name = KINDS[kind]
+    x = np.array(
+        data.draw(st.lists(st.floats(-domain, domain, width=32), min_size=16, max_size=16)), np.float32
+    )
+    found = values(executor, kind, degree, x)
+    off = np.abs(found - function(x.astype(np.float64)))
+    assert np.max(off) + NUMPY <= getattr(sine.POLYNOMIALS[degree], name)
+
+
+@pytest.mark.parametrize("degree", DEGREES)
+@pytest.mark.parametrize("kind", KINDS)
+def test_beyond_the_domain_on_executor(executor, kind, degree):
+    """A number gives +0, to the bit; an infinity and NaN give NaN."""
+    domain = np.float32(KINDS[kind][1])
+    numbers = [np.nextafter(domain, np.float32(np.inf)), 3e4, 1e6, 1e9, 1e20, 1e38, np.finfo(np.float32).max]
+    found = values(executor, kind, degree, [*numbers, *(-number for number in numbers)])
+    assert np.array_equal(found.view(np.uint32), np.zeros(14))
+    assert np.isnan(values(executor, kind, degree, [np.inf, -np.inf, np.nan])).all()
+
+
+@pytest.mark.parametrize("name", ["numpy", "opencl", "opengl-egl", "opengl-osmesa"])
+def test_beyond_the_domain_in_vectors(executor_named, kit, name):
+    """The schedules of vectors choose in their own words: between two affine maps, where they hold sines."""
+    executor, eye = executor_named(name), np.eye(3, dtype=np.float32)
+    program = kit.program(lambda x: np.matmul(np.sin(np.matmul(x, 6000.0 * eye)), eye), {"a": 3})
+    image = np.zeros((6, 1, 3), np.float32)
+    image[:, 0, 0] = [1.0, 2.2, -2.2, 1e30, np.inf, np.nan]
+    schedules = {"opencl": ("tile16", "tile8", "vector16"), "opengl": ("inlined",)}.get(executor.name, ())
+    for schedule in ("plain", *schedules):
+        artifact = compile_program(program, executor.name, "ieee", schedule)
+        assert artifact.manifest["schedule"]["name"] == schedule
+        found = unchecked(executor, artifact, image)
+        assert abs(found[0, 0, 0] - np.sin(6000.0)) <= artifact.manifest["bound"]["output"][0]
+        assert np.array_equal(found[1:4, 0, 0], np.zeros(3))
+        assert np.isnan(found[4:, 0, 0]).all()
+
+
+@pytest.mark.parametrize("degree", DEGREES)
+def test_zeros_on_executor(executor, degree):
+    found = values(executor, "sine", degree, [0.0, -0.0])
+    assert np.array_equal(found.view(np.uint32), [0, 0])
+
+
+# ---- the command that measures -----------------------------------------------------------------------------
+
+
+def test_batches_hold_every_number_of_the_domain_once(script):
+    """The last one is filled up with the domain's end."""
+    found = list(script.batches(0.0, 2.0**-130, 1.0))
+    bits = np.unique(np.concatenate([x.view(np.uint32) for x in found]))
+    assert np.array_equal(bits, np.arange(int(np.float32(2.0**-130).view(np.uint32)) + 1))
+    few = list(script.batches(1.0, sine.DOMAIN, 0.01))
+    assert len(few) <= 10
+    assert min(x.min() for x in few) >= 1.0
+    assert few[-1][-1] == np.float32(sine.DOMAIN)
+
+
+def test_every_number_is_compared(script, executor_named, capsys, monkeypatch):
+    monkeypatch.setattr(script, "BATCH", 2**14)
+    monkeypatch.setattr(script, "WIDTH", 64)
+    executor = executor_named("opencl")
+    assert script.every(executor, False, 0.00005)
+    assert "BROKEN" not in capsys.readouterr().out
+    monkeypatch.setattr(script, "NUMPY", 1.0)
+    assert not script.every(executor, True, 0.00005)
+    assert "BROKEN" in capsys.readouterr().out
+
+
+def test_table_of_sines(script, executor_named, monkeypatch):
+    monkeypatch.setattr(script, "COUNT", 2**10)
+    monkeypatch.setattr(script, "WIDTH", 16)
+    lines = list(script.tables({place: executor_named(place) for place in ("numpy", "opencl")}))
+    assert any(line.startswith("| opencl | native_sin | none") for line in lines)
+    assert any(line.startswith("| numpy | emitted, degree 13 | 2.03e-07 | ") for line in lines)
+    assert any(line.startswith("| 8192 to 12800 | ") for line in lines)
+
+
+def test_kernel_without_sin_has_no_native_one(script):
+    with pytest.raises(ValueError, match="calls no sin"):
+        script.native_sin(script.kernel("opencl", "ieee"))

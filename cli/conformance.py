@@ -48,7 +48,7 @@ Executor = Annotated[
     typer.Option(
         "--executor",
         metavar="NAME",
-        help="In its place an executor of this project (numpy, opencl, opengl), or [bold]reference[/].",
+        help="In its place an executor of this project (numpy, opencl, opengl, c), or [bold]reference[/].",
         show_default=False,
     ),
 ]

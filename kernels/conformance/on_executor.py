@@ -2,7 +2,7 @@
 
 1. A function of numbers is compiled like a network: its inputs are the channels of an image [`OnExecutor`].
 2. A whole path is told vertex by vertex by kernels that stop at each depth (compare_paths.py) [`_vertices`].
-3. Pictures are denoised and rendered as the commands do it.
+3. Pictures are denoised and rendered as the commands do it; not every executor has kernels of paths.
 
 Steps of a path, layers and derivatives of a network have no kernel of their own: they are not supported.
 """
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...compiler.artifact import Artifact
-from ...compiler.compile import compile_program
+from ...compiler.compile import TARGETS, compile_program
 from ...compiler.emit_path import END
 from ...compiler.ir import Gather, Image, Program, Type
 from ...compiler.lower_scene import PATH, SURFACE, lower_scene
@@ -44,16 +44,19 @@ from .kinds.paths import VERTEX
 from .numbers import from_json
 
 
+Own = Callable[[Mapping[str, Any], str], Mapping[str, Any]]
+"""(inputs, profile) -> outputs, of a kind that is no function of numbers."""
+
+
 class OnExecutor:
     """Functions as kernels, compiled when they are first asked for."""
 
     def __init__(self, executor: Executor) -> None:
         self.executor = executor
-        self._own: Mapping[str, Callable[[Mapping[str, Any], str], Mapping[str, Any]]] = {
-            "path.whole": self._vertices,
-            "picture.denoised": self._denoised,
-            "picture.rendered": self._rendered,
-        }
+        own: dict[str, Own] = {"picture.denoised": self._denoised}
+        if executor.name in TARGETS:
+            own |= {"path.whole": self._vertices, "picture.rendered": self._rendered}
+        self._own: Mapping[str, Own] = own
         self.kinds = [*FUNCTIONS, *self._own]
         self._compiled = cache(self._compile)
         self._path_kernel = cache(self._compile_path)

@@ -43,7 +43,6 @@ from .kinds.images import frame_of
 from .kinds.paths import VERTEX
 from .numbers import from_json
 
-
 Own = Callable[[Mapping[str, Any], str], Mapping[str, Any]]
 """(inputs, profile) -> outputs, of a kind that is no function of numbers."""
 

@@ -19,7 +19,7 @@ from typing import Annotated, Any
 import typer
 
 from ..refimpl.errors import WamnetError
-from . import animate, bench, certify, compare, conformance, dataset, demo, denoise, render, train
+from . import animate, bench, certify, compare, conformance, dataset, demo, denoise, render, train, tune
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
 
@@ -57,6 +57,7 @@ _register(certify.certify, certify.EXAMPLES)
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)
 _register(animate.animate, animate.EXAMPLES)
+_register(tune.tune, tune.EXAMPLES)
 _register(bench.bench, bench.EXAMPLES)
 _register(denoise.executors, denoise.EXECUTORS_EXAMPLES)
 _register(conformance.conformance, conformance.EXAMPLES)

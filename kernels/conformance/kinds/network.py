@@ -19,6 +19,7 @@ from ....compiler.lower_step import ADAM_INPUTS, lower_adam, step_of
 from ....compiler.profiles import EMITTED_SINE
 from ....compiler.ranges import Range
 from ....compiler.step import SQUARES, sum_errors
+from ....compiler.sums import gamma
 from ....compiler.trace import trace
 from ....refimpl import adam, siren, train
 from ....refimpl.siren import Siren
@@ -167,7 +168,7 @@ def _gradient_cases() -> list[Case]:
         for name, value in _gradient(inputs).items():
             if name == "loss":
                 # The mean of all squares is their sums' sum over their number: 8 more roundings at most.
-                error = float(errors[SQUARES].sum()) / target.size + bounds.gamma(8) * value
+                error = float(errors[SQUARES].sum()) / target.size + gamma(8) * value
                 expected[name] = Output(value, error, POSTERIORI)
                 continue
             array = inputs[name.removeprefix("d")]

@@ -19,7 +19,7 @@ from typing import Annotated, Any
 import typer
 
 from ..refimpl.errors import WamnetError
-from . import animate, bench, certify, compare, dataset, demo, denoise, render, train, tune
+from . import animate, bench, certify, compare, conformance, dataset, demo, denoise, render, train, tune
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
 
@@ -60,6 +60,7 @@ _register(animate.animate, animate.EXAMPLES)
 _register(tune.tune, tune.EXAMPLES)
 _register(bench.bench, bench.EXAMPLES)
 _register(denoise.executors, denoise.EXECUTORS_EXAMPLES)
+_register(conformance.conformance, conformance.EXAMPLES)
 _register(demo.demo, demo.EXAMPLES)
 
 

@@ -487,3 +487,11 @@ def test_loops_have_the_ranges_of_their_trips_one_after_another():
                 a, b = (np.broadcast_to(getattr(r, end), 500) for r in (expected, second[name]))
                 assert np.array_equal(a, b), (name, end)
     assert len(np.unique(first["surface"].low)) > 2
+
+
+@given(st.integers(0, 2**24 - 1))
+def test_what_single_precision_computes_exactly_stays_a_point(n):
+    """2 u - 1 of a random number u = n / 2^24 is exact, fused or not, and so is the sign that it decides."""
+    program = trace(lambda u: {"a": 2.0 * u - 1.0}, {"u": Type()})
+    found = evaluate(program, {"u": np.float64(n / 2**24)})["a"]
+    assert found.low == found.high == 2.0 * (n / 2**24) - 1.0

@@ -12,6 +12,9 @@ import pytest
 PARTS = ("refimpl", "compiler", "kernels", "cli")
 """The folders that become `wamnet.refimpl` and so on."""
 
+VECTORS = "spec/vectors"
+"""The folder of data that becomes `wamnet.spec.vectors`."""
+
 NOT_DATA = {".pyc"}
 """Suffixes of files in these folders that are no part of the package."""
 
@@ -21,7 +24,7 @@ def wheel(house, tmp_path_factory) -> zipfile.ZipFile:
     """Give the wheel built from a copy of the tree, with the setuptools of this environment."""
     folder = tmp_path_factory.mktemp("wheel")
     tree = folder / "tree"
-    for part in PARTS:
+    for part in (*PARTS, VECTORS):
         shutil.copytree(house.root / part, tree / part, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("pyproject.toml", "LICENSE", "README.md"):
         shutil.copy(house.root / name, tree / name)
@@ -36,7 +39,8 @@ def test_wheel_equals_the_tree(house, wheel):
     wanted = {
         f"wamnet/{path.relative_to(house.root).as_posix()}"
         for path in house.files()
-        if path.relative_to(house.root).parts[0] in PARTS and path.suffix not in NOT_DATA
+        if path.relative_to(house.root).as_posix().startswith(tuple(f"{part}/" for part in (*PARTS, VECTORS)))
+        and path.suffix not in NOT_DATA
     }
     found = {name for name in wheel.namelist() if ".dist-info/" not in name}
     differences = [f"{name}: in the tree, not in the wheel" for name in sorted(wanted - found)]

@@ -1,0 +1,166 @@
+"""Cases: what is given, what is expected, how far off an answer may be, and which clause says so.
+
+1. A kind of case has a function of the reference, the clauses that it tests, and a way to make its cases
+   [`Kind`]; all kinds stand in `kinds/`.
+2. A file of vectors holds the cases of one kind, with the version of the format [`save`], [`load`]. Files are
+   text that can be reviewed: floats are hexadecimal (numbers.py).
+3. A case is valid, and has expected values with bounds, or invalid, and must be refused.
+
+Versions are X.Y.Z: X changes with the format, Y with the behaviour that is expected, Z with the cases.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...refimpl.errors import InputError
+from .numbers import from_file, from_json, rounded_up, to_json
+
+VERSION = "1.0.0"
+"""Version of format, behaviour and cases."""
+
+FORMAT = "wamnet-vectors"
+"""Value of the key `format`, by which a file of vectors is recognised."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """One expected output: a value, how far off each number may be, and where that bound comes from.
+
+    `bound` 0 asks for equality; `accepted` holds other values that are right too, where rounding decides,
+    each a mapping with its own `value` and `bound`.
+    `welch`: the value is an estimate, and so is the answer (kinds/pictures.py).
+    """
+
+    value: Any
+    bound: Any = 0.0
+    source: str = "exact"
+    accepted: tuple[Mapping[str, Any], ...] = ()
+    welch: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True)
+class Case:
+    """One question to a program, and the answer. `expected` None: the program must refuse the input."""
+
+    id: str
+    clause: str
+    inputs: Mapping[str, Any]
+    expected: Mapping[str, Output] | None
+    flags: tuple[str, ...] = ()
+    note: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the case in the form of JSON."""
+        data: dict[str, Any] = {"id": self.id, "clause": self.clause, "flags": list(self.flags)}
+        if self.note:
+            data["note"] = self.note
+        data |= {"valid": self.expected is not None, "input": to_json(dict(self.inputs))}
+        if self.expected is not None:
+            data["expected"] = {name: _output_json(output) for name, output in self.expected.items()}
+        return data
+
+
+def _output_json(output: Output) -> dict[str, Any]:
+    """Return an expected output in the form of JSON."""
+    data = {"value": to_json(output.value), "bound": _bound_json(output.bound), "source": output.source}
+    if output.accepted:
+        data["accepted"] = [
+            {"value": to_json(other["value"]), "bound": _bound_json(other["bound"])}
+            for other in output.accepted
+        ]
+    if output.welch is not None:
+        data["welch"] = to_json(dict(output.welch))
+    return data
+
+
+def _bound_json(bound: Any) -> Any:
+    """Return bounds in the form of JSON, rounded up; those that are all one as that one."""
+    rounded = rounded_up(bound)
+    same = np.size(rounded) > 1 and np.all(rounded == np.ravel(rounded)[0])
+    return to_json(np.ravel(rounded)[0] if same else rounded)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of case: its name, title, what its fields are, its cases, and the reference's answer.
+
+    `inputs` and `outputs` describe fields for the format page: type, shape, unit. `files` are those that its
+    cases name, by path relative to the folder of vectors; `notes` say what else a reader must know.
+    """
+
+    name: str
+    title: str
+    inputs: Mapping[str, str]
+    outputs: Mapping[str, str]
+    make: Callable[[], Sequence[Case]]
+    answer: Callable[[Mapping[str, Any]], Mapping[str, Any]]
+    files: Callable[[], Mapping[str, bytes]] = field(default=dict)
+    notes: str = ""
+
+
+def text_of(kind: Kind) -> str:
+    """Return the vectors of a kind as text, one case a line."""
+    lines = [json.dumps(case.to_json(), allow_nan=False) for case in kind.make()]
+    head = {"format": FORMAT, "version": VERSION, "kind": kind.name, "title": kind.title}
+    opening = json.dumps(head)[:-1]
+    return opening + ', "cases": [\n' + ",\n".join(lines) + "\n]}\n"
+
+
+def load(path: Path) -> tuple[str, list[Case]]:
+    """Return the kind's name and the cases of a file of vectors; paths in them are made absolute."""
+    try:
+        data = json.loads(path.read_text())
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(
+            "file of vectors", str(path), f"it cannot be read ({error})", "fetch it again"
+        ) from None
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError("file of vectors", str(path), f"its format must be {FORMAT!r}", "give another file")
+    if str(data.get("version")).split(".")[0] != VERSION.split(".")[0]:
+        rule = f"this runner reads version {VERSION.split('.')[0]}"
+        raise InputError(f"{path}: version", data.get("version"), rule, "update wamnet or the vectors")
+    try:
+        return str(data["kind"]), [_case(item, path.parent) for item in data["cases"]]
+    except (KeyError, TypeError, AttributeError) as error:
+        rule = f"its cases must be as spec/vectors/schema.json says ({error!r})"
+        raise InputError("file of vectors", str(path), rule, "fetch it again") from None
+
+
+def _case(data: Mapping[str, Any], folder: Path) -> Case:
+    """Return a case from JSON; numbers stay texts until they are compared."""
+    expected = None
+    if data["valid"]:
+        expected = {
+            name: Output(o["value"], o["bound"], o["source"], tuple(o.get("accepted", ())), o.get("welch"))
+            for name, o in data["expected"].items()
+        }
+    flags, note = tuple(data["flags"]), data.get("note", "")
+    inputs = {name: _placed(value, folder) for name, value in data["input"].items()}
+    return Case(str(data["id"]), str(data["clause"]), inputs, expected, flags, note)
+
+
+def _placed(value: Any, folder: Path) -> Any:
+    """Return an input with the path of its file, if it is one, made absolute."""
+    if isinstance(value, dict) and isinstance(value.get("file"), str):
+        return {**value, "file": str((folder / value["file"]).resolve())}
+    return value
+
+
+def given(value: Any) -> Any:
+    """Return an input as the reference takes it: numbers as arrays, files as what they hold."""
+    if isinstance(value, dict) and "file" in value:
+        return from_file(value, "input") if "shape" in value else Path(value["file"]).read_text()
+    if isinstance(value, (dict, bool)):
+        return value
+    try:
+        found = from_json(value, "input")
+    except InputError:
+        return value
+    return found if found.ndim else found[()]

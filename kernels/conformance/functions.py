@@ -1,0 +1,213 @@
+"""Kinds of cases that are functions of numbers: traced, so that the bound of each answer is computed.
+
+1. A function of the reference is called with float64 numbers that float32 holds exactly: the expected value.
+2. The same function, traced, has for each output a range of what single precision may give, under the
+   promises of profile `ieee` (compiler/ranges.py): its farther end is the bound [`Function.bounded`]. Where a
+   decision is closer to its threshold than rounding, either way is accepted; the flag is `undecided`.
+3. Cases are chosen numbers, edge cases first, and others from the project's own generator [`drawn`].
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler import ranges
+from ...compiler.ir import Program, Type
+from ...compiler.lower_scene import PASSES
+from ...compiler.passes import pipeline
+from ...compiler.trace import trace
+from ...refimpl import rng, vectors
+from .case import Case, Kind, Output
+
+Numbers = Mapping[str, Any]
+
+SOURCE = "range of single precision under profile ieee (compiler/ranges.py)"
+"""Where these bounds come from."""
+
+SEED = 20_240_817
+"""Seed of the numbers that are drawn for cases."""
+
+
+class Field(NamedTuple):
+    """An input or output: what it is, its components (0: a number), and the least and largest value given."""
+
+    text: str
+    size: int = 0
+    low: float = 0.0
+    high: float = 1.0
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function of the reference as a kind of case: `call` has the inputs and the float type of constants.
+
+    `given`: inputs of cases with a note; `draws` more are drawn by `draw` from uniform numbers in [0, 1).
+    """
+
+    name: str
+    title: str
+    clause: str
+    inputs: Mapping[str, Field]
+    outputs: Mapping[str, Field]
+    call: Callable[[Numbers, Any], Numbers]
+    given: Sequence[tuple[str, Numbers]] = ()
+    draw: Callable[[NDArray[np.float64]], Numbers] | None = None
+    draws: int = 8
+
+    def kind(self) -> Kind:
+        """Return the kind of case."""
+        fields = [
+            {name: f"{_shape(field.size)}, {field.text}" for name, field in side.items()}
+            for side in (self.inputs, self.outputs)
+        ]
+        return Kind(self.name, self.title, fields[0], fields[1], self.cases, self.answer)
+
+    def cases(self) -> list[Case]:
+        """Return the cases with their answers and bounds."""
+        rows = [(note, values) for note, values in self.given]
+        if self.draw is not None:
+            rows += [("", self.draw(drawn(self.name, index))) for index in range(self.draws)]
+        found = []
+        for index, (note, values) in enumerate(rows):
+            inputs = {name: np.asarray(values[name], np.float32).astype(np.float64) for name in self.inputs}
+            expected, undecided = self.bounded(inputs)
+            flags = ("undecided",) if undecided else ()
+            found.append(Case(f"{self.name}/{index}", self.clause, inputs, expected, flags, note))
+        return found
+
+    def answer(self, inputs: Numbers) -> Numbers:
+        """Return the reference's answer, in float64."""
+        lanes = {name: np.asarray(inputs[name], np.float64)[np.newaxis] for name in self.inputs}
+        return {name: np.asarray(value)[0] for name, value in self.call(lanes, np.float64).items()}
+
+    def bounded(self, inputs: Numbers) -> tuple[dict[str, Output], bool]:
+        """Return expected outputs with bounds, and whether some decision is undecided."""
+        wanted = self.answer(inputs)
+        given = components(self.inputs, inputs)
+        found = ranges.evaluate(self.program(), given)
+        outputs, sure = {}, all(bool(np.all(part.sure & part.known)) for part in found.values())
+        for name, field in self.outputs.items() if sure else ():
+            value = np.asarray(wanted[name], np.float64)
+            low, high = (_ends(found, name, field, end).reshape(value.shape) for end in ENDS)
+            outputs[name] = Output(value, np.maximum(high - value, value - low), SOURCE)
+            # Single precision may be sure of its way, and double precision go the other one.
+            outside = np.maximum(low - value, value - high)
+            sure &= bool(np.max(outside) <= APART * (1.0 + float(np.max(np.abs(value)))))
+        if not sure:
+            return self._either(inputs, wanted, ranges.evaluate(self.program(), given, guided=True)), True
+        return outputs, False
+
+    def _either(
+        self, inputs: Numbers, wanted: Numbers, guided: Mapping[str, ranges.Range]
+    ) -> dict[str, Output]:
+        """Return outputs where a decision is undecided: all that the reference answers nearby.
+
+        Every input is moved by `NUDGE` either way. An answer that is farther off than `APART` is another one,
+        and accepted as well; what is nearer adds to the bound.
+        """
+        near = [self.answer(moved) for moved in _nudged(inputs)]
+        outputs = {}
+        for name, field in self.outputs.items():
+            value = np.asarray(wanted[name], np.float64)
+            low, high = (_ends(guided, name, field, end) for end in ENDS)
+            others, bound = list[Any](), float(np.max(high - low))
+            for other in (np.asarray(answers[name], np.float64) for answers in near):
+                least = min(float(np.max(np.abs(other - known))) for known in (value, *others))
+                if least <= APART * (1.0 + float(np.max(np.abs(other)))):
+                    bound = max(bound, least)
+                else:
+                    others.append(other)
+            assert np.isfinite(bound), f"{self.name}: no bound at {inputs}"
+            bounds = [np.maximum(bound, ULP * np.abs(other)) for other in (value, *others)]
+            accepted = tuple({"value": v, "bound": b} for v, b in zip(others, bounds[1:], strict=True))
+            outputs[name] = Output(value, bounds[0], EITHER, accepted)
+        return outputs
+
+    @cached_property
+    def _program(self) -> Program:
+        """The traced function."""
+        inputs = {part: Type() for name, field in self.inputs.items() for part in names(name, field.size)}
+
+        def call(*numbers: Any) -> dict[str, Any]:
+            given = dict(zip(inputs, numbers, strict=True))
+            return self.parts(given)
+
+        return pipeline.run(trace(call, inputs), PASSES)
+
+    def program(self) -> Program:
+        """Return the traced function, of numbers and to numbers."""
+        return self._program
+
+    def parts(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the components of the outputs for those of the inputs, by name, in float32."""
+        fields = {
+            name: vectors.vector(*(given[part] for part in names(name, f.size))) if f.size else given[name]
+            for name, f in self.inputs.items()
+        }
+        return components(self.outputs, self.call(fields, np.float32))
+
+
+def _ends(found: Mapping[str, ranges.Range], name: str, field: Field, end: str) -> NDArray[np.float64]:
+    """Return one end of the ranges of a field's components."""
+    return np.array([float(getattr(found[part], end)) for part in names(name, field.size)])
+
+
+def _nudged(inputs: Numbers) -> Iterator[dict[str, Any]]:
+    """Yield the inputs with one component moved, each in turn, either way."""
+    for name, value in inputs.items():
+        for index in np.ndindex(np.shape(value)):
+            for step in (-NUDGE, NUDGE):
+                moved = np.array(value, np.float64)
+                moved[index] += step * max(1.0, abs(float(moved[index])))
+                yield {**inputs, name: moved}
+
+
+NUDGE = 2.0**-20
+"""How far inputs are moved, relative to 1 or to their size, to see what is near an undecided decision: some
+roundings of single precision."""
+
+APART = 2.0**-10
+"""Answers that differ by more than this, relative to 1 or to their size, are two."""
+
+EITHER = "range of single precision with decisions as the reference takes them, or as it does 2^-20 away"
+"""Where the bounds of undecided cases come from."""
+
+ULP = 2.0**-23
+"""One ulp of float32, relative: the rounding of the answer itself."""
+
+ENDS = ("low", "high")
+"""The ends of a range."""
+
+
+def drawn(name: str, index: int, count: int = 16) -> NDArray[np.float64]:
+    """Return uniform numbers (count,) in [0, 1) for a case of a kind, the same on every machine."""
+    stream = rng.counter(zlib.crc32(name.encode()))
+    blocks = rng.counter(np.arange((count + 3) // 4))
+    found = rng.uniforms(rng.counter(SEED), blocks, rng.counter(index), stream, np.float64)
+    return np.stack(found, axis=-1).reshape(-1)[:count]
+
+
+def names(name: str, count: int) -> list[str]:
+    """Return the names of a field's components."""
+    return [f"{name}_{axis}" for axis in range(count)] if count else [name]
+
+
+def components(fields: Mapping[str, Field], values: Numbers) -> dict[str, Any]:
+    """Return the components of fields by name."""
+    found = {}
+    for name, field in fields.items():
+        for axis, part in enumerate(names(name, field.size)):
+            found[part] = values[name][..., axis] if field.size else values[name]
+    return found
+
+
+def _shape(count: int) -> str:
+    """Return the type of a field for the format page."""
+    return f"float[{count}]" if count else "float"

@@ -1,0 +1,304 @@
+"""Kinds of files: models and scenes, good, damaged and hostile."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import struct
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ....compiler import model_file
+from ....refimpl import scene as scene_module
+from ....refimpl import siren
+from ....refimpl.dataset import Normalization, Window
+from ....refimpl.denoise import Model
+from ..case import Case, Kind, Output
+from .paths import scene_text
+
+MODEL = Model(
+    siren.init([27, 4, 3], 3.0, 1.0, seed=5, dtype=np.float32),
+    ("color",),
+    Window(3, "clamp"),
+    Normalization(exposure_stops=0.5),
+    {"recipe": "none"},
+)
+"""The model of the files."""
+
+
+def file_of(model: Model) -> bytes:
+    """Return a model's file."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.safetensors"
+        model_file.save_model(path, model)
+        return path.read_bytes()
+
+
+def model_from(content: bytes) -> Model:
+    """Return the model in a file's content."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.safetensors"
+        path.write_bytes(content)
+        return model_file.load_model(path)
+
+
+def digest(model: Model) -> str:
+    """Return the SHA-256 of all parameters as little-endian float64: layer by layer weights, then biases."""
+    parts = (p for pair in zip(model.siren.weights, model.siren.biases, strict=True) for p in pair)
+    return hashlib.sha256(b"".join(np.ascontiguousarray(p, "<f8").tobytes() for p in parts)).hexdigest()
+
+
+def _model(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a file holds."""
+    model = model_from(base64.b64decode(inputs["content"]))
+    return {
+        "digest": digest(model),
+        "widths": np.array(model.siren.widths),
+        "features": ",".join(model.features),
+        "window": model.window.size,
+        "border": model.window.border,
+        "omega_0": np.array([model.siren.omega_0_first, model.siren.omega_0_hidden]),
+    }
+
+
+# ---- changed files ----------------------------------------------------------------------------------------
+
+Header = dict[str, Any]
+
+
+def _parts(content: bytes) -> tuple[Header, bytes]:
+    """Return header and data of a file."""
+    length = int.from_bytes(content[:8], "little")
+    return json.loads(content[8 : 8 + length]), content[8 + length :]
+
+
+def _joined(header: Any, data: bytes) -> bytes:
+    """Return a file of header, an object or its bytes, and data."""
+    text = header if isinstance(header, bytes) else json.dumps(header, sort_keys=True).encode()
+    text += b" " * (-len(text) % 8)
+    return struct.pack("<Q", len(text)) + text + data
+
+
+def _text(name: str, value: str | None) -> bytes:
+    """Return the file with a text of its header changed, or left out."""
+    header, data = _parts(file_of(MODEL))
+    texts = dict(header["__metadata__"])
+    texts[name] = value
+    header["__metadata__"] = {key: text for key, text in texts.items() if text is not None}
+    return _joined(header, data)
+
+
+def _tensor(name: str, **changes: Any) -> bytes:
+    """Return the file with an entry of a tensor changed."""
+    header, data = _parts(file_of(MODEL))
+    header[name] = {**header[name], **changes}
+    return _joined(header, data)
+
+
+def _renamed(old: str, new: str) -> bytes:
+    """Return the file with a tensor under another name."""
+    header, data = _parts(file_of(MODEL))
+    header[new] = header.pop(old)
+    return _joined(header, data)
+
+
+def _number(value: float) -> bytes:
+    """Return the file with another first number."""
+    header, data = _parts(file_of(MODEL))
+    return _joined(header, struct.pack("<f", value) + data[4:])
+
+
+def _twice() -> bytes:
+    """Return a file whose header has one name twice."""
+    header, data = _parts(file_of(MODEL))
+    text = json.dumps(header).encode()
+    return _joined(text[:-1] + b', "layer0.bias": ' + json.dumps(header["layer1.bias"]).encode() + b"}", data)
+
+
+GOOD: Mapping[str, Callable[[], bytes]] = {
+    "as it was written": lambda: file_of(MODEL),
+    "in float64": lambda: file_of(
+        replace(MODEL, siren=siren.init([27, 4, 3], 3.0, 1.0, seed=5, dtype=np.float64))
+    ),
+    "a fact more": lambda: _text("info.author", "somebody"),
+    "an entry that is not known": lambda: _text("later", "ignored"),
+    "one layer": lambda: file_of(replace(MODEL, siren=siren.init([27, 3], 1.0, 1.0, seed=6))),
+}
+"""Files that are read, by what is special about them."""
+
+BAD: Mapping[str, Callable[[], bytes]] = {
+    "empty": lambda: b"",
+    "7 bytes": lambda: b"\0" * 7,
+    "cut in the header": lambda: file_of(MODEL)[:100],
+    "cut in the data": lambda: file_of(MODEL)[:-4],
+    "bytes after the end": lambda: file_of(MODEL) + b"\0\0\0\0",
+    "a header longer than the file": lambda: struct.pack("<Q", 1 << 40) + file_of(MODEL)[8:],
+    "a header longer than any memory": lambda: struct.pack("<Q", (1 << 64) - 1) + file_of(MODEL)[8:],
+    "a header that is no JSON": lambda: _joined(b"{'layer0': 1}", b""),
+    "a header that is no object": lambda: _joined(b"[]", b""),
+    "a header that is not UTF-8": lambda: _joined(b'{"\xff": 1}', b""),
+    "a header of brackets": lambda: _joined(b"[" * 4000, b""),
+    "another format": lambda: _text("format", "wamnet-checkpoint"),
+    "no format": lambda: _text("format", None),
+    "a later version": lambda: _text("version", "2"),
+    "no features": lambda: _text("features", None),
+    "an empty list of features": lambda: _text("features", "[]"),
+    "an unknown feature": lambda: _text("features", '["colour"]'),
+    "a feature twice": lambda: _text("features", '["color", "color"]'),
+    "features that are no list": lambda: _text("features", '"color"'),
+    "a window of no pixels": lambda: _text("window", '{"border": "clamp", "size": 0}'),
+    "a window that does not fit the layer": lambda: _text("window", '{"border": "clamp", "size": 5}'),
+    "a window of 3.0 pixels": lambda: _text("window", '{"border": "clamp", "size": 3.0}'),
+    "an unknown border": lambda: _text("window", '{"border": "mirror", "size": 3}'),
+    "omega_0 of 0": lambda: _text("omega_0_first", "0.0"),
+    "omega_0 that is no number": lambda: _text("omega_0_hidden", "nan"),
+    "a scale of 0": lambda: _text(
+        "normalization",
+        '{"depth_scale": 0.0, "exposure_stops": 0.0, "position_center": [0, 0, 0], "position_scale": 1.0}',
+    ),
+    "no normalization": lambda: _text("normalization", None),
+    "a tensor of another shape than its bytes": lambda: _tensor("layer0.weight", shape=[4, 28]),
+    "layers that do not chain": lambda: _tensor("layer1.weight", shape=[4, 3]),
+    "a tensor of integers": lambda: _tensor("layer0.bias", dtype="I32"),
+    "an unknown type": lambda: _tensor("layer0.bias", dtype="F33"),
+    "a shape beyond 64 bits": lambda: _tensor("layer0.bias", shape=[1 << 62, 1 << 62]),
+    "a tensor beyond the file": lambda: _tensor("layer0.bias", data_offsets=[1 << 30, (1 << 30) + 16]),
+    "a tensor that ends before it begins": lambda: _tensor("layer0.bias", data_offsets=[16, 0]),
+    "tensors that overlap": lambda: _tensor("layer0.weight", data_offsets=[0, 432]),
+    "a layer without biases": lambda: _renamed("layer1.bias", "layer1.offset"),
+    "a layer left out": lambda: _renamed("layer1.weight", "layer2.weight"),
+    "NaN among the weights": lambda: _number(float("nan")),
+    "an infinity among the weights": lambda: _number(float("inf")),
+    "a name twice": _twice,
+}
+"""Files that are refused, by what is wrong with them."""
+
+
+def _model_cases() -> list[Case]:
+    """Return good and bad files."""
+    cases: list[Case] = []
+    for note, content in [*GOOD.items(), *BAD.items()]:
+        inputs = {"content": base64.b64encode(content()).decode()}
+        expected = {name: Output(value) for name, value in _model(inputs).items()} if note in GOOD else None
+        clause = "MOD-2" if note in GOOD else "MOD-6"
+        cases.append(Case(f"file.model/{len(cases)}", clause, inputs, expected, (), note))
+    return cases
+
+
+# ---- scenes -----------------------------------------------------------------------------------------------
+
+
+def _scene(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a scene's text stands for."""
+    scene = scene_module.from_json(inputs["text"])
+    return {"digest": scene_module.scene_digest(scene)}
+
+
+def _changed(path: str, value: Any) -> str:
+    """Return the text of a scene with one value replaced, or removed with the value ..."""
+    data = json.loads(scene_text("cornell"))
+    *above, last = [int(part) if part.isdigit() else part for part in path.split(".")]
+    place = data
+    for part in above:
+        place = place[part]
+    if value is ...:
+        del place[last]
+    else:
+        place[last] = value
+    return json.dumps(data)
+
+
+SCENE_GOOD: Mapping[str, Callable[[], str]] = {
+    "as it was written": lambda: scene_text("cornell"),
+    "with materials": lambda: scene_text("glossy"),
+    "with a sky": lambda: scene_text("daylight"),
+    "other facts, the same digest": lambda: _changed("info.author", "somebody"),
+    "whole numbers are numbers": lambda: _changed("camera.vertical_fov_deg", 37),
+}
+"""Scenes that are read."""
+
+SCENE_BAD: Mapping[str, Callable[[], str]] = {
+    "no JSON": lambda: "{",
+    "no object": lambda: "[]",
+    "thousands of brackets": lambda: "[" * 20_000,
+    "another format": lambda: _changed("format", "other"),
+    "another version": lambda: _changed("version", 2),
+    "a version that is a truth value": lambda: _changed("version", True),
+    "no camera": lambda: _changed("camera", ...),
+    "an unknown key": lambda: _changed("camera.lens", 1.0),
+    "NaN": lambda: _changed("camera.vertical_fov_deg", float("nan")),
+    "a number beyond 1e12": lambda: _changed("camera.position.0", 1.0001e12),
+    "an integer of thousands of digits": lambda: _changed("camera.position.0", 10**4000),
+    "a number as text": lambda: _changed("camera.vertical_fov_deg", "37"),
+    "a truth value as number": lambda: _changed("camera.vertical_fov_deg", True),
+    "two numbers for three": lambda: _changed("camera.position", [0.0, 1.0]),
+    "an angle of 180 degrees": lambda: _changed("camera.vertical_fov_deg", 180.0),
+    "a camera that looks at itself": lambda: _changed("camera.look_at", [0.0, 1.0, 4.4]),
+    "a camera that looks along its up": lambda: _changed("camera.up", [0.0, 0.0, 2.0]),
+    "a reflectance above 1": lambda: _changed("boxes.0.reflectance.1", 1.01),
+    "a negative emission": lambda: _changed("boxes.0.emission.2", -0.5),
+    "an extent of 0": lambda: _changed("boxes.1.half_extent.0", 0.0),
+    "a room inside out": lambda: _changed("room.low.0", 1.0),
+    "five walls": lambda: _changed("room.reflectances.5", ...),
+    "a matrix that is no rotation": lambda: _changed("boxes.0.rotation.0.0", 0.9),
+    "a light without an area": lambda: _changed("lights.0.edge_u", [0.0, 0.0, 1.0]),
+    "a negative power": lambda: _changed("lights.0.power", -1.0),
+    "an unknown material": lambda: _changed("boxes.0.material", {"kind": "velvet"}),
+    "a material without a kind": lambda: _changed("boxes.0.material", {"roughness": 0.5}),
+    "a roughness of 0": lambda: _changed("boxes.0.material", {"kind": "conductor", "roughness": 0.0}),
+    "glass below 1": lambda: _changed("boxes.0.material", {"kind": "dielectric", "ior": 0.9}),
+    "a sky and a background": lambda: json.dumps(
+        {**json.loads(scene_text("daylight")), "background": [0.1, 0.1, 0.1]}
+    ),
+}
+"""Scenes that are refused: first for their form."""
+
+FIRST_OF_VALUES = "an angle of 180 degrees"
+"""The first one that is refused for a value."""
+
+
+def _scene_cases() -> list[Case]:
+    """Return good and bad scenes."""
+    cases, names = list[Case](), list(SCENE_BAD)
+    for note, text in [*SCENE_GOOD.items(), *SCENE_BAD.items()]:
+        inputs = {"text": text()}
+        expected = {name: Output(v) for name, v in _scene(inputs).items()} if note in SCENE_GOOD else None
+        form = note in SCENE_BAD and names.index(note) < names.index(FIRST_OF_VALUES)
+        clause = "SCN-8" if note in SCENE_GOOD else "SCN-6" if form else "SCN-7"
+        cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note))
+    return cases
+
+
+KINDS = (
+    Kind(
+        "file.model",
+        "Model files",
+        {"content": "text, the file's bytes in base64"},
+        {
+            "digest": "text, SHA-256 in hexadecimal of all parameters as little-endian float64: "
+            "layer by layer, weights in C order, then biases",
+            "widths": "integer[L + 1]",
+            "features": "text, names with commas",
+            "window": "integer, its size",
+            "border": "text",
+            "omega_0": "float[2]: first layer, others",
+        },
+        _model_cases,
+        _model,
+    ),
+    Kind(
+        "file.scene",
+        "Scene files",
+        {"text": "text, the file"},
+        {"digest": "text, the digest of SCN-8"},
+        _scene_cases,
+        _scene,
+    ),
+)
+"""The kinds of this module."""

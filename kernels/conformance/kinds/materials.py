@@ -1,0 +1,248 @@
+"""Kinds of materials: how paths go on, what light from a direction is worth, heuristics, the sky."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ....refimpl import environment, transport
+from ....refimpl.materials import Conductor, Dielectric, Lambertian, Mirror
+from ....refimpl.materials.material import Site
+from ....refimpl.scene import Sky
+from ..functions import Field, Function, Numbers
+from .light import UNIFORM, _unit
+
+VERTEX = {
+    "wo": Field("unit direction back along the path", 3, -1.0),
+    "normal": Field("unit normal on the side of wo", 3, -1.0),
+    "reflectance": Field("of the surface", 3),
+}
+"""What a vertex is."""
+
+CHOICES = {**UNIFORM, "u_choice": Field("third uniform number")}
+"""The numbers that choose a direction."""
+
+GONE_ON = {
+    "direction": Field("unit direction in which the path goes on", 3),
+    "beta": Field("throughput, for a throughput of 1 before", 3),
+    "pdf": Field("density of the direction, 1/sr"),
+}
+"""How a path goes on."""
+
+GOLD = (1.0, 0.78, 0.34)
+"""A reflectance."""
+
+SLANT = (0.6, 0.8, 0.0)
+"""A direction."""
+
+
+def _site(given: Numbers, parameter: Any = None, outside: Any = None) -> Site:
+    """Return the vertex with a throughput of 1."""
+    reflectance = given["reflectance"]
+    one = np.ones_like(reflectance)
+    return Site(given["wo"], given["normal"], outside, reflectance, one, one * reflectance, parameter)
+
+
+def _sampled(material: Any, given: Numbers, **of_site: Any) -> dict[str, Any]:
+    """Return how a path goes on."""
+    found = material.sample(_site(given, **of_site), given["u0"], given["u1"], given["u_choice"])
+    return {name: getattr(found, name) for name in GONE_ON}
+
+
+def _vertex(u: Any) -> dict[str, Any]:
+    """Return a vertex and three uniform numbers from others."""
+    normal, wo = _unit(u[:3]), _unit(u[3:6])
+    wo = wo if float(normal.astype(np.float64) @ wo) > 0.0 else -wo
+    return {"normal": normal, "wo": wo, "reflectance": u[6:9], "u0": u[9], "u1": u[10], "u_choice": u[11]}
+
+
+def _at(u0: float, u1: float, u_choice: float = 0.5, wo: Any = SLANT, **more: Any) -> dict[str, Any]:
+    """Return a vertex with the normal +y."""
+    vertex = {"normal": (0.0, 1.0, 0.0), "wo": wo, "reflectance": GOLD}
+    return {**vertex, "u0": u0, "u1": u1, "u_choice": u_choice, **more}
+
+
+LAMBERTIAN = Function(
+    "material.lambertian",
+    "A matt surface sends a path on",
+    "LAM-1",
+    {**VERTEX, **CHOICES},
+    GONE_ON,
+    lambda given, dtype: _sampled(Lambertian, given),
+    [("straight up", _at(0.5, 0.5)), ("at the horizon", _at(0.0, 0.25))],
+    _vertex,
+    draws=4,
+)
+"""Matt surfaces."""
+
+MIRROR = Function(
+    "material.mirror",
+    "A mirror sends a path on",
+    "MIR-1",
+    {**VERTEX, **CHOICES},
+    GONE_ON,
+    lambda given, dtype: _sampled(Mirror, given),
+    [
+        ("straight down", _at(0.5, 0.5, wo=(0.0, 1.0, 0.0))),
+        ("grazing", _at(0.5, 0.5, wo=(1.0, 2.0**-20, 0.0))),
+    ],
+    _vertex,
+    draws=4,
+)
+"""Mirrors."""
+
+ROUGHNESS = Field("GGX's alpha", 0, 0.001)
+"""Roughness of a metal."""
+
+CONDUCTOR = Function(
+    "material.conductor",
+    "A rough metal sends a path on",
+    "CDR-3",
+    {**VERTEX, **CHOICES, "roughness": ROUGHNESS},
+    GONE_ON,
+    lambda given, dtype: _sampled(Conductor, given, parameter=given["roughness"]),
+    [
+        ("seen from above", _at(0.25, 0.625, wo=(0.0, 1.0, 0.0), roughness=0.25)),
+        ("slanted", _at(0.25, 0.625, roughness=0.25)),
+        ("as rough as can be", _at(0.75, 0.125, roughness=1.0)),
+    ],
+    lambda u: {**_vertex(u), "roughness": 0.05 + 0.9 * u[12]},
+)
+"""Metals."""
+
+CONDUCTOR_VALUE = Function(
+    "material.conductor_value",
+    "What light from a direction is worth at a rough metal, and the density of that direction",
+    "CDR-2",
+    {
+        **VERTEX,
+        "wi": Field("unit direction to the light, above the surface", 3, -1.0),
+        "roughness": ROUGHNESS,
+    },
+    {"value": Field("f cos, for a throughput of 1", 3), "pdf": Field("density of wi, 1/sr")},
+    lambda given, dtype: _valued(given),
+    [
+        ("the mirrored direction", {**_at(0, 0), "wi": (-0.6, 0.8, 0.0), "roughness": 0.25}),
+        ("back where it came from", {**_at(0, 0), "wi": SLANT, "roughness": 0.5}),
+        ("off the lobe", {**_at(0, 0), "wi": (0.0, 0.6, 0.8), "roughness": 0.0625}),
+    ],
+    lambda u: {**_vertex(u), "wi": _above(u), "roughness": 0.05 + 0.9 * u[12]},
+    draws=4,
+)
+"""Metals and light samples."""
+
+
+def _above(u: Any) -> Any:
+    """Return a direction above the surface of [`_vertex`]."""
+    normal, wi = _unit(u[:3]), _unit(u[9:12])
+    return wi if float(normal.astype(np.float64) @ wi) > 0.0 else -wi
+
+
+def _valued(given: Numbers) -> dict[str, Any]:
+    """Return value and density."""
+    site, wi = _site(given, parameter=given["roughness"]), given["wi"]
+    cosine = np.maximum(
+        (site.normal[..., 0] * wi[..., 0] + site.normal[..., 1] * wi[..., 1])
+        + site.normal[..., 2] * wi[..., 2],
+        0.0,
+    )
+    color, factor = Conductor.value(site, wi, cosine)
+    return {"value": color * factor[..., np.newaxis], "pdf": Conductor.pdf(site, wi, cosine)}
+
+
+DIELECTRIC = Function(
+    "material.dielectric",
+    "Glass sends a path on: mirrored or refracted",
+    "DIE-4",
+    {
+        **VERTEX,
+        **CHOICES,
+        "ior": Field("index of refraction", 0, 1.0, 4.0),
+        "outside": Field("1: the normal points out of the body, 0: into it"),
+    },
+    GONE_ON,
+    lambda given, dtype: _sampled(Dielectric, given, parameter=given["ior"], outside=given["outside"] > 0.5),
+    [
+        ("in, refracted", _at(0, 0, 0.9, ior=1.5, outside=1)),
+        ("in, mirrored", _at(0, 0, 0.0, ior=1.5, outside=1)),
+        ("out, refracted", _at(0, 0, 0.9, wo=(0.28, 0.96, 0.0), ior=1.5, outside=0)),
+        ("out, totally reflected", _at(0, 0, 0.999, wo=(0.96, 0.28, 0.0), ior=1.5, outside=0)),
+        ("an index of 1: the body is not there", _at(0, 0, 0.5, ior=1.0, outside=1)),
+    ],
+    lambda u: {**_vertex(u), "ior": 1.0 + u[12], "outside": round(u[13])},
+)
+"""Glass."""
+
+MIS = Function(
+    "transport.mis_weight",
+    "Weights of two techniques",
+    "LTR-5",
+    {"pdf": Field("density of the technique", 0, 0.0, 2e30), "other": Field("of the other one", 0, 0.0, 1e6)},
+    {"balance": Field("weight by the balance heuristic"), "power": Field("by the power heuristic")},
+    lambda given, dtype: {
+        name: transport.mis_weight(transport.Settings(heuristic=name), given["pdf"], given["other"])
+        for name in transport.HEURISTICS
+    },
+    [
+        ("alike", {"pdf": 0.25, "other": 0.25}),
+        ("the other one cannot find it", {"pdf": 0.25, "other": 0.0}),
+        ("a camera ray", {"pdf": 1e30, "other": 3.0}),
+        ("three to one: 3/4 and 9/10", {"pdf": 3.0, "other": 1.0}),
+    ],
+    lambda u: {"pdf": 4.0 * u[0], "other": 4.0 * u[1]},
+    draws=4,
+)
+"""Heuristics."""
+
+SKY = Sky((0.16, 0.30, 0.62), (0.62, 0.70, 0.80), (0.18, 0.16, 0.14), (0.6, 0.8, 0.0), (2.6, 2.2, 1.6), 64.0)
+"""The sky of all directions."""
+
+
+def _sky(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return radiance and density."""
+    sky = environment.build(SKY, dtype)
+    direction = given["direction"]
+    return {"radiance": environment.radiance(sky, direction), "pdf": environment.pdf(sky, direction)}
+
+
+RADIANCE = Function(
+    "sky.radiance",
+    f"{SKY}".replace("Sky(", "The sky with ").rstrip(")"),
+    "ENV-1",
+    {"direction": Field("unit direction", 3, -1.0)},
+    {"radiance": Field("radiance from there", 3), "pdf": Field("density of the direction, 1/sr")},
+    _sky,
+    [
+        ("the zenith", {"direction": (0.0, 1.0, 0.0)}),
+        ("the horizon", {"direction": (1.0, 0.0, 0.0)}),
+        ("the ground", {"direction": (0.0, -1.0, 0.0)}),
+        ("the sun", {"direction": SKY.sun_direction}),
+    ],
+    lambda u: {"direction": _unit(u)},
+    draws=4,
+)
+"""The sky's light."""
+
+SKY_SAMPLE = Function(
+    "sky.sample",
+    "A direction to the same sky",
+    "ENV-2",
+    {**CHOICES},
+    {"direction": Field("unit direction", 3)},
+    lambda given, dtype: {
+        "direction": environment.sample(
+            environment.build(SKY, dtype), given["u_choice"], given["u0"], given["u1"]
+        )
+    },
+    [
+        ("the middle of the sun", {"u_choice": 0.0, "u0": 0.0, "u1": 0.5}),
+        ("anywhere", {"u_choice": 0.999, "u0": 0.5, "u1": 0.25}),
+    ],
+    lambda u: {"u_choice": u[0], "u0": u[1], "u1": u[2]},
+    draws=6,
+)
+"""Samples of the sky."""
+
+FUNCTIONS = (LAMBERTIAN, MIRROR, CONDUCTOR, CONDUCTOR_VALUE, DIELECTRIC, MIS, RADIANCE, SKY_SAMPLE)
+"""The functions of this module."""

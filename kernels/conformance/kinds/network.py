@@ -1,0 +1,290 @@
+"""Kinds of the network: initial parameters, activations layer by layer, derivatives, Adam over several steps.
+
+Bounds are those of compiler/bounds.py (PRO-6) at the case's own inputs, and for Adam ranges, step by step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....compiler import bounds, ranges
+from ....compiler.compile import analysed
+from ....compiler.ir import Type
+from ....compiler.lower_step import ADAM_INPUTS, lower_adam, step_of
+from ....compiler.profiles import EMITTED_SINE
+from ....compiler.ranges import Range
+from ....compiler.step import SQUARES, sum_errors
+from ....compiler.sums import gamma
+from ....compiler.trace import trace
+from ....refimpl import adam, siren, train
+from ....refimpl.siren import Siren
+from ..case import Case, Kind, Output
+from ..functions import drawn
+
+Array = NDArray[Any]
+
+POSTERIORI = "bounds of profile ieee at these inputs (compiler/bounds.py)"
+"""Where the bounds of networks come from."""
+
+SIZES = (([4, 5, 3], 3.0, 1.0), ([6, 8, 8, 3], 1.0, 10.0), ([3, 4, 4, 4, 3], 30.0, 30.0), ([2, 3], 1.0, 1.0))
+"""Networks of the cases: widths, omega_0 of the first layer and of the others; the last is affine alone."""
+
+EXAMPLES = 4
+"""Examples of a minibatch."""
+
+
+def _network(index: int) -> Siren:
+    """Return the network of a case: large weights in the third."""
+    widths, first, hidden = SIZES[index]
+    return siren.init(widths, first, hidden, seed=index, dtype=np.float32)
+
+
+def _as_inputs(network: Siren) -> dict[str, Any]:
+    """Return a network as inputs of a case."""
+    found: dict[str, Any] = {"omega_0_first": network.omega_0_first, "omega_0_hidden": network.omega_0_hidden}
+    for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+        found |= {f"weight_{layer}": weight, f"bias_{layer}": bias}
+    return found
+
+
+def _from_inputs(inputs: Mapping[str, Any]) -> Siren:
+    """Return the network of a case in float64."""
+    count = sum(name.startswith("weight_") for name in inputs)
+    weights, biases = (
+        tuple(np.asarray(inputs[f"{name}_{layer}"], np.float64) for layer in range(count))
+        for name in ("weight", "bias")
+    )
+    return Siren(weights, biases, float(inputs["omega_0_first"]), float(inputs["omega_0_hidden"]))
+
+
+def _numbers(index: int, shape: tuple[int, ...], scale: float = 1.0) -> Array:
+    """Return numbers (...) in [-scale, scale], float32 in float64."""
+    count = int(np.prod(shape))
+    flat = (2.0 * drawn("network", index, count) - 1.0) * scale
+    return flat.astype(np.float32).astype(np.float64).reshape(shape)
+
+
+# ---- initial parameters -----------------------------------------------------------------------------------
+
+
+def _init(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters in float32."""
+    widths = [int(width) for width in np.ravel(inputs["widths"])]
+    drawn_ones = siren.init(
+        widths,
+        float(inputs["omega_0_first"]),
+        float(inputs["omega_0_hidden"]),
+        int(inputs["seed"]),
+        np.float32,
+    )
+    return {name: value for name, value in _as_inputs(drawn_ones).items() if not name.startswith("omega")}
+
+
+def _init_cases() -> list[Case]:
+    """Return some networks."""
+    cases = []
+    for index, (widths, first, hidden) in enumerate(SIZES):
+        inputs = {"widths": np.array(widths), "omega_0_first": first, "omega_0_hidden": hidden, "seed": index}
+        expected = {
+            name: Output(value, 0.0, "exact, rounded once to float32")
+            for name, value in _init(inputs).items()
+        }
+        cases.append(Case(f"network.init/{index}", "SIR-5", inputs, expected))
+    return cases
+
+
+# ---- activations ------------------------------------------------------------------------------------------
+
+
+def activations(network: Siren, x: Any) -> dict[str, Any]:
+    """Return what each layer gives, the last one the network's value; `x` (..., D_in) may be traced."""
+    found = {}
+    for layer in range(len(network.weights)):
+        part = Siren(
+            (network.weights[layer],), (network.biases[layer],), network.omega_0_first, network.omega_0_hidden
+        )
+        omega = network.omega_0_first if layer == 0 else network.omega_0_hidden
+        x = siren.forward(part, x)
+        if layer < len(network.weights) - 1:
+            x = np.sin(omega * x)
+        found[f"layer_{layer}"] = x
+    return found
+
+
+def _forward(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the activations of one input vector."""
+    found = activations(_from_inputs(inputs), np.asarray(inputs["x"], np.float64)[np.newaxis])
+    return {name: value[0] for name, value in found.items()}
+
+
+def _forward_cases() -> list[Case]:
+    """Return activations with bounds."""
+    cases = []
+    rows = [(index, note) for index in range(len(SIZES)) for note in ("", "zeros", "an input of a firefly")]
+    for number, (index, note) in enumerate(rows):
+        network, n_in = _network(index), SIZES[index][0][0]
+        x = {"": _numbers(number, (n_in,)), "zeros": np.zeros(n_in)}.get(
+            note, _numbers(number, (n_in,), 40.0)
+        )
+        inputs = {**_as_inputs(network), "x": x}
+        program = analysed(trace(partial(activations, network), {"x": Type(shape=(n_in,))}))
+        found = bounds.at_inputs(program, {"x": x[np.newaxis]}, EMITTED_SINE)
+        expected = {
+            name: Output(value, np.broadcast_to(found[name], (1, value.size))[0], POSTERIORI)
+            for name, value in _forward(inputs).items()
+        }
+        cases.append(Case(f"network.forward/{number}", "SIR-2", inputs, expected, (), note))
+    return cases
+
+
+# ---- derivatives ------------------------------------------------------------------------------------------
+
+
+def _gradient(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the loss and its derivatives."""
+    windows, targets = (np.asarray(inputs[name], np.float64) for name in ("x", "target"))
+    loss, found = train.loss_and_gradients(_from_inputs(inputs), windows, targets)
+    derivatives: dict[str, Any] = {"loss": loss}
+    for layer, (weight, bias) in enumerate(zip(found.dweights, found.dbiases, strict=True)):
+        derivatives |= {f"dweight_{layer}": weight, f"dbias_{layer}": bias}
+    return derivatives
+
+
+def _gradient_cases() -> list[Case]:
+    """Return derivatives with bounds."""
+    cases = []
+    for index, (widths, _, _) in enumerate(SIZES):
+        network = _network(index)
+        x, target = _numbers(20 + index, (EXAMPLES, widths[0])), _numbers(30 + index, (EXAMPLES, widths[-1]))
+        inputs = {**_as_inputs(network), "x": x, "target": target}
+        step = step_of(partial(siren.forward, network), widths[0], widths[-1], EXAMPLES)
+        errors = sum_errors(step, x, target)
+        expected = {}
+        for name, value in _gradient(inputs).items():
+            if name == "loss":
+                # The mean of all squares is their sums' sum over their number: 8 more roundings at most.
+                error = float(errors[SQUARES].sum()) / target.size + gamma(8) * value
+                expected[name] = Output(value, error, POSTERIORI)
+                continue
+            array = inputs[name.removeprefix("d")]
+            owner = next(n for n, p in step.program.parameters.items() if np.array_equal(p, array))
+            expected[name] = Output(value, errors[owner].reshape(value.shape), POSTERIORI)
+        cases.append(Case(f"network.gradient/{index}", "SIR-7", inputs, expected))
+    return cases
+
+
+# ---- Adam -------------------------------------------------------------------------------------------------
+
+
+def _adam(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return parameters and moments (K, n) after each step."""
+    theta: tuple[Array, ...] = (np.asarray(inputs["theta"], np.float64),)
+    state, rows = adam.init(theta), []
+    for gradient in np.asarray(inputs["gradients"], np.float64):
+        theta, state = adam.step(theta, (gradient,), state, float(inputs["learning_rate"]))
+        rows.append((theta[0], state.m[0], state.v[0]))
+    return {name: np.array([row[i] for row in rows]) for i, name in enumerate(("theta", "m", "v"))}
+
+
+def _adam_ranges(inputs: Mapping[str, Any]) -> dict[str, tuple[Array, Array]]:
+    """Return the ends (K, n) of what single precision may give, from step to step."""
+    program, theta = lower_adam(), np.asarray(inputs["theta"], np.float64)
+    zero = np.zeros_like(theta)
+    state: dict[str, Any] = {"theta": theta, "m": zero, "v": zero}
+    rows = []
+    for t, gradient in enumerate(inputs["gradients"], start=1):
+        grown = [_rounded(value) for value in adam.growth(t)]
+        rate = np.float64(inputs["learning_rate"])
+        given = (state["theta"], gradient, state["m"], state["v"], rate, *grown)
+        state = ranges.evaluate(program, dict(zip(ADAM_INPUTS, given, strict=True)))
+        rows.append({name: (np.array(r.low), np.array(r.high)) for name, r in state.items()})
+    return {
+        name: tuple(np.array([row[name][end] for row in rows]) for end in (0, 1))  # type: ignore[misc]
+        for name in ("theta", "m", "v")
+    }
+
+
+def _rounded(value: float) -> Range:
+    """Return the range of a float64 number that may be rounded to float32, either way."""
+    near = np.float32(value)
+    ends = sorted((float(np.nextafter(near, np.float32(0))), float(np.nextafter(near, np.float32(np.inf)))))
+    return Range(np.float64(ends[0]), np.float64(ends[1]), near)
+
+
+ADAM_ROWS = (
+    ("gradients of all sizes", np.array([1e-6, 1e-3, 1.0, 1e3]), 4),
+    ("a gradient that turns", np.array([1.0, -1.0, 0.5, -0.25]), 4),
+    ("a parameter without a gradient", np.array([0.0, 0.0, 1.0, 0.0]), 3),
+)
+"""Gradients of the first step; they halve from step to step, and every second one turns in the second row."""
+
+
+def _adam_cases() -> list[Case]:
+    """Return runs of a few steps."""
+    cases = []
+    for index, (note, first, count) in enumerate(ADAM_ROWS):
+        factors = [(-0.5 if index == 1 else 0.5) ** k for k in range(count)]
+        gradients = np.array([np.float32(f) * first.astype(np.float32) for f in factors], np.float64)
+        inputs = {"theta": _numbers(40 + index, (4,)), "gradients": gradients, "learning_rate": 2.0**-10}
+        found, ends = _adam(inputs), _adam_ranges(inputs)
+        expected = {
+            name: Output(value, np.maximum(ends[name][1] - value, value - ends[name][0]), ranges_text())
+            for name, value in found.items()
+        }
+        cases.append(Case(f"adam.run/{index}", "ADM-1", inputs, expected, (), note))
+    return cases
+
+
+def ranges_text() -> str:
+    """Return where the bounds of Adam's runs come from."""
+    return "ranges of single precision under profile ieee, from step to step (compiler/ranges.py)"
+
+
+NETWORK = {
+    "weight_l": "float[D_out][D_in], for each layer l from 0",
+    "bias_l": "float[D_out]",
+    "omega_0_first": "float",
+    "omega_0_hidden": "float",
+}
+"""What a network is, for the page."""
+
+KINDS = (
+    Kind(
+        "network.init",
+        "Initial parameters",
+        {"widths": "integer[L + 1]", "omega_0_first": "float", "omega_0_hidden": "float", "seed": "integer"},
+        {name: NETWORK[name] for name in ("weight_l", "bias_l")},
+        _init_cases,
+        _init,
+    ),
+    Kind(
+        "network.forward",
+        "The network, layer by layer",
+        {**NETWORK, "x": "float[D_in]"},
+        {"layer_l": "float[D_out], what layer l gives: after its sine, but for the last"},
+        _forward_cases,
+        _forward,
+    ),
+    Kind(
+        "network.gradient",
+        "The mean squared error of a minibatch, and its derivatives",
+        {**NETWORK, "x": "float[N][D_in]", "target": "float[N][D_out]"},
+        {"loss": "float", "dweight_l": "float[D_out][D_in]", "dbias_l": "float[D_out]"},
+        _gradient_cases,
+        _gradient,
+    ),
+    Kind(
+        "adam.run",
+        "Adam over several steps, from moments of zero",
+        {"theta": "float[n]", "gradients": "float[K][n], one row a step", "learning_rate": "float"},
+        {"theta": "float[K][n], after each step", "m": "float[K][n]", "v": "float[K][n]"},
+        _adam_cases,
+        _adam,
+    ),
+)
+"""The kinds of this module."""

@@ -1,0 +1,164 @@
+"""Kinds of single numbers: the random generator, encodings, the sine, Adam."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ....compiler import sine
+from ....refimpl import adam, encoding, rng
+from ..case import Case, Kind, Output
+from ..functions import Field, Function, drawn
+
+LAST = 2**32 - 1
+"""Largest counter."""
+
+COUNTERS = ("seed", "pixel", "sample", "block")
+"""Inputs of a block of random numbers, in the order of `refimpl/rng.py: random_block`."""
+
+
+def _block(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the words and floats of a block."""
+    words = rng.random_block(*(rng.counter(int(inputs[name])) for name in COUNTERS))
+    floats = [rng.uniform_floats(word, np.float64) for word in words]
+    return {"words": [int(w[0]) for w in words], "floats": np.array([f[0] for f in floats])}
+
+
+def _blocks() -> list[Case]:
+    """Return blocks at the ends of the counters, one counter at a time, and others."""
+    rows: list[tuple[str, tuple[int, ...]]] = [
+        ("zeros", (0, 0, 0, 0)),
+        ("all at their end: products wrap", (LAST,) * 4),
+    ]
+    rows += [(f"only {name} at its end", tuple(LAST * (name == n) for n in COUNTERS)) for name in COUNTERS]
+    rows += [
+        ("the order of the counters matters", (9, 10, 11, 12)),
+        ("pixel (1, 2)", (7, 1 + 65536 * 2, 0, 0)),
+    ]
+    rows += [("", tuple(int(u * 2**32) for u in drawn("random.block", i, 4))) for i in range(8)]
+    found = []
+    for index, (note, values) in enumerate(rows):
+        inputs = dict(zip(COUNTERS, values, strict=True))
+        expected = {name: Output(value) for name, value in _block(inputs).items()}
+        found.append(Case(f"random.block/{index}", "RNG-3", inputs, expected, (), note))
+    return found
+
+
+BLOCK = Kind(
+    "random.block",
+    "A block of random numbers",
+    dict.fromkeys(COUNTERS, "integer below 2^32"),
+    {"words": "integer[4] below 2^32", "floats": "float[4] in [0, 1)"},
+    _blocks,
+    _block,
+)
+"""Four words and four floats of four counters."""
+
+
+def _scalar(u: np.ndarray, low: float, high: float) -> float:
+    """Return the first of uniform numbers, stretched to a range."""
+    return float(low + (high - low) * u[0])
+
+
+SRGB = Function(
+    "encoding.display",
+    "Linear radiance to display-encoded colour",
+    "ENC-5",
+    {"linear": Field("linear radiance", 0, -1.0, 1e6)},
+    {"encoded": Field("display-encoded colour in [0, 1]")},
+    lambda given, dtype: {"encoded": encoding.to_display(given["linear"])},
+    [
+        ("black", {"linear": 0.0}),
+        ("below black: clipped", {"linear": -0.5}),
+        ("white", {"linear": 1.0}),
+        ("a firefly: clipped", {"linear": 1e6}),
+        ("where the line meets the curve, below", {"linear": 0.0031308}),
+        ("where the line meets the curve, above", {"linear": 0.0031309}),
+        ("least normal number", {"linear": 2.0**-126}),
+    ],
+    lambda u: {"linear": _scalar(u, 0.0, 1.2)},
+)
+"""The transfer function with its clip."""
+
+
+def _adam(given: Mapping[str, Any], dtype: Any) -> dict[str, Any]:
+    """Return parameter and moments after a step."""
+    grown = (given["growth_1"], given["growth_2"])
+    theta, g, m, v = (given[name] for name in ("theta", "g", "m", "v"))
+    theta, m, v = adam.update(theta, g, m, v, given["learning_rate"], grown)
+    return {"theta": theta, "m": m, "v": v}
+
+
+def _step(theta: float, g: float, m: float, v: float, t: int, rate: float = 1e-3) -> dict[str, float]:
+    """Return the inputs of a step."""
+    first, second = adam.growth(t)
+    names = ("theta", "g", "m", "v", "learning_rate", "growth_1", "growth_2")
+    return dict(zip(names, (theta, g, m, v, rate, first, second), strict=True))
+
+
+ADAM = Function(
+    "adam.step",
+    "One parameter through one step of Adam",
+    "ADM-1",
+    {
+        "theta": Field("parameter", 0, -1.0, 1.0),
+        "g": Field("derivative of the loss", 0, -1e6, 1e6),
+        "m": Field("mean of derivatives", 0, -1.0, 1.0),
+        "v": Field("mean of their squares"),
+        "learning_rate": Field("step length"),
+        "growth_1": Field("1 - beta_1^t", 0, 0.09),
+        "growth_2": Field("1 - beta_2^t", 0, 0.0009),
+    },
+    {
+        "theta": Field("parameter after the step"),
+        "m": Field("mean after it"),
+        "v": Field("mean of squares after it"),
+    },
+    _adam,
+    [
+        ("first step: the learning rate, whatever the gradient", _step(1.0, 0.5, 0.0, 0.0, 1)),
+        ("no gradient yet: nothing moves, nothing divides 0 by 0", _step(1.0, 0.0, 0.0, 0.0, 1)),
+        (
+            "gradient of the size of epsilon: half a step; epsilon is outside the root",
+            _step(0.0, 1e-8, 0.0, 0.0, 1),
+        ),
+        ("step 20,000: bias correction has faded", _step(0.3, -0.01, 0.02, 0.003, 20_000)),
+        ("large gradient", _step(0.3, 1e6, 0.0, 0.0, 1)),
+    ],
+    lambda u: _step(2 * u[0] - 1, 2 * u[1] - 1, u[2] - 0.5, u[3], 1 + int(100 * u[4])),
+)
+"""The update of one number."""
+
+LARGEST = float(np.nextafter(np.float32(sine.DOMAIN), np.float32(0)))
+"""Largest argument of the sine in these cases: the last float32 below the end of its domain."""
+
+SINE = Function(
+    "sine",
+    "The emitted sine",
+    "PRO-4",
+    {"x": Field("radians, |x| < 12,800", 0, -LARGEST, LARGEST)},
+    {"sin": Field("sine, in [-1, 1]")},
+    lambda given, dtype: {"sin": np.sin(given["x"])},
+    [
+        ("zero", {"x": 0.0}),
+        ("least denormal number", {"x": 2.0**-149}),
+        ("float32 nearest to pi", {"x": np.float32(np.pi)}),
+        ("float32 nearest to pi / 2", {"x": np.float32(np.pi / 2)}),
+        (
+            "float32 nearest to 710 pi: few multiples of pi are so near a float",
+            {"x": np.float32(710 * np.pi)},
+        ),
+        ("last float32 in the domain", {"x": LARGEST}),
+        ("first one", {"x": -LARGEST}),
+    ],
+    lambda u: {"x": _scalar(u, -100.0, 100.0)},
+)
+"""The sine of the network; its contract is the emitted sine's."""
+
+KINDS = (BLOCK,)
+"""Kinds of this module that are no functions of floats."""
+
+FUNCTIONS = (SRGB, SINE, ADAM)
+"""Those that are."""

@@ -1,0 +1,499 @@
+"""Kinds of paths: one step of a path from its state to the next, and whole paths with every vertex.
+
+1. A step is a function of a state: from the camera [`start`], to the next surface [`arrive`], and away from
+   it [`scatter`]. Its bound is the range of what single precision may give at that state
+   (compiler/ranges.py).
+2. A whole path is the steps one after another, each from the range of the one before: the bound grows from
+   vertex to vertex. A case ends before the first vertex of which a decision is not sure [`followed`].
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ....compiler import ranges
+from ....compiler.lower_scene import PATH, SURFACE, PathPrograms, Values, kinds, lower_scene
+from ....compiler.ranges import Range
+from ....refimpl import camera, render, rng, scenes, transport
+from ....refimpl import scene as scene_module
+from ....refimpl.intersection import Hit, Surface
+from ....refimpl.transport import Counters, Path, Settings
+from ..case import Case, Kind, Output
+from ..functions import SOURCE
+
+SCENES = ("cornell", "glossy", "daylight", "minicubes")
+"""Canonical scenes whose paths are cases; each at a time of its own, [`TIME_S`]."""
+
+TIME_S = 1.25
+"""Time of the scenes in their animation."""
+
+SIZE_PX = 16
+"""Width and height of the images that the paths belong to."""
+
+SEED = 20
+"""Seed of their random numbers."""
+
+LARGEST_BOUND = 0.01
+"""Whole paths end where the point of a vertex has a larger bound, in scene units."""
+
+MOST_VERTICES = 5
+"""Most vertices of a whole path."""
+
+CHAIN = "ranges of single precision under profile ieee, from step to step (compiler/ranges.py)"
+"""Where the bounds of whole paths come from."""
+
+SCENE_FIELD = "scene file (SCN-6)"
+"""What a scene is, for the page."""
+
+SETTINGS_FIELD = "object: max_depth, roulette_depth (or null), strategy, heuristic, sampler (LTR-6 to LTR-9)"
+"""What settings are, for the page."""
+
+State = dict[str, Any]
+
+
+class World(NamedTuple):
+    """A scene in float64, and its camera."""
+
+    world: transport.World
+    basis: camera.CameraBasis
+
+
+def scene_text(name: str) -> str:
+    """Return the JSON of a scene of these cases."""
+    return scene_module.to_json(scenes.canonical(name, time=TIME_S))
+
+
+def files() -> dict[str, bytes]:
+    """Return the scene files."""
+    return {_file(name): scene_text(name).encode() for name in SCENES}
+
+
+def _file(name: str) -> str:
+    """Return the name of a scene's file."""
+    return f"scenes/{name}.json"
+
+
+def settings_of(data: Mapping[str, Any]) -> Settings:
+    """Return settings from JSON."""
+    return Settings(**data)
+
+
+def world_of(text: str, settings: Mapping[str, Any]) -> World:
+    """Return what a scene's text and settings stand for."""
+    return _world(text, json.dumps(settings))
+
+
+@cache
+def _world(text: str, settings_text: str) -> World:
+    """Return a world, made once."""
+    scene, settings = scene_module.from_json(text), settings_of(json.loads(settings_text))
+    return World(
+        transport.build(scene, settings, np.float64),
+        camera.camera_basis(scene.camera, np.float64),
+    )
+
+
+def programs_of(name: str, settings: Settings) -> PathPrograms:
+    """Return the programs of a path; the greatest depth is none of their business."""
+    return _programs(name, replace(settings, max_depth=0))
+
+
+@cache
+def _programs(name: str, settings: Settings) -> PathPrograms:
+    """Return the programs of a path through a canonical scene, made once."""
+    return lower_scene(scene_module.from_json(scene_text(name)), settings, None)
+
+
+# ---- steps in float64 -----------------------------------------------------------------------------------
+
+
+def _lanes(values: Values, inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a state as arrays with one lane."""
+    return {
+        name: np.asarray(inputs[name], kind if kind != "float32" else "float64")[np.newaxis]
+        for name, (_, kind) in values.items()
+    }
+
+
+def _counters(inputs: Mapping[str, Any]) -> Counters:
+    """Return the counters of a path."""
+    return Counters(*(rng.counter(int(inputs[name])) for name in ("seed", "pixel", "sample")))
+
+
+def start(inputs: Mapping[str, Any]) -> State:
+    """Return a path at the camera."""
+    at = world_of(inputs["scene"], inputs["settings"])
+    x, y = (np.array([float(inputs[name])]) for name in ("x", "y"))
+    pixel = render.pixel_counter(x.astype(np.int64), y.astype(np.int64))
+    counters = Counters(rng.counter(int(inputs["seed"])), pixel, rng.counter(int(inputs["sample"])))
+    size = float(inputs["width"]), float(inputs["height"])
+    path = render.start(at.basis, x, y, *size, counters, np.float64, at.world.settings.sampler)
+    return {"pixel": int(pixel[0]), "origin": path.origin[0], "direction": path.direction[0]}
+
+
+def arrive(inputs: Mapping[str, Any]) -> State:
+    """Return the surface that a path meets, and the light gathered there."""
+    at = world_of(inputs["scene"], inputs["settings"])
+    path, surface, hit = transport.arrive(at.world, Path(**_lanes(PATH, inputs)))
+    found = {**surface._asdict(), **hit._asdict()}
+    return {"radiance": path.radiance[0], **{name: found[name][0] for name in SURFACE}}
+
+
+def scatter(inputs: Mapping[str, Any]) -> State:
+    """Return how a path leaves a surface; of one that ends, only the light it has gathered."""
+    at = world_of(inputs["scene"], inputs["settings"])
+    of_surface = _lanes(SURFACE, inputs)
+    point, normal, reflectance = (of_surface[name] for name in ("point", "normal", "reflectance"))
+    surface = Surface(point, normal, reflectance, None, None)
+    hit = Hit(of_surface["t"], of_surface["surface"])
+    path = Path(**_lanes(PATH, inputs))
+    found, alive = transport.scatter(
+        at.world, path, surface, hit, rng.counter(int(inputs["depth"])), _counters(inputs)
+    )
+    if not alive[0]:
+        return {"alive": np.False_, "radiance": found.radiance[0]}
+    return {"alive": np.True_, **{name: getattr(found, name)[0] for name in PATH}}
+
+
+# ---- bounds ---------------------------------------------------------------------------------------------
+
+
+def _flat(inputs: Mapping[str, Any], values: Values) -> dict[str, Any]:
+    """Return the components of a state by name, each (1,)."""
+    found = {}
+    for name, (ends, kind) in values.items():
+        parts = np.asarray(inputs[name]).reshape(len(ends))
+        for end, part in zip(ends, parts, strict=True):
+            found[name + end] = np.array([part]).astype(kind)
+    return found
+
+
+def _counted(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the counters by the names of programs."""
+    names = {
+        "seed": "seed",
+        "pixel": "pixel",
+        "sample_number": "sample",
+        "x": "x",
+        "y": "y",
+        "depth": "depth",
+    }
+    found = {name: rng.counter(int(inputs[own])) for name, own in names.items() if own in inputs}
+    sizes = {name: np.array([inputs[name]], np.float32) for name in ("width", "height") if name in inputs}
+    return {**found, **sizes}
+
+
+def _ends(found: Mapping[str, Range], name: str, ends: tuple[str, ...]) -> tuple[Any, Any, bool]:
+    """Return the ends (len(ends),) of a value's range, and whether it is sure and finite."""
+    parts = [found[name + end] for end in ends]
+    low, high = (
+        np.array([np.float64(np.ravel(getattr(p, side))[0]) for p in parts]) for side in ("low", "high")
+    )
+    return low, high, bool(all(np.all(p.sure & p.known) for p in parts))
+
+
+def _expected(wanted: State, found: Mapping[str, Range]) -> dict[str, Output] | None:
+    """Return outputs with bounds, or nothing where a decision is not sure."""
+    outputs = {}
+    for name, value in wanted.items():
+        if name == "pixel":
+            outputs[name] = Output(value)
+            continue
+        ends, kind = {**PATH, **SURFACE, "alive": (("",), "bool")}[name]
+        low, high, sure = _ends(found, name, ends)
+        if not sure:
+            return None
+        if kind in ("bool", "int32"):
+            outputs[name] = Output(bool(value) if kind == "bool" else int(value))
+            continue
+        low, high = (end.reshape(np.shape(value)) for end in (low, high))
+        outputs[name] = Output(value, np.maximum(high - value, value - low), SOURCE)
+    return outputs
+
+
+# ---- cases ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class View:
+    """A path: its scene and settings, its pixel, its sample."""
+
+    scene: str
+    settings: Settings
+    x: int
+    y: int
+    sample: int
+
+    def inputs(self) -> dict[str, Any]:
+        """Return the inputs of the first step."""
+        return {
+            "scene": {"file": _file(self.scene)},
+            "settings": asdict(self.settings),
+            "width": SIZE_PX,
+            "height": SIZE_PX,
+            "x": self.x,
+            "y": self.y,
+            "seed": SEED,
+            "sample": self.sample,
+        }
+
+
+VARIANTS = (
+    Settings(),
+    Settings(strategy="light", heuristic="balance", sampler="sobol"),
+    Settings(roulette_depth=0, heuristic="balance"),
+    Settings(strategy="bsdf"),
+)
+"""Settings of the cases, in turn."""
+
+
+def _views(count: int) -> Iterator[View]:
+    """Yield paths spread over scenes, settings and pixels."""
+    for index in range(count):
+        words = rng.random_block(rng.counter(SEED), rng.counter(index), rng.counter(0), rng.counter(0))
+        x, y = (int(word[0]) % SIZE_PX for word in words[:2])
+        name = SCENES[index % len(SCENES)]
+        yield View(name, VARIANTS[index // len(SCENES) % len(VARIANTS)], x, y, index % 3)
+
+
+def _with_scene(inputs: Mapping[str, Any], view: View) -> dict[str, Any]:
+    """Return inputs as the reference takes them: the scene's text for its file."""
+    return {**inputs, "scene": scene_text(view.scene)}
+
+
+class Found(NamedTuple):
+    """The cases of the three kinds of steps."""
+
+    start: list[Case]
+    arrive: list[Case]
+    scatter: list[Case]
+
+
+@cache
+def _steps() -> Found:
+    """Return the cases of all steps: paths in float64 whose states are rounded to float32 at each step."""
+    found = Found([], [], [])
+    for view in _views(16):
+        given = view.inputs()
+        programs = programs_of(view.scene, view.settings)
+        wanted = start(_with_scene(given, view))
+        _add(
+            found.start,
+            "path.start",
+            "CAM-3",
+            given,
+            wanted,
+            ranges.evaluate(programs.start, _counted(given)),
+        )
+        kept = {name: given[name] for name in ("scene", "settings")}
+        counters = {"seed": SEED, "pixel": wanted.pop("pixel"), "sample": view.sample}
+        one = np.ones(3)
+        state: dict[str, Any] = {**wanted, "beta": one, "radiance": 0.0 * one, "pdf": transport.CAMERA_PDF}
+        for depth in range(3):
+            state = {name: _rounded(state[name]) for name in PATH}
+            wanted = arrive(_with_scene({**kept, **state}, view))
+            sent = ranges.evaluate(programs.arrive, _flat(state, PATH))
+            _add(found.arrive, "path.arrive", "LTR-2", {**kept, **state}, wanted, sent)
+            surface = {name: _rounded(wanted[name]) for name in SURFACE}
+            inputs = {
+                **kept,
+                **counters,
+                "depth": depth,
+                **state,
+                "radiance": _rounded(wanted["radiance"]),
+                **surface,
+            }
+            wanted = scatter(_with_scene(inputs, view))
+            flat = {**_flat(inputs, PATH), **_flat(inputs, SURFACE), **_counted(inputs)}
+            sent = ranges.evaluate(programs.scatter, flat)
+            _add(found.scatter, "path.scatter", "LTR-7", inputs, wanted, sent)
+            if not wanted["alive"]:
+                break
+            state = wanted
+    return found
+
+
+def _rounded(value: Any) -> Any:
+    """Return numbers rounded to float32, in float64."""
+    if np.asarray(value).dtype.kind == "f":
+        return np.asarray(value, np.float32).astype(np.float64)
+    return value
+
+
+def _add(
+    cases: list[Case],
+    kind: str,
+    clause: str,
+    inputs: Mapping[str, Any],
+    wanted: State,
+    found: Mapping[str, Range],
+) -> None:
+    """Append a case, unless a decision of it is not sure."""
+    expected = _expected(wanted, found)
+    if expected is not None:
+        note = f"{inputs['settings']['strategy']}, {inputs['settings']['sampler']}"
+        cases.append(Case(f"{kind}/{len(cases)}", clause, dict(inputs), expected, (), note))
+
+
+# ---- whole paths ----------------------------------------------------------------------------------------
+
+VERTEX = ("t", "surface", "point", "normal", "reflectance", "beta", "radiance")
+"""What is told of each vertex: the surface, and beta and radiance on arrival."""
+
+
+def whole(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return every vertex of a path: each output with the vertices on its first axis."""
+    state: dict[str, Any] = dict(start(inputs))
+    counters = {name: inputs[name] for name in ("scene", "settings", "seed", "sample")}
+    counters["pixel"] = state.pop("pixel")
+    one = np.ones(3)
+    state |= {"beta": one, "radiance": 0.0 * one, "pdf": transport.CAMERA_PDF}
+    vertices = []
+    for depth in range(inputs["settings"]["max_depth"] + 1):
+        found = arrive({**counters, **state})
+        state["radiance"] = found["radiance"]
+        vertices.append({**state, **found})
+        if depth == inputs["settings"]["max_depth"]:
+            break
+        sent: dict[str, Any] = dict(scatter({**counters, **state, **found, "depth": depth}))
+        if not sent.pop("alive"):
+            vertices[-1]["radiance"] = sent["radiance"]
+            break
+        state = sent
+    return {name: np.array([vertex[name] for vertex in vertices]) for name in VERTEX}
+
+
+def followed(view: View) -> Iterator[dict[str, Range]]:
+    """Yield the ranges of each vertex of a path, as long as all decisions are sure."""
+    given, programs = view.inputs(), programs_of(view.scene, view.settings)
+    counters = _counted({**given, "pixel": view.x + render.MAX_IMAGE_SIDE_PX * view.y})
+    state = dict(ranges.evaluate(programs.start, counters))
+    for depth in range(MOST_VERTICES):
+        state |= ranges.evaluate(programs.arrive, state)
+        if not all(
+            np.all(state[name].sure & state[name].known) for name in {**kinds(PATH), **kinds(SURFACE)}
+        ):
+            return
+        yield dict(state)
+        state = {
+            **state,
+            **ranges.evaluate(programs.scatter, {**state, **counters, "depth": rng.counter(depth)}),
+        }
+        alive = state.pop("alive")
+        if not (np.all(alive.sure) and np.all(alive.low)):
+            return
+
+
+@cache
+def _whole_cases() -> list[Case]:
+    """Return whole paths."""
+    cases: list[Case] = []
+    for view in _views(32):
+        reach = []
+        for state in followed(view):
+            low, high, _ = _ends(state, "point", PATH["origin"][0])
+            if not np.max(high - low) <= LARGEST_BOUND:
+                break
+            reach.append(state)
+        if len(reach) < 2:
+            continue
+        inputs = view.inputs()
+        inputs["settings"]["max_depth"] = len(reach) - 1
+        wanted = whole(_with_scene(inputs, view))
+        expected = {}
+        for name in VERTEX:
+            ends = {**PATH, **SURFACE}[name][0]
+            sides = [_ends(state, name, ends)[:2] for state in reach]
+            low, high = (np.reshape([side[i] for side in sides], wanted[name].shape) for i in (0, 1))
+            bound = np.maximum(high - wanted[name], wanted[name] - low)
+            expected[name] = Output(wanted[name], bound if name != "surface" else 0.0, CHAIN)
+        note = f"{view.scene}, {len(reach)} vertices"
+        cases.append(Case(f"path.whole/{len(cases)}", "LTR-8", inputs, expected, (), note))
+    return cases
+
+
+COUNTED = {"seed": "integer below 2^32", "sample": "integer below 2^32"}
+"""Counters, for the page."""
+
+PLACED = {"width": "pixels", "height": "pixels", "x": "column", "y": "row"}
+"""A pixel, for the page."""
+
+OF_PATH = {
+    "origin": "float[3]",
+    "direction": "float[3], unit",
+    "beta": "float[3], throughput",
+    "radiance": "float[3], gathered so far",
+    "pdf": "float, density of the direction, 1/sr; 1e30 at the camera",
+}
+"""A state, for the page."""
+
+OF_SURFACE = {
+    "point": "float[3]",
+    "normal": "float[3]",
+    "reflectance": "float[3]",
+    "t": "float, distance; 1e30 for none",
+    "surface": "integer, number of the surface (ISC-1)",
+}
+"""A surface, for the page."""
+
+GIVEN = {"scene": SCENE_FIELD, "settings": SETTINGS_FIELD}
+"""What all paths are given, for the page."""
+
+KINDS = (
+    Kind(
+        "path.start",
+        "A path at the camera",
+        {**GIVEN, **PLACED, **COUNTED},
+        {"pixel": "integer, its counter (RNG-4)", "origin": "float[3]", "direction": "float[3], unit"},
+        lambda: _steps().start,
+        start,
+        files,
+    ),
+    Kind(
+        "path.arrive",
+        "The next surface of a path, and the light that it emits",
+        {**GIVEN, **OF_PATH},
+        {"radiance": "float[3], after the surface's emission", **OF_SURFACE},
+        lambda: _steps().arrive,
+        arrive,
+        files,
+    ),
+    Kind(
+        "path.scatter",
+        "A path leaves a surface: light sample, new direction, roulette",
+        {
+            **GIVEN,
+            **COUNTED,
+            "pixel": "integer below 2^32",
+            "depth": "scatterings before",
+            **OF_PATH,
+            **OF_SURFACE,
+        },
+        {"alive": "whether it goes on; if not, only radiance is asked for", **OF_PATH},
+        lambda: _steps().scatter,
+        scatter,
+        files,
+    ),
+    Kind(
+        "path.whole",
+        "A whole path with every vertex",
+        {**GIVEN, **PLACED, **COUNTED},
+        {
+            "t": "float[V]",
+            "surface": "integer[V]",
+            **dict.fromkeys(("point", "normal", "reflectance"), "float[V][3]"),
+            "beta": "float[V][3], on arrival",
+            "radiance": "float[V][3], after the vertex's emission",
+        },
+        _whole_cases,
+        whole,
+        files,
+    ),
+)
+"""The kinds of this module."""

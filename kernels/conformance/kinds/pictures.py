@@ -1,0 +1,188 @@
+"""Kinds of whole pictures: denoising of a small frame, and a small render with a statistical verdict.
+
+1. A denoised picture has a bound at each pixel: the network's at its window (compiler/bounds.py), for encoded
+   features that may be one ulp of float32 off [`_denoise_cases`].
+2. A rendered picture is an estimate. The answer holds the mean of each pixel and the variance of one sample;
+   both are averaged over blocks of pixels, and the blocks' means are compared by Welch's test with those of
+   the reference (welch.py) [`_render_cases`].
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ....compiler import bounds
+from ....compiler.compile import analysed
+from ....compiler.lower import lower
+from ....compiler.profiles import EMITTED_SINE
+from ....refimpl import dataset, denoise, siren
+from ....refimpl import scene as scene_module
+from ....refimpl.dataset import Normalization, Window
+from ....refimpl.denoise import Model
+from ....refimpl.frame import LAYERS, Frame, validate
+from ....refimpl.render import Job, render
+from .. import blocks
+from ..case import Case, Kind, Output
+from . import paths
+from .files import file_of, model_from
+from .images import LAYER_FIELDS, ULP, bad_layers, frame_of
+
+SIGNIFICANCE = 1e-5
+"""Chance that a right program fails a case of a render, over all its blocks and channels."""
+
+REFERENCE_SPP, ASKED_SPP = 256, 64
+"""Samples per pixel of the reference and of the answer."""
+
+SIZE_PX, BLOCK_PX = 16, 4
+"""Side of the picture and of a block."""
+
+
+# ---- denoising --------------------------------------------------------------------------------------------
+
+
+def _model(features: tuple[str, ...], window: Window, widths: list[int], seed: int) -> Model:
+    """Return a small model whose values lie in the middle of [0, 1], where clipping hides nothing."""
+    n_in = dataset.n_inputs(features, window)
+    network = siren.init([n_in, *widths, 3], 3.0, 1.0, seed=seed, dtype=np.float32)
+    biases = (*network.biases[:-1], np.full(3, 0.5, np.float32))
+    weights = (*network.weights[:-1], (network.weights[-1] * np.float32(0.2)).astype(np.float32))
+    scales = Normalization(0.5, 0.75, (0.25, -0.5, 0.5), 0.5)
+    return Model(siren.Siren(weights, biases, 3.0, 1.0), features, window, scales)
+
+
+def _layers(inputs: Mapping[str, Any]) -> Frame:
+    """Return the frame of a case."""
+    return frame_of({name: inputs[name] for name in LAYERS if name in inputs})
+
+
+def _denoise(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the denoised picture."""
+    frame = _layers(inputs)
+    validate(frame, finite=False)
+    return {"picture": denoise.denoise(model_from(base64.b64decode(inputs["model"])), frame, np.float64)}
+
+
+DENOISED = (
+    (("color", "normal"), Window(4, "clamp"), [6, 6], (4, 5), "NaN, infinities and a firefly"),
+    (("color",), Window(5, "zero"), [8], (3, 3), "smaller than the window, zeros outside"),
+    (("depth", "albedo", "position"), Window(3, "clamp"), [5, 5], (1, 4), "one row"),
+)
+"""Features, window, hidden widths, height and width, note."""
+
+
+def _denoise_cases() -> list[Case]:
+    """Return denoised pictures with bounds."""
+    cases = []
+    for index, (features, window, widths, size, note) in enumerate(DENOISED):
+        model = _model(features, window, widths, index)
+        wanted = {dataset.FEATURES[name].layer for name in features}
+        layers = {name: v for name, v in bad_layers(*size, 90 + 10 * index).items() if name in wanted}
+        inputs = {**layers, "model": base64.b64encode(file_of(model)).decode()}
+        picture = _denoise(inputs)["picture"]
+        bound = _bound(model, frame_of(layers), picture)
+        text = "bounds of profile ieee at these pixels, features being one ulp off (compiler/bounds.py)"
+        expected = {"picture": Output(picture, bound, text)}
+        cases.append(Case(f"picture.denoised/{index}", "DEN-2", inputs, expected, (), note))
+    inputs = {"color": bad_layers(2, 2, 5)["color"], "model": inputs["model"]}
+    return [*cases, Case(f"picture.denoised/{len(cases)}", "DAT-9", inputs, None, (), "layers are missing")]
+
+
+def _bound(model: Model, frame: Frame, picture: Any) -> Any:
+    """Return the bound (H, W, 3) of a picture."""
+    program = analysed(lower(model))
+    image = dataset.feature_image(frame, model.features, model.normalization).astype(np.float64)
+    windows = dataset.all_windows(dataset.pad(image, model.window), model.window)
+    nodes = bounds.enclose(program, {"window": (windows - ULP, windows + ULP)}, EMITTED_SINE)
+    ((_, index),) = program.outputs
+    found = nodes[index]
+    return np.maximum(found.high - picture, picture - found.low) + found.read
+
+
+# ---- rendering --------------------------------------------------------------------------------------------
+
+
+def _render(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return mean and variance of each pixel."""
+    width, height, spp, seed = (int(inputs[name]) for name in ("width", "height", "spp", "seed"))
+    job = Job(width, height, spp, seed, paths.settings_of(inputs["settings"]))
+    found = render(scene_module.from_json(inputs["scene"]), job)
+    return {"mean": found.frame["color"], "variance": found.color_variance, "spp": job.spp}
+
+
+@cache
+def _render_cases() -> list[Case]:
+    """Return small renders of three scenes."""
+    cases = []
+    for index, name in enumerate(("cornell", "glossy", "daylight")):
+        settings = {
+            "max_depth": 3,
+            "roulette_depth": None,
+            "strategy": "mis",
+            "heuristic": "power",
+            "sampler": "pcg4d",
+        }
+        own = {
+            "width": SIZE_PX,
+            "height": SIZE_PX,
+            "spp": REFERENCE_SPP,
+            "seed": 1000 + index,
+            "settings": settings,
+        }
+        found = _render({**own, "scene": paths.scene_text(name)})
+        mean, variance = blocks.mean_and_variance(
+            found["mean"].astype(np.float64), found["variance"], BLOCK_PX
+        )
+        welch = {
+            "variance": variance,
+            "spp": REFERENCE_SPP,
+            "asked": ASKED_SPP,
+            "block": BLOCK_PX,
+            "shape": np.array([SIZE_PX, SIZE_PX, 3]),
+            "significance": SIGNIFICANCE,
+        }
+        text = f"Welch's test of block means, significance {SIGNIFICANCE:g} in all"
+        inputs = {**own, "scene": {"file": f"scenes/{name}.json"}, "spp": ASKED_SPP, "seed": index}
+        expected = {"mean": Output(mean, 0.0, text, (), welch)}
+        cases.append(Case(f"picture.rendered/{index}", "LTR-6", inputs, expected, ("statistical",), name))
+    return cases
+
+
+KINDS = (
+    Kind(
+        "picture.denoised",
+        "Denoising of a small frame with NaN, infinities and fireflies",
+        {**LAYER_FIELDS, "model": "text, a model file in base64"},
+        {"picture": "float[H][W][3], display-encoded"},
+        _denoise_cases,
+        _denoise,
+        notes="The layers that the model needs, and no others, are given; they may hold nan and inf.",
+    ),
+    Kind(
+        "picture.rendered",
+        "A small render",
+        {
+            "scene": paths.SCENE_FIELD,
+            "settings": paths.SETTINGS_FIELD,
+            "width": "pixels",
+            "height": "pixels",
+            "spp": "samples per pixel",
+            "seed": "integer",
+        },
+        {
+            "mean": "float[H][W][3], linear radiance",
+            "variance": "float[H][W][3], of one sample",
+            "spp": "integer",
+        },
+        _render_cases,
+        _render,
+        paths.files,
+        "The answer may have any number of samples, any random numbers and be in files; "
+        "`expected` holds the means of blocks of pixels, and `welch` what the test needs besides.",
+    ),
+)
+"""The kinds of this module."""

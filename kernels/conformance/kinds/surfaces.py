@@ -1,0 +1,132 @@
+"""Kinds of surfaces: rays against boxes and rooms, with the normals that they are given."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ....refimpl import intersection
+from ....refimpl.scene import Box, Camera, Quad, Room, Scene, Sphere
+from ..functions import Field, Function, Numbers
+from .light import RAY_FIELDS, T, _aimed
+
+GRAY = (0.5, 0.5, 0.5)
+"""A reflectance, which these cases do not ask for."""
+
+EYE = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0))
+"""A camera, which they do not ask for either."""
+
+HALVES = ((0.8, 0.6, 0.0), (-0.6, 0.8, 0.0), (0.0, 0.0, 1.0))
+"""A rotation about z."""
+
+BOX = Box((0.25, -0.5, 0.125), (0.5, 0.75, 1.0), GRAY)
+"""The box of all rays."""
+
+TURNED = Box((0.25, -0.5, 0.125), (0.5, 0.75, 1.0), GRAY, HALVES)
+"""The same one, turned."""
+
+ROOM = Room((-2.0, -1.0, -3.0), (2.0, 1.5, 3.0), (GRAY,) * 6)
+"""The room of all rays."""
+
+MIXED = Scene(
+    "mixed",
+    EYE,
+    boxes=(Box((0.0, -0.5, 0.0), (1.0, 0.5, 1.0), GRAY),),
+    spheres=(Sphere((0.0, 0.5, 0.0), 0.5, GRAY),),
+    quads=(Quad((-1.0, 1.0, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), GRAY),),
+)
+"""A sphere between a box and a quad, which it touches."""
+
+FOUND = {**T, "normal": Field("unit normal against the ray; 0 where nothing is hit", 3)}
+"""What the answers hold."""
+
+
+def _met(scene: Scene) -> Any:
+    """Return the function from rays to distance, normal and number of the surface."""
+
+    def call(given: Numbers, dtype: Any) -> dict[str, Any]:
+        geometry = intersection.build(scene, dtype)
+        hit = intersection.closest_hit(geometry, given["origin"], given["direction"])
+        surface = intersection.surface_at(geometry, hit, given["origin"], given["direction"])
+        return {"t": hit.t, "normal": surface.normal, "surface": hit.surface.astype(dtype)}
+
+    return call
+
+
+def _ray(origin: Any, direction: Any) -> dict[str, Any]:
+    """Return the inputs of a ray, its direction made a unit one."""
+    vector = np.array(direction, np.float64)
+    return {"origin": origin, "direction": vector / np.sqrt(vector @ vector)}
+
+
+BOXES = Function(
+    "intersection.box",
+    f"The box around {BOX.center} with the half extents {BOX.half_extent}, parallel to the axes",
+    "ISC-4",
+    RAY_FIELDS,
+    FOUND,
+    _met(Scene("box", EYE, boxes=(BOX,))),
+    [
+        ("from outside", _ray((0.25, -0.5, 4.0), (0, 0, -1))),
+        ("from inside: the exit, with a normal that faces the ray", _ray(BOX.center, (0, 1, 0))),
+        ("parallel to two slabs, outside one", _ray((2.0, -0.5, 4.0), (0, 0, -1))),
+        ("behind the ray", _ray((0.25, -0.5, 4.0), (0, 0, 1))),
+        ("along a face", _ray((0.75, -0.5, 4.0), (0, 0, -1))),
+        ("through an edge", _ray((2.75, 0.25, 0.125), (-1, 0, 0))),
+        ("into a corner", _ray((2.75, 2.25, 3.125), (-1, -1, -1))),
+        ("a component that is the other zero", _ray((0.25, -0.5, 4.0), (-0.0, 0.0, -1))),
+    ],
+    _aimed,
+)
+"""Rays and a box."""
+
+TURNED_BOXES = Function(
+    "intersection.turned_box",
+    f"The same box turned: its axes are {HALVES}",
+    "ISC-3",
+    RAY_FIELDS,
+    FOUND,
+    _met(Scene("turned box", EYE, boxes=(TURNED,))),
+    [("from outside", _ray((0.25, -0.5, 4.0), (0, 0, -1))), ("from inside", _ray(BOX.center, (0, 1, 0)))],
+    _aimed,
+)
+"""Rays and a turned box."""
+
+ROOMS = Function(
+    "intersection.room",
+    f"The room from {ROOM.low} to {ROOM.high}, seen from inside and outside",
+    "SCN-2",
+    RAY_FIELDS,
+    {**FOUND, "surface": Field("number of the wall; 6 where nothing is hit")},
+    _met(Scene("room", EYE, ROOM)),
+    [
+        ("from inside to the right wall", _ray((0, 0, 0), (1, 0, 0))),
+        ("from inside to the floor", _ray((0, 0, 0), (0.5, -1, 0))),
+        ("from outside: the near wall is not there", _ray((0, 0, 8), (0, 0, -1))),
+        ("from outside, past it", _ray((5, 0, 8), (0, 0, -1))),
+        ("into a corner: the first axis wins", _ray((0, 0.25, 0), (2, 1.25, 3))),
+    ],
+    _aimed,
+)
+"""Rays and a room."""
+
+NEAREST = Function(
+    "intersection.nearest",
+    "A box, a sphere on it (surface 1), and a quad that touches the sphere from above",
+    "ISC-1",
+    RAY_FIELDS,
+    {**FOUND, "surface": Field("number: 0 the box, 1 the sphere, 2 the quad, 3 nothing")},
+    _met(MIXED),
+    [
+        ("where quad and sphere touch, from above", _ray((0, 3, 0), (0, -1, 0))),
+        ("between sphere and box", _ray((3, 0.5, 0), (-1, -0.125, 0))),
+        ("the quad from below", _ray((0.75, 0.5, 0.75), (0, 1, 0))),
+        ("nothing", _ray((0, 3, 0), (0, 1, 0))),
+    ],
+    _aimed,
+)
+"""Rays and a scene."""
+
+FUNCTIONS = (BOXES, TURNED_BOXES, ROOMS, NEAREST)
+"""The functions of this module."""

@@ -1,0 +1,132 @@
+"""Numbers as text that loses nothing: floats in hexadecimal, so that files can be compared and reviewed.
+
+1. A float is C's `%a`: `0x1.8p+1`; also `inf`, `-inf` and `nan` [`number_text`]. An integer is a JSON number.
+2. An array is a list of such, nested by its axes [`to_json`]; a truth value is a JSON one.
+3. Reading takes decimal numbers too, which are rounded to float64: programs without a hexadecimal format may
+   answer with 17 significant digits [`from_json`].
+4. A picture may be a file: `{"file": PATH, "shape": [...]}`, raw little-endian float32 [`from_file`].
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...refimpl.errors import InputError
+
+
+def number_text(value: float) -> str:
+    """Return a float as text: hexadecimal with the shortest fraction, or inf, -inf, nan."""
+    if not math.isfinite(value):
+        return str(float(value))
+    sign, _, rest = float(value).hex().rpartition("0x")
+    mantissa, _, exponent = rest.partition("p")
+    whole, _, fraction = mantissa.partition(".")
+    fraction = fraction.rstrip("0")
+    return f"{sign}0x{whole}{'.' + fraction if fraction else ''}p{exponent}"
+
+
+def is_number(value: Any) -> bool:
+    """Tell whether a JSON value is a number, as such or as text."""
+    try:
+        _float(value, "")
+    except InputError:
+        return False
+    return True
+
+
+def rounded_up(bound: Any) -> Any:
+    """Return bounds (...) rounded up to 8 bits: short texts, and no less than was proven."""
+    mantissa, exponent = np.frexp(np.asarray(bound, np.float64))
+    return np.ldexp(np.ceil(mantissa * 256.0), exponent - 8)
+
+
+def from_file(value: Mapping[str, Any], what: str) -> NDArray[np.float32]:
+    """Return the array (...) in the file that a JSON value names."""
+    try:
+        shape = tuple(int(side) for side in value["shape"])
+        found = np.fromfile(Path(str(value["file"])), "<f4")
+        return found.reshape(shape)
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        rule = f"it must name a file of little-endian float32 of its shape ({error})"
+        raise InputError(what, _shortened(value), rule, "see spec/conformance.md") from None
+
+
+def to_json(value: Any) -> Any:
+    """Return arrays, numbers and truth values in the form of JSON; mappings and sequences item by item."""
+    if isinstance(value, dict):
+        return {name: to_json(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [to_json(item) for item in value]
+    if isinstance(value, np.ndarray) and value.ndim:
+        return [to_json(item) for item in value]
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating, np.ndarray)):
+        return number_text(float(value))
+    return value
+
+
+def from_json(value: Any, what: str) -> NDArray[Any]:
+    """Return nested lists of numbers as an array: float64, or int64 where all are integers, or bool."""
+    try:
+        flat = list(_leaves(value))
+    except RecursionError:
+        raise InputError(what, "nested too deeply", "it must be a list of numbers", "see spec") from None
+    if flat and all(isinstance(leaf, bool) for leaf in flat):
+        return np.array(value, np.bool_)
+    if flat and all(isinstance(leaf, int) and not isinstance(leaf, bool) for leaf in flat):
+        return _array(value, int, np.int64, what)
+    return _array(value, lambda leaf: _float(leaf, what), np.float64, what)
+
+
+def _leaves(value: Any) -> Any:
+    """Return all that is no list, in order."""
+    if isinstance(value, list):
+        for item in value:
+            yield from _leaves(item)
+    else:
+        yield value
+
+
+def _array(value: Any, convert: Any, dtype: Any, what: str) -> NDArray[Any]:
+    """Return an array of converted leaves, or refuse lists of unequal lengths."""
+
+    def converted(item: Any) -> Any:
+        return [converted(part) for part in item] if isinstance(item, list) else convert(item)
+
+    try:
+        return np.array(converted(value), dtype)
+    except InputError:
+        raise
+    except (ValueError, OverflowError, RecursionError):
+        rule = "lists must be of one length on each axis, integers below 2**63"
+        raise InputError(
+            what, _shortened(value), rule, "answer with the shape that the format page states"
+        ) from None
+
+
+def _float(leaf: Any, what: str) -> float:
+    """Return one number."""
+    try:
+        if isinstance(leaf, str):
+            return float.fromhex(leaf) if "0x" in leaf.lower() else float(leaf)
+        if isinstance(leaf, (int, float)) and not isinstance(leaf, bool):
+            return float(leaf)
+    except (ValueError, OverflowError):
+        pass
+    rule = "it must be a number, as JSON or as text such as 0x1.8p+1"
+    raise InputError(what, _shortened(leaf), rule, "see the format page of this kind")
+
+
+def _shortened(value: Any) -> str:
+    """Return a value as a text that fits a line."""
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

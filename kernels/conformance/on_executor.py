@@ -1,0 +1,158 @@
+"""Answers of an executor: functions traced, compiled and run on an image of one pixel, and whole pictures.
+
+1. A function of numbers is compiled like a network: its inputs are the channels of an image [`OnExecutor`].
+2. A whole path is told vertex by vertex by kernels that stop at each depth (compare_paths.py) [`_vertices`].
+3. Pictures are denoised and rendered as the commands do it; not every executor has kernels of paths.
+
+Steps of a path, layers and derivatives of a network have no kernel of their own: they are not supported.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ...compiler.artifact import Artifact
+from ...compiler.compile import TARGETS, compile_program
+from ...compiler.emit_path import END
+from ...compiler.ir import Gather, Image, Program, Type
+from ...compiler.lower_scene import PATH, SURFACE, lower_scene
+from ...compiler.passes import pipeline
+from ...compiler.path_kernel import PathArtifact, compile_path, most_unrolled
+from ...compiler.profiles import profile_named
+from ...compiler.trace import trace
+from ...refimpl import scene as scene_module
+from ...refimpl.dataset import Window
+from ...refimpl.errors import CompileError
+from ...refimpl.frame import LAYERS
+from ...refimpl.render import Job
+from ...refimpl.transport import Settings
+from ..denoise_on import denoise_on
+from ..executor import Executor, Part
+from ..render_on import render_on
+from .case import given
+from .functions import Function, components, names
+from .kinds import FUNCTIONS
+from .kinds.files import model_from
+from .kinds.images import frame_of
+from .kinds.paths import VERTEX
+from .numbers import from_json
+
+Own = Callable[[Mapping[str, Any], str], Mapping[str, Any]]
+"""(inputs, profile) -> outputs, of a kind that is no function of numbers."""
+
+
+class OnExecutor:
+    """Functions as kernels, compiled when they are first asked for."""
+
+    def __init__(self, executor: Executor) -> None:
+        self.executor = executor
+        own: dict[str, Own] = {"picture.denoised": self._denoised}
+        if executor.name in TARGETS:
+            own |= {"path.whole": self._vertices, "picture.rendered": self._rendered}
+        self._own: Mapping[str, Own] = own
+        self.kinds = [*FUNCTIONS, *self._own]
+        self._compiled = cache(self._compile)
+        self._path_kernel = cache(self._compile_path)
+
+    def answer(self, kind: str, inputs: Mapping[str, Any], profile: str) -> Mapping[str, Any]:
+        """Return the executor's outputs."""
+        profile_named(profile)
+        if kind in self._own:
+            return self._own[kind]({name: given(value) for name, value in inputs.items()}, profile)
+        function, kernels = FUNCTIONS[kind], self._compiled(kind, profile)
+        fields = {name: np.asarray(from_json(inputs[name], name), np.float32) for name in function.inputs}
+        parts = components(function.inputs, fields)
+        images = {part: np.full((1, 1, 1), value, np.float32) for part, value in parts.items()}
+        found = np.concatenate([self.executor.run(kernel, images)[0, 0] for kernel in kernels])
+        outputs, at = {}, 0
+        for name, field in function.outputs.items():
+            outputs[name] = found[at : at + field.size] if field.size else found[at]
+            at += max(field.size, 1)
+        return outputs
+
+    def _vertices(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
+        """Return every vertex of a path, each from a kernel that stops there."""
+        x, y, width, height, sample, seed = (
+            int(inputs[name]) for name in ("x", "y", "width", "height", "sample", "seed")
+        )
+        part = Part(width, height, y, 1, sample, 1, seed)
+        rows: list[dict[str, Any]] = []
+        for depth in range(inputs["settings"]["max_depth"] + 1):
+            settings = json.dumps({**inputs["settings"], "max_depth": depth})
+            kernel = self._path_kernel(inputs["scene"], settings, profile)
+            planes = self.executor.trace(kernel, part)[:, 0, x]
+            state = dict(zip(kernel.planes, planes, strict=True))
+            # A path that ended at the surface before has no vertex here.
+            if rows and not state["alive"] > 0:
+                break
+            rows.append(state)
+        return {name: np.array([_joined(row, name) for row in rows]) for name in VERTEX}
+
+    def _compile_path(self, scene: str, settings: str, profile: str) -> PathArtifact:
+        """Return the kernel that tells the last vertex of paths."""
+        programs = lower_scene(
+            scene_module.from_json(scene), Settings(**json.loads(settings)), most_unrolled(self.executor.name)
+        )
+        return compile_path(programs, self.executor.name, profile, self.executor.lanes, tuple(END))
+
+    def _denoised(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
+        """Return a denoised picture."""
+        frame = frame_of({name: inputs[name] for name in LAYERS if name in inputs})
+        model = model_from(base64.b64decode(inputs["model"]))
+        return {"picture": denoise_on(self.executor, model, frame, profile).image}
+
+    def _rendered(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
+        """Return mean and variance of each pixel."""
+        width, height, spp, seed = (int(inputs[name]) for name in ("width", "height", "spp", "seed"))
+        job = Job(width, height, spp, seed, Settings(**inputs["settings"]))
+        found = render_on(self.executor, scene_module.from_json(inputs["scene"]), job, profile=profile)
+        return {"mean": found.frame["color"], "variance": found.color_variance, "spp": job.spp}
+
+    def _compile(self, kind: str, profile: str) -> list[Artifact]:
+        """Return the kernels of a function: outputs three at a time, since a picture has few channels."""
+        function = FUNCTIONS[kind]
+        total = sum(max(size, 1) for size in (field.size for field in function.outputs.values()))
+        threes = [list(range(first, min(first + 3, total))) for first in range(0, total, 3)]
+        return [self._kernel(_program(function, wanted), profile) for wanted in threes]
+
+    def _kernel(self, program: Program, profile: str) -> Artifact:
+        """Return the kernel of a program.
+
+        Where the ranges of the inputs leave the argument of a sine without bound, as a division does, there
+        is no bound over all inputs: sines are expanded before anything asks for one. Each case has its own.
+        """
+        try:
+            return compile_program(program, self.executor.name, profile)
+        except CompileError:
+            expanded = pipeline.run(pipeline.run(program, pipeline.COMMON), profile_named(profile).passes)
+            return compile_program(expanded, self.executor.name, profile)
+
+
+def _joined(state: Mapping[str, Any], name: str) -> Any:
+    """Return a value of a path's state from its planes."""
+    ends, kind = {**PATH, **SURFACE}[name]
+    parts = np.array([state[f"last_{name}{end}"] for end in ends])
+    whole = parts if len(parts) > 1 else parts[0]
+    return int(whole) if kind == "int32" else whole
+
+
+def _program(function: Function, wanted: list[int]) -> Program:
+    """Return the program of a pixel: inputs are its channels, outputs some of the function's numbers."""
+    images = [
+        Image(part, 1, field.low, field.high)
+        for name, field in function.inputs.items()
+        for part in names(name, field.size)
+    ]
+    gather = Gather(Window(1, "clamp"), tuple(images))
+
+    def call(window: Any) -> Any:
+        found = list(function.parts({image.name: window[..., i] for i, image in enumerate(images)}).values())
+        return np.stack([found[i] for i in wanted], axis=-1)
+
+    return trace(call, {"window": Type(shape=(len(images),))}, gather)

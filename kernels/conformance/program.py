@@ -1,0 +1,78 @@
+"""The project's own answers through the same door: `python -m wamnet.kernels.conformance.program`.
+
+--executor reference   the reference in float64
+--executor NAME        kernels on an executor (on_executor.py)
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TextIO
+
+from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
+from .case import given
+from .kinds import KINDS
+from .numbers import to_json
+
+Answer = Callable[[str, Mapping[str, Any], str], Mapping[str, Any]]
+"""(kind, inputs, profile) -> outputs."""
+
+REFERENCE = "reference"
+"""Name of the program that is the reference."""
+
+
+def serve(requests: Iterable[str], answers: TextIO, name: str, kinds: Sequence[str], answer: Answer) -> None:
+    """Answer each request with a line."""
+    for line in requests:
+        request = json.loads(line)
+        if request["kind"] == "hello":
+            found: Mapping[str, Any] = {"program": name, "kinds": list(kinds)}
+        else:
+            found = {"id": request["id"], **_answered(request, kinds, answer)}
+        answers.write(json.dumps(found) + "\n")
+        answers.flush()
+
+
+def _answered(request: Mapping[str, Any], kinds: Sequence[str], answer: Answer) -> Mapping[str, Any]:
+    """Return what the answer to a request says."""
+    kind = request["kind"]
+    if kind not in kinds:
+        return {"unsupported": f"no kind {kind}"}
+    try:
+        return {"output": to_json(dict(answer(kind, request["input"], request["profile"])))}
+    except (InputError, CompileError) as error:
+        return {"refused": str(error)}
+
+
+def of_reference(kind: str, inputs: Mapping[str, Any], profile: str) -> Mapping[str, Any]:
+    """Return the reference's answer."""
+    return KINDS[kind].answer({name: given(value) for name, value in inputs.items()})
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Serve standard input."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--executor", default=REFERENCE)
+    options = parser.parse_args(arguments)
+    if options.executor == REFERENCE:
+        serve(sys.stdin, sys.stdout, "wamnet, reference", list(KINDS), of_reference)
+        return
+    from .. import open_executor
+    from .on_executor import OnExecutor
+
+    try:
+        with open_executor(options.executor) as executor:
+            answers = OnExecutor(executor)
+            name = f"wamnet, {options.executor} ({executor.device})"
+            serve(sys.stdin, sys.stdout, name, answers.kinds, answers.answer)
+    except ExecutorUnavailable as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,254 @@
+"""Kinds: the reference answers its own vectors, wrong references are caught, executors pass."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from wamnet.kernels.conformance import blocks, case, program, run, vectors
+from wamnet.kernels.conformance.functions import Field, Function
+from wamnet.kernels.conformance.kinds import FUNCTIONS, KINDS
+from wamnet.kernels.conformance.numbers import to_json
+from wamnet.kernels.conformance.on_executor import OnExecutor
+from wamnet.refimpl import (
+    adam,
+    camera,
+    dataset,
+    encoding,
+    environment,
+    intersection,
+    metrics,
+    rng,
+    sampling,
+    siren,
+    transport,
+)
+from wamnet.refimpl.materials import conductor, dielectric
+
+
+def judged(kind: str, answer) -> list[run.Verdict]:
+    """Hold the answers of a function (kind, inputs, profile) to the vectors of a kind, without a process."""
+    _, cases = case.load(vectors.FOLDER / f"{kind}.json")
+    requests = [
+        json.dumps({"id": c.id, "kind": kind, "profile": "ieee", "input": dict(c.inputs)}) for c in cases
+    ]
+    answers = io.StringIO()
+    program.serve(requests, answers, "here", [kind], answer)
+    return [
+        run.judge(kind, c, json.loads(line))
+        for c, line in zip(cases, answers.getvalue().splitlines(), strict=True)
+    ]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_reference_answers_its_own_vectors(kind):
+    wrong = [v for v in judged(kind, program.of_reference) if v.verdict != "pass"]
+    assert not wrong
+
+
+# ---- mutants ----------------------------------------------------------------------------------------------
+
+
+def biased(function):
+    """Return a sampler whose points are drawn from three quarters of the light."""
+    return lambda u0, *rest: function(u0 * 0.75, *rest)
+
+
+MUTANTS = {
+    "counters in another order": (
+        rng,
+        "random_block",
+        lambda s, p, n, b: rng.pcg4d(p, b, n, s),
+        "random.block",
+        "RNG-3",
+    ),
+    "floats of 23 bits": (rng, "MANTISSA_BITS", 23, "random.block", "RNG-3"),
+    "gamma of 2.2": (encoding, "GAMMA", 2.2, "encoding.display", "ENC-5"),
+    "epsilon of 1e-7": (adam, "EPSILON", 1e-7, "adam.step", "ADM-1"),
+    "beta_2 of 0.99": (adam, "BETA_2", 0.99, "adam.run", "ADM-1"),
+    "rows from below": (
+        camera,
+        "camera_ray",
+        lambda b, x, y, u, v, w, h, true=camera.camera_ray: true(b, x, h - 1 - y, u, v, w, h),
+        "camera.ray",
+        "CAM-2",
+    ),
+    "biased light sampling": (sampling, "sample_quad", biased(sampling.sample_quad), "path.scatter", "LTR-7"),
+    "no offset from surfaces": (intersection, "SPAWN_OFFSET", 0.0, "path.scatter", "LTR-7"),
+    "weights the other way round": (
+        transport,
+        "mis_weight",
+        lambda s, p, q, true=transport.mis_weight: true(s, q, p),
+        "path.arrive",
+        "LTR-2",
+    ),
+    "the other heuristic": (
+        transport,
+        "HEURISTICS",
+        {"balance": 2, "power": 1},
+        "transport.mis_weight",
+        "LTR-5",
+    ),
+    "roulette at 0.9": (transport, "ROULETTE_LIMIT", 0.5, "path.scatter", "LTR-7"),
+    "a sky upside down": (
+        environment,
+        "radiance",
+        lambda s, d, true=environment.radiance: true(s, -d),
+        "sky.radiance",
+        "ENV-1",
+    ),
+    "F without its fifth power": (conductor, "schlick", lambda r, c: r, "material.conductor", "CDR-3"),
+    "half of Fresnel": (dielectric, "fresnel", lambda c, f, r: 0.0 * c, "material.dielectric", "DIE-4"),
+    "NaN of a frame kept": (dataset, "known", lambda values: values, "image.features", "DAT-10"),
+    "borders the other way": (
+        dataset,
+        "BORDERS",
+        {"clamp": "reflect", "zero": "constant"},
+        "image.window",
+        "DAT-5",
+    ),
+    "the centre one pixel off": (
+        dataset.Window,
+        "before",
+        property(lambda w: (w.size - 1) // 2),
+        "image.window",
+        "DAT-4",
+    ),
+    "omega_0 outside the bracket": (
+        siren,
+        "_omega_0",
+        lambda s, layer: 1.0,
+        "network.gradient",
+        "SIR-7",
+    ),
+    "biases without their own tag": (siren, "BIAS_TAG", siren.WEIGHT_TAG, "network.init", "SIR-5"),
+    "PSNR by the natural logarithm": (
+        metrics,
+        "math",
+        type("math", (), {"log10": staticmethod(np.log), "inf": np.inf}),
+        "metric.psnr",
+        "MET-4",
+    ),
+    "SSIM's K2 of 0.3": (metrics, "K2", 0.3, "metric.ssim", "MET-5"),
+    "relMSE's epsilon of 0.001": (metrics, "RELMSE_EPSILON", 1e-3, "metric.relmse", "MET-6"),
+}
+"""Wrong references: module, name, what stands in its place, the kind that notices, the clause blamed."""
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_of_the_reference_are_caught_and_blamed(monkeypatch, name):
+    owner, attribute, value, kind, clause = MUTANTS[name]
+    monkeypatch.setattr(owner, attribute, value)
+    if attribute == "before":
+        monkeypatch.setattr(owner, "after", property(lambda w: w.size - (w.size - 1) // 2 - 1))
+    if attribute == "EPSILON":
+        monkeypatch.setattr(adam.update, "__defaults__", (*adam.update.__defaults__[:-1], value))
+    if attribute == "BETA_2":
+        monkeypatch.setattr(adam.step, "__defaults__", (adam.BETA_1, value, adam.EPSILON))
+    failed = {v.clause for v in judged(kind, program.of_reference) if v.failed}
+    assert clause in failed
+
+
+def test_a_biased_render_is_caught(monkeypatch):
+    """A light that is a fifth too bright: far beyond what 64 samples leave open."""
+    true = KINDS["picture.rendered"].answer
+
+    def brighter(kind, inputs, profile):
+        found = true({name: case.given(value) for name, value in inputs.items()})
+        return {**found, "mean": found["mean"] * 1.2}
+
+    found = judged("picture.rendered", brighter)
+    assert {v.verdict for v in found} == {"fail"}
+    assert all("p-value" in v.text and v.stage.startswith("mean[") for v in found)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"mean": np.zeros((4, 4, 3))}, r"shapes \(4, 4, 3\) and"),
+        ({"variance": None}, "output variance is None"),
+        ({"spp": 1}, "1 samples per pixel have no variance"),
+        ({"mean": np.full((16, 16, 3), np.nan)}, "p-value 0 of a block"),
+    ],
+)
+def test_renders_that_are_none(changes, text):
+    kind, (first, *_) = case.load(vectors.FOLDER / "picture.rendered.json")
+    answer = {"mean": np.ones((16, 16, 3)), "variance": np.ones((16, 16, 3)), "spp": 64, **changes}
+    found = run.judge(kind, first, {"output": to_json(answer)})
+    assert found.verdict == "fail"
+    assert __import__("re").match(text, found.text)
+
+
+def test_blocks_are_means_of_their_pixels():
+    image = np.arange(16.0).reshape(4, 4, 1)
+    mean, variance = blocks.mean_and_variance(image, np.ones((4, 4, 1)), 2)
+    assert mean[..., 0].tolist() == [[2.5, 4.5], [10.5, 12.5]]
+    assert np.all(variance == 0.25)
+
+
+# ---- undecided --------------------------------------------------------------------------------------------
+
+
+def test_a_decision_on_its_threshold_is_accepted_either_way():
+    """x is just below sqrt(3): float32 rounds x^2 to 3, float64 to less."""
+    step = Function(
+        "k",
+        "t",
+        "RNG-3",
+        {"x": Field("number")},
+        {"y": Field("1 or 2")},
+        lambda given, dtype: {"y": np.where(given["x"] * given["x"] < 3.0, 1.0 + 0.0 * given["x"], 2.0)},
+        [("near", {"x": 3.0**0.5}), ("far", {"x": 1.0})],
+    )
+    near, far = step.cases()
+    assert near.flags == ("undecided",)
+    values = {
+        float(near.expected["y"].value),
+        *(float(other["value"]) for other in near.expected["y"].accepted),
+    }
+    assert values == {1.0, 2.0}
+    assert (far.flags, far.expected["y"].accepted, float(far.expected["y"].bound)) == ((), (), 0.0)
+
+
+# ---- executors --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["numpy"])
+def test_an_executor_passes_all_that_it_supports(executor_named, name):
+    answers = OnExecutor(executor_named(name))
+    assert set(answers.kinds) >= set(FUNCTIONS)
+    for kind in answers.kinds:
+        count = Counter(v.verdict for v in judged(kind, answers.answer))
+        assert set(count) == {"pass"}, kind
+
+
+SOME = (
+    "random.block",
+    "sine",
+    "sampling.concentric_disk",
+    "intersection.box",
+    "material.dielectric",
+    "picture.denoised",
+)
+"""Kinds that every executor is asked for here; the command asks for all."""
+
+
+def test_executors_pass(executor):
+    answers = OnExecutor(executor)
+    for kind in (k for k in SOME if k in answers.kinds):
+        wrong = [v for v in judged(kind, answers.answer) if v.verdict != "pass"]
+        assert not wrong
+
+
+def test_an_executor_that_is_wrong_is_caught(executor_named):
+    answers = OnExecutor(executor_named("numpy"))
+
+    def off(kind, inputs, profile):
+        return {name: np.asarray(v) * (1 + 1e-3) for name, v in answers.answer(kind, inputs, profile).items()}
+
+    for kind in FUNCTIONS:
+        assert any(v.failed for v in judged(kind, off)), kind

@@ -1,0 +1,210 @@
+"""Programs that are wrong in one way each: every one gets the verdict that it deserves, none a traceback."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+
+import pytest
+
+from wamnet.kernels.conformance import run
+from wamnet.kernels.conformance.case import Case, Output
+from wamnet.kernels.conformance.protocol import NoAnswerError, Session
+from wamnet.refimpl.errors import InputError
+
+ANSWER = '{"id": request["id"], "output": KINDS[request["kind"]](request["input"])}'
+"""The example's answer, which wrong programs change."""
+
+WRONG = {
+    "a wrong multiplier": ("1664525", "1664527", "random.block", "RNG-3", "fail"),
+    "words entangled in another order": (
+        "((0, 1, 3), (1, 2, 0), (2, 0, 1), (3, 1, 2))",
+        "((3, 1, 2), (0, 1, 3), (1, 2, 0), (2, 0, 1))",
+        "random.block",
+        "RNG-3",
+        "fail",
+    ),
+    "counters in another order": (
+        '("pixel", "sample",',
+        '("sample", "pixel",',
+        "random.block/7",
+        "RNG-3",
+        "fail",
+    ),
+    "floats of 23 bits": ("(word >> 8) / 2**24", "(word >> 9) / 2**23", "random.block", "RNG-3", "fail"),
+    "a gamma of 2.2": ("1 / 2.4", "1 / 2.2", "encoding.display", "ENC-5", "fail"),
+    "no clip": (
+        'min(max(float.fromhex(given["linear"]), 0.0), 1.0)',
+        'float.fromhex(given["linear"])',
+        "encoding.display/3",
+        "ENC-5",
+        "fail",
+    ),
+    "the line too long": ("0.0031308", "0.3", "encoding.display", "ENC-5", "fail"),
+    "NaN": ('{"encoded": 12.92', '{"encoded": float("nan") * 12.92', "encoding.display", "ENC-5", "fail"),
+    "another shape": ('"words": words', '"words": [words]', "random.block", "RNG-3", "fail"),
+    "one number too few": ('"words": words', '"words": words[:3]', "random.block", "RNG-3", "fail"),
+    "texts for numbers": ('"words": words', '"words": ["a"] * 4', "random.block", "RNG-3", "fail"),
+    "null for numbers": ('"words": words', '"words": None', "random.block", "RNG-3", "fail"),
+    "an object for numbers": ('"words": words', '"words": {"file": 3}', "random.block", "RNG-3", "fail"),
+    "integers of a thousand digits": (
+        '"words": words',
+        '"words": [10**999] * 4',
+        "random.block",
+        "RNG-3",
+        "fail",
+    ),
+    "lists of lists of lists": (
+        "print(json.dumps(answer)",
+        'print(json.dumps(answer).replace("words\\": [", "words\\": [" + "[" * 500 + "]" * 500 + ",")',
+        "random.block",
+        "RNG-3",
+        "fail",
+    ),
+    "an output left out": ('"words": words, ', "", "random.block", "RNG-3", "fail"),
+    "a valid input refused": (
+        ANSWER,
+        '{"id": request["id"], "refused": "no"}',
+        "random.block",
+        "RNG-3",
+        "fail",
+    ),
+    "no answer to this case": (
+        ANSWER,
+        '{"id": request["id"], "unsupported": "no"}',
+        "random.block",
+        "RNG-3",
+        "unsupported",
+    ),
+    "neither output nor refusal": (ANSWER, '{"id": request["id"]}', "random.block", "RNG-3", "garbage"),
+    "another id": ('request["id"]', '"mine"', "random.block", "RNG-3", "garbage"),
+    "an id that is a list": ('request["id"]', "[1]", "random.block", "RNG-3", "garbage"),
+    "no JSON": (ANSWER, '"words"', "random.block", "RNG-3", "garbage"),
+    "words of greeting": (
+        'answer = {"id"',
+        'print("computing ..."); answer = {"id"',
+        "random.block",
+        "RNG-3",
+        "garbage",
+    ),
+    "a crash": (ANSWER, '{} if sys.exit("out of memory") else {}', "random.block", "RNG-3", "crash"),
+}
+"""By name: what is replaced, by what, chosen cases, the clause blamed, the worst verdict."""
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_program(program, verdicts, name):
+    old, new, word, clause, verdict = WRONG[name]
+    found = verdicts(program((old, new)), [word])
+    count = Counter(v.verdict for v in found)
+    assert count[verdict] > 0, count
+    assert set(count) <= {verdict, "pass"}
+    assert {v.clause for v in found if v.verdict == verdict} == {clause}
+    assert all(v.failed == (v.verdict not in ("pass", "unsupported")) for v in found)
+
+
+def test_a_crash_tells_the_status_and_the_last_words(program, verdicts):
+    old, new, *_ = WRONG["a crash"]
+    (found,) = verdicts(program((old, new)), ["random.block/1"])
+    assert found.text == "it ended with status 1; it said: out of memory"
+
+
+def test_a_program_that_crashes_is_started_again(program, verdicts):
+    crash = 'KINDS[request["kind"]](request["input"]) if request["id"][-1] != "3" else sys.exit(7)'
+    found = verdicts(program(('KINDS[request["kind"]](request["input"])', crash)), ["random.block"])
+    assert Counter(v.verdict for v in found) == {"pass": 14, "crash": 2}
+
+
+def test_a_program_that_hangs_is_given_up(program, verdicts):
+    hang = (ANSWER, '__import__("time").sleep(60)')
+    found = verdicts(program(hang), ["random.block"], 0.5)
+    assert Counter(v.verdict for v in found) == {"timeout": 16}
+    assert found[0].text == "no answer within 0.5 s"
+    assert found[3].text == "not asked: 3 cases of this kind had no answer in time"
+
+
+def test_output_without_end_fills_no_memory(program, verdicts):
+    endless = ("print(json.dumps(answer), flush=True)", 'print(json.dumps(answer) + "x" * 2**25, flush=True)')
+    greeting = (
+        '"kinds": list(KINDS)}',
+        '"kinds": list(KINDS)}; print(json.dumps(answer), flush=True); continue',
+    )
+    found = verdicts(program(endless, greeting), ["random.block/0"], 20.0)
+    assert [v.verdict for v in found] == ["garbage"]
+
+
+def test_a_program_that_does_not_read(tmp_path):
+    """A request larger than a pipe's buffer of 64 KiB must not stop the runner."""
+    request = {"id": "a", "input": "x" * 2**20}
+    with Session(["sleep", "60"], 0.5) as session, pytest.raises(NoAnswerError, match="no answer within"):
+        session.ask(request)
+
+
+def test_what_a_program_has_started_ends_with_it(verdicts, tmp_path):
+    """The grandchild holds the program's output open: the session must not wait for it."""
+    script = 'sleep 60 & while read line; do echo \'{"kinds": ["random.block"]}\'; done'
+    found = verdicts(["sh", "-c", script], ["random.block/0"])
+    assert [v.verdict for v in found] == ["garbage"]
+
+
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        (["/no/such/program"], r"crash: /no/such/program cannot be started: No such file"),
+        ([sys.executable, "-c", "print(1)"], "garbage: the line is no JSON object"),
+        ([sys.executable, "-c", "print({})"], "garbage: the answer to hello has no list of kinds"),
+        ([sys.executable, "-c", "raise SystemExit(3)"], "crash: it ended with status 3"),
+        (["sleep", "60"], "timeout: no answer within"),
+    ],
+)
+def test_programs_that_do_not_introduce_themselves_are_refused(verdicts, command, text):
+    with pytest.raises(InputError, match=rf"^--program is .*: it must answer to hello \({text}.*; see spec"):
+        verdicts(command, ["random.block"], 1.0)
+
+
+ACCEPTS = (
+    'KINDS = {**dict.fromkeys(("metric.mse", "file.model", "file.scene"), lambda given: {"value": 0.0}), '
+)
+"""A program that takes everything."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "clause"), [("metric.mse", "MET-1"), ("file.model", "MOD-6"), ("file.scene", "SCN-7")]
+)
+def test_a_program_that_takes_what_is_invalid(program, verdicts, kind, clause):
+    found = verdicts(program(("KINDS = {", ACCEPTS)), [kind])
+    wrong = [v for v in found if v.text == "the input is invalid and must be refused"]
+    assert clause in {v.clause for v in wrong}
+    assert {v.verdict for v in wrong} == {"fail"}
+
+
+# ---- judgement --------------------------------------------------------------------------------------------
+
+
+def judged(output, **expected):
+    case = Case("k/0", "RNG-3", {"x": 1}, {"y": Output(**expected)})
+    return run.judge("k", case, {"output": {"y": output}})
+
+
+def test_the_bound_is_met_or_not():
+    assert judged("0x1p+0", value="0x1.8p+0", bound="0x1p-1").verdict == "pass"
+    found = judged(["0x1p+0", "0x1p+1"], value=["0x1p+0", "0x1p+0"], bound="0x1.cp-1")
+    assert (found.verdict, found.stage, found.expected, found.got) == ("fail", "y[1]", "0x1p+0", "0x1p+1")
+    assert found.text == "error 1, bound 0.875"
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf"])
+def test_what_is_no_number_is_within_no_bound(value):
+    assert judged(value, value="0x1p+0", bound="0x1p+9").verdict == "fail"
+    assert judged("nan", value=value, bound="inf").verdict == "fail"
+
+
+def test_infinity_is_met_by_infinity_alone():
+    assert judged("inf", value="inf", bound="0x0p+0").verdict == "pass"
+    assert judged(1e300, value="inf", bound="0x0p+0").verdict == "fail"
+
+
+def test_other_answers_that_are_accepted_have_bounds_of_their_own():
+    other = ({"value": "0x1p+10", "bound": "0x1p+0"},)
+    verdicts = [judged(x, value=0.0, bound=0.25, accepted=other).verdict for x in (0.25, 0.5, 1024.5, 1026)]
+    assert verdicts == ["pass", "fail", "pass", "fail"]

@@ -1,0 +1,246 @@
+"""The vectors in the repository are those that the reference makes, in the form that their schema states."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from wamnet.kernels.conformance import case, vectors
+from wamnet.kernels.conformance.case import Case, Kind, Output
+from wamnet.kernels.conformance.kinds import FUNCTIONS, KINDS
+from wamnet.kernels.conformance.numbers import from_json, is_number
+from wamnet.refimpl.errors import InputError
+
+FILES = sorted(path for path in vectors.FOLDER.glob("*.json") if path.name != "schema.json")
+
+SHARE = 64
+"""A number that is made anew may differ by this share of its bound (CNF-7)."""
+
+LARGEST_BYTES = 2 * 10**6
+"""What all vectors together may take: they are part of the package."""
+
+
+@pytest.fixture(scope="module")
+def made():
+    return vectors.contents()
+
+
+def moved(old, new, bound, path):
+    """Yield what differs between a stored and a new value by more than a share of the bound."""
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        each = bound if isinstance(bound, list) else [bound] * len(old)
+        for index, parts in enumerate(zip(old, new, each, strict=True)):
+            yield from moved(*parts, f"{path}[{index}]")
+    elif old != new and not (
+        is_number(old) and is_number(new) and abs(number(old) - number(new)) <= number(bound) / SHARE
+    ):
+        yield f"{path}: {old} is now {new}"
+
+
+def number(value):
+    return float(from_json(value, "number"))
+
+
+def differences(old, new):
+    """Yield what differs between two cases; bounds have 8 bits, so they may be one bit apart."""
+    plain = [{k: v for k, v in c.items() if k not in ("expected", "input")} for c in (old, new)]
+    if plain[0] != plain[1] or set(old.get("expected", ())) != set(new.get("expected", ())):
+        yield f"{old['id']}: {plain[0]} is now {plain[1]}"
+        return
+    for name, value in old["input"].items():
+        yield from moved(
+            value, new["input"].get(name), 64 * ROUNDED * size(value), f"{old['id']}: input {name}"
+        )
+    for name, output in old.get("expected", {}).items():
+        others = new["expected"][name]
+        ways = zip([output, *output.get("accepted", ())], [others, *others.get("accepted", ())], strict=True)
+        for one, other in ways:
+            yield from moved(one["value"], other["value"], one["bound"], f"{old['id']}: {name}")
+            yield from moved(
+                one["bound"], other["bound"], scaled(one["bound"]), f"{old['id']}: bound of {name}"
+            )
+
+
+ROUNDED = 2.0**-23
+"""Inputs are float32 numbers that functions such as sin may have had a part in: one ulp."""
+
+
+def size(value):
+    """Return the largest number of an input, 0 if it holds none."""
+    try:
+        found = np.abs(from_json(value, "input").astype(np.float64))
+    except InputError:
+        return 0.0
+    finite = found[np.isfinite(found)]
+    return float(finite.max(initial=0.0))
+
+
+def scaled(bound):
+    """Return what a bound may change by, times SHARE: 2 of its 8 bits."""
+    return [scaled(part) for part in bound] if isinstance(bound, list) else number(bound) * SHARE / 64
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_vectors_are_those_that_the_reference_makes(made, name):
+    path = vectors.FOLDER / f"{name}.json"
+    way_out = (
+        "run wamnet conformance --write spec/vectors, read git diff, and raise the version if it is meant"
+    )
+    assert path.exists(), f"{path.name} is not there; {way_out}"
+    old, new = json.loads(path.read_text()), json.loads(made[path.name])
+    assert {k: v for k, v in old.items() if k != "cases"} == {k: v for k, v in new.items() if k != "cases"}
+    assert [c["id"] for c in old["cases"]] == [c["id"] for c in new["cases"]], way_out
+    found = [text for pair in zip(old["cases"], new["cases"], strict=True) for text in differences(*pair)]
+    assert not found, f"{found[:5]}; {way_out}"
+
+
+def test_nothing_is_left_over(made):
+    there = {p.relative_to(vectors.FOLDER).as_posix() for p in vectors.FOLDER.rglob("*") if p.is_file()}
+    assert there == set(made)
+
+
+def test_files_beside_the_vectors_are_those_that_the_reference_makes(made):
+    for name in ("schema.json", "README.md", *(n for n in made if n.startswith("scenes/"))):
+        assert (vectors.FOLDER / name).read_bytes() == made[name], name
+    for name in (n for n in made if n.startswith("images/")):
+        old, new = (np.frombuffer(b, "<f4") for b in ((vectors.FOLDER / name).read_bytes(), made[name]))
+        assert np.max(np.abs(old - new)) <= ROUNDED, name
+
+
+def test_they_are_small():
+    assert sum(path.stat().st_size for path in vectors.FOLDER.rglob("*") if path.is_file()) <= LARGEST_BYTES
+
+
+def test_the_comparison_sees_a_change():
+    old = json.loads((vectors.FOLDER / "sine.json").read_text())["cases"][8]
+    new = json.loads(json.dumps(old))
+    assert list(differences(old, new)) == []
+    wanted = number(old["expected"]["sin"]["value"])
+    for share, count in ((0.01, 0), (0.05, 1)):
+        new["expected"]["sin"]["value"] = wanted + share * number(old["expected"]["sin"]["bound"])
+        assert len(list(differences(old, new))) == count
+    new["note"] = "another"
+    assert len(list(differences(old, new))) == 1
+
+
+# ---- form -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_files_follow_the_schema(path):
+    data = json.loads(path.read_text())
+    jsonschema.validate(data, json.loads((vectors.FOLDER / "schema.json").read_text()))
+    assert data["kind"] == path.stem
+    assert data["version"] == case.VERSION
+    assert len({c["id"] for c in data["cases"]}) == len(data["cases"])
+
+
+def test_the_schema_refuses_what_is_no_vector():
+    schema = json.loads((vectors.FOLDER / "schema.json").read_text())
+    data = json.loads((vectors.FOLDER / "metric.mse.json").read_text())
+    wrong = [
+        lambda c: c.pop("clause"),
+        lambda c: c.update(valid=False),
+        lambda c: c["expected"]["value"].pop("bound"),
+        lambda c: c["expected"]["value"].update(value="0x1.8"),
+        lambda c: c.update(flags=["other"]),
+        lambda c: c.update(id="metric.mse"),
+    ]
+    for change in wrong:
+        changed = json.loads(json.dumps(data))
+        change(changed["cases"][0])
+        with pytest.raises(jsonschema.ValidationError, match=r"."):
+            jsonschema.validate(changed, schema)
+
+
+def test_every_kind_says_what_its_fields_are():
+    for kind in KINDS.values():
+        for c in kind.make():
+            known = {re.sub(r"_l$", "_", name) if name.endswith("_l") else name for name in kind.inputs}
+            for side, fields in ((c.inputs, kind.inputs), (c.expected or {}, kind.outputs)):
+                known = [re.compile(name[:-1] + r"\d+" if name.endswith("_l") else name) for name in fields]
+                unknown = [name for name in side if not any(p.fullmatch(name) for p in known)]
+                assert not unknown, f"{c.id}: the page of formats does not name {unknown}"
+
+
+def test_bounds_are_finite_and_small():
+    """Functions have bounds below 0.1 of 1 or of the value: an answer that means nothing passes nowhere."""
+    for name, function in FUNCTIONS.items():
+        for c in function.kind().make():
+            for output in c.expected.values():
+                bound, value = np.max(output.bound), np.max(np.abs(output.value))
+                assert math.isfinite(bound), name
+                assert bound <= 0.1 * max(1.0, value), f"{c.id}: {bound} of {value}"
+
+
+def test_each_kind_of_files_has_cases_to_be_refused():
+    for name in (
+        "file.model",
+        "file.scene",
+        "image.features",
+        "image.window",
+        "metric.ssim",
+        "picture.denoised",
+    ):
+        assert any(c.expected is None for c in KINDS[name].make()), name
+
+
+# ---- reading ----------------------------------------------------------------------------------------------
+
+
+def written(tmp_path: Path, **changes) -> Path:
+    data = json.loads((vectors.FOLDER / "sine.json").read_text())
+    path = tmp_path / "sine.json"
+    path.write_text(json.dumps({**data, **changes}))
+    return path
+
+
+def test_a_file_comes_back_as_it_was_made():
+    kind, cases = case.load(vectors.FOLDER / "random.block.json")
+    assert (kind, len(cases)) == ("random.block", 16)
+    assert cases[0].expected["words"].value == list(KINDS["random.block"].make()[0].expected["words"].value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"format": "other"}, "its format must be 'wamnet-vectors'"),
+        (
+            {"version": "2.0.0"},
+            r"version is 2\.0\.0: this runner reads version 1; update wamnet or the vectors",
+        ),
+        ({"cases": [{"id": "a"}]}, "its cases must be as spec/vectors/schema.json says"),
+        ({"cases": 3}, "its cases must be as spec/vectors/schema.json says"),
+    ],
+)
+def test_other_files_are_refused(tmp_path, changes, text):
+    with pytest.raises(InputError, match=text):
+        case.load(written(tmp_path, **changes))
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", "[" * 5000])
+def test_what_is_no_vector_is_refused(tmp_path, text):
+    path = tmp_path / "a.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"it cannot be read|its format must be"):
+        case.load(path)
+
+
+def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(vectors, "contents", lambda: {"a.json": b""})
+    with pytest.raises(InputError, match=r"folder of vectors is .*: it cannot be written"):
+        vectors.write(tmp_path / "file")
+
+
+def test_a_page_keeps_bars_out_of_tables():
+    kind = Kind(
+        "k", "t", {"x": "|x|"}, {"y": "float"}, lambda: [Case("k/0", "RNG-3", {}, {"y": Output(0)})], dict
+    )
+    assert "| input | `x` | \\|x\\| |" in vectors._about(kind)

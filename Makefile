@@ -2,11 +2,13 @@
 #
 # VENV=.venv       the virtual environment to make and use
 # PYTHON=python3   the Python that makes it, 3.10 or newer
-# WAMNET_REQUIRE=  executors whose absence fails `make test`; empty: skip, and say so, what is not there
+# WAMNET_REQUIRE=  executors whose absence fails `make test`; empty: skip, and say so, what is not there;
+#                  c is among them where $(CC) finds the C library
 
 VENV ?= .venv
 PYTHON ?= python3
-WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba
+comma := ,
+WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba$(if $(shell $(CC) -E -include math.h -x c /dev/null >/dev/null 2>&1 && echo yes),$(comma)c)
 PYTEST_OPTIONS ?= -n 2
 export VENV PYTHON WAMNET_REQUIRE
 

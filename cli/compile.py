@@ -32,12 +32,14 @@ wamnet compile model.safetensors --target glsl -o kernel-glsl
 
 wamnet compile model.safetensors --target opencl --profile native -o kernel-opencl
 
+wamnet compile model.safetensors --target c --profile exact -o kernel-c
+
 wamnet compile minicubes --time 2.5 --target glsl -o scene-glsl
 
 wamnet compile mine.json --target opencl --lanes 16 -o scene-opencl"""
 """Shown below the help of `wamnet compile`."""
 
-EXECUTOR_OF = {Target.opencl: "opencl", Target.glsl: "opengl"}
+EXECUTOR_OF = {Target.opencl: "opencl", Target.glsl: "opengl", Target.c: "c"}
 """The compiler names a target by the executor that runs it; people know the language."""
 
 

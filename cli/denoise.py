@@ -24,6 +24,8 @@ wamnet denoise model.safetensors noisy.exr -o denoised.png
 
 wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr
 
+wamnet denoise model.safetensors noisy.exr --executor c --profile exact
+
 wamnet denoise small.safetensors noisy.exr --executor opencl --rank 16"""
 """Shown below the help of `wamnet denoise`."""
 
@@ -45,12 +47,14 @@ def denoise(
         Path, typer.Option("-o", "--output", metavar="FILE", help="Linear colour (.exr) or picture (.png).")
     ] = Path("denoised.png"),
     executor: options.Executor = ExecutorName.numpy,
+    profile: options.Profile = "ieee",
     schedule: options.Schedule = None,
     rank: options.CutRank = 0,
 ) -> None:
     """Denoise a frame with a trained model.
 
-    The kernel's schedule is the one that suits the device, unless another is named.
+    The kernel's schedule is the one that suits the device, unless another is named. With profile exact the
+    result is the same to the last bit on every executor; its digest is printed, to be compared.
     """
     from ..kernels import denoise_on, open_executor
     from . import exr
@@ -62,13 +66,15 @@ def denoise(
     )
     _say_what_is_no_number(frame, noisy, network)
     with open_executor(executor.value) as runner:
-        result = denoise_on(runner, network, noisy, schedule=schedule, rank=rank)
+        result = denoise_on(runner, network, noisy, profile, schedule, rank)
     write_denoised(output, result.image, network, noisy)
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")
     say(f"schedule {result.schedule}")
     if rank:
         say(result.cut)
     say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation")
+    if profile == "exact":
+        say(f"sha256 of the float32 result, the same on every executor: {result.digest}")
 
 
 def _say_what_is_no_number(path: Path, noisy: Frame, model: Model) -> None:

@@ -43,6 +43,7 @@ class ExecutorName(str, Enum):
     numpy = "numpy"
     opencl = "opencl"
     opengl = "opengl"
+    c = "c"
 
 
 class Renderer(str, Enum):
@@ -65,6 +66,7 @@ class Target(str, Enum):
 
     opencl = "opencl"
     glsl = "glsl"
+    c = "c"
 
 
 class FloatType(str, Enum):
@@ -108,7 +110,8 @@ Profile = Annotated[
     typer.Option(
         "--profile",
         help="What the arithmetic promises: [bold]ieee[/] brings its own sine and a bound on the error, "
-        "[bold]ieee-sine7[/] one of degree 7 (3 to 13), [bold]native[/] uses the target's sine.",
+        "[bold]ieee-sine7[/] one of degree 7 (3 to 13), [bold]exact[/] gives the same bits everywhere, "
+        "[bold]native[/] uses the target's sine.",
     ),
 ]
 Trainer = Annotated[

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .ir import Gather, Node, Program
+from .ir import LEAST, Gather, Node, Program
 from .ops import LOOPS, OPS
 from .profiles import (
     EXP2_ULPS,
@@ -458,7 +458,8 @@ def enclose(
             continue
         if node.op == "input":
             low, high = (np.asarray(end, np.float64) for end in inputs[str(node["name"])])
-            found.append(Enclosure(low, high, np.zeros_like(low)))
+            # An exact program reads small numbers as 0.
+            found.append(Enclosure(low, high, np.full_like(low, LEAST if program.exact else 0.0)))
             continue
         operands = [_spread(found[arg], program.nodes[arg], node) for arg in node.args]
         # An infinite bound may meet a weight of 0: _outward reads the NaN as no bound.

@@ -22,12 +22,13 @@ import numpy as np
 from ..refimpl.errors import CompileError
 from . import artifact, bounds, ir, profiles, schedules
 from .artifact import Artifact
+from .c import C
 from .dialect import Dialect
 from .emit import kernel_gather, output_channels
 from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
 from .glsl_inlined import GLSL_LADDER
-from .ir import OUTPUT_ENCODING, Gather, Program
+from .ir import LEAST, OUTPUT_ENCODING, Gather, Program
 from .opencl import OpenCL
 from .opencl_fourier import OPENCL_FOURIER
 from .opencl_tiled import OPENCL_LADDER
@@ -82,7 +83,10 @@ TARGETS: Mapping[str, Target] = {
         _dialect_target(GLSL(), *GLSL_LADDER),
     )
 }
-"""All targets, by the name of the executor that runs them."""
+"""All targets of paths, encodings and denoisers, by the name of the executor that runs them."""
+
+DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C())}
+"""All targets of denoisers: those, and C, which is made to be pasted."""
 
 
 KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
@@ -91,6 +95,13 @@ KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on
 
 JSON_INFO = ("normalization", "recipe")
 """Which of them are JSON texts."""
+
+
+AGAINST = "float64 reference, same float32 weights and images"
+"""What a bound compares a kernel with."""
+
+AGAINST_PINNED = f"{AGAINST}, where weights below {LEAST!r} are 0"
+"""The same for an exact kernel."""
 
 
 @dataclass(frozen=True)
@@ -104,9 +115,9 @@ class Bound:
     sines: tuple[tuple[float, float], ...]
 
 
-def analysed(program: Program) -> Program:
+def analysed(program: Program, profile: str = "ieee") -> Program:
     """Return the program that bounds speak about: after the common passes, each sine one node."""
-    return pipeline.run(program, pipeline.COMMON)
+    return pipeline.run(program, (*pipeline.COMMON, *profiles.profile_named(profile).common))
 
 
 def sine_contract(profile: str, target: str) -> SineContract:
@@ -167,9 +178,19 @@ def _refuse_domain(
 
 def target_named(name: str) -> Target:
     """Return the target, or say which ones there are."""
+    if name not in DENOISERS:
+        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(DENOISERS)}")
+    return DENOISERS[name]
+
+
+def target_of_pipelines(name: str) -> Target:
+    """Return a target that has kernels of all kinds, or refuse one whose kernels denoise alone."""
+    found = target_named(name)
     if name not in TARGETS:
-        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(TARGETS)}")
-    return TARGETS[name]
+        raise CompileError(
+            f"target {name} has denoisers alone; for other kernels there are {', '.join(TARGETS)}"
+        )
+    return found
 
 
 def compile_program(
@@ -182,7 +203,7 @@ def compile_program(
     """
     chosen = target_named(target)
     kernel_gather(program)
-    common = analysed(program)
+    common = analysed(program, profile)
     if not rank:
         picked = _picked(common, chosen, profile, schedule).schedule
         bound = bound_over_images(common, profile, target, schedule=picked)
@@ -345,7 +366,7 @@ def _assemble(
         "entry_point": target.entry,
         "profile": {"name": profile.name, "text": profile.text},
         "sine": asdict_finite(sine_contract(profile.name, target.name)),
-        "passes": [*pipeline.COMMON, *profile.passes],
+        "passes": [*pipeline.COMMON, *profile.common, *profile.passes],
         "window": _window(gather),
         "images": [asdict(image) for image in gather.images],
         "output": {
@@ -356,7 +377,7 @@ def _assemble(
         "arguments": _arguments(picked, output_channels(emitted)),
         "bound": {
             "output": bound.output and [round_up(error) for error in bound.output],
-            "against": "float64 reference, same float32 weights and images",
+            "against": AGAINST_PINNED if emitted.exact else AGAINST,
         },
         "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],
         "info": {name: _info_value(name, text) for name, text in emitted.info if name in KEPT_INFO},

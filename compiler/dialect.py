@@ -1,12 +1,14 @@
 """What a target's language looks like: templates and a table of operations, no decisions.
 
 emit.py fills the templates in. Names in braces: `image` and `channels` of a feature image, `entry`,
-`images`, `results`, `starts` and `defines` of the whole kernel (`number` and `result` of each result),
-`unordered` (what stands where the language cannot keep operations in order: without an error bound, with
-one), `index` into the weights, `i` and `value` of an output channel, `0`, `1`, `2` the operands of one,
+`images`, their `names`, `results`, `starts` and `defines` of the whole kernel (`number` and `result` of each
+result), `unordered` (what stands where the language cannot keep operations in order: without an error bound,
+with one), `index` into the weights, `i` and `value` of an output channel, `0`, `1`, `2` the operands of one,
 `type` the type of its result, `table` the name of its table, `name`, `count` and `values` of a table's
 declaration. The text between is the language's own, its braces doubled. An operation's template may differ
 for a kind of operand: `minimum.int32`. More channels than `channels_per_result` go into several results.
+`exact` are the lines that an exact kernel needs at its top, `magnitude` the absolute value of a number,
+`clamp` the name of the function that limits an index.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .ir import Node
+from .ir import LEAST, Node
 from .profiles import SineContract
 
 
@@ -42,6 +44,9 @@ class Dialect:
     channels_per_result: int | None = None
     native_sine: SineContract
     unordered: tuple[str, str] = ("", "")
+    exact: tuple[str, ...] = ()
+    magnitude: str = "fabs({0})"
+    clamp: str = "clamp"
     types: Mapping[str, str] = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "bool"}
     qualifiers: Mapping[str, str] = {}
     table: str
@@ -89,6 +94,10 @@ class Dialect:
         """Return the text of an operation on operands, the last of which is of the given kind."""
         template = self.operations.get(f"{node.op}.{kind}") or self.operations[node.op]
         return template.format(*operands, type=self.types[node.type.dtype], table=node.get("table"))
+
+    def kept(self, value: str) -> str:
+        """Return the text of a number as an exact program reads it."""
+        return f"{self.magnitude.format(value)} < {self.literal(LEAST)} ? 0.0f : {value}"
 
     def constant(self, node: Node) -> str:
         """Return the text of a constant."""

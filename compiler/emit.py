@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 from ..refimpl.errors import CompileError
 from .dialect import Dialect
-from .ir import Gather, Node, Program, users
+from .ir import Gather, Image, Node, Program, users
 from .lines import Lines
 from .ops import LOOPS, OPS
 from .weights import layout, tables
@@ -77,16 +77,17 @@ def emit(
     _check_channels(program, dialect)
     body = body or Body(program, dialect, gather)
     images = [dialect.image_declaration.format(image=i.name, channels=i.channels) for i in gather.images]
-    defines = [*_window_defines(gather), *body.defines()]
+    defines = [*(dialect.exact if program.exact else ()), *_window_defines(gather), *body.defines()]
     declared = [dialect.table_declaration(name, array) for name, array in tables(program).items()]
     begin = dialect.begin.format(
         defines="\n".join([*defines, *declared]),
         entry=dialect.entry,
         images=dialect.image_separator.join(images),
         image=gather.images[0].name,
+        names=", ".join(f"image_{i.name}" for i in gather.images),
         results=_each_result(dialect.result_declaration, program, dialect),
         starts=_each_result(dialect.result_start, program, dialect),
-        unordered=dialect.unordered[bounded],
+        unordered=dialect.unordered[bounded or program.exact],
     )
     comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
     return "\n".join([*comment, begin, *body.text(), dialect.end.format()]) + "\n"
@@ -277,33 +278,46 @@ class Body(Lines):
         self._comment(f"output {self.program.outputs[0][0]}")
         store, results = self.dialect.store, self.dialect.results(channels)
         if not self.program.nodes[index].type.shape:
-            self._line(store.format(result=results[0], channels=1, i="0", value=self._read(index, "")))
+            value = self._written(self._read(index, ""))
+            self._line(store.format(result=results[0], channels=1, i="0", value=value))
             return
         each = self.dialect.channels_per_result or channels
         for first, result in zip(range(0, channels, each), results, strict=True):
-            line = store.format(
-                result=result, channels=channels, i="i", value=self._read(index, _plus(first, "i"))
-            )
+            value = self._written(self._read(index, _plus(first, "i")))
+            line = store.format(result=result, channels=channels, i="i", value=value)
             self._nest([f"for (int i = 0; i < {min(each, channels - first)}; ++i) {{"], [line])
+
+    def _written(self, value: str) -> str:
+        """Return the text of a number as it is written: an exact program has one zero."""
+        return f"{value} == 0.0f ? 0.0f : {value}" if self.program.exact else value
 
     # ---- the window --------------------------------------------------------------------------------------
 
     def _over_window(self, body: Callable[[str], list[str]]) -> None:
-        """Write the loops over taps and channels that set `value`; `body` takes the index into the window."""
+        """Write the loops over taps and channels that set `value`; `body` takes the index into the window.
+
+        An exact program reads one image after another.
+        """
+        for group in self.gather.groups(by_image=self.program.exact):
+            self._over_taps(group, body)
+
+    def _over_taps(self, images: Sequence[tuple[Image, int]], body: Callable[[str], list[str]]) -> None:
+        """Write the loops over the taps of some images, each with its first channel's place in a tap."""
         (before, value), names = BORDERS[self.gather.window.border], self.sides
         self._open(f"for (int dy = 0; dy < {names.rows}; ++dy) {{")
-        self._line(f"int row = clamp(y + dy - {names.row}, 0, height - 1);")
+        self._line(f"int row = {self.dialect.clamp}(y + dy - {names.row}, 0, height - 1);")
         self._open(f"for (int dx = 0; dx < {names.columns}; ++dx) {{")
-        self._line(f"int column = clamp(x + dx - {names.column}, 0, width - 1);")
+        self._line(f"int column = {self.dialect.clamp}(x + dx - {names.column}, 0, width - 1);")
         if before:
             self._line(before.format(sides=names))
         self._line(f"int tap = (dy * {names.columns} + dx) * {self.gather.channels};")
-        first = 0
-        for image in self.gather.images:
+        for image, first in images:
             pixel = self.dialect.pixel.format(image=image.name, channels=image.channels)
-            lines = [f"float value = {value.format(pixel=pixel)};", *body(_plus("tap", first, "c"))]
+            lines = [f"float value = {value.format(pixel=pixel)};"]
+            if self.program.exact:
+                lines.append(f"value = {self.dialect.kept('value')};")
+            lines += body(_plus("tap", first, "c"))
             self._nest([f"for (int c = 0; c < {image.channels}; ++c) {{"], lines)
-            first += image.channels
         self._close()
         self._close()
 
@@ -330,7 +344,10 @@ class Body(Lines):
 
     def _declaration(self, index: int) -> str:
         """Return the declaration of the array of a value."""
-        return f"{self._type(index)} v{index}[{self.program.nodes[index].type.shape[0]}];"
+        kind, node = self._type(index), self.program.nodes[index]
+        # Sums of an exact program have one order too.
+        kind = self.dialect.variable(node.type.dtype) if self.program.exact else kind
+        return f"{kind} v{index}[{node.type.shape[0]}];"
 
     def declares(self, index: int) -> bool:
         """Return whether the kernel has an array for this value."""

@@ -97,11 +97,13 @@ class InlinedBody(Body):
         """Return the function that reads a pixel under the border rule."""
         kind, border = _vector(channels), self.gather.window.border
         value = {"clamp": "texel", "zero": f"at == nearest ? texel : {kind}(0.0f)"}[border]
+        kept = [f"    texel{i} = {self.dialect.kept(f'texel{i}')};" for i in _components(channels)]
         return [
             f"{kind} tap_{name}(ivec2 at)",
             "{",
             f"    ivec2 nearest = clamp(at, ivec2(0), textureSize(image_{name}, 0) - 1);",
             f"    {kind} texel = texelFetch(image_{name}, nearest, 0).{'rgba'[:channels]};",
+            *(kept if self.program.exact else []),
             f"    return {value};",
             "}",
         ]
@@ -157,7 +159,8 @@ class InlinedBody(Body):
         self._comment(f"%{index}: affine map {node['weight']} from {matrix.shape[1]} to {numbers}")
         for vector in range(self.vectors(index)):
             start = self._numbers(self.program.parameters[str(bias)], vector) if bias else "vec4(0.0f)"
-            self._line(f"vec4 v{index}_{vector} = {start};")
+            qualifier = self.dialect.qualifiers["float32"] if self.program.exact else ""
+            self._line(f"{qualifier}vec4 v{index}_{vector} = {start};")
         if source.op == "input":
             self._windowed(index, matrix)
         else:
@@ -167,22 +170,29 @@ class InlinedBody(Body):
                 self._multiply(index, columns, held)
 
     def _windowed(self, index: int, matrix: NDArray[np.float32]) -> None:
-        """Write the products of all taps."""
-        gather, first = self.gather, 0
-        for image in self.gather.images:
+        """Write the products of all taps, image by image in an exact program."""
+        gather = self.gather
+        for image in gather.images:
             self._line(f"{_vector(image.channels)} {image.name}_{index};")
-        for tap in range(gather.rows * gather.columns):
+        taps, groups = range(gather.rows * gather.columns), gather.groups(by_image=self.program.exact)
+        for tap, (image, first) in ((tap, image) for group in groups for tap in taps for image in group):
             row, column = divmod(tap, gather.columns)
             dy, dx = row - gather.rows // 2, column - gather.columns // 2
-            for image in self.gather.images:
-                name = f"{image.name}_{index}"
-                self._line(f"{name} = tap_{image.name}(ivec2(x, y) + ivec2({dx}, {dy}));")
-                self._multiply(index, matrix[:, first : first + image.channels], name)
-                first += image.channels
+            name, start = f"{image.name}_{index}", tap * gather.channels + first
+            self._line(f"{name} = tap_{image.name}(ivec2(x, y) + ivec2({dx}, {dy}));")
+            self._multiply(index, matrix[:, start : start + image.channels], name)
 
     def _multiply(self, index: int, columns: NDArray[np.float32], value: str) -> None:
-        """Write the additions of columns (D_out, k) times `value` with k components to all vectors."""
+        """Write the additions of columns (D_out, k) times `value` with k components to all vectors.
+
+        A product of a matrix and a vector adds up in an order of its own: an exact program has one column
+        after another.
+        """
         count = columns.shape[1]
+        if self.program.exact and count > 1:
+            for i, part in enumerate(_components(count)):
+                self._multiply(index, columns[:, i : i + 1], f"{value.partition('.')[0]}{part}")
+            return
         kind = "vec4" if count == 1 else f"mat{count}x4"
         for vector in range(self.vectors(index)):
             numbers = [n for column in columns.T for n in _filled(column, vector)]
@@ -196,7 +206,8 @@ class InlinedBody(Body):
         channels = self.program.nodes[index].type.shape[0]
         for vector, result in enumerate(self.dialect.results(channels)):
             components = COMPONENTS[min(4, channels - 4 * vector) - 1]
-            self._line(f"{result}.{components} = v{index}_{vector}.{components};")
+            for part in components if self.program.exact else (components,):
+                self._line(f"{result}.{part} = {self._written(f'v{index}_{vector}.{part}')};")
 
     def _element(self, index: int, lane: str) -> str:
         """Return the name of a value inside a function."""
@@ -207,6 +218,11 @@ class InlinedBody(Body):
         if self.program.nodes[index].op == "parameter":
             return f"v{index}"
         return super()._read(index, lane, group)
+
+
+def _components(count: int) -> list[str]:
+    """Return the selectors of each component of a float or vector of so many."""
+    return [""] if count == 1 else [f".{letter}" for letter in "xyzw"[:count]]
 
 
 def _vector(components: int) -> str:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from . import weights
 from .dialect import Dialect
 from .emit import BORDERS, Body, emit, kernel_gather, output_channels, schedule
-from .ir import Gather, Node, Program
+from .ir import Node, Program
 from .ops import OPS
 from .schedules import Schedule
 from .weights import Slot
@@ -149,7 +149,7 @@ class Tiled(Schedule):
         """Return a parameter in its stored shape."""
         rows = np.atleast_2d(program.parameters[name].T)  # (D_in, D_out), or (1, D_out)
         if name in _matrices(readers_of_window(program)):
-            rows = rows[_image_by_image(kernel_gather(program))]
+            rows = rows[kernel_gather(program).by_image]
         blocks = self.blocks(rows.shape[1])
         filled = np.zeros((len(rows), blocks.total * self.lanes), np.float32)
         filled[:, : rows.shape[1]] = rows
@@ -170,13 +170,6 @@ def readers_of_window(program: Program) -> list[Node]:
 def _matrices(nodes: Iterable[Node]) -> set[str]:
     """Return the names of the matrices that affine maps among these nodes apply."""
     return {str(node["weight"]) for node in nodes if node.op == "affine"}
-
-
-def _image_by_image(gather: Gather) -> NDArray[np.intp]:
-    """Return the window's indices (n_inputs,): image by image, in each tap by tap, channel by channel."""
-    taps = np.arange(gather.n_inputs).reshape(-1, gather.channels)
-    ends = np.cumsum([image.channels for image in gather.images])[:-1]
-    return np.concatenate([part.ravel() for part in np.split(taps, ends, axis=1)])
 
 
 @dataclass
@@ -222,7 +215,7 @@ class TiledBody(Body):
         self._open("if (within) {")
         source = f"image_{name}[(row * width + left) * {channels} + i]"
         loop = f"for (int i = 0; i < PATCH_WIDTH * {channels}; ++i) {{"
-        self._nest([loop], [f"to_{name}[i] = {source};"])
+        self._nest([loop], self._put(f"to_{name}[i]", source))
         self._close()
         self._open("else {")
         self._open("for (int dx = 0; dx < PATCH_WIDTH; ++dx) {")
@@ -230,9 +223,15 @@ class TiledBody(Body):
         if before:
             self._line(before.format(sides=self.sides))
         loop = f"for (int c = 0; c < {channels}; ++c) {{"
-        self._nest([loop], [f"to_{name}[dx * {channels} + c] = {value.format(pixel=pixel)};"])
+        self._nest([loop], self._put(f"to_{name}[dx * {channels} + c]", value.format(pixel=pixel)))
         self._close()
         self._close()
+
+    def _put(self, place: str, value: str) -> list[str]:
+        """Return the lines that copy one number of an image."""
+        if not self.program.exact:
+            return [f"{place} = {value};"]
+        return [f"float value = {value};", f"{place} = {self.dialect.kept('value')};"]
 
     def _affine(self, index: int, node: Node) -> None:
         """Write v = W x + b for all pixels, block by block."""
@@ -286,7 +285,7 @@ class TiledBody(Body):
         held = self.tile.blocks(channels).total
         self._comment(f"output {name}")
         value = f"v{index}.number[p * {held} * LANES + i]"
-        line = self.dialect.store.format(channels=channels, i="i", value=value)
+        line = self.dialect.store.format(channels=channels, i="i", value=self._written(value))
         loops = [
             "for (int p = 0; p < PIXELS && x + p < width; ++p) {",
             f"for (int i = 0; i < {channels}; ++i) {{",

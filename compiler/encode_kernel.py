@@ -22,7 +22,7 @@ from ..refimpl.dataset import FEATURES, Normalization
 from ..refimpl.errors import CompileError
 from . import bounds, ir, profiles
 from .artifact import OneSource
-from .compile import sine_contract, target_named
+from .compile import sine_contract, target_of_pipelines
 from .encode_dialect import ENCODE_DIALECTS, EncodeDialect
 from .ir import Image, Program
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
@@ -58,7 +58,7 @@ def compile_encode(
 
     `planes` are those that the sums have, in order; by default the features' own alone.
     """
-    chosen, promised = target_named(target), profiles.profile_named(profile)
+    chosen, promised = target_of_pipelines(target), profiles.unpinned(profile, "encodings of features")
     program = pipeline.run(lower_encode(features, normalization), promised.passes)
     planes = tuple(planes or planes_of(features))
     lacking = set(planes_of(features)) - set(planes)

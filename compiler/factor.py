@@ -32,7 +32,8 @@ from ..refimpl.errors import CompileError
 from . import bounds
 from .bounds import Enclosure
 from .emit import kernel_gather
-from .ir import Gather, Image, Node, Program, Type, attributes
+from .ir import LEAST, Gather, Image, Node, Program, Type, attributes
+from .passes.pin import pin
 from .profiles import SineContract
 from .trace import trace
 from .verify import verify
@@ -83,10 +84,13 @@ def factor(program: Program, rank: int, widest: int | None = None) -> Cut:
     vertical, horizontal = (a.astype(np.float32) for a in (factors.vertical, factors.horizontal))
     row = replace(gather, axes=(1,))
     first = trace(lambda window: {HORIZONTAL: window @ horizontal.T}, {"window": _window(row)}, row)
-    column = Gather(gather.window, between(rank, _range(first), widest), axes=(0,))
+    first = pin(first) if program.exact else first
+    images = between(rank, _range(first), widest)
+    column = Gather(gather.window, images, axes=(0,), joined=len(images) > 1)
     nodes = tuple(_read_by(column, node) if node.op == "input" else node for node in program.nodes)
     parameters = {**program.parameters, name: vertical.reshape(len(vertical), -1)}
     second = replace(program, nodes=nodes, parameters=parameters, gather=column)
+    second = pin(second) if program.exact else second
     return Cut(program, verify(first, "horizontal pass"), verify(second, "vertical pass"), layer)
 
 
@@ -113,7 +117,10 @@ def enclose(cut: Cut, contract: SineContract, x: Any, columns: Columns, of_cut: 
     h = bounds.enclose(cut.horizontal, {"window": row_box}, contract)[output]
     read = cut.whole.nodes[cut.layer].args[0]
     until = replace(cut.vertical, nodes=cut.vertical.nodes[: cut.layer + 1], outputs=())
-    second = bounds.enclose(until, {}, contract, known={read: columns(h)})[cut.layer]
+    image = columns(h)
+    if cut.vertical.exact:
+        image = replace(image, error=image.error + LEAST)  # it reads small numbers as 0
+    second = bounds.enclose(until, {}, contract, known={read: image})[cut.layer]
     until = replace(cut.whole, nodes=cut.whole.nodes[: cut.layer + 1], outputs=())
     wanted = bounds.enclose(until, {"window": whole_box}, contract)[cut.layer]
     left_out = np.maximum(np.abs(whole_box[0]), np.abs(whole_box[1])) @ left(cut).T

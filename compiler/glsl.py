@@ -76,6 +76,7 @@ void main()
     )
     max_output_channels = 4 * MOST_RESULTS
     channels_per_result = 4
+    magnitude = "abs({0})"
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
     qualifiers = {"float32": "PRECISE "}
     table = "const {type} {name}[{count}] = {type}[{count}]({values});"

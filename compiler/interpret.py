@@ -3,6 +3,10 @@
 Lanes are leading axes: an input of type float32[n] is an array (..., n), a number an array (...). With
 dtype=float64, in which floats are then computed, this is the reference that error bounds speak about; with
 float32 it is one more executor. Integers and truth values are the same in both.
+
+An exact program has one order of operations [`_in_order`]: affine maps add to the bias one rounded product
+after another, in the order of the operand's numbers, or image by image where the operand is the window.
+What it reads is 0 where it is below LEAST [`_kept`], and the zeros that it writes are +0.
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .ir import Node, Parameters, Program
+from .ir import LEAST, Node, Parameters, Program
 from .loops import Loop, loops
 from .ops import OPS
 
@@ -36,7 +40,10 @@ def interpret(
             _run(ends[index], program, values, inputs, parameters, kind)
         if index not in in_bodies:
             values[index] = _value(node, program, values, inputs, parameters, kind)
-    return {name: values[index] for name, index in program.outputs}
+    found = {name: values[index] for name, index in program.outputs}
+    if program.exact:
+        return {name: np.where(value == 0, kind.type(0), value) for name, value in found.items()}
+    return found
 
 
 def _run(
@@ -65,7 +72,8 @@ def _value(
 ) -> Any:
     """Return the value of one node in all lanes."""
     if node.op == "input":
-        return np.asarray(given[str(node["name"])]).astype(element(node.type.dtype, kind), copy=False)
+        value = np.asarray(given[str(node["name"])]).astype(element(node.type.dtype, kind), copy=False)
+        return _kept(value) if program.exact else value
     if node.op == "constant":
         return element(node.type.dtype, kind).type(node["value"])
     if node.op == "parameter":
@@ -74,8 +82,28 @@ def _value(
         return values[node.args[0]]
     if node.op == "loop":
         return values[node.args[int(node["index"])]]  # type: ignore[arg-type]
+    if program.exact and node.op == "affine":
+        return _in_order(program, node, values[node.args[0]], parameters)
     operands = [_spread(values[arg], program.nodes[arg], node) for arg in node.args]
     return apply(node, operands, parameters, kind)
+
+
+def _kept(value: Array) -> Array:
+    """Return value (...), 0 where it is smaller than an exact program reads."""
+    return np.where(np.absolute(value) < LEAST, value.dtype.type(0), value)
+
+
+def _in_order(program: Program, node: Node, x: Array, parameters: Any) -> Array:
+    """Return W x + b (..., D_out) of x (..., D_in), all rounded, in the order of exact programs."""
+    weight, gather = parameters[str(node["weight"])], program.gather
+    over_window = gather is not None and program.nodes[node.args[0]].op == "input"
+    order = gather.by_image if gather is not None and over_window else range(weight.shape[1])
+    total = np.zeros((*np.shape(x)[:-1], len(weight)), weight.dtype)
+    if node.get("bias") is not None:
+        total = total + parameters[str(node["bias"])]
+    for i in order:
+        total = total + weight[:, i] * x[..., i, None]
+    return total
 
 
 def element(dtype: str, kind: np.dtype[Any]) -> np.dtype[Any]:

@@ -6,6 +6,7 @@
    part of the program; every operation works on each lane alone.
 3. Weights and tables stand beside the nodes under names [`Program.parameters`]; floats are float32 exactly.
 4. How a kernel fills the input named `window` from images is data of the program, not nodes [`Gather`].
+   So is the promise to give the same bits everywhere [`Program.exact`].
 5. Programs are built by value numbering: asking twice for the same operation gives the same value
    [`Builder`]. They are printed in one stable text [`text`], whose hash is their identity [`digest`].
 
@@ -17,6 +18,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -39,6 +41,11 @@ class Type:
 
     def __str__(self) -> str:
         return self.dtype + "".join(f"[{n}]" for n in self.shape)
+
+
+LEAST = 2.0**-40
+"""An exact program reads any smaller number of an image, and any smaller weight, as 0: then no product and no
+sum in it is a denormal number (grain.py), which targets flush to zero or not."""
 
 
 OUTPUT_ENCODING = "output_encoding"
@@ -86,11 +93,13 @@ class Gather:
     """The program's input `window` holds, for each tap (dy, dx) in C order, the channels of all `images`.
 
     `axes` are those along which the window reaches: both, or one, 0 (a column of pixels) or 1 (a row).
+    `joined`: the images are the channels of one, which a target holds in several.
     """
 
     window: Window
     images: tuple[Image, ...]
     axes: tuple[int, ...] = (0, 1)
+    joined: bool = False
 
     @property
     def rows(self) -> int:
@@ -112,16 +121,38 @@ class Gather:
         """Return the length of the window vector."""
         return self.rows * self.columns * self.channels
 
+    @property
+    def by_image(self) -> NDArray[np.intp]:
+        """Return the window's indices (n_inputs,): image by image, in each tap by tap, channel by channel."""
+        taps = np.arange(self.n_inputs).reshape(-1, self.channels)
+        if self.joined:
+            return taps.ravel()
+        ends = np.cumsum([image.channels for image in self.images])[:-1]
+        return np.concatenate([part.ravel() for part in np.split(taps, ends, axis=1)])
+
+    def groups(self, by_image: bool) -> list[list[tuple[Image, int]]]:
+        """Return the images, each with its first channel's place in a tap: those that are read together.
+
+        All of them, or `by_image` one after another; those that are joined are one.
+        """
+        firsts = accumulate((image.channels for image in self.images), initial=0)
+        found = list(zip(self.images, firsts, strict=False))
+        return [[image] for image in found] if by_image and not self.joined else [found]
+
 
 @dataclass(frozen=True)
 class Program:
-    """A function of one lane; `info` says where it came from and how its images are encoded."""
+    """A function of one lane; `info` says where it came from and how its images are encoded.
+
+    `exact`: its outputs are the same bits on every target, those of the interpreter in float32.
+    """
 
     nodes: tuple[Node, ...]
     outputs: tuple[tuple[str, int], ...]
     parameters: Parameters = field(default_factory=dict)
     gather: Gather | None = None
     info: tuple[tuple[str, str], ...] = ()
+    exact: bool = False
 
 
 class Builder:
@@ -163,6 +194,8 @@ class Builder:
 def text(program: Program) -> str:
     """Return the program as text: one line a node, the same bytes for the same program."""
     lines = ["program"]
+    if program.exact:
+        lines.append(f"  exact, numbers below {LEAST!r} are read as 0")
     if program.gather is not None:
         taps, border = f"{program.gather.rows}x{program.gather.columns}", program.gather.window.border
         lines.append(f"  window {taps}, border {border}")

@@ -39,6 +39,7 @@ __kernel void {entry}(
         "Global size: at least (width, height)"
     )
     max_output_channels = 2**16
+    exact = ("#pragma OPENCL FP_CONTRACT OFF /* every operation is rounded */",)
     native_sine = SineContract(
         "sin() of OpenCL 1.2, 4 ulp on all arguments (full profile)", 4 * 2 * UNIT_ROUNDOFF
     )

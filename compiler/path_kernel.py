@@ -20,7 +20,7 @@ from typing import Any
 from ..refimpl.errors import CompileError
 from . import emit_path, ir, opencl_path, profiles
 from .artifact import OneSource
-from .compile import asdict_finite, sine_contract, target_named
+from .compile import asdict_finite, sine_contract, target_of_pipelines
 from .glsl_path import GLSLPath
 from .lower_scene import MOST_UNROLLED, PASSES, PathPrograms
 from .passes import pipeline
@@ -88,7 +88,7 @@ def compile_path(
     groups: Sequence[str] = emit_path.FRAME_GROUPS,
 ) -> PathArtifact:
     """Return the kernel that follows the paths of a scene, `lanes` at once, and adds up groups of planes."""
-    chosen, promised = target_named(target), profiles.profile_named(profile)
+    chosen, promised = target_of_pipelines(target), profiles.unpinned(profile, "paths")
     make, known = SCHEDULES[target]
     if lanes not in known:
         raise CompileError(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..compiler import schedules
 from ..compiler.artifact import Artifact
 from ..compiler.compile import compile_program
+from ..compiler.ir import sha256
 from ..compiler.lower import lower
 from ..refimpl.dataset import feature_image
 from ..refimpl.denoise import Model
@@ -34,6 +35,11 @@ class RunResult:
     device: str
     schedule: str
     cut: str = ""
+
+    @property
+    def digest(self) -> str:
+        """Return the SHA-256 of the picture's numbers, little-endian float32, rows from the top."""
+        return sha256(self.image.astype("<f4").tobytes())
 
 
 def images_of(model: Model, frame: Frame) -> Images:

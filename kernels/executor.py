@@ -33,6 +33,9 @@ T = TypeVar("T")
 KEPT_KERNELS = 64
 """Kernels that an executor keeps built: programs use a few; a process that makes thousands stays small."""
 
+INDEX_LIMIT = 2**31
+"""Numbers of an image must be fewer where a kernel's indices are `int`."""
+
 
 @dataclass(frozen=True)
 class Part:

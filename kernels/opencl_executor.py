@@ -25,7 +25,7 @@ from ..compiler.path_kernel import PathArtifact
 from ..compiler.step_kernel import StepKernel
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import Executor, Images, Part, black, images_of, keep
+from .executor import INDEX_LIMIT, Executor, Images, Part, black, images_of, keep
 from .opencl_trainer import OpenCLTrainer
 from .passes import PICTURE, Passes
 
@@ -45,9 +45,6 @@ the first one refuses, `tile16` takes."""
 
 STACK_BYTES = 2**20
 """Most bytes of a group's arrays on a processor: half the smallest stack that glibc gives a thread."""
-
-INDEX_LIMIT = 2**31
-"""Numbers of an image must be fewer: the kernel's indices are `int`."""
 
 PATH_LOCAL_SIZE = {1: (8, 8), 2: (1, 1)}
 """Work items (x, y) in a group of a path kernel: one path each, or (2) vectors of paths, which are groups by

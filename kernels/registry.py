@@ -30,7 +30,19 @@ def _opengl(**options: Any) -> Executor:
     return OpenGLExecutor(**options)
 
 
-EXECUTORS: Mapping[str, Callable[..., Executor]] = {"numpy": _numpy, "opencl": _opencl, "opengl": _opengl}
+def _c(**options: Any) -> Executor:
+    """Open the system's C compiler."""
+    from .c_executor import CExecutor
+
+    return CExecutor(**options)
+
+
+EXECUTORS: Mapping[str, Callable[..., Executor]] = {
+    "numpy": _numpy,
+    "opencl": _opencl,
+    "opengl": _opengl,
+    "c": _c,
+}
 """How to open each executor; the name is also the target that the compiler takes."""
 
 

@@ -2,7 +2,8 @@
 
 1. Hypothesis draws the same examples on every run, without a deadline: a test's result is a function of the
    code. HYPOTHESIS_PROFILE=long draws twenty times as many.
-2. `executor` runs one test body on every executor [`EXECUTORS`], `mitsuba` gives a peer [`PEERS`]. One that
+2. `executor` runs one test body on every executor of whole pipelines [`PIPELINES`], `denoiser` on those that
+   denoise alone too [`EXECUTORS`], `mitsuba` gives a peer [`PEERS`]. One that
    is missing fails its tests when WAMNET_REQUIRE names it, as `make test` does; else they are skipped. Either
    way the summary says what was missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
 3. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
@@ -19,8 +20,11 @@ from typing import Any
 import hypothesis
 import pytest
 
-EXECUTORS = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
-"""Every way to run a kernel that the tests know; an OpenGL executor is named with the kind of its context."""
+PIPELINES = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
+"""Executors of kernels of all kinds; an OpenGL executor is named with the kind of its context."""
+
+EXECUTORS = (*PIPELINES, "c")
+"""Every way to run a denoiser that the tests know."""
 
 PEERS = ("mitsuba",)
 """Other renderers that tests compare with, under the policy of executors."""
@@ -79,9 +83,15 @@ def executor_named(pytestconfig: pytest.Config) -> Iterator[Callable[[str], Any]
             executor.__exit__(None, None, None)
 
 
-@pytest.fixture(scope="session", params=EXECUTORS)
+@pytest.fixture(scope="session", params=PIPELINES)
 def executor(request: pytest.FixtureRequest, executor_named: Callable[[str], Any]) -> Any:
-    """Give each executor in turn: one test body for all of them."""
+    """Give each executor of whole pipelines in turn: one test body for all of them."""
+    return executor_named(request.param)
+
+
+@pytest.fixture(scope="session", params=EXECUTORS)
+def denoiser(request: pytest.FixtureRequest, executor_named: Callable[[str], Any]) -> Any:
+    """Give each executor of denoisers in turn."""
     return executor_named(request.param)
 
 

@@ -95,7 +95,9 @@ def test_a_rank_that_cannot_be_is_refused(wamnet, here, options, reason) -> None
     assert not (here / "denoised.png").exists()
 
 
-@pytest.mark.parametrize(("target", "source"), [("opencl", "denoise.cl"), ("glsl", "denoise.frag")])
+@pytest.mark.parametrize(
+    ("target", "source"), [("opencl", "denoise.cl"), ("glsl", "denoise.frag"), ("c", "denoise.h")]
+)
 def test_compile_writes_a_kernel(wamnet, here, target, source) -> None:
     """Source, weights, manifest; by default into a folder that is named after the language."""
     outcome = wamnet("compile", "model.safetensors", "--target", target)

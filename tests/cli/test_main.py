@@ -14,7 +14,7 @@ import pytest
 
 from wamnet.cli import main as module
 from wamnet.cli import options
-from wamnet.compiler.compile import TARGETS
+from wamnet.compiler.compile import DENOISERS
 from wamnet.kernels import EXECUTORS
 from wamnet.refimpl.errors import TrainingError
 from wamnet.refimpl.scenes import CANONICAL
@@ -70,7 +70,7 @@ def test_choices_equal_the_registries() -> None:
     assert [name.value for name in options.Sampler] == list(SAMPLERS)
     assert options.SCENES.split(", ") == list(CANONICAL)
     assert {module.compile_model.__globals__["EXECUTOR_OF"][target] for target in options.Target} <= set(
-        TARGETS
+        DENOISERS
     )
 
 

@@ -14,12 +14,13 @@ from hypothesis import strategies as st
 
 from wamnet.compiler import artifact as artifacts
 from wamnet.compiler import ir
-from wamnet.compiler.compile import TARGETS, analysed, compile_program, round_up
+from wamnet.compiler.compile import DENOISERS, analysed, compile_program, round_up
 from wamnet.compiler.emit_tiled import refused_by_vectors
 from wamnet.compiler.glsl_inlined import GLSLInlined
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.lower import lower
+from wamnet.compiler.profiles import PROFILES
 from wamnet.compiler.trace import trace
 from wamnet.compiler.weights import layout, pack
 from wamnet.refimpl import dataset, siren
@@ -47,8 +48,8 @@ def test_golden_program(golden):
     golden("denoise.analysed.ir.txt", ir.text(analysed(lower(model()))))
 
 
-@pytest.mark.parametrize("profile", ["ieee", "native"])
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("target", DENOISERS)
 def test_golden_source(golden, target, profile):
     artifact = compile_program(lower(model()), target, profile)
     golden(f"{profile}.{artifact.source_name}", artifact.source)
@@ -163,9 +164,11 @@ def test_two_writers_at_once_leave_whole_files(tmp_path):
 
 
 def test_unknown_target_and_profile():
-    with pytest.raises(CompileError, match="target 'metal' does not exist; there are: numpy, opencl, opengl"):
+    with pytest.raises(
+        CompileError, match="target 'metal' does not exist; there are: numpy, opencl, opengl, c"
+    ):
         compile_program(lower(model()), "metal")
-    with pytest.raises(CompileError, match="profile 'fast' does not exist; there are: ieee, native"):
+    with pytest.raises(CompileError, match="profile 'fast' does not exist; there are: ieee, exact, native"):
         compile_program(lower(model()), "opencl", "fast")
 
 
@@ -189,7 +192,7 @@ def test_sine_that_may_leave_its_domain_is_refused():
         (lambda x: np.maximum(x * 3e38 + 3e38, 0.0), r"add \(%3\) may hold numbers up to 6e\+38"),
     ],
 )
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", DENOISERS)
 def test_numbers_that_may_overflow_are_refused(target, function, message):
     with pytest.raises(CompileError, match=message):
         compile_program(gathered(function), target)
@@ -214,7 +217,7 @@ def test_the_target_s_own_sine_has_no_domain():
     assert max(artifact.manifest["bound"]["output"]) < 1
 
 
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", DENOISERS)
 def test_program_without_a_window_or_with_two_outputs_is_refused(target):
     with pytest.raises(CompileError, match="has 1 outputs and no gathered window: a kernel needs one output"):
         compile_program(trace(lambda x: x, {"window": Type()}), target)

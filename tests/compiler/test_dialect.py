@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from wamnet.compiler.c import C
 from wamnet.compiler.dialect import Dialect
 from wamnet.compiler.glsl import GLSL
 from wamnet.compiler.opencl import OpenCL
 from wamnet.compiler.ops import ELEMENTWISE, OPS
 
 
-@pytest.mark.parametrize("dialect", [OpenCL, GLSL])
+@pytest.mark.parametrize("dialect", [OpenCL, GLSL, C])
 def test_every_elementwise_operation_has_a_template(dialect):
     names = {name.partition(".")[0] for name in dialect.operations}
     assert names == {"take", "row", *(op.name for op in ELEMENTWISE)}

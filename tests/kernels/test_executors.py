@@ -60,20 +60,20 @@ def cases(draw):
 
 @settings(max_examples=EXAMPLES)
 @given(case=cases())
-def test_error_is_within_the_bound(executor, kit, case):
+def test_error_is_within_the_bound(denoiser, kit, case):
     network = kit.network(case["widths"], case["omegas"], case["seed"], case["scale"])
     program = kit.denoiser(network, case["channels"], case["size"], case["border"])
     (seen,) = interpret(program, {"window": kit.windows(program, case["images"])}, np.float64).values()
     assert ((seen > 0) & (seen < 1)).all()
-    assert kit.excess(executor, program, case["images"]) <= 1
+    assert kit.excess(denoiser, program, case["images"]) <= 1
 
 
-def test_the_paper_s_network(executor, kit):
+def test_the_paper_s_network(denoiser, kit):
     network = kit.network([864, 32, 32, 32, 32, 3], (3.0, 3.0))
     program = kit.denoiser(network, {"color": 3, "normal": 3}, 12, "clamp")
     random = np.random.default_rng(5)
     images = {name: random.uniform(-1, 1, (13, 17, 3)).astype(np.float32) for name in ("color", "normal")}
-    assert kit.excess(executor, program, images) <= 1
+    assert kit.excess(denoiser, program, images) <= 1
 
 
 def test_target_s_own_sine_on_opencl(executor_named, kit):
@@ -94,13 +94,13 @@ def test_target_s_own_sine_without_promise_runs_but_has_no_bound(executor_named,
     assert "promises nothing" in artifact.source
 
 
-def test_row_0_is_the_top_row_and_columns_are_not_mirrored(executor, kit):
+def test_row_0_is_the_top_row_and_columns_are_not_mirrored(denoiser, kit):
     image = np.arange(5 * 7, dtype=np.float32).reshape(5, 7, 1) / 64
-    artifact = compile_program(kit.program(lambda x: x * 1.0, {"a": 1}), executor.name)
-    assert np.array_equal(executor.run(artifact, {"a": image}), image)
+    artifact = compile_program(kit.program(lambda x: x * 1.0, {"a": 1}), denoiser.name)
+    assert np.array_equal(denoiser.run(artifact, {"a": image}), image)
 
 
-def test_denoise_on_equals_the_definition(executor, kit):
+def test_denoise_on_equals_the_definition(denoiser, kit):
     """Whole frames: the float64 `denoise` is the reference, the bound the a-priori one, over all images."""
     random = np.random.default_rng(7)
     network = kit.network([54, 8, 3], (3.0, 3.0))
@@ -111,10 +111,10 @@ def test_denoise_on_equals_the_definition(executor, kit):
             "normal": random.uniform(-1, 1, (6, 11, 3)).astype(np.float32),
         }
     )
-    result = denoise_on(executor, model, noisy)
-    bound = compile_program(lower(model), executor.name).manifest["bound"]["output"]
+    result = denoise_on(denoiser, model, noisy)
+    bound = compile_program(lower(model), denoiser.name).manifest["bound"]["output"]
     assert result.image.shape == (6, 11, 3)
-    assert result.device == executor.device
+    assert result.device == denoiser.device
     assert (np.abs(result.image - denoise.denoise(model, noisy, np.float64)) <= bound).all()
 
 

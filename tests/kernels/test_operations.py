@@ -124,42 +124,42 @@ def test_operations_without_a_bound_are_tested_without_one():
 
 
 @pytest.mark.parametrize("op", CASES)
-def test_operation_on_executor(executor, kit, image, op):
+def test_operation_on_executor(denoiser, kit, image, op):
     program = kit.program(CASES[op], {"a": 4})
     if {node.op for node in program.nodes} & set(NO_BOUND):
         assert op in {*EXACT, "cos", "greater", "greater_equal"}
         return  # exact, as the next test says, or without a promise
     assert op in {node.op for node in program.nodes}
-    assert kit.excess(executor, program, {"a": image}) <= 1
+    assert kit.excess(denoiser, program, {"a": image}) <= 1
 
 
 @pytest.mark.parametrize("op", EXACT)
-def test_operation_is_exact(executor, kit, image, op):
+def test_operation_is_exact(denoiser, kit, image, op):
     image = np.where(np.abs(image) < 1e-30, np.float32(0), image)  # denormals may be flushed
     program = kit.program(CASES[op], {"a": 4})
-    found = executor.run(compile_program(program, executor.name), {"a": image})
+    found = denoiser.run(compile_program(program, denoiser.name), {"a": image})
     (expected,) = interpret(program, {"window": image}).values()
     assert np.array_equal(found, expected)
 
 
-def test_random_numbers_are_those_of_the_reference(executor, kit, image):
+def test_random_numbers_are_those_of_the_reference(denoiser, kit, image):
     program = kit.program(hashed, {"a": 4})
-    found = executor.run(compile_program(program, executor.name), {"a": image})
+    found = denoiser.run(compile_program(program, denoiser.name), {"a": image})
     assert np.array_equal(found, hashed(image))
     assert len(np.unique(found)) > 100
 
 
-def test_cosine_without_a_bound_is_near(executor, kit, image):
+def test_cosine_without_a_bound_is_near(denoiser, kit, image):
     """Every target's cosine is right to 2^-11 on [-pi, pi], and the emitted one to its contract."""
     program = kit.program(lambda x: np.cos(1.5 * x), {"a": 4})
     exact = np.cos((np.float32(1.5) * image).astype(np.float64))
     for profile, error in (("ieee", EMITTED_COSINE.error), ("native", 2.0**-11)):
-        artifact = compile_program(program, executor.name, profile)
+        artifact = compile_program(program, denoiser.name, profile)
         assert artifact.manifest["bound"]["output"] is None
-        assert np.max(np.abs(executor.run(artifact, {"a": image}) - exact)) <= error
+        assert np.max(np.abs(denoiser.run(artifact, {"a": image}) - exact)) <= error
 
 
-def test_all_operations_compile_without_a_window_of_one(executor, kit):
+def test_all_operations_compile_without_a_window_of_one(denoiser, kit):
     """A value that is read in loops, in straight code and by two affine maps, with a window of 2."""
 
     def function(x):
@@ -169,10 +169,10 @@ def test_all_operations_compile_without_a_window_of_one(executor, kit):
 
     program = kit.program(function, {"a": 4}, size=2, border="zero")
     images = {"a": np.random.default_rng(4).uniform(-2, 2, (3, 5, 4)).astype(np.float32)}
-    assert kit.excess(executor, program, images) <= 1
+    assert kit.excess(denoiser, program, images) <= 1
 
 
-def test_constant_output(executor, kit):
-    artifact = compile_program(kit.program(lambda x: 0.25, {"a": 1}), executor.name)
-    found = executor.run(artifact, {"a": np.zeros((2, 3, 1), np.float32)})
+def test_constant_output(denoiser, kit):
+    artifact = compile_program(kit.program(lambda x: 0.25, {"a": 1}), denoiser.name)
+    found = denoiser.run(artifact, {"a": np.zeros((2, 3, 1), np.float32)})
     assert np.array_equal(found, np.full((2, 3, 1), 0.25, np.float32))

@@ -14,7 +14,7 @@ from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 
 
 def test_unknown_executor():
-    with pytest.raises(InputError, match="executor is metal: must be one of numpy, opencl, opengl"):
+    with pytest.raises(InputError, match="executor is metal: must be one of numpy, opencl, opengl, c"):
         kernels.open_executor("metal")
 
 

@@ -1,0 +1,192 @@
+"""Kernels as C, built by the system's compiler and called in this process: rows of a picture in threads.
+
+1. Write the kernel's source and a function around it [`GLUE`] into a folder that goes with the executor.
+2. Compile them to a shared object, for this processor where the compiler knows how [`OPTIONS`].
+3. Call it on blocks of rows, one a thread: ctypes lets other threads run meanwhile.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shlex
+import subprocess
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiler.artifact import Artifact
+from ..compiler.emit import output_channels
+from ..compiler.encode_kernel import EncodeArtifact
+from ..compiler.path_kernel import PathArtifact
+from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
+from .executor import INDEX_LIMIT, Executor, Images, Part, gather_of, images_of, keep
+from .passes import Passes
+
+COMPILER_VARIABLE = "CC"
+"""Environment variable that names the compiler, with options if need be; else `cc`."""
+
+OPTIONS = ("-std=c99", "-O3", "-ffp-contract=off", "-fPIC", "-shared")
+"""Nothing here may allow what the standard does not; contraction is off in the source too."""
+
+NATIVE = "-march=native"
+"""Option for this very processor's instructions; not all compilers take it."""
+
+PRIVATE_BYTES = 2**20
+"""Most bytes of a pixel's arrays: half the smallest stack that glibc gives a thread."""
+
+TRIAL = "#include <math.h>\nint wamnet_trial;\n"
+"""What any C compiler with a library compiles."""
+
+WAY_OUT = f"install one (Debian: gcc and libc6-dev), or name yours in {COMPILER_VARIABLE}"
+"""What to do without a compiler."""
+
+MOST_TOLD = 300
+"""Most letters of a compiler's complaint in a message of one line."""
+
+GLUE = """\
+#include "{header}"
+
+void wamnet_rows(const float *const *images, const float *weights, float *result, int width, int height,
+                 int first, int end)
+{{
+    for (int y = first; y < end; ++y) {{
+        for (int x = 0; x < width; ++x) {{
+            {entry}({images}, weights, result, width, height, x, y);
+        }}
+    }}
+}}
+"""
+"""The function that is called: rows [first, end) of a picture."""
+
+
+class CExecutor(Executor):
+    """The system's C compiler; what it has built stays loaded as long as the process."""
+
+    name = "c"
+
+    def __init__(self) -> None:
+        self._command = shlex.split(os.environ.get(COMPILER_VARIABLE) or "") or ["cc"]
+        version = self._call("--version").stdout.strip().partition("\n")[0]
+        self.device = f"{' '.join(self._command)}: {version}"
+        self._built: dict[str, Any] = {}
+        self._options = [*OPTIONS, NATIVE]
+        self._folder = tempfile.TemporaryDirectory(prefix="wamnet-c-")
+        self._try()
+        self._threads = ThreadPoolExecutor(os.cpu_count() or 1)
+
+    def _try(self) -> None:
+        """Find out what the compiler takes, or say what it lacks."""
+        if self._compile("trial", TRIAL, ["-lm"]).returncode == 0:
+            return
+        self._options.remove(NATIVE)
+        done = self._compile("trial", TRIAL, ["-lm"])
+        if done.returncode:
+            self._folder.cleanup()
+            told = " ".join(done.stderr.split())[:MOST_TOLD]
+            raise ExecutorUnavailable(f"c: {self.device} does not compile C99 ({told}); {WAY_OUT}")
+
+    def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
+        """Compile and load the kernels."""
+        for kernel in artifact.kernels:
+            built = self._built.get(kernel.digest) or self._loaded(kernel)
+            keep(self._built, kernel.digest, built)
+
+    def _loaded(self, artifact: Artifact) -> Any:
+        """Return the compiled function."""
+        used = artifact.manifest["private_bytes"]
+        if used > PRIVATE_BYTES:
+            raise CompileError(
+                f"{self.device}: the kernel's arrays take {used} bytes a pixel: at most {PRIVATE_BYTES} fit "
+                "a thread's stack; use narrower layers, or executor numpy"
+            )
+        images = ", ".join(f"images[{i}]" for i in range(len(gather_of(artifact).images)))
+        stem, header = artifact.digest[:32], f"{artifact.digest[:32]}.h"
+        (Path(self._folder.name) / header).write_text(artifact.source, encoding="utf-8")
+        glue = GLUE.format(header=header, entry=artifact.entry_point, images=images)
+        done = self._compile(stem, glue, ["-lm"])
+        if done.returncode:
+            raise CompileError(f"{self.device} does not build the kernel: {done.stderr.strip()}")
+        function = ctypes.CDLL(str(self._object(stem))).wamnet_rows
+        function.restype = None
+        function.argtypes = [*[ctypes.c_void_p] * 3, *[ctypes.c_int] * 4]
+        return function
+
+    def _object(self, stem: str) -> Path:
+        """Return the path of a shared object."""
+        return Path(self._folder.name) / f"{stem}.so"
+
+    def _compile(self, stem: str, text: str, libraries: list[str]) -> subprocess.CompletedProcess[str]:
+        """Compile a text to a shared object."""
+        source = Path(self._folder.name) / f"{stem}.c"
+        source.write_text(text, encoding="utf-8")
+        return self._call(*self._options, "-o", str(self._object(stem)), str(source), *libraries)
+
+    def _call(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run the compiler."""
+        try:
+            return subprocess.run(
+                [*self._command, *arguments], capture_output=True, text=True, check=False, errors="replace"
+            )
+        except OSError as error:
+            raise ExecutorUnavailable(
+                f"c: the compiler {self._command[0]!r} cannot be run ({error.strerror}); {WAY_OUT}"
+            ) from None
+
+    def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
+        """Refuse images whose indices `int` does not hold."""
+        written = [output_channels(kernel.program) for kernel in artifact.kernels]
+        most = max(*written, *(image.channels for image in images_of(artifact)))
+        if size[0] * size[1] * most >= INDEX_LIMIT:
+            raise InputError(
+                "size of the picture for C",
+                f"{size[1]} x {size[0]} with {most} channels",
+                f"one image must hold fewer than {INDEX_LIMIT} numbers",
+                "split the picture, or use executor numpy",
+            )
+
+    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
+        found = list(images.values())
+        # What one pass returns is the image of the next.
+        for kernel in artifact.kernels:
+            found = [self._run_kernel(kernel, found)]
+        return found[0]
+
+    def _run_kernel(self, artifact: Artifact, images: list[NDArray[np.float32]]) -> NDArray[np.float32]:
+        """Return the output (H, W, C) of one kernel."""
+        height, width, _ = images[0].shape
+        result = np.empty((height, width, output_channels(artifact.program)), np.float32)
+        pointers = (ctypes.c_void_p * len(images))(*(image.ctypes.data for image in images))
+        weights = np.ascontiguousarray(artifact.weights)
+        call = self._built[artifact.digest]
+
+        def rows(first: int, end: int) -> None:
+            call(pointers, weights.ctypes.data, result.ctypes.data, width, height, first, end)
+
+        ends = range(0, height, max(1, height // (8 * (os.cpu_count() or 1))))
+        list(self._threads.map(rows, ends, [*ends[1:], height]))
+        return result
+
+    def build_path(self, kernel: PathArtifact) -> None:
+        """Refuse: paths have no C."""
+        raise self._denoises_only()
+
+    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
+        raise self._denoises_only()
+
+    def _passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
+        raise self._denoises_only()
+
+    def _denoises_only(self) -> InputError:
+        """Return what is told to those who want more."""
+        rule = "its kernels denoise; they follow no paths"
+        return InputError("executor that renders", self.name, rule, "use executor opencl, opengl or numpy")
+
+    def close(self) -> None:
+        """End the threads and remove the folder."""
+        self._threads.shutdown()
+        self._folder.cleanup()

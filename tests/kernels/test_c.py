@@ -1,0 +1,206 @@
+"""C: clean under warnings and sanitizers, exact under all options that keep the standard, refusals."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wamnet import kernels
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.encode_kernel import compile_encode
+from wamnet.compiler.interpret import interpret
+from wamnet.compiler.lower_scene import lower_scene
+from wamnet.compiler.path_kernel import compile_path
+from wamnet.kernels import c_executor
+from wamnet.kernels.executor import Part
+from wamnet.refimpl import dataset, scenes
+from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
+from wamnet.refimpl.transport import Settings
+
+WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror")
+"""What a careful project compiles with."""
+
+SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+"""Any access outside an array and any undefined operation ends the program."""
+
+MAIN = """
+#include <stdio.h>
+#include "denoise.h"
+
+static float result[{count}];
+
+int main(void)
+{{
+    wamnet_image({images}, numbers, result, {width}, {height});
+    for (int i = 0; i < {count}; ++i) {{
+        printf("%a\\n", (double)result[i]);
+    }}
+    return 0;
+}}
+"""
+"""A program that has the kernel pasted in, images and weights as arrays of their own."""
+
+
+@pytest.fixture(scope="module")
+def case(kit):
+    """A denoiser with two images, a picture narrower than its window, and what comes out."""
+    program = kit.denoiser(kit.network([100, 7, 5, 3], (3.0, 5.0)), {"a": 3, "b": 1}, 5, "zero")
+    random = np.random.default_rng(1)
+    images = {name: random.uniform(-2, 2, (6, 3, n)).astype(np.float32) for name, n in (("a", 3), ("b", 1))}
+    exact = compile_program(program, "numpy", "exact").program
+    (expected,) = interpret(exact, {"window": kit.windows(program, images)}).values()
+    return program, images, expected
+
+
+def array(name, values):
+    """Return the declaration of an array."""
+    text = ", ".join(float(value).hex() + "f" for value in np.ravel(values))
+    return f"static const float {name}[{np.size(values)}] = {{{text}}};\n"
+
+
+def built(folder: Path, case, profile, options):
+    """Compile a program around the kernel with the compiler of the executor, and return what it prints."""
+    program, images, expected = case
+    artifact = compile_program(program, "c", profile)
+    (folder / artifact.source_name).write_text(artifact.source)
+    data = array("numbers", artifact.weights) + "".join(array(f"in_{n}", x) for n, x in images.items())
+    height, width, _ = expected.shape
+    arguments = ", ".join(f"in_{name}" for name in images)
+    main = MAIN.format(count=expected.size, images=arguments, width=width, height=height)
+    (folder / "main.c").write_text(data + main)
+    command = os.environ.get(c_executor.COMPILER_VARIABLE, "cc").split()
+    subprocess.run([*command, *options, "-o", "main", "main.c", "-lm"], cwd=folder, check=True)
+    lines = subprocess.run(["./main"], cwd=folder, check=True, capture_output=True, text=True).stdout.split()
+    return np.array([float.fromhex(line) for line in lines], np.float32).reshape(expected.shape)
+
+
+@pytest.mark.parametrize("profile", ["exact", "ieee", "native"])
+def test_source_is_clean_under_warnings_and_sanitizers(executor_named, case, tmp_path, profile):
+    executor_named("c")
+    found = built(tmp_path, case, profile, ["-std=c99", "-O1", "-g", *WARNINGS, *SANITIZERS])
+    if profile == "exact":
+        assert np.array_equal(found.view(np.uint32), case[2].view(np.uint32))
+    elif profile == "ieee":
+        # Both are that near the float64 reference.
+        both = [compile_program(case[0], "c", p).manifest["bound"]["output"] for p in ("exact", "ieee")]
+        assert (np.abs(found - case[2]) <= np.sum(both, axis=0)).all()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["-std=gnu11", "-O3"],
+        ["-std=gnu11", "-O3", "-march=native"],
+        ["-std=c99", "-O0"],
+    ],
+    ids=["plain", "contraction is the default", "not optimised"],
+)
+def test_pasted_source_is_exact_without_our_options(executor_named, case, tmp_path, options):
+    """GCC contracts by default where the processor can, and clang within an expression: pragmas forbid it."""
+    executor_named("c")
+    found = built(tmp_path, case, "exact", options)
+    assert np.array_equal(found.view(np.uint32), case[2].view(np.uint32))
+
+
+def test_arithmetic_that_is_not_ieee_is_refused_by_the_source(executor_named, case, tmp_path, capfd):
+    executor_named("c")
+    with pytest.raises(subprocess.CalledProcessError, match="non-zero exit status"):
+        built(tmp_path, case, "exact", ["-std=c99", "-ffast-math"])
+    assert "the error bound needs float arithmetic as in IEEE 754" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 40), (40, 1), (17, 5)])
+def test_rows_are_shared_out_without_gaps(executor_named, kit, size):
+    program = kit.program(lambda x: x * 1.0, {"a": 2})
+    image = np.random.default_rng(2).uniform(-2, 2, (*size, 2)).astype(np.float32)
+    assert np.array_equal(executor_named("c").run(compile_program(program, "c"), {"a": image}), image)
+
+
+def test_building_again_costs_nothing(executor_named, case, monkeypatch):
+    executor, artifact = executor_named("c"), compile_program(case[0], "c")
+    executor.build(artifact)
+    built = executor._built[artifact.digest]
+    monkeypatch.setattr(executor, "_call", None)
+    executor.build(artifact)
+    assert executor._built[artifact.digest] is built
+
+
+# ---- refusals ----------------------------------------------------------------------------------------
+
+
+def test_no_compiler(monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler -O2")
+    with pytest.raises(
+        ExecutorUnavailable, match=r"c: the compiler 'no-such-compiler' cannot be run .*Debian: gcc"
+    ):
+        kernels.open_executor("c")
+
+
+def test_compiler_that_compiles_nothing(monkeypatch):
+    monkeypatch.setenv("CC", "false")
+    with pytest.raises(ExecutorUnavailable, match=r"does not compile C99 \(.*\); install one"):
+        kernels.open_executor("c")
+
+
+def test_compiler_that_does_not_know_this_processor(executor_named, kit, tmp_path, monkeypatch):
+    """A compiler that refuses -march=native builds kernels without it."""
+    executor_named("c")
+    wrapper = tmp_path / "cc"
+    wrapper.write_text('#!/bin/sh\ncase "$*" in *-march*) exit 1;; esac\nexec cc "$@"\n')
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("CC", str(wrapper))
+    with kernels.open_executor("c") as executor:
+        image = np.ones((2, 3, 1), np.float32)
+        artifact = compile_program(kit.program(lambda x: x * 0.5, {"a": 1}), "c")
+        assert np.array_equal(executor.run(artifact, {"a": image}), image / 2)
+
+
+def test_kernel_that_does_not_compile(executor_named, kit):
+    artifact = compile_program(kit.program(lambda x: x * 0.5, {"a": 1}), "c")
+    with pytest.raises(CompileError, match=r"(?s)does not build the kernel: .*error"):
+        executor_named("c").build(kit.with_source(artifact, "float value", "flaot value"))
+
+
+def test_arrays_too_large_for_a_stack(executor_named, kit):
+    wide = np.ones((2**18, 1), np.float32)
+    program = kit.program(lambda x: np.matmul(np.sin(np.matmul(x, wide.T)), wide) * 0.5, {"a": 1})
+    with pytest.raises(
+        CompileError, match=r"arrays take \d+ bytes a pixel: at most 1048576 fit a thread's stack"
+    ):
+        executor_named("c").build(compile_program(program, "c", "native"))
+
+
+def test_picture_too_large_for_indices(executor_named, kit, monkeypatch):
+    monkeypatch.setattr(c_executor, "INDEX_LIMIT", 10)
+    artifact = compile_program(kit.program(lambda x: x * 0.5, {"a": 1}), "c")
+    with pytest.raises(
+        InputError, match="size of the picture for C is 4 x 3 with 1 channels: one image must hold"
+    ):
+        executor_named("c").run(artifact, {"a": np.zeros((3, 4, 1), np.float32)})
+
+
+def test_paths_and_encodings_are_refused():
+    programs = lower_scene(scenes.CANONICAL["empty"](0.0), Settings())
+    with pytest.raises(
+        CompileError, match="target c has denoisers alone; for other kernels there are numpy, opencl"
+    ):
+        compile_path(programs, "c")
+    with pytest.raises(CompileError, match="target c has denoisers alone"):
+        compile_encode(("color",), dataset.Normalization(), "c")
+
+
+def test_rendering_is_refused(executor_named, case):
+    executor, artifact = executor_named("c"), compile_program(case[0], "c")
+    for call in (
+        lambda: executor.build_path(None),
+        lambda: executor._trace(None, Part(1, 1, 0, 1, 0, 1, 0)),
+        lambda: executor._passes(None, artifact, (1, 1)),
+    ):
+        with pytest.raises(
+            InputError, match="executor that renders is c: its kernels denoise; they follow no"
+        ):
+            call()

@@ -19,7 +19,7 @@ from typing import Annotated, Any
 import typer
 
 from ..refimpl.errors import WamnetError
-from . import animate, bench, compare, dataset, demo, denoise, render, train
+from . import animate, bench, compare, dataset, demo, denoise, render, train, triage
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
 
@@ -55,6 +55,7 @@ _register(train.train, train.EXAMPLES)
 _register(compile_model, COMPILE_EXAMPLES, "compile")
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)
+_register(triage.triage, triage.EXAMPLES)
 _register(animate.animate, animate.EXAMPLES)
 _register(bench.bench, bench.EXAMPLES)
 _register(denoise.executors, denoise.EXECUTORS_EXAMPLES)

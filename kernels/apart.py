@@ -81,7 +81,7 @@ class Apart:
     """An executor in a process of its own, as a runner; raises ExecutorUnavailable where it is missing."""
 
     def __init__(self, way: str, limit_s: float = LIMIT_S) -> None:
-        self.way, self._limit_s = way, limit_s
+        self.way, self.limit_s = way, limit_s
         self.target, self._options = WAYS[way]
         self._process: Any = None
         self._start()
@@ -127,12 +127,12 @@ class Apart:
     def _answer(self) -> Any:
         """Return what the process sends, or how it ended."""
         try:
-            if self._pipe.poll(self._limit_s):
+            if self._pipe.poll(self.limit_s):
                 return self._pipe.recv()
         except (EOFError, OSError):
             return self._ended()
         self.close()
-        return Outcome(failure=f"no answer in {self._limit_s:g} s")
+        return Outcome(failure=f"no answer in {self.limit_s:g} s")
 
     def _ended(self) -> Outcome:
         """Return how the process ended."""

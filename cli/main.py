@@ -19,7 +19,7 @@ from typing import Annotated, Any
 import typer
 
 from ..refimpl.errors import WamnetError
-from . import animate, bench, compare, dataset, demo, denoise, render, train, triage
+from . import animate, bench, certify, compare, dataset, demo, denoise, render, train, triage
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
 
@@ -53,6 +53,7 @@ _register(render.scene, render.SCENE_EXAMPLES)
 _register(dataset.dataset, dataset.EXAMPLES)
 _register(train.train, train.EXAMPLES)
 _register(compile_model, COMPILE_EXAMPLES, "compile")
+_register(certify.certify, certify.EXAMPLES)
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)
 _register(triage.triage, triage.EXAMPLES)

@@ -29,7 +29,8 @@ SCHEMA = "wamnet-artifact-1"
 class Artifact:
     """A compiled kernel; `program` is what was emitted, after all passes.
 
-    `before`: the kernel that writes the only image of this one, of a first layer in two passes [factor.py].
+    `before`: the kernel that writes the only image of this one, of a first layer in two passes [factor.py];
+    `certificate`: the proof of the bound, as JSON's types.
     """
 
     target: str
@@ -41,6 +42,7 @@ class Artifact:
     weights: NDArray[np.float32]
     manifest: Mapping[str, Any]
     before: Artifact | None = None
+    certificate: Mapping[str, Any] | None = None
 
     @property
     def digest(self) -> str:
@@ -56,6 +58,8 @@ class Artifact:
         """Return the files besides the manifest, by name."""
         own = {self.source_name: self.source.encode(), WEIGHTS_NAME: weight_bytes(self)}
         first = self.before.contents() if self.before else {}
+        if self.certificate:
+            own[CERTIFICATE_NAME] = (json.dumps(self.certificate, allow_nan=False) + "\n").encode()
         return {**{f"{FIRST_PASS}{name}": data for name, data in first.items()}, **own}
 
 
@@ -64,6 +68,9 @@ FIRST_PASS = "horizontal."
 
 WEIGHTS_NAME = "weights.bin"
 """File of the weights: little-endian float32, nothing else."""
+
+CERTIFICATE_NAME = "denoise.certificate.json"
+"""File of the proof of the bound, beside kernels that have one [certificate.py]."""
 
 MANIFEST_NAME = "manifest.json"
 """File of the manifest."""

@@ -15,20 +15,24 @@
 A target may fuse a product with the sum that reads it, also across nodes. That leaves out the product's
 rounding for this one reader: an error of 0 in place of one that the product's rule allows.
 
-n rounded operations in any order: gamma(n) = n u / (1 - n u), Higham, "Accuracy and Stability of Numerical
-Algorithms", 2002, section 3.1. The programs analysed are those before `expand_sine`: a sine is one node,
+Sums, and their order: sums.py. The programs analysed are those before `expand_sine`: a sine is one node,
 with the contract that its profile gives.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import adjoint, scaled
+from .enclosure import OUTWARD as OUTWARD
+from .enclosure import OVERFLOW, RANGE_OUTWARD
+from .enclosure import Enclosure as Enclosure
+from .enclosure import sine_range as sine_range
 from .ir import LEAST, Gather, Node, Program
 from .ops import LOOPS, OPS
 from .profiles import (
@@ -41,74 +45,26 @@ from .profiles import (
     UNIT_ROUNDOFF,
     SineContract,
 )
+from .sums import gamma, parts, rounding
 
 Array = NDArray[np.float64]
-
-OUTWARD = 2.0**-20
-"""Relative widening of every error bound: covers float64's rounding in rules and reference (step 5)."""
-
-RANGE_OUTWARD = 2.0**-40
-"""Relative widening of every range: float64's rounding of one operation, or sin; of a sum: `_affine`."""
-
-OVERFLOW = float(np.finfo(np.float32).max) * (1 - OUTWARD)
-"""What a number on the way must stay below: the largest float32, less float64's rounding in the rules."""
-
-SURE_TURNS = 2.0**30
-"""Largest argument, in radians, for which float64 finds a sine's crests: they are off by less than 2**-20."""
-
-
-@dataclass(frozen=True)
-class Enclosure:
-    """The reference's value lies in [low, high] (..., n), the kernel's at most `error` (..., n) from it.
-
-    `size` (..., n): no number that the operation rounds is larger; 0 for operations that round nothing.
-    """
-
-    low: Array
-    high: Array
-    error: Array
-    size: Any = 0.0
-
-    @property
-    def overflows(self) -> bool:
-        """Return whether float32 may be too small for what the operation rounds from bounded operands."""
-        return bool(np.any((self.size >= OVERFLOW) & np.isfinite(self.size)))
-
-    @property
-    def largest(self) -> Array:
-        """Return the largest magnitude of the reference's value."""
-        return np.maximum(np.abs(self.low), np.abs(self.high))
-
-    @property
-    def seen(self) -> Array:
-        """Return the largest magnitude of the kernel's value."""
-        return self.largest + self.error
-
-    @property
-    def read(self) -> Array:
-        """Return the error of the kernel's value when it is read, and perhaps flushed to zero."""
-        return self.error + FLUSH
 
 
 @dataclass(frozen=True)
 class Context:
     """What a rule may look at beside its operands: the node, the parameters in float64, sine and cosine.
 
-    `cosine` None: nothing is promised of it.
+    `cosine` None: nothing is promised of it. `gather`: how the node's operand is filled, if it is a window.
     """
 
     node: Node
     parameters: Mapping[str, Array]
     sine: SineContract
     cosine: SineContract | None = None
+    gather: Gather | None = None
 
 
 Rule = Callable[[Context, list[Enclosure]], Enclosure]
-
-
-def gamma(n: int) -> float:
-    """Return the largest relative error of n rounded operations."""
-    return n * UNIT_ROUNDOFF / (1.0 - n * UNIT_ROUNDOFF)
 
 
 # ---- rules ------------------------------------------------------------------------------------------
@@ -139,7 +95,7 @@ def _parameter(context: Context, operands: list[Enclosure]) -> Enclosure:
 
 
 def _affine(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """|W| times x's error, and gamma(D_in + 1) of the magnitudes of the D_in + 1 terms of W x + b."""
+    """|W| times x's error, and what rounding the sums in their parts adds [sums.py]."""
     (x,) = operands
     weight = context.parameters[str(context.node["weight"])]
     bias = np.zeros(weight.shape[0])
@@ -152,11 +108,12 @@ def _affine(context: Context, operands: list[Enclosure]) -> Enclosure:
     middle = (x.low + x.high) / 2 @ weight.T + bias
     reach = ((x.high - x.low) / 2 + outward * x.largest) @ size + outward * np.abs(bias)
     # Error: x's own, rounding, and underflow of a weight, of a product and of a sum.
-    error = (x.read + gamma(n) * (x.seen + FLUSH)) @ size + gamma(n) * np.abs(bias)
+    blocks = parts(context.gather, weight.shape[1])
+    own = rounding(weight, bias, x.low - x.read, x.high + x.read, blocks)
     underflow = FLUSH * (np.sum(x.seen, axis=-1, keepdims=True) + 4 * n)
     # In any order of summation no partial sum is larger than the sum of all magnitudes.
     whole = ((x.seen + FLUSH) @ size + np.abs(bias)) * (1 + gamma(n)) + n * FLUSH
-    return held(middle - reach, middle + reach, error + underflow, whole)
+    return held(middle - reach, middle + reach, x.read @ size + own + underflow, whole)
 
 
 def _add(context: Context, operands: list[Enclosure]) -> Enclosure:
@@ -313,20 +270,6 @@ def argument_reach(a: Enclosure) -> Array:
     return a.largest + a.read
 
 
-def sine_range(low: Array, high: Array) -> tuple[Array, Array]:
-    """Return the least and largest sine on [low, high] (...): at the ends, or 1 and -1 at crests between."""
-    sure = np.maximum(np.abs(low), np.abs(high)) <= SURE_TURNS
-    low, high = np.where(sure, low, -np.pi), np.where(sure, high, np.pi)
-    turn = 2 * np.pi
-    at_low, at_high = np.sin(low), np.sin(high)
-    # A crest that rounding hides here is so near an end that the sine there is 1 up to RANGE_OUTWARD.
-    crest = np.floor((high - np.pi / 2) / turn) >= np.ceil((low - np.pi / 2) / turn)
-    trough = np.floor((high + np.pi / 2) / turn) >= np.ceil((low + np.pi / 2) / turn)
-    least = np.where(trough, -1.0, np.minimum(at_low, at_high))
-    most = np.where(crest, 1.0, np.maximum(at_low, at_high))
-    return np.maximum(least - RANGE_OUTWARD, -1.0), np.minimum(most + RANGE_OUTWARD, 1.0)
-
-
 def _stack(context: Context, operands: list[Enclosure]) -> Enclosure:
     """Each number with its own bound."""
     parts = [np.broadcast_arrays(*(getattr(o, name) for o in operands)) for name in ("low", "high", "error")]
@@ -445,10 +388,12 @@ def enclose(
     sine: SineContract,
     cosine: SineContract | None = None,
     known: Mapping[int, Enclosure] | None = None,
+    local: bool = True,
 ) -> list[Enclosure]:
     """Return the enclosure of every node for inputs in the given boxes (low, high), each (..., n).
 
-    `known`: those of nodes by index, whose rule is not asked.
+    `known`: those of nodes by index, whose rule is not asked. `local`: with each operation's own error, on
+    which the sharper bounds of outputs rest; it takes every rule twice.
     """
     parameters = {name: array.astype(np.float64) for name, array in program.parameters.items()}
     found: list[Enclosure] = []
@@ -462,10 +407,21 @@ def enclose(
             found.append(Enclosure(low, high, np.full_like(low, LEAST if program.exact else 0.0)))
             continue
         operands = [_spread(found[arg], program.nodes[arg], node) for arg in node.args]
+        windowed = bool(node.args) and program.nodes[node.args[0]].op == "input"
+        context = Context(node, parameters, sine, cosine, program.gather if windowed else None)
         # An infinite bound may meet a weight of 0: _outward reads the NaN as no bound.
         with np.errstate(invalid="ignore"):
-            found.append(_outward(RULES[node.op](Context(node, parameters, sine, cosine), operands)))
+            enclosure = _outward(RULES[node.op](context, operands))
+            found.append(replace(enclosure, own=_own(context, operands, enclosure)) if local else enclosure)
     return found
+
+
+def _own(context: Context, operands: Sequence[Enclosure], enclosure: Enclosure) -> Array:
+    """Return the error that the operation adds to what the kernel gives it: that of exact operands there."""
+    if not any(np.any(operand.error) for operand in operands):
+        return enclosure.error
+    given = [Enclosure(o.low - o.error, o.high + o.error, np.zeros_like(o.error)) for o in operands]
+    return _outward(RULES[context.node.op](context, given)).error
 
 
 def _spread(found: Enclosure, operand: Node, node: Node) -> Enclosure:
@@ -498,8 +454,20 @@ def window_box(gather: Gather) -> tuple[Array, Array]:
 
 
 def output_errors(program: Program, found: list[Enclosure]) -> dict[str, Array]:
-    """Return the bound (..., n) of each output, which may be flushed when it is written."""
-    return {name: np.atleast_1d(found[index].read) for name, index in program.outputs}
+    """Return the bound (..., n) of each output, which may be flushed when it is written.
+
+    The least of three: what the rules say going forwards, the sum of all operations' own errors times their
+    sensitivities [adjoint.py], and, over boxes, the scaled norms of a network's layers [scaled.py].
+    """
+    errors = {}
+    for name, index in program.outputs:
+        least = found[index].error
+        for sharper in (adjoint.output_error, scaled.output_error):
+            error = sharper(program, found, index)
+            # What may overflow has no bound, whatever its slopes are.
+            least = least if error is None else np.where(np.isfinite(least), np.fmin(least, error), least)
+        errors[name] = np.atleast_1d(least + FLUSH)
+    return errors
 
 
 def over_box(program: Program, inputs: Mapping[str, tuple[Any, Any]], sine: SineContract) -> dict[str, Array]:

@@ -14,17 +14,17 @@ import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 import numpy as np
 
 from ..refimpl.errors import CompileError
-from . import artifact, bounds, ir, profiles, schedules
+from . import artifact, bounds, certificate, ir, profiles, schedules
 from .artifact import Artifact
 from .c import C
 from .dialect import Dialect
 from .emit import kernel_gather, output_channels
+from .enclosure import round_up as round_up
 from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
 from .glsl_inlined import GLSL_LADDER
@@ -35,6 +35,7 @@ from .opencl_tiled import OPENCL_LADDER
 from .passes import pipeline
 from .profiles import Profile, SineContract
 from .schedules import PLAIN, Pick, Plain, Printed, Schedule, pick
+from .sums import is_split
 
 
 @dataclass(frozen=True)
@@ -103,16 +104,20 @@ AGAINST = "float64 reference, same float32 weights and images"
 AGAINST_PINNED = f"{AGAINST}, where weights below {LEAST!r} are 0"
 """The same for an exact kernel."""
 
+SUMS = "sums      over the window: a partial sum for each image and row of taps, in any order; then these"
+"""What a header says where the bound rests on partial sums [sums.py]."""
+
 
 @dataclass(frozen=True)
 class Bound:
     """A-priori promise: `output` bounds each channel's error, None where an operation promises nothing.
 
-    `sines` holds the range of each sine's argument.
+    `sines` holds the range of each sine's argument; `proof` the steps of a certificate, if it has one.
     """
 
     output: tuple[float, ...] | None
     sines: tuple[tuple[float, float], ...]
+    proof: certificate.Proof | None = None
 
 
 def analysed(program: Program, profile: str = "ieee") -> Program:
@@ -146,8 +151,10 @@ def bound_over_images(
         if contract.error is not None and not bounds.argument_reach(argument).max() <= contract.domain:
             _refuse_domain(number + 1, len(sines), index, ranges[-1], contract)
     errors = bounds.output_errors(program, found)[program.outputs[0][0]]
-    known = all(math.isfinite(error) for error in errors)
-    return Bound(tuple(float(e) for e in errors) if known else None, tuple(ranges))
+    if not all(math.isfinite(error) for error in errors):
+        return Bound(None, tuple(ranges))
+    proof = None if cut else certificate.prove(program, found, contract)
+    return Bound(proof.bound if proof else tuple(float(e) for e in errors), tuple(ranges), proof)
 
 
 def _check_sizes(program: Program, found: Sequence[bounds.Enclosure]) -> None:
@@ -306,6 +313,7 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound, pi
         f"profile   {profile.name}: {profile.text}",
         f"sine      {sine_contract(profile.name, target.name).text}",
         f"bound     {_bound_text(bound)}",
+        *([SUMS] if is_split(gather) and type(picked.schedule).enclosures is Schedule.enclosures else []),
         *([] if picked.schedule.name == PLAIN else [f"schedule  {schedules.text(picked.manifest())}"]),
         f"arguments {arguments[0]}",
         *(f"          {line}" for line in arguments[1:]),
@@ -331,16 +339,6 @@ def _bound_text(bound: Bound) -> str:
     if bound.output is None:
         return "none: for some images an operation of this program promises nothing on this target"
     return f"|output - float64 reference| <= {round_up(max(bound.output)):g} for all images in these ranges"
-
-
-def round_up(value: float, digits: int = 3) -> float:
-    """Return the smallest number of so many significant decimal digits that is not below `value`."""
-    if value == 0 or not math.isfinite(value):
-        return value
-    # Decimals hold every float64 exactly, and the float64 nearest to one above `value` is not below it.
-    exact = Decimal(value)
-    unit = Decimal(1).scaleb(exact.adjusted() - digits + 1)
-    return float(exact.quantize(unit, ROUND_CEILING))
 
 
 def _assemble(
@@ -379,6 +377,7 @@ def _assemble(
             "output": bound.output and [round_up(error) for error in bound.output],
             "against": AGAINST_PINNED if emitted.exact else AGAINST,
         },
+        "certificate": artifact.CERTIFICATE_NAME if bound.proof else None,
         "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],
         "info": {name: _info_value(name, text) for name, text in emitted.info if name in KEPT_INFO},
         "files": {
@@ -394,7 +393,12 @@ def _assemble(
         },
     }
     manifest = json.loads(json.dumps(manifest, allow_nan=False))
-    return Artifact(target.name, profile.name, target.entry, source, source_name, emitted, weights, manifest)
+    proven = None
+    if bound.proof:
+        sine = sine_contract(profile.name, target.name)
+        proven = certificate.certificate(common, bound.proof, sine, schedule, emitted, manifest)
+    names = (target.name, profile.name, target.entry)
+    return Artifact(*names, source, source_name, emitted, weights, manifest, certificate=proven)
 
 
 def _window(gather: Gather) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
 1. Nodes are grouped in their order [`schedule`]: neighbouring elementwise nodes of one shape share a loop, an
    affine node is a loop nest of its own.
-2. An affine node that reads the window accumulates straight from the images, tap by tap; the window vector
-   exists only if something else reads it [`_over_window`].
+2. An affine node that reads the window accumulates straight from the images, a partial sum for each row of
+   taps of an image [sums.py]; the window vector exists only if something else reads it [`_over_window`].
 3. A value that another group reads is an array `v<number>`; a number, or a value that only its own loop
    reads, is a variable `t<number>`; numbers are those of the printed program.
 
@@ -20,6 +20,7 @@ from .dialect import Dialect
 from .ir import Gather, Image, Node, Program, users
 from .lines import Lines
 from .ops import LOOPS, OPS
+from .sums import is_split
 from .weights import layout, tables
 
 BORDERS: Mapping[str, tuple[str, str]] = {
@@ -102,8 +103,16 @@ def _each_result(template: str, program: Program, dialect: Dialect) -> str:
 def private_bytes(program: Program) -> int:
     """Return the bytes of the arrays that a kernel declares for each pixel."""
     body = Body(program, Dialect(), kernel_gather(program))
-    shapes = [program.nodes[index].type.shape for index in body.group_of if body.declares(index)]
-    return sum(4 * shape[0] for shape in shapes)
+    parts = [index for index in _split(program) if index in body.group_of]
+    arrays = [*filter(body.declares, body.group_of), *parts]
+    return sum(4 * program.nodes[index].type.shape[0] for index in arrays)
+
+
+def _split(program: Program) -> list[int]:
+    """Return the indices of the affine maps that add up partial sums over the window [sums.py]."""
+    nodes = program.nodes
+    found = [i for i, node in enumerate(nodes) if node.op == "affine" and nodes[node.args[0]].op == "input"]
+    return found if is_split(kernel_gather(program)) else []
 
 
 def kernel_gather(program: Program) -> Gather:
@@ -228,17 +237,24 @@ class Body(Lines):
         neurons = f"for (int j = 0; j < {n_out}; ++j) {{"
         self._nest([neurons], [f"v{index}[j] = {start};"])
         if source.op == "input":
+            sums, zero, add = f"v{index}", [], []
+            if is_split(self.gather):
+                sums = f"part{index}"
+                zero, add = [f"{sums}[j] = 0.0f;"], [f"v{index}[j] += {sums}[j];"]
+                self._line(f"{self.dialect.variable('float32')} {sums}[{n_out}];")
             self._over_window(
-                lambda tap: self._accumulate(index, neurons, _plus(weight.offset, f"({tap}) * {n_out}", "j"))
+                lambda tap: self._accumulate(sums, neurons, _plus(weight.offset, f"({tap}) * {n_out}", "j")),
+                lambda: self._nest([neurons] if zero else [], zero),
+                lambda: self._nest([neurons] if add else [], add),
             )
         else:
-            inner = self._accumulate(index, neurons, _plus(weight.offset, f"i * {n_out}", "j"))
+            inner = self._accumulate(f"v{index}", neurons, _plus(weight.offset, f"i * {n_out}", "j"))
             value = f"float value = {self._read(node.args[0], 'i')};"
             self._nest([f"for (int i = 0; i < {n_in}; ++i) {{"], [value, *inner])
 
-    def _accumulate(self, index: int, neurons: str, weight: str) -> list[str]:
-        """Return the loop that adds `value` times one row of weights to all neurons."""
-        return [neurons, f"    v{index}[j] += {self._weight(weight)} * value;", "}"]
+    def _accumulate(self, sums: str, neurons: str, weight: str) -> list[str]:
+        """Return the loop that adds `value` times one row of weights to all neurons' sums."""
+        return [neurons, f"    {sums}[j] += {self._weight(weight)} * value;", "}"]
 
     def _elementwise(self, group: tuple[int, ...]) -> None:
         """Write the operations of a group, in a loop when they work on vectors."""
@@ -293,33 +309,38 @@ class Body(Lines):
 
     # ---- the window --------------------------------------------------------------------------------------
 
-    def _over_window(self, body: Callable[[str], list[str]]) -> None:
-        """Write the loops over taps and channels that set `value`; `body` takes the index into the window.
+    def _over_window(
+        self,
+        body: Callable[[str], list[str]],
+        before: Callable[[], None] = lambda: None,
+        after: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Write the loops over images, rows of taps, taps and channels that set `value`.
 
-        An exact program reads one image after another.
+        `body` takes the index into the window; `before` and `after` write what stands around an image's row.
         """
-        for group in self.gather.groups(by_image=self.program.exact):
-            self._over_taps(group, body)
+        (inside, value), names = BORDERS[self.gather.window.border], self.sides
+        for group in self.gather.groups:
+            self._open(f"for (int dy = 0; dy < {names.rows}; ++dy) {{")
+            self._line(f"int row = {self.dialect.clamp}(y + dy - {names.row}, 0, height - 1);")
+            before()
+            self._open(f"for (int dx = 0; dx < {names.columns}; ++dx) {{")
+            self._line(f"int column = {self.dialect.clamp}(x + dx - {names.column}, 0, width - 1);")
+            if inside:
+                self._line(inside.format(sides=names))
+            self._line(f"int tap = (dy * {names.columns} + dx) * {self.gather.channels};")
+            for image, first in group:
+                self._channels(image, value, body(_plus("tap", first, "c")))
+            self._close()
+            after()
+            self._close()
 
-    def _over_taps(self, images: Sequence[tuple[Image, int]], body: Callable[[str], list[str]]) -> None:
-        """Write the loops over the taps of some images, each with its first channel's place in a tap."""
-        (before, value), names = BORDERS[self.gather.window.border], self.sides
-        self._open(f"for (int dy = 0; dy < {names.rows}; ++dy) {{")
-        self._line(f"int row = {self.dialect.clamp}(y + dy - {names.row}, 0, height - 1);")
-        self._open(f"for (int dx = 0; dx < {names.columns}; ++dx) {{")
-        self._line(f"int column = {self.dialect.clamp}(x + dx - {names.column}, 0, width - 1);")
-        if before:
-            self._line(before.format(sides=names))
-        self._line(f"int tap = (dy * {names.columns} + dx) * {self.gather.channels};")
-        for image, first in images:
-            pixel = self.dialect.pixel.format(image=image.name, channels=image.channels)
-            lines = [f"float value = {value.format(pixel=pixel)};"]
-            if self.program.exact:
-                lines.append(f"value = {self.dialect.kept('value')};")
-            lines += body(_plus("tap", first, "c"))
-            self._nest([f"for (int c = 0; c < {image.channels}; ++c) {{"], lines)
-        self._close()
-        self._close()
+    def _channels(self, image: Image, value: str, lines: list[str]) -> None:
+        """Write the loop over an image's channels at a tap."""
+        pixel = self.dialect.pixel.format(image=image.name, channels=image.channels)
+        kept = [f"value = {self.dialect.kept('value')};"] if self.program.exact else []
+        value = f"float value = {value.format(pixel=pixel)};"
+        self._nest([f"for (int c = 0; c < {image.channels}; ++c) {{"], [value, *kept, *lines])
 
     # ---- values ------------------------------------------------------------------------------------------
 

@@ -25,6 +25,7 @@ from .emit import Body, emit, kernel_gather
 from .emit_tiled import refused_by_vectors
 from .ir import Node, Program
 from .schedules import Schedule
+from .sums import is_split
 from .weights import Slot
 
 LARGEST_WEIGHTS = 2**16
@@ -167,22 +168,31 @@ class InlinedBody(Body):
             for first in range(0, matrix.shape[1], 4):
                 columns = matrix[:, first : first + 4]
                 held = f"v{node.args[0]}_{first // 4}.{COMPONENTS[columns.shape[1] - 1]}"
-                self._multiply(index, columns, held)
+                self._multiply(f"v{index}", columns, held)
 
     def _windowed(self, index: int, matrix: NDArray[np.float32]) -> None:
-        """Write the products of all taps, image by image in an exact program."""
-        gather = self.gather
+        """Write the products of all taps: a partial sum for each row of taps of an image."""
+        gather, vectors, split = self.gather, range(self.vectors(index)), is_split(self.gather)
         for image in gather.images:
             self._line(f"{_vector(image.channels)} {image.name}_{index};")
-        taps, groups = range(gather.rows * gather.columns), gather.groups(by_image=self.program.exact)
-        for tap, (image, first) in ((tap, image) for group in groups for tap in taps for image in group):
+        if split:
+            parts = ", ".join(f"part{index}_{vector}" for vector in vectors)
+            self._line(f"{self.dialect.variable('float32')} {parts};")
+        sums, taps = f"part{index}" if split else f"v{index}", range(gather.rows * gather.columns)
+        for group, tap in ((group, tap) for group in gather.groups for tap in taps):
             row, column = divmod(tap, gather.columns)
             dy, dx = row - gather.rows // 2, column - gather.columns // 2
-            name, start = f"{image.name}_{index}", tap * gather.channels + first
-            self._line(f"{name} = tap_{image.name}(ivec2(x, y) + ivec2({dx}, {dy}));")
-            self._multiply(index, matrix[:, start : start + image.channels], name)
+            for image, first in group:
+                name, start = f"{image.name}_{index}", tap * gather.channels + first
+                self._line(f"{name} = tap_{image.name}(ivec2(x, y) + ivec2({dx}, {dy}));")
+                opens = split and column == 0 and first == group[0][1]
+                columns = matrix[:, start : start + image.channels]
+                self._multiply(sums, columns, name, "=" if opens else "+=")
+            if split and column == gather.columns - 1:
+                for vector in vectors:
+                    self._line(f"v{index}_{vector} += part{index}_{vector};")
 
-    def _multiply(self, index: int, columns: NDArray[np.float32], value: str) -> None:
+    def _multiply(self, sums: str, columns: NDArray[np.float32], value: str, operator: str = "+=") -> None:
         """Write the additions of columns (D_out, k) times `value` with k components to all vectors.
 
         A product of a matrix and a vector adds up in an order of its own: an exact program has one column
@@ -191,13 +201,14 @@ class InlinedBody(Body):
         count = columns.shape[1]
         if self.program.exact and count > 1:
             for i, part in enumerate(_components(count)):
-                self._multiply(index, columns[:, i : i + 1], f"{value.partition('.')[0]}{part}")
+                each = columns[:, i : i + 1], f"{value.partition('.')[0]}{part}"
+                self._multiply(sums, *each, operator if i == 0 else "+=")
             return
         kind = "vec4" if count == 1 else f"mat{count}x4"
-        for vector in range(self.vectors(index)):
+        for vector in range(-(-columns.shape[0] // 4)):
             numbers = [n for column in columns.T for n in _filled(column, vector)]
             constant = f"{kind}({', '.join(map(self._literal, numbers))})"
-            self._line(f"v{index}_{vector} += {constant} * {value};")
+            self._line(f"{sums}_{vector} {operator} {constant} * {value};")
 
     def _outputs(self) -> None:
         """Write the only output."""

@@ -29,6 +29,7 @@ from .emit import BORDERS, Body, emit, kernel_gather, output_channels, schedule
 from .ir import Node, Program
 from .ops import OPS
 from .schedules import Schedule
+from .sums import is_split
 from .weights import Slot
 
 LARGEST_PRIVATE = 2**19
@@ -249,28 +250,36 @@ class TiledBody(Body):
         starts = [self._bias(str(bias), f"{at}{j}") if bias else "(vector)(0.0f)" for j in each]
         self._pixels([f"sum[p][{j}] = {start};" for j, start in zip(each, starts, strict=True)])
         if source.op == "input":
-            for image in self.gather.images:
-                self._open(f"for (int dy = 0; dy < {self.sides.rows}; ++dy) {{")
-                patch = f"patch_{image.name} + dy * PATCH_WIDTH * {image.channels}"
-                self._line(f"const float *row = {patch};")
-                self._multiply(
-                    blocks, f"{self.sides.columns} * {image.channels}", f"row[p * {image.channels} + i]"
-                )
-                self._close()
+            self._windowed(blocks)
         else:
             held = self.tile.blocks(source.type.shape[0]).total
             self._multiply(blocks, str(n_in), f"v{node.args[0]}.number[p * {held} * LANES + i]")
         self._pixels([f"v{index}.all[p * {blocks.total} + {at}{j}] = sum[p][{j}];" for j in each])
         self._close()
 
-    def _multiply(self, blocks: Blocks, inputs: str, value: str) -> None:
+    def _windowed(self, blocks: Blocks) -> None:
+        """Write the sums over the window: a partial sum for each image and row, which stays in registers."""
+        each, split = range(blocks.vectors), is_split(self.gather)
+        for image in self.gather.images:
+            self._open(f"for (int dy = 0; dy < {self.sides.rows}; ++dy) {{")
+            self._line(f"const float *row = patch_{image.name} + dy * PATCH_WIDTH * {image.channels};")
+            if split:
+                self._line(f"vector part[PIXELS][{blocks.vectors}];")
+                self._pixels([f"part[p][{j}] = (vector)(0.0f);" for j in each])
+            inputs = f"{self.sides.columns} * {image.channels}"
+            self._multiply(blocks, inputs, f"row[p * {image.channels} + i]", "part" if split else "sum")
+            if split:
+                self._pixels([f"sum[p][{j}] += part[p][{j}];" for j in each])
+            self._close()
+
+    def _multiply(self, blocks: Blocks, inputs: str, value: str, sums: str = "sum") -> None:
         """Write the loop over inputs: each one's row of a block of weights, times its value at each pixel."""
         each = range(blocks.vectors)
         self._open(f"for (int i = 0; i < {inputs}; ++i) {{")
         for j in each:
             self._line(f"vector w{j} = w[{j}];")
         self._line(f"w += {blocks.vectors};")
-        self._pixels([f"float value = {value};", *(f"sum[p][{j}] += w{j} * value;" for j in each)])
+        self._pixels([f"float value = {value};", *(f"{sums}[p][{j}] += w{j} * value;" for j in each)])
         self._close()
 
     def _pixels(self, lines: list[str]) -> None:

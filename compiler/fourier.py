@@ -39,10 +39,11 @@ from numpy.typing import NDArray
 
 from ..refimpl import dataset
 from . import bounds
-from .bounds import Enclosure, gamma
+from .bounds import Enclosure
 from .emit import kernel_gather
 from .ir import Gather, Program
 from .profiles import FLUSH, UNIT_ROUNDOFF, SineContract
+from .sums import gamma
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .ir import LEAST, Node, Parameters, Program
+from .ir import LEAST, Gather, Node, Parameters, Program
 from .loops import Loop, loops
 from .ops import OPS
+from .sums import parts
 
 Array = NDArray[Any]
 
@@ -85,6 +86,8 @@ def _value(
     if program.exact and node.op == "affine":
         return _in_order(program, node, values[node.args[0]], parameters)
     operands = [_spread(values[arg], program.nodes[arg], node) for arg in node.args]
+    if node.op == "affine" and kind == np.float32 and program.gather and _is_input(program, node.args[0]):
+        return _in_parts(node, operands[0], parameters, program.gather)
     return apply(node, operands, parameters, kind)
 
 
@@ -96,14 +99,32 @@ def _kept(value: Array) -> Array:
 def _in_order(program: Program, node: Node, x: Array, parameters: Any) -> Array:
     """Return W x + b (..., D_out) of x (..., D_in), all rounded, in the order of exact programs."""
     weight, gather = parameters[str(node["weight"])], program.gather
-    over_window = gather is not None and program.nodes[node.args[0]].op == "input"
-    order = gather.by_image if gather is not None and over_window else range(weight.shape[1])
+    over_window = gather is not None and _is_input(program, node.args[0])
+    blocks = parts(gather if over_window else None, weight.shape[1])
     total = np.zeros((*np.shape(x)[:-1], len(weight)), weight.dtype)
     if node.get("bias") is not None:
         total = total + parameters[str(node["bias"])]
-    for i in order:
-        total = total + weight[:, i] * x[..., i, None]
+    for block in blocks:
+        # A single part holds the bias.
+        part = total if len(blocks) == 1 else np.zeros_like(total)
+        for i in block:
+            part = part + weight[:, i] * x[..., i, None]
+        total = part if len(blocks) == 1 else total + part
     return total
+
+
+def _is_input(program: Program, index: int) -> bool:
+    """Return whether a value is the window."""
+    return program.nodes[index].op == "input"
+
+
+def _in_parts(node: Node, x: Any, parameters: Any, gather: Gather) -> Any:
+    """Return W x + b in float32 as kernels add it up: partial sums of each image's rows of taps [sums.py]."""
+    weight = parameters[str(node["weight"])]
+    found = parameters[str(node["bias"])] if node.get("bias") is not None else np.float32(0)
+    for part in parts(gather, weight.shape[1]):
+        found = found + np.matmul(x[..., part], weight[:, part].T)
+    return found
 
 
 def element(dtype: str, kind: np.dtype[Any]) -> np.dtype[Any]:

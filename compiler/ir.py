@@ -130,14 +130,12 @@ class Gather:
         ends = np.cumsum([image.channels for image in self.images])[:-1]
         return np.concatenate([part.ravel() for part in np.split(taps, ends, axis=1)])
 
-    def groups(self, by_image: bool) -> list[list[tuple[Image, int]]]:
-        """Return the images, each with its first channel's place in a tap: those that are read together.
-
-        All of them, or `by_image` one after another; those that are joined are one.
-        """
+    @property
+    def groups(self) -> list[list[tuple[Image, int]]]:
+        """Return the images, each with its first channel's place in a tap; those that are joined together."""
         firsts = accumulate((image.channels for image in self.images), initial=0)
         found = list(zip(self.images, firsts, strict=False))
-        return [[image] for image in found] if by_image and not self.joined else [found]
+        return [found] if self.joined else [[image] for image in found]
 
 
 @dataclass(frozen=True)

@@ -107,26 +107,26 @@ POLYNOMIALS: Mapping[int, Polynomial] = {
     7: _polynomial(
         "0x1p+0 -0x1.55501ep-3 0x1.10601p-7 -0x1.83b822p-13",
         approximation_error=8.95e-07,
-        error=1.11e-06,
-        cosine_error=1.11e-06,
+        error=1.1e-06,
+        cosine_error=1.1e-06,
     ),
     9: _polynomial(
         "0x1p+0 -0x1.555548p-3 0x1.110e58p-7 -0x1.9f5ccep-13 0x1.5ccedcp-19",
         approximation_error=4.92e-09,
-        error=2.17e-07,
-        cosine_error=2.17e-07,
+        error=2.08e-07,
+        cosine_error=2.08e-07,
     ),
     11: _polynomial(
         "0x1p+0 -0x1.555556p-3 0x1.111132p-7 -0x1.a0221p-13 0x1.72915ap-19 -0x1.b0e154p-26",
         approximation_error=2.75e-10,
-        error=2.12e-07,
-        cosine_error=2.12e-07,
+        error=2.03e-07,
+        cosine_error=2.03e-07,
     ),
     13: _polynomial(
         "0x1p+0 -0x1.555556p-3 0x1.111142p-7 -0x1.a02d8ap-13 0x1.7566dep-19 -0x1.2337fep-25 0x1.608abap-30",
         approximation_error=1.61e-10,
-        error=2.12e-07,
-        cosine_error=2.12e-07,
+        error=2.03e-07,
+        cosine_error=2.03e-07,
     ),
 }
 """Polynomials by degree; the errors are the script's, rounded up."""

@@ -23,10 +23,11 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..refimpl import factored
 from ..refimpl.factored import Factors
-from .bounds import OUTWARD, Enclosure, enclose, gamma
+from .bounds import OUTWARD, Enclosure, enclose
 from .interpret import interpret
 from .ir import Program
 from .profiles import EMITTED_COSINE, EMITTED_SINE, FLUSH
+from .sums import gamma
 
 Array = NDArray[Any]
 
@@ -113,7 +114,7 @@ def sum_errors(step: Step, windows: Array, targets: Array) -> dict[str, Array]:
     for the sum; padding adds zeros, which round nothing, and the sum over groups is part of the order.
     """
     given = {name: (np.asarray(x, np.float64),) * 2 for name, x in ((WINDOW, windows), (TARGET, targets))}
-    nodes = enclose(step.program, given, EMITTED_SINE, EMITTED_COSINE)
+    nodes = enclose(step.program, given, EMITTED_SINE, EMITTED_COSINE, local=False)
     ends = dict(step.program.outputs)
     return {known.parameter: _sum_error(known, ends, nodes, len(windows)) for known in step.sums}
 

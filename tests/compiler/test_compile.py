@@ -146,7 +146,7 @@ def test_failure_at_the_second_name_leaves_whole_files_and_the_old_manifest(tmp_
     assert (tmp_path / "denoise.cl").read_text() == two.source
     assert (tmp_path / "weights.bin").read_bytes() == artifacts.weight_bytes(one)
     assert (tmp_path / "manifest.json").read_text() == artifacts.manifest_text(one)
-    assert len(list(tmp_path.iterdir())) == 3
+    assert len(list(tmp_path.iterdir())) == 4
 
 
 def test_two_writers_at_once_leave_whole_files(tmp_path):
@@ -157,7 +157,7 @@ def test_two_writers_at_once_leave_whole_files(tmp_path):
             assert (tmp_path / "denoise.cl").read_text() in {kernel.source for kernel in kernels}
     texts = {artifacts.manifest_text(kernel) for kernel in kernels}
     assert (tmp_path / "manifest.json").read_text() in texts
-    assert len(list(tmp_path.iterdir())) == 3
+    assert len(list(tmp_path.iterdir())) == 4
 
 
 # ---- refusals ------------------------------------------------------------------------------------------
@@ -233,8 +233,8 @@ def test_a_bound_needs_precise_and_no_bound_does_not():
 def test_private_bytes_are_those_of_the_declared_arrays():
     for target in ("opencl", "opengl"):
         artifact = compile_program(lower(model()), target)
-        declared = re.findall(r"float v\d+\[(\d+)\];", artifact.source)
-        assert artifact.manifest["private_bytes"] == 4 * sum(map(int, declared)) == 56
+        declared = re.findall(r"(?:float|PRECISE float) (?:v|part)\d+\[(\d+)\];", artifact.source)
+        assert artifact.manifest["private_bytes"] == 4 * sum(map(int, declared)) == 72
 
 
 def test_too_many_output_channels_for_a_fragment():

@@ -9,6 +9,7 @@
  * profile   native: any order of summation, fused multiply-add allowed, the target's own sine
  * sine      sinf() of C99, which promises nothing
  * bound     none: for some images an operation of this program promises nothing on this target
+ * sums      over the window: a partial sum for each image and row of taps, in any order; then these
  * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
  *           weights; result: width * height * 3 floats in the same order, encoded as `output` says;
  *           width; height: fewer than 2^31 numbers an image.
@@ -83,8 +84,12 @@ static inline void wamnet_pixel(
     for (int j = 0; j < 4; ++j) {
         v1[j] = weights[96 + j];
     }
+    float part1[4];
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
         int row = wamnet_clamp(y + dy - WINDOW_CENTRE, 0, height - 1);
+        for (int j = 0; j < 4; ++j) {
+            part1[j] = 0.0f;
+        }
         for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
             int column = wamnet_clamp(x + dx - WINDOW_CENTRE, 0, width - 1);
             bool inside = row == y + dy - WINDOW_CENTRE && column == x + dx - WINDOW_CENTRE;
@@ -92,15 +97,32 @@ static inline void wamnet_pixel(
             for (int c = 0; c < 3; ++c) {
                 float value = inside ? image_color[(row * width + column) * 3 + c] : 0.0f;
                 for (int j = 0; j < 4; ++j) {
-                    v1[j] += weights[(tap + c) * 4 + j] * value;
+                    part1[j] += weights[(tap + c) * 4 + j] * value;
                 }
             }
+        }
+        for (int j = 0; j < 4; ++j) {
+            v1[j] += part1[j];
+        }
+    }
+    for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
+        int row = wamnet_clamp(y + dy - WINDOW_CENTRE, 0, height - 1);
+        for (int j = 0; j < 4; ++j) {
+            part1[j] = 0.0f;
+        }
+        for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
+            int column = wamnet_clamp(x + dx - WINDOW_CENTRE, 0, width - 1);
+            bool inside = row == y + dy - WINDOW_CENTRE && column == x + dx - WINDOW_CENTRE;
+            int tap = (dy * WINDOW_SIZE + dx) * 6;
             for (int c = 0; c < 3; ++c) {
                 float value = inside ? image_normal[(row * width + column) * 3 + c] : 0.0f;
                 for (int j = 0; j < 4; ++j) {
-                    v1[j] += weights[(tap + 3 + c) * 4 + j] * value;
+                    part1[j] += weights[(tap + 3 + c) * 4 + j] * value;
                 }
             }
+        }
+        for (int j = 0; j < 4; ++j) {
+            v1[j] += part1[j];
         }
     }
 

@@ -8,7 +8,8 @@
  * output    2 channels
  * profile   ieee: any order of summation, fused multiply-add allowed, emitted sine
  * sine      emitted, odd polynomial of degree 11
- * bound     |output - float64 reference| <= 4e-06 for all images in these ranges
+ * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
+ * sums      over the window: a partial sum for each image and row of taps, in any order; then these
  * schedule  tile16: 14 pixels share each weight: 28 vectors of 16 sums stay in registers
  * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
  *           weights, at an address that is a multiple of 64; result: width * height * 2 floats
@@ -100,26 +101,44 @@ __kernel void wamnet_denoise(
         }
         for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
             const float *row = patch_i0 + dy * PATCH_WIDTH * 2;
+            vector part[PIXELS][1];
+            #pragma unroll
+            for (int p = 0; p < PIXELS; ++p) {
+                part[p][0] = (vector)(0.0f);
+            }
             for (int i = 0; i < WINDOW_SIZE * 2; ++i) {
                 vector w0 = w[0];
                 w += 1;
                 #pragma unroll
                 for (int p = 0; p < PIXELS; ++p) {
                     float value = row[p * 2 + i];
-                    sum[p][0] += w0 * value;
+                    part[p][0] += w0 * value;
                 }
+            }
+            #pragma unroll
+            for (int p = 0; p < PIXELS; ++p) {
+                sum[p][0] += part[p][0];
             }
         }
         for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
             const float *row = patch_i1 + dy * PATCH_WIDTH * 1;
+            vector part[PIXELS][1];
+            #pragma unroll
+            for (int p = 0; p < PIXELS; ++p) {
+                part[p][0] = (vector)(0.0f);
+            }
             for (int i = 0; i < WINDOW_SIZE * 1; ++i) {
                 vector w0 = w[0];
                 w += 1;
                 #pragma unroll
                 for (int p = 0; p < PIXELS; ++p) {
                     float value = row[p * 1 + i];
-                    sum[p][0] += w0 * value;
+                    part[p][0] += w0 * value;
                 }
+            }
+            #pragma unroll
+            for (int p = 0; p < PIXELS; ++p) {
+                sum[p][0] += part[p][0];
             }
         }
         #pragma unroll

@@ -107,8 +107,8 @@ def test_the_paper_s_network_of_rank_16(executor_named, kit, target, schedule, b
     # Each weight is rounded by at most u = 2^-24 of itself when the model is made; its factors again, when
     # they are cut: a product of two is off by 2 u of the magnitudes |V| |H|, which are larger than |W|.
     assert report["cut"]["first_layer"] <= 2.0**-18 * report["cut"]["of"]
-    whole = compile_program(program, target, "ieee", schedule).manifest["bound"]["output"]
-    assert max(artifact.manifest["bound"]["output"]) <= max(whole)
+    # Sums of two passes hold larger numbers than one of 36 terms: what is left is below half an 8-bit step.
+    assert max(artifact.manifest["bound"]["output"]) <= 1 / 510
 
 
 @pytest.mark.parametrize("rank", [1, 4])

@@ -1,0 +1,213 @@
+"""The certificate beside a kernel: every step of the proof of its bound, for a checker that trusts none.
+
+1. A network of sines [scaled.py] over the box of its images, layer by layer: the magnitudes of its sums, what
+   rounding and the sine add to each number [`_layers`].
+2. From each layer to each output: norms of the scaled matrices, or products of magnitudes, whichever is less
+   [`_outputs`]. The scalings are data: any are sound, the checker need not find them.
+3. Numbers are rounded up to `DIGITS` digits, as the checker rounds its own. One that is smaller than what the
+   checker finds is refused; so none can be made smaller.
+4. The program's text, where each weight lies in the kernel's file, digests of both and of the source
+   [`certificate`]. Weights that the file does not hold stand in the certificate itself.
+
+checker.py repeats all of it from the text and the weights, with code of its own. Programs of another form,
+kernels in two passes and sines without a promise have no certificate [`prove`].
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import bounds, ir, scaled
+from .enclosure import round_up
+from .ir import Program
+from .profiles import FLUSH, UNIT_ROUNDOFF, SineContract
+from .schedules import Schedule
+from .sums import parts, rounding
+
+Array = NDArray[np.float64]
+
+SCHEMA = "wamnet-certificate-1"
+"""Name and version of the form; spec/certificate.schema.json."""
+
+DIGITS = 4
+"""Significant decimal digits of a number of the proof, rounded up."""
+
+WIDER = 1 + 2.0**-34
+"""Factor by which each result is widened: more than float64 rounds in it."""
+
+
+@dataclass(frozen=True)
+class Proof:
+    """The steps for `layers` and `outputs`, as JSON's types; `bound` of each output channel."""
+
+    layers: tuple[Mapping[str, Any], ...]
+    outputs: tuple[Mapping[str, Any], ...]
+    bound: tuple[float, ...]
+
+
+def prove(program: Program, found: Sequence[bounds.Enclosure], sine: SineContract) -> Proof | None:
+    """Return the proof for an analysed program over all images, or None where it has no certificate."""
+    output = program.outputs[0][1]
+    network = scaled.network(program, found, output)
+    if sine.error is None or len(network) < 2 or program.nodes[network[0].read].op != "input":
+        return None
+    if found[network[0].affine].own is None:  # a schedule's own sums, which the steps know nothing of
+        return None
+    low, high = bounds.window_box(program.gather)  # type: ignore[arg-type]
+    layers, own = [], []
+    for number, layer in enumerate(network):
+        step, errors = _layer(
+            program, layer, low, high, sine, parts(None if number else program.gather, len(low))
+        )
+        layers.append({"node": layer.affine, **step})
+        own.append(errors)
+        high = np.full(len(errors), 1.0 + sine.error + FLUSH)
+        low = -high
+    matrices = [layer.scale * _array(program, layer, "weight") for layer in network[1:]]
+    if not all(np.isfinite(errors).all() for errors in own) or not scaled.decomposable(matrices):
+        return None
+    outputs = [step for rows in scaled.outputs(len(own[-1])) for step in _outputs(matrices, own, rows)]
+    return Proof(tuple(layers), tuple(outputs), tuple(step["error_bound"] for step in outputs))
+
+
+def _array(program: Program, layer: scaled.Layer, name: str) -> Array:
+    """Return a layer's weights, or its biases, in float64."""
+    held = program.nodes[layer.affine].get(name)
+    if held is None:
+        return np.zeros(program.nodes[layer.affine].type.shape[0])
+    return program.parameters[str(held)].astype(np.float64)
+
+
+def _layer(
+    program: Program, layer: scaled.Layer, low: Array, high: Array, sine: SineContract, blocks: Sequence[Any]
+) -> tuple[dict[str, Any], Array]:
+    """Return the step of one layer for inputs (n,) in [low, high], and what it adds to the errors (m,)."""
+    weight, bias = _array(program, layer, "weight"), _array(program, layer, "bias")
+    omega = abs(layer.scale)
+    up, down, largest = (
+        np.maximum(weight, 0.0),
+        np.maximum(-weight, 0.0),
+        np.maximum(np.abs(low), np.abs(high)),
+    )
+    own = rounding(weight, bias, low - FLUSH, high + FLUSH, blocks)
+    own = own + FLUSH * (np.sum(up + down, axis=1) + largest.sum() + 4 * (len(low) + 1))
+    sizes = (up + down) @ (largest + FLUSH) + np.abs(bias)
+    reach = (
+        np.maximum(up @ high - down @ low + bias, up @ -low - down @ -high - bias) + own + 2.0**-40 * sizes
+    )
+    if layer.multiply != layer.affine:
+        own = omega * own + UNIT_ROUNDOFF * omega * reach + 2 * FLUSH
+        reach, sizes = omega * reach, np.maximum(omega, 1.0) * sizes
+    added = 0.0 if layer.sine is None else float(sine.error or 0.0) + 2 * FLUSH
+    errors = (own + added) * WIDER
+    step = {
+        "size_bound": _up(float(sizes.max()) * (1 + 2.0**-10)),
+        "argument_bound": _up(float(reach.max()) * (1 + 2.0**-20)),
+        "rounding_bound": [_up(float(value) * WIDER) for value in own],
+        "error_bound": [_up(float(value)) for value in errors],
+    }
+    return step, errors
+
+
+def _outputs(matrices: Sequence[Array], own: Sequence[Array], rows: Sequence[int]) -> list[dict[str, Any]]:
+    """Return the steps of outputs that share scalings: from each layer's errors to each output's."""
+    last = matrices[-1][rows]
+    scales = scaled.scalings([*matrices[:-1], last], own[0])
+    norms = [
+        _up(float(np.linalg.norm(after[:, None] * matrix / before, 2)) * (1 + 1e-9))
+        for matrix, before, after in zip(matrices[:-1], scales, scales[1:], strict=False)
+    ]
+    reach, least = [1.0], [np.eye(len(own[-2]))]
+    for norm, matrix in zip(reversed(norms), reversed(matrices[:-1]), strict=True):
+        reach.insert(0, reach[0] * norm)
+        least.insert(0, least[0] @ np.abs(matrix))
+    found = []
+    for row, number in zip(last, rows, strict=True):
+        short = float(np.linalg.norm(row / scales[-1]))
+        by_norms = [
+            short * norm * float(np.linalg.norm(s * e))
+            for norm, s, e in zip(reach, scales, own[:-1], strict=True)
+        ]
+        by_size = [float(np.abs(row) @ matrix @ e) for matrix, e in zip(least, own[:-1], strict=True)]
+        layers = [min(pair) * WIDER for pair in zip(by_norms, by_size, strict=True)] + [
+            float(own[-1][number])
+        ]
+        found.append(
+            {
+                "output": number,
+                "scalings": [scale.tolist() for scale in scales],
+                "norm_bounds": norms,
+                "layer_bounds": [_up(value) for value in layers],
+                "error_bound": _up((math.fsum(layers) + FLUSH) * WIDER),
+            }
+        )
+    return found
+
+
+def _up(value: float) -> float:
+    """Round up to the digits that the checker compares."""
+    return round_up(value, DIGITS)
+
+
+def certificate(
+    common: Program,
+    proof: Proof,
+    sine: SineContract,
+    schedule: Schedule,
+    emitted: Program,
+    manifest: Mapping[str, Any],
+) -> Mapping[str, Any]:
+    """Return the certificate of a kernel, as JSON's types; `manifest` has the digests of its files."""
+    return {
+        "schema": SCHEMA,
+        "manifest_digest": manifest["digest"],
+        "program_digest": manifest["program"],
+        "files": dict(manifest["files"]),
+        "profile": manifest["profile"]["name"],
+        "sine": {
+            "text": sine.text,
+            "error_bound": sine.error,
+            "domain": sine.domain if math.isfinite(sine.domain) else None,
+        },
+        "program": ir.text(common),
+        "parameters": _places(common, schedule, emitted),
+        "layers": [dict(step) for step in proof.layers],
+        "outputs": [dict(step) for step in proof.outputs],
+        "bound": {"output": list(proof.bound), "against": manifest["bound"]["against"]},
+    }
+
+
+def _places(common: Program, schedule: Schedule, emitted: Program) -> dict[str, Any]:
+    """Return for each parameter where element (j, i) lies in the file: at offset + rows[j] + columns[i].
+
+    The schedule packs numbers that count all elements from 1; where they come out is their place.
+    """
+    coded, count = {}, 1
+    for name, array in emitted.parameters.items():
+        coded[name] = np.arange(count, count + array.size, dtype=np.float64).reshape(array.shape)
+        count += array.size
+    packed = np.zeros(0)
+    if count < 2**24:
+        arrays = {name: array.astype(np.float32) for name, array in coded.items()}
+        packed = schedule.pack(replace(emitted, parameters=arrays)).astype(np.int64)
+    at = np.full(count, -1)
+    at[packed] = np.arange(len(packed))
+    found: dict[str, Any] = {}
+    for name, array in common.parameters.items():
+        place = np.atleast_2d(at[coded[name].astype(np.int64)]) if name in coded else np.full((1, 1), -1)
+        rows, columns = place[:, 0] - place[0, 0], place[0] - place[0, 0]
+        shape = list(array.shape)
+        if (place >= 0).all() and (place == place[0, 0] + rows[:, None] + columns).all():
+            found[name] = {"shape": shape, "offset": int(place[0, 0])}
+            found[name] |= {"rows": rows.tolist(), "columns": columns.tolist()}
+        else:
+            held = np.ascontiguousarray(array, "<f4").tobytes()
+            found[name] = {"shape": shape, "base64": base64.b64encode(held).decode()}
+    return found

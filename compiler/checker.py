@@ -1,0 +1,266 @@
+"""Check a certificate: derive every number again from the program's text and the kernel's weights.
+
+1. The files beside it have the digests that it states; the text and the weights make the program's [`_read`].
+2. The text is that of a network of sines; anything else is refused [`_layers`].
+3. Each layer: magnitudes, rounding of sums in parts, the sine's error [`_layer`]; each output: how far each
+   layer's errors reach, by norms that hold for the scalings in the certificate [`_output`].
+4. That a matrix has a norm of at most N is proven in whole numbers, by elimination [`norm_is_below`].
+   All other numbers are sums of magnitudes in float64, widened by more than it rounds.
+
+It shares no code with what wrote the certificate but the promises of sines. Formulas: spec/certificate.md.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from decimal import ROUND_CEILING, Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..refimpl.errors import InputError
+from .opencl import OpenCL
+from .profiles import emitted_sine
+from .sine import POLYNOMIALS
+
+U, TINY, WIDER = 2.0**-24, 2.0**-126, 1 + 2.0**-34
+"""float32's rounding and smallest normal number; a factor of more than float64 can be off in what follows."""
+
+PROMISES = {promise.text: promise for promise in (*map(emitted_sine, POLYNOMIALS), OpenCL.native_sine)}
+"""What is known of sines, by the name that a certificate gives."""
+
+BROKEN = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
+"""What may happen while something is read that is no certificate."""
+
+NODE = re.compile(r"  %(\d+) = (\w+)((?: %\d+,?)*)(?: \{(.*)\})? : \w+(?:\[(\d+)\])?")
+"""A line of a program's text: number, operation, operands, attributes, length of the result."""
+
+
+class Refused(Exception):
+    """A step of a certificate that does not hold."""
+
+
+def check(path: Path) -> dict[str, Any]:
+    """Return a certificate whose every step holds; raise `Refused`, or `InputError` for what is none."""
+    try:
+        held, manifest, text, arrays = _read(path)
+        layers, box = _layers(text)
+        promise: Any = PROMISES.get(held["sine"]["text"])
+        if promise is None or promise.domain != (held["sine"]["domain"] or np.inf):
+            raise Refused("sine: nobody promises it")
+        _same("sine", manifest["sine"]["text"], promise.text)
+        _at_least("sine: error_bound", [held["sine"]["error_bound"]], [promise.error], exact=True)
+        _same("layers", len(held["layers"]), len(layers))
+        matrices, own = [], []
+        for number, layer in enumerate(layers):
+            own.append(_layer(f"layer {number}", held["layers"][number], layer, box, arrays, promise))
+            matrices.append(arrays[layer["weight"]] * layer["scale"])
+            high = np.full(len(own[-1]), 1 + promise.error + TINY)
+            box = (-high, high, None)
+        _same("outputs", [o["output"] for o in held["outputs"]], list(range(len(own[-1]))))
+        found = [_output(f"output {o['output']}", o, matrices[1:], own) for o in held["outputs"]]
+        _at_least("bound: output", held["bound"]["output"], found)
+        _at_least("manifest: bound", manifest["bound"]["output"], found)
+        return held
+    except BROKEN as error:
+        rule = f"it must be a whole certificate beside its kernel ({type(error).__name__}: {error})"
+        raise InputError("certificate", str(path), rule, "compile the model again") from None
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any]]:
+    """Return the certificate, the manifest, the program's text and its parameters, once all digests agree."""
+    held = json.loads(path.read_bytes())
+    manifest = json.loads((path.parent / "manifest.json").read_bytes())
+    _same("schema", held["schema"], "wamnet-certificate-1")
+    files = {name: (path.parent / name).read_bytes() for name in manifest["files"]}
+    for name, data in files.items():
+        _same(f"digest of {name}", held["files"].get(name), hashlib.sha256(data).hexdigest())
+    kernel = [manifest["digest"], manifest["profile"]["name"]]
+    _same("digest of the kernel, and profile", [held["manifest_digest"], held["profile"]], kernel)
+    raw, text = np.frombuffer(files["weights.bin"], "<f4"), str(held["program"])
+    arrays = {}
+    for name, place in held["parameters"].items():
+        if "base64" in place:
+            array = np.frombuffer(base64.b64decode(place["base64"], validate=True), "<f4")
+        else:
+            at = place["offset"] + np.add.outer(place["rows"], place["columns"])
+            array = raw[at if at.min() >= 0 else len(raw)]
+        arrays[name] = array.reshape(place["shape"])
+    pieces = b"".join(arrays[name].tobytes() for name in sorted(arrays))
+    digest = hashlib.sha256(text.encode() + pieces).hexdigest()
+    _same("digest of the program in the certificate", held["program_digest"], digest)
+    _same("digest of the program in the manifest", manifest["program"], digest)
+    _same("weights: all are finite", all(np.isfinite(array).all() for array in arrays.values()), True)
+    return held, manifest, text, {name: array.astype(np.float64) for name, array in arrays.items()}
+
+
+def _layers(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
+    """Return the layers of a network of sines, first to last, and (low, high, parts) of its windows."""
+    nodes = {int(m[1]): m for m in map(NODE.fullmatch, text.splitlines()) if m}
+
+    def arguments(m: Any) -> list[Any]:
+        return [nodes[int(i)] for i in re.findall(r"%(\d+)", m[3])]
+
+    def other(m: Any) -> tuple[Any, float]:
+        first, second = sorted(arguments(m), key=lambda a: a[2] == "constant")
+        value = float(second[4].removeprefix("value="))
+        _same("program: a constant in float32", float(np.float32(value)), value)
+        return first, value
+
+    (at,) = (nodes[int(i)] for i in re.findall(r"(?m)^  output \w+ = %(\d+)$", text))
+    while at[2] in ("minimum", "maximum"):
+        at, _ = other(at)
+    layers: list[dict[str, Any]] = []
+    while at[2] != "input":
+        scale = None
+        if layers and at[2] == "sin":
+            (at,) = arguments(at)
+            if at[2] == "multiply":
+                at, scale = other(at)
+        elif layers:
+            raise Refused(f"program: %{at[1]} is {at[2]}, no sine of a layer")
+        _same(f"program: operation of %{at[1]}", at[2], "affine")
+        names = dict(pair.split("=") for pair in at[4].split(", "))
+        known = {"node": int(at[1]), "scale": scale or 1.0, "scaled": scale is not None, "last": not layers}
+        layers.insert(0, {**names, **known})
+        (at,) = arguments(at)
+    (taps,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", text)
+    images = re.findall(r"(?m)^  image \w+: (\d+) in \[(\S+), (\S+)\]$", text)
+    ends = [(int(n), float(low), float(high)) for n, low, high in images]
+    zero, count = taps[2] == "zero", int(taps[0]) * int(taps[1])
+    low = np.tile(np.concatenate([np.full(n, min(a, 0.0) if zero else a) for n, a, _ in ends]), count)
+    high = np.tile(np.concatenate([np.full(n, max(b, 0.0) if zero else b) for n, _, b in ends]), count)
+    _same("program: numbers in a window", at[5], str(len(low)))
+    owner = np.tile(np.repeat(np.arange(len(ends)), [n for n, _, _ in ends]), count)
+    row = np.repeat(np.arange(int(taps[0])), len(low) // int(taps[0]))
+    parts = [np.flatnonzero((owner == image) & (row == y)) for image in range(len(ends)) for y in set(row)]
+    return layers, (low, high, parts if len(parts) > 1 else None)
+
+
+def _layer(name: str, stated: Any, layer: Any, given: Any, arrays: Any, promise: Any) -> Any:
+    """Check the step of one layer; return what it adds to the errors of its numbers (m,)."""
+    low, high, parts = given
+    weight, scale = arrays[layer["weight"]], abs(layer["scale"])
+    bias = arrays[layer["bias"]] if "bias" in layer else np.zeros(len(weight))
+    own, least, most = _sum(weight, bias, low - TINY, high + TINY, parts)
+    largest = np.maximum(-low, high)
+    own = own + TINY * (np.abs(weight).sum(axis=1) + largest.sum() + 4 * (len(low) + 1))
+    sizes = np.abs(weight) @ (largest + TINY) + np.abs(bias)
+    reach = np.maximum(most, -least) + own + 2.0**-40 * sizes
+    if layer["scaled"]:
+        own, reach = scale * own + U * scale * reach + 2 * TINY, scale * reach
+    _same(f"{name}: node", stated["node"], layer["node"])
+    size, argument = sizes.max() * max(scale, 1.0) * (1 + 2.0**-10), reach.max() * (1 + 2.0**-20)
+    if size >= 3.4e38 or not (layer["last"] or argument <= promise.domain):
+        raise Refused(f"{name}: numbers up to {size:.3g}, arguments up to {argument:.6g} of a sine")
+    errors = (own + (0.0 if layer["last"] else promise.error + 2 * TINY)) * WIDER
+    _at_least(f"{name}: size_bound", [stated["size_bound"]], [size])
+    _at_least(f"{name}: argument_bound", [stated["argument_bound"]], [argument])
+    _at_least(f"{name}: rounding_bound", stated["rounding_bound"], own * WIDER)
+    _at_least(f"{name}: error_bound", stated["error_bound"], errors)
+    return errors
+
+
+def _sum(weight: Any, bias: Any, low: Any, high: Any, parts: Any) -> tuple[Any, Any, Any]:
+    """Return the error (m,) of W x + b in any order of all, or in parts, and its least and largest value."""
+    if parts is None:
+        low, high = np.append(low, 1.0), np.append(high, 1.0)
+        return _part(np.append(weight, bias[:, None], axis=1), low, high, len(low) - 1)
+    found = [_part(weight[:, p], low[p], high[p], len(p)) for p in parts]
+    own = sum(error for error, _, _ in found)
+    least = np.stack([*(least for _, least, _ in found), bias], axis=1)
+    most = np.stack([*(most for _, _, most in found), bias], axis=1)
+    sizes, n = np.maximum(-least, most), len(parts) + 1
+    cap = np.maximum(np.maximum(most, 0).sum(axis=1), np.maximum(-least, 0).sum(axis=1))
+    off = n * U / (1 - n * U) * (sizes.sum(axis=1) + own) + own
+    return own + U * (_additions(sizes, cap) + n * off), least.sum(axis=1), most.sum(axis=1)
+
+
+def _part(weight: Any, low: Any, high: Any, products: int) -> tuple[Any, Any, Any]:
+    """Return the error (m,) of sums of terms in any order, `products` of them rounded, and their range."""
+    ends = np.stack([weight * low, weight * high])
+    least, most, n = ends.min(axis=0), ends.max(axis=0), weight.shape[1]
+    sizes = np.maximum(-least, most)
+    cap = np.maximum(np.maximum(most, 0).sum(axis=1), np.maximum(-least, 0).sum(axis=1))
+    whole, rounded = sizes.sum(axis=1), sizes[:, :products].sum(axis=1)
+    error = U * (_additions(sizes, cap) + rounded + n * (n * U / (1 - n * U)) * whole)
+    return error, least.sum(axis=1) - 2.0**-40 * whole, most.sum(axis=1) + 2.0**-40 * whole
+
+
+def _additions(sizes: Any, cap: Any) -> Any:
+    """Return how large all additions of terms (m, n) are together, in any tree; no sum is above cap (m,)."""
+    largest = np.cumsum(np.sort(sizes, axis=1)[:, ::-1], axis=1)[:, 1:]
+    return np.minimum(largest, cap[:, None]).sum(axis=1)
+
+
+def _output(name: str, stated: Any, matrices: Any, own: Any) -> float:
+    """Check the step of one output: how far each layer's errors reach; return its bound."""
+    scales = [np.array(scale, np.float64) for scale in stated["scalings"]]
+    row, last = matrices[-1][stated["output"]], float(own[-1][stated["output"]])
+    _same(f"{name}: sizes of scalings", [s.shape for s in scales], [e.shape for e in own[:-1]])
+    if not all(np.isfinite(scale).all() and (scale > 0).all() for scale in scales):
+        raise Refused(f"{name}: scalings must be positive numbers")
+    short, sizes, found = float(np.linalg.norm(row / scales[-1])), np.abs(row), [last]
+    for at in range(len(scales) - 1, -1, -1):
+        by_norms = short * float(np.linalg.norm(scales[at] * own[at]))
+        found.insert(0, min(by_norms, float(sizes @ own[at])) * WIDER)
+        if at:
+            before, after, matrix = scales[at - 1], scales[at], matrices[at - 1]
+            norm = _up(float(np.linalg.norm(after[:, None] * matrix / before, 2)) * (1 + 1e-9))
+            _at_least(f"{name}: norm of layer {at}", [stated["norm_bounds"][at - 1]], [norm], exact=True)
+            if not norm_is_below(norm, after, matrix, before):
+                raise Refused(f"{name}: the norm of layer {at} is not below {norm}")
+            short, sizes = short * norm, sizes @ np.abs(matrix)
+    _same(f"{name}: number of norms", len(stated["norm_bounds"]), len(scales) - 1)
+    _at_least(f"{name}: layer_bounds", stated["layer_bounds"], found)
+    _at_least(f"{name}: error_bound", [stated["error_bound"]], [total := (sum(found) + TINY) * WIDER])
+    return total
+
+
+def norm_is_below(norm: float, after: Any, matrix: Any, before: Any) -> bool:
+    """Return whether |S A B^-1| < N, S and B diagonal: all pivots of N^2 B^2 - A^T S^2 A, A (m, n), are > 0.
+
+    All numbers are whole multiples of one power of two; elimination without fractions keeps them whole.
+    """
+    scaled = matrix.tolist(), after.tolist()
+    lines = [[Fraction(a) * Fraction(s) for a in line] for line, s in zip(*scaled, strict=True)]
+    diagonal = [Fraction(norm) * Fraction(scale) for scale in before]
+    unit = max(value.denominator for line in [*lines, diagonal] for value in line)
+    columns = [[int(value * unit) for value in column] for column in zip(*lines, strict=True)]
+    rows = [[-sum(x * y for x, y in zip(a, b, strict=True)) for b in columns] for a in columns]
+    for i, value in enumerate(diagonal):
+        rows[i][i] += int(value * unit) ** 2
+    pivot = 1
+    for k, line in enumerate(rows):
+        if line[k] <= 0:
+            return False
+        for i, other in enumerate(rows[k + 1 :], k + 1):
+            pairs = zip(line[i:], other[i:], strict=True)
+            other[i:] = [(y * line[k] - line[i] * x) // pivot for x, y in pairs]
+        pivot = line[k]
+    return True
+
+
+def _up(value: float) -> float:
+    """Round up to four significant decimal digits."""
+    exact = Decimal(value)
+    return float(exact.quantize(Decimal(1).scaleb(exact.adjusted() - 3), ROUND_CEILING)) if value else 0.0
+
+
+def _at_least(step: str, stated: Any, found: Any, exact: bool = False) -> None:
+    """Refuse numbers that are below those found, these rounded up as a certificate's are."""
+    for value, wanted in zip(stated, found, strict=True):
+        least = float(wanted) if exact else _up(float(wanted))
+        if type(value) not in (int, float) or not least <= value < np.inf:
+            raise Refused(f"{step} is {value!r}: it must be a number, at least {least!r}")
+
+
+def _same(step: str, stated: Any, wanted: Any) -> None:
+    """Refuse what is not what it must be."""
+    if stated != wanted:
+        raise Refused(f"{step} is {stated!r}: it must be {wanted!r}")

@@ -1,0 +1,52 @@
+"""`wamnet certify`: the verdict, its exit status, and the table."""
+
+import json
+
+import pytest
+
+
+@pytest.fixture
+def kernel(wamnet, samples, tmp_path):
+    """Return the folder of a kernel with a certificate."""
+    assert wamnet("compile", samples / "model.safetensors", "--target", "opencl", "-o", "kernel").status == 0
+    return tmp_path / "kernel"
+
+
+@pytest.mark.parametrize("name", ["", "denoise.certificate.json"])
+def test_a_certificate_holds(wamnet, kernel, name):
+    outcome = wamnet("certify", kernel / name)
+    assert outcome.status == 0
+    assert "Where the error comes from" in outcome.out
+    assert "holds: |output - reference| <= " in outcome.out
+    assert "of half an 8-bit step" in outcome.out
+
+
+def test_a_smaller_number_is_refused(wamnet, kernel):
+    path = kernel / "denoise.certificate.json"
+    held = json.loads(path.read_text())
+    held["layers"][1]["error_bound"][0] *= 0.999
+    path.write_text(json.dumps(held))
+    outcome = wamnet("certify", path)
+    assert outcome.status == 1
+    assert outcome.out.startswith("refused: layer 1: error_bound is ")
+    assert outcome.out.count("\n") == 1
+
+
+def test_other_weights_are_refused(wamnet, kernel):
+    path = kernel / "weights.bin"
+    path.write_bytes(path.read_bytes()[:-4] + b"\0\0\0\0")
+    outcome = wamnet("certify", kernel)
+    assert outcome.status == 1
+    assert outcome.out.startswith("refused: digest of weights.bin")
+
+
+def test_half_a_file_is_a_bad_file(refused, kernel):
+    path = kernel / "denoise.certificate.json"
+    path.write_bytes(path.read_bytes()[:200])
+    assert "it must be a whole certificate beside its kernel" in refused("certify", path)
+
+
+def test_a_kernel_without_one_is_a_bad_file(wamnet, refused, samples, tmp_path):
+    model = samples / "model.safetensors"
+    assert wamnet("compile", model, "--target", "glsl", "--profile", "native", "-o", "plain").status == 0
+    assert "no such file; kernels of profile ieee have one" in refused("certify", "plain")

@@ -1,0 +1,274 @@
+"""Certificates: what the checker accepts and refuses, and that their bounds hold."""
+
+import ast
+import inspect
+import json
+import math
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from wamnet.compiler import artifact, checker, scaled
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.ir import sha256
+from wamnet.compiler.lower import lower
+from wamnet.refimpl import siren
+from wamnet.refimpl.dataset import Normalization, Window
+from wamnet.refimpl.denoise import Model
+from wamnet.refimpl.errors import InputError
+
+NAME = artifact.CERTIFICATE_NAME
+SPEC = Path(__file__).parents[2] / "spec"
+
+
+def model(omega_0=3.0, window=None, seed=5):
+    window = window or Window(3, "zero")
+    network = siren.init((window.size**2 * 6, 6, 5, 3), 1.0, omega_0, seed)
+    return Model(network, ("color", "normal"), window, Normalization())
+
+
+def written(folder, target="opencl", schedule="plain", **kwargs):
+    """Write the kernel of a small model, and return the path of its certificate."""
+    artifact.write(compile_program(lower(model(**kwargs)), target, schedule=schedule), folder)
+    return folder / NAME
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return written(tmp_path_factory.mktemp("kernel"))
+
+
+@pytest.fixture(scope="module")
+def changed(path, tmp_path_factory):
+    """Write another certificate, or manifest, beside a copy of the kernel's files."""
+    folder = tmp_path_factory.mktemp("changed")
+
+    def write(**others):
+        for name in ("manifest.json", "weights.bin", "denoise.cl", NAME):
+            given = others.get(name.replace(".", "_"))
+            held = (path.parent / name).read_bytes() if given is None else given
+            (folder / name).write_bytes(held if isinstance(held, bytes) else json.dumps(held).encode())
+        return folder / NAME
+
+    return write
+
+
+def certificate_of(path):
+    return json.loads(path.read_text())
+
+
+def leaves(node, under=False, place=()):
+    """Return the places of all numbers under keys that hold `bound`."""
+    if isinstance(node, dict):
+        return [
+            p for key, value in node.items() for p in leaves(value, under or "bound" in key, (*place, key))
+        ]
+    if isinstance(node, list):
+        return [p for i, value in enumerate(node) for p in leaves(value, under, (*place, i))]
+    return [place] if under and type(node) in (int, float) else []
+
+
+def put(node, place, value):
+    """Return a copy with another value at a place."""
+    copy = json.loads(json.dumps(node))
+    inner = copy
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = value(inner[place[-1]])
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("target", "schedule"),
+    [
+        ("opencl", "plain"),
+        ("opencl", "tile16"),
+        ("opencl", "vector16"),
+        ("opengl", "inlined"),
+        ("numpy", "plain"),
+    ],
+)
+def test_certificates_of_all_schedules_hold(tmp_path, target, schedule):
+    held = checker.check(written(tmp_path, target, schedule))
+    assert max(held["bound"]["output"]) <= max(
+        json.loads((tmp_path / "manifest.json").read_text())["bound"]["output"]
+    )
+
+
+def test_a_certificate_is_what_its_schema_says(path):
+    schema = json.loads((SPEC / "certificate.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(certificate_of(path), schema)
+
+
+def test_any_number_made_smaller_is_refused(path, changed):
+    """By one unit in its last place, and by half: each number is the least that the checker takes."""
+    held = certificate_of(path)
+    places = leaves(held)
+    assert len(places) > 50
+    for place in places:
+        for smaller in (lambda x: math.nextafter(x, -math.inf), lambda x: x / 2, lambda x: -x, lambda x: 0):
+            try:
+                checker.check(changed(denoise_certificate_json=put(held, place, smaller)))
+            except checker.Refused:
+                continue
+            pytest.fail(f"{place}: a smaller number was accepted")
+
+
+def test_a_larger_number_is_no_lie(path, changed):
+    held = certificate_of(path)
+    for place in leaves(held):
+        if "norm_bounds" not in place:
+            checker.check(changed(denoise_certificate_json=put(held, place, lambda x: x * 2)))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1.0, "0.5", True, None, [1.0]])
+def test_what_is_no_number_is_refused(path, changed, value):
+    held = put(certificate_of(path), ("outputs", 0, "error_bound"), lambda x: value)
+    with pytest.raises((checker.Refused, InputError), match=r"must be"):
+        checker.check(changed(denoise_certificate_json=held))
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "match"),
+    [
+        (("schema",), "wamnet-certificate-2", "schema is"),
+        (("manifest_digest",), "0" * 64, "digest of the kernel"),
+        (("program_digest",), "0" * 64, "digest of the program in the certificate"),
+        (("files", "denoise.cl"), "0" * 64, "digest of denoise.cl"),
+        (("profile",), "native", "and profile is"),
+        (("sine", "text"), "a better one", "sine: nobody promises it"),
+        (("sine", "domain"), 25600.0, "sine: nobody promises it"),
+        (("layers", 1, "node"), 1, "layer 1: node"),
+        (("outputs", 1, "output"), 0, "outputs is"),
+        (("outputs", 0, "scalings", 0, 2), 0.0, "scalings must be positive"),
+        (("outputs", 0, "scalings", 0, 2), -1.0, "scalings must be positive"),
+        (("outputs", 0, "scalings", 0, 2), 1e-3, "output 0: .*norm"),
+        (("outputs", 0, "scalings", 0), [1.0], "sizes of scalings"),
+        (("parameters", "b0", "offset"), 1, "digest of the program in the certificate"),
+        (("layers",), [], "layers is 0"),
+    ],
+)
+def test_a_changed_step_is_refused_by_name(path, changed, place, value, match):
+    held = put(certificate_of(path), place, lambda _: value)
+    with pytest.raises(checker.Refused, match=match):
+        checker.check(changed(denoise_certificate_json=held))
+
+
+def test_other_weights_are_refused(path, changed):
+    """A bit in the file; and the same with all digests of files made to agree: the program's does not."""
+    raw = bytearray((path.parent / "weights.bin").read_bytes())
+    raw[5] ^= 1
+    with pytest.raises(checker.Refused, match=r"digest of weights.bin"):
+        checker.check(changed(weights_bin=bytes(raw)))
+    manifest = json.loads((path.parent / "manifest.json").read_text())
+    digests = {**manifest["files"], "weights.bin": sha256(bytes(raw))}
+    held = {**certificate_of(path), "files": digests}
+    manifest["files"] = digests
+    with pytest.raises(checker.Refused, match="digest of the program in the certificate"):
+        checker.check(changed(weights_bin=bytes(raw), denoise_certificate_json=held, manifest_json=manifest))
+
+
+def test_another_source_is_refused(path, changed):
+    source = (path.parent / "denoise.cl").read_bytes()
+    with pytest.raises(checker.Refused, match=r"digest of denoise.cl"):
+        checker.check(changed(denoise_cl=source + b"\n"))
+
+
+def test_a_manifest_that_promises_more_is_refused(path, changed):
+    manifest = json.loads((path.parent / "manifest.json").read_text())
+    manifest["bound"]["output"][1] /= 2
+    with pytest.raises(checker.Refused, match="manifest: bound"):
+        checker.check(changed(manifest_json=manifest))
+
+
+def test_other_weights_of_the_same_form_have_other_numbers(path, tmp_path):
+    """The numbers of another model's proof, with that model's digests left in place."""
+    other = written(tmp_path, omega_0=4.0)
+    held = {
+        **certificate_of(other),
+        **{name: certificate_of(path)[name] for name in ("layers", "outputs", "bound")},
+    }
+    other.write_text(json.dumps(held))
+    with pytest.raises(checker.Refused, match="layer 1"):
+        checker.check(other)
+
+
+@pytest.mark.parametrize("cut", [0, 1, 40, 400, -2])
+def test_a_truncated_file_is_no_certificate(path, changed, cut):
+    with pytest.raises(InputError, match="must be a whole certificate beside its kernel"):
+        checker.check(changed(denoise_certificate_json=path.read_bytes()[:cut]))
+
+
+@pytest.mark.parametrize("data", [b"", b"\xff\x00", b"[]", b"{}", b"null", b'{"schema": 1}', b"[" * 100000])
+def test_garbage_is_no_certificate(changed, data):
+    with pytest.raises((InputError, checker.Refused), match=r"must be|promises"):
+        checker.check(changed(denoise_certificate_json=data))
+
+
+def test_any_key_left_out_is_told(path, changed):
+    held = certificate_of(path)
+    for name in held:
+        with pytest.raises((InputError, checker.Refused), match=r"must be|promises"):
+            checker.check(changed(denoise_certificate_json={k: v for k, v in held.items() if k != name}))
+
+
+def test_the_checker_shares_no_code_with_the_compiler_and_is_short():
+    """Under 200 lines of code, its texts not counted; of the compiler only what promises of sines are."""
+    source = inspect.getsource(checker)
+    tree = ast.parse(source)
+    imported = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) if node.level == 1}
+    assert imported == {"opencl", "profiles", "sine"}
+    statements = [node for node in ast.walk(tree) if isinstance(node, ast.Expr)]
+    texts = [node for node in statements if isinstance(node.value, ast.Constant)]
+    skipped = {n for text in texts for n in range(text.lineno, text.end_lineno + 1)}
+    lines = [line for n, line in enumerate(source.splitlines(), 1) if n not in skipped]
+    assert sum(bool(line.strip()) for line in lines) < 200
+
+
+def test_kernels_without_a_proof_have_no_certificate(tmp_path):
+    """GLSL promises nothing of its own sine; a kernel in two passes is not covered."""
+    for kernel in (
+        compile_program(lower(model()), "opengl", "native"),
+        compile_program(lower(model()), "opencl", rank=2),
+    ):
+        assert kernel.certificate is None
+        assert kernel.manifest["certificate"] is None
+        assert NAME not in kernel.contents()
+
+
+def test_native_opencl_has_a_certificate(tmp_path):
+    artifact.write(compile_program(lower(model()), "opencl", "native"), tmp_path)
+    assert checker.check(tmp_path / NAME)["sine"]["domain"] is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_norms_in_whole_numbers(seed):
+    """The largest singular value, a little below it and a little above; and a matrix of rank 1."""
+    random = np.random.default_rng(seed)
+    matrix = np.float32(random.normal(size=(4, 6))).astype(np.float64)
+    if seed == 4:
+        matrix = np.outer(np.arange(1.0, 5.0), np.arange(1.0, 7.0))
+    after, before = random.integers(1, 256, 4) / 64, random.integers(1, 256, 6) / 64
+    norm = np.linalg.norm(after[:, None] * matrix / before, 2)
+    assert checker.norm_is_below(norm * (1 + 1e-12), after, matrix, before)
+    assert not checker.norm_is_below(norm * (1 - 1e-12), after, matrix, before)
+
+
+def test_scalings_are_sound_and_gain(path):
+    """Any positive scalings bound the true worst case over signs; those found beat plain norms."""
+    random = np.random.default_rng(3)
+    matrices = [random.normal(size=(5, 6)), random.normal(size=(5, 5)), random.normal(size=(1, 5))]
+    own = [random.uniform(0, 1, 6), random.uniform(0, 0.1, 5), random.uniform(0, 0.1, 5), np.zeros(1)]
+    found = scaled.amplified(matrices, own, scaled.scalings(matrices, own[0]))
+    plain = scaled.amplified(matrices, own, [np.ones(6), np.ones(5), np.ones(5)])
+    assert found <= plain
+    worst = 0.0
+    for _ in range(3000):
+        e = own[0] * random.choice([-1, 1], 6)
+        for matrix, error in zip(matrices, own[1:], strict=True):
+            e = random.choice([-1, 1], len(error)) * (matrix @ e) + error * random.choice([-1, 1], len(error))
+        worst = max(worst, abs(float(e[0])))
+    assert worst <= found

@@ -1,14 +1,14 @@
 """What a kernel may write for given images: the reference's picture, and how far each number may be from it.
 
-1. The reference is the program in float64, as the artifact's profile has it [`analysed`], the bound that of
-   the artifact's schedule at these very images: a-posteriori.
+1. The reference is the program in float64, with the weights that the artifact's profile has [`analysed`] and
+   the images as they are; the bound is that of the artifact's schedule at these images: a-posteriori.
 2. Both are computed for a block of rows at a time: all windows of a picture fill the memory [`expected`].
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,7 @@ def expected(program: Program, artifact: Artifact, images: Mapping[str, NDArray[
     """Return what the artifact of a program may write for images (H, W, C); without a promise, any number."""
     if artifact.before is not None:
         raise CompileError("a kernel of two passes is compared by factor.at_images; compile without a rank")
-    common = analysed(program)
+    common = analysed(program, artifact.profile)
     contract = sine_contract(artifact.profile, artifact.target)
     schedule = schedule_named(artifact.target, artifact.manifest["schedule"]["name"])
     height, width = next(iter(images.values())).shape[:2]
@@ -47,7 +47,7 @@ def expected(program: Program, artifact: Artifact, images: Mapping[str, NDArray[
     for top in range(0, height, rows):
         block = slice(top, min(top + rows, height))
         windows = schedules.windows(kernel_gather(program), images, block)
-        (value,) = interpret(common, {"window": windows}, np.float64).values()
+        (value,) = interpret(replace(common, exact=False), {"window": windows}, np.float64).values()
         enclosed = schedule.enclosures(common, contract, images, block)
         (error,) = bounds.output_errors(common, enclosed).values()
         values.append(_per_pixel(value, windows.shape[:2]))

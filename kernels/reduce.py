@@ -210,16 +210,15 @@ class Found:
 
 @dataclass(frozen=True)
 class Reduced:
-    """The smallest part of the picture that was found to show it, all kernels' verdicts there, the stages."""
+    """The smallest part of the picture that was found to show it, all kernels' verdicts there, the stages.
+
+    `repeats` False: no part showed it once more, and the part is the whole picture with its first verdicts.
+    """
 
     box: Box
     verdicts: tuple[Verdict, ...]
     stages: tuple[Found, ...]
-
-    @property
-    def repeats(self) -> bool:
-        """Tell whether the failure is still there: one that comes and goes may not be."""
-        return bool(odd_ones(self.verdicts))
+    repeats: bool
 
 
 def reduced(
@@ -250,11 +249,12 @@ def reduced(
     box = shrink(whole, fails, at, model.window.size, most)
     part = box.cut(images)
     again = judged([verdict.kernel for verdict in verdicts], program, part)
-    if not odd_ones(again):
+    repeats = bool(odd_ones(again))
+    if not repeats:
         box, part, again = whole, images, list(verdicts)
     found = []
     for verdict in {v.kernel.runner.way: v for v in odd_ones(again)[::-1]}.values():
         kernel = verdict.kernel
         stage = first_stage(kernel.runner, kernel.schedule, model, profile, part, compiled)
         found.append(Found(kernel, *(stage or (None, None))))
-    return Reduced(box, tuple(again), tuple(found[::-1]))
+    return Reduced(box, tuple(again), tuple(found[::-1]), repeats)

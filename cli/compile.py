@@ -15,6 +15,7 @@ import typer
 
 from ..refimpl.errors import InputError
 from . import options
+from .choose import Request, check_request, choose
 from .inputs import load_model
 from .options import Sampler, Target
 from .outputs import check_parent, unwritable
@@ -22,7 +23,7 @@ from .render import load_scene
 from .terminal import say
 
 if TYPE_CHECKING:
-    from ..compiler.artifact import Files
+    from ..compiler.artifact import Artifact, Files
     from ..compiler.path_kernel import PathArtifact
     from ..refimpl.scene import Scene
 
@@ -31,6 +32,10 @@ EXAMPLES = """Examples:
 wamnet compile model.safetensors --target glsl -o kernel-glsl
 
 wamnet compile model.safetensors --target opencl --profile native -o kernel-opencl
+
+wamnet compile model.safetensors --target opencl --variant window8+rank16 -o kernel-small
+
+wamnet compile model.safetensors --target opencl --max-loss-db 0.1 --frames cubes -o kernel-fast
 
 wamnet compile model.safetensors --target c --profile exact -o kernel-c
 
@@ -71,20 +76,26 @@ def compile_model(
         typer.Option(help="Paths that a work item follows: 16 suit CPUs, 1 GPUs.", show_default="1"),
     ] = None,
     schedule: options.Schedule = None,
+    variant: options.Variant = None,
+    max_error: options.MaxError = None,
+    max_ms: options.MaxMs = None,
+    max_loss_db: options.MaxLoss = None,
+    curve: options.CurveFile = None,
+    frames: options.CurveFrames = None,
+    size: options.CurveSize = None,
 ) -> None:
     """Compile a model, or a scene, to a kernel: source, weights, and a manifest with its interface.
 
     The source is meant to be read and pasted into another program: a model's denoises, with a bound on its
-    error; a scene's traces paths. No device is needed.
+    error; a scene's traces paths. No device is needed, unless a variant is to be chosen by limits: then the
+    fastest one that keeps them is, from a curve that is measured once for each device.
     """
-    from ..compiler.compile import compile_program
-    from ..compiler.lower import lower
-    from ..compiler.schedules import PLAIN
-
     folder, name = output or Path(target.value), EXECUTOR_OF[target]
+    request = Request(max_error, max_ms, max_loss_db, curve, frames, size)
     kernel: Files
     if is_scene(model):
-        _only_for("a model", {"--schedule": schedule}, f"{model} is a scene, whose kernels have one schedule")
+        of_models = {"--schedule": schedule, "--variant": variant, **request.options()}
+        _only_for("a model", of_models, f"{model} is a scene, whose kernels have one schedule, no variants")
         check_folder(folder, name, of_scene=True)
         scene = load_scene(model, time, parameters or [])
         kernel = _compiled_scene(scene, name, profile, max_depth, sampler, lanes)
@@ -94,11 +105,30 @@ def compile_model(
         _only_for("a scene", of_scenes, f"{model} is no scene: neither a canonical one nor a .json file")
         _check_name(model)
         check_folder(folder, name)
-        kernel = compile_program(lower(load_model(Path(model))), name, profile, schedule or PLAIN)
+        kernel = _compiled_model(Path(model), name, profile, schedule, variant, request)
+    _write(kernel, folder, schedule)
+
+
+def _write(kernel: Files, folder: Path, schedule: str | None) -> None:
+    """Write a kernel, and say its files, and why its schedule is another one."""
     for path in write_kernel(kernel, folder):
         say(str(path))
     if reason := kernel.manifest.get("schedule", {}).get("reason"):
         say(f"schedule plain, not {schedule}: {reason}")
+
+
+def _compiled_model(
+    path: Path, target: str, profile: str, schedule: str | None, variant: str | None, request: Request
+) -> Artifact:
+    """Return the kernel of a model: of a variant that is named, or that keeps limits, or of all of it."""
+    from ..compiler.schedules import PLAIN
+    from ..compiler.variants import FULL, compile_variant
+
+    check_request(request, variant)
+    model = load_model(path)
+    if request.limited:
+        variant, schedule = choose(model, request, target, profile, schedule)
+    return compile_variant(model, variant or FULL, target, profile, schedule or PLAIN)
 
 
 def _only_for(what: str, given: Mapping[str, Any], rule: str) -> None:

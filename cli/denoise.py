@@ -24,6 +24,8 @@ wamnet denoise model.safetensors noisy.exr -o denoised.png
 
 wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr
 
+wamnet denoise model.safetensors noisy.exr --executor opencl --variant window8+rank16
+
 wamnet denoise model.safetensors noisy.exr --executor c --profile exact
 
 wamnet denoise small.safetensors noisy.exr --executor opencl --rank 16"""
@@ -50,12 +52,14 @@ def denoise(
     profile: options.Profile = "ieee",
     schedule: options.Schedule = None,
     rank: options.CutRank = 0,
+    variant: options.Variant = None,
 ) -> None:
     """Denoise a frame with a trained model.
 
     The kernel's schedule is the one that suits the device, unless another is named. With profile exact the
     result is the same to the last bit on every executor; its digest is printed, to be compared.
     """
+    from ..compiler.variants import FULL
     from ..kernels import denoise_on, open_executor
     from . import exr
 
@@ -66,12 +70,12 @@ def denoise(
     )
     _say_what_is_no_number(frame, noisy, network)
     with open_executor(executor.value) as runner:
-        result = denoise_on(runner, network, noisy, profile, schedule, rank)
+        result = denoise_on(runner, network, noisy, profile, schedule, rank, variant or FULL)
     write_denoised(output, result.image, network, noisy)
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")
     say(f"schedule {result.schedule}")
-    if rank:
-        say(result.cut)
+    if result.variant:
+        say(result.variant)
     say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation")
     if profile == "exact":
         say(f"sha256 of the float32 result, the same on every executor: {result.digest}")

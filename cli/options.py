@@ -125,10 +125,70 @@ CutRank = Annotated[
     typer.Option(
         "--rank",
         metavar="R",
-        help="Cut the first layer to this rank, and run it along rows, then columns: 16 halves the time. "
-        "Made for models that were trained with a rank: others lose much.",
+        help="Short for --variant rankR: cut the first layer to this rank, and run it along rows, then "
+        "columns. Trained on with it, a model loses little.",
         show_default="no cut",
     ),
+]
+Variant = Annotated[
+    str | None,
+    typer.Option(
+        "--variant",
+        metavar="NAME",
+        help="Fewer operations: [bold]full[/], or some of without-FEATURE, windowN, hiddenN, rankN, sineN "
+        "with + between them, as in window8+rank16.",
+        show_default="full",
+    ),
+]
+MaxError = Annotated[
+    float | None,
+    typer.Option(
+        "--max-error",
+        metavar="E",
+        help="Choose the fastest variant whose measured error is at most E: the largest difference of "
+        "display-encoded colour (0 to 1) from the full network in float64, on the frames.",
+        show_default="no limit",
+    ),
+]
+MaxMs = Annotated[
+    float | None,
+    typer.Option(
+        "--max-ms",
+        metavar="T",
+        help="Choose the most accurate variant that takes at most T milliseconds here.",
+        show_default="no limit",
+    ),
+]
+MaxLoss = Annotated[
+    float | None,
+    typer.Option(
+        "--max-loss-db",
+        metavar="D",
+        help="Choose the fastest variant that loses at most D dB of the full network's PSNR on the frames.",
+        show_default="no limit",
+    ),
+]
+CurveFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--curve",
+        metavar="FILE",
+        help="Choose among the points of this file (.json).",
+        show_default="measured, and kept in the cache folder",
+    ),
+]
+CurveFrames = Annotated[
+    Path | None,
+    typer.Option(
+        "--frames",
+        metavar="FOLDER",
+        help="Data set whose test frames errors are measured on.",
+        show_default=False,
+    ),
+]
+CurveSize = Annotated[
+    int | None,
+    typer.Option("--size", metavar="N", help="Times are those of N x N pixels.", show_default="1024"),
 ]
 Schedule = Annotated[
     str | None,

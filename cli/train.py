@@ -34,6 +34,8 @@ wamnet train -i n0.exr -t r0.exr -i n1.exr -t r1.exr --features color,normal --s
 
 wamnet train -i noisy.exr -t reference.exr --resume --steps 20000
 
+wamnet train --dataset cubes --from model.safetensors --variant window8+rank16 --steps 2000
+
 wamnet train --dataset cubes --from model.safetensors --rank 12 --executor opencl -o small.safetensors"""
 """Shown below the help of `wamnet train`."""
 
@@ -67,7 +69,16 @@ Begin = Annotated[
     typer.Option(
         "--from",
         metavar="MODEL",
-        help="Begin with the weights of this model, cut to --rank, not with random ones.",
+        help="Begin with the weights of this model, cut to --rank or --variant, not with random ones.",
+        show_default=False,
+    ),
+]
+Cut = Annotated[
+    str | None,
+    typer.Option(
+        "--variant",
+        metavar="NAME",
+        help="Train on this variant of the model that --from names, as in window8+rank16.",
         show_default=False,
     ),
 ]
@@ -95,6 +106,7 @@ def train(
     ] = None,
     rank: Rank = None,
     begin: Begin = None,
+    variant: Cut = None,
     steps: Annotated[int | None, typer.Option(help="Training steps.", show_default="the preset's")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first weights and of the draws.")] = None,
     resume: Annotated[
@@ -122,6 +134,11 @@ def train(
     state = load_checkpoint(saved) if resume else None
     recipe = _wanted(preset, state, features, steps, seed, rank)
     network = _first_network(begin, state)
+    if variant is not None:
+        if features is not None or rank is not None:
+            option = "--features" if rank is None else "--rank"
+            raise InputError("--variant", variant, f"it chooses what {option} does", f"leave out {option}")
+        recipe, network = _varied(recipe, begin, variant)
     pairs = read_training(dataset, inputs, targets, recipe.features)
     state = _fit_to_the_end(recipe, pairs, output, state, network, executor.value)
     say(f"{output}: {state.step} steps; checkpoint in {saved}")
@@ -154,6 +171,32 @@ def _first_network(begin: Path | None, state: TrainState | None) -> Siren | None
     if state is not None:
         raise InputError("--from", str(begin), "a resumed run goes on from its checkpoint", "leave it out")
     return load_model(begin).siren
+
+
+def _varied(recipe: Recipe, begin: Path | None, name: str) -> tuple[Recipe, Siren]:
+    """Return the recipe and the first network of a variant of the model that a run begins with."""
+    from ..compiler import sine, variants
+    from ..refimpl.train import check_recipe
+    from .inputs import load_model
+
+    if begin is None:
+        raise InputError("--variant", name, "it is cut from a trained model", "name one with --from")
+    varied = variants.vary(variants.parse(name), load_model(begin))
+    if varied.degree != sine.DEGREE:
+        rule = "the degree of a sine is chosen when a kernel is compiled, not trained"
+        raise InputError("--variant", name, rule, "leave it out of the name here")
+    model = varied.model
+    found = replace(
+        recipe,
+        features=model.features,
+        window=model.window,
+        widths=model.siren.widths[1:-1],
+        omega_0_first=model.siren.omega_0_first,
+        omega_0_hidden=model.siren.omega_0_hidden,
+        rank=varied.rank,
+    )
+    check_recipe(found)
+    return found, model.siren
 
 
 def _fit_to_the_end(

@@ -43,6 +43,9 @@ WORK = 2**23
 LARGEST_WORK = 2**31
 """Most multiplications of one step: layers beyond have no bound of this kind."""
 
+WIDEST = 2**12
+"""Neurons of the widest layer that is looked at: matrices of that many rows and columns are made."""
+
 MOST_ALONE = 4
 """Most outputs that have scalings of their own; more share theirs."""
 
@@ -116,7 +119,7 @@ def outputs(count: int) -> list[list[int]]:
 
 def decomposable(matrices: Sequence[Array]) -> bool:
     """Return whether norms of matrices (m, n) of these sizes are found in little time."""
-    return _work(matrices) <= LARGEST_WORK
+    return _work(matrices) <= LARGEST_WORK and max(max(matrix.shape) for matrix in matrices) <= WIDEST
 
 
 def _work(matrices: Sequence[Array]) -> int:

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ..compiler import schedules
 from ..compiler.artifact import Artifact
-from ..compiler.compile import compile_program
 from ..compiler.ir import sha256
-from ..compiler.lower import lower
+from ..compiler.variants import FULL, compile_variant, parse, vary
 from ..refimpl.dataset import feature_image
 from ..refimpl.denoise import Model
+from ..refimpl.errors import InputError
 from ..refimpl.frame import Frame
 from .executor import Executor, Images
 from .memory import keep_freed_memory
@@ -26,7 +26,7 @@ class RunResult:
 
     `seconds_compile`: tracing, passes, bound, emission, the driver's compilation and one run on a few pixels.
     `seconds_run`: images to the device, the kernel, the result back; not the encoding of the features.
-    `schedule`: what was picked, and why, where it is not what was asked for. `cut`: what a rank costs.
+    `schedule`: what was picked, and why, where it is not what was asked for. `variant`: what it may cost.
     """
 
     image: NDArray[np.float32]
@@ -34,7 +34,7 @@ class RunResult:
     seconds_run: float
     device: str
     schedule: str
-    cut: str = ""
+    variant: str = ""
 
     @property
     def digest(self) -> str:
@@ -54,28 +54,35 @@ def denoise_on(
     profile: str = "ieee",
     schedule: str | None = None,
     rank: int = 0,
+    variant: str = FULL,
 ) -> RunResult:
     """Return the denoised frame and the times; without a `schedule`, the one that suits device and size.
 
-    With a `rank` the first layer is cut to it, and run in two passes [factor.py].
+    `variant`: with fewer operations [variants.py]; a `rank` is short for the variant of this name.
     """
-    images = images_of(model, frame)
+    if rank:
+        if variant != FULL:
+            raise InputError("rank", rank, f"the variant is {variant}", "name it in the variant: +rank12")
+        variant = f"rank{rank}"
+    varied = vary(parse(variant), model)
+    images = images_of(varied.model, frame)
     start = time.perf_counter()
     size = (frame.height, frame.width)
     wanted = schedule or executor.schedule_for(size)
-    artifact = compile_program(lower(model), executor.name, profile, wanted, rank)
+    artifact = compile_variant(model, variant, executor.name, profile, wanted)
     executor.build(artifact, size)
     keep_freed_memory()
     built = time.perf_counter()
     image = executor.run(artifact, images)
     seconds = time.perf_counter() - built
     picked = schedules.text(artifact.manifest["schedule"])
-    return RunResult(image, built - start, seconds, executor.device, picked, _cut_text(artifact))
+    return RunResult(image, built - start, seconds, executor.device, picked, _text_of(artifact))
 
 
-def _cut_text(artifact: Artifact) -> str:
-    """Return what a manifest says about a cut, for a reader; nothing where there is none."""
-    if (cut := artifact.manifest.get("factored")) is None:
+def _text_of(artifact: Artifact) -> str:
+    """Return what a manifest says about a variant, for a reader; nothing where it is all of the network."""
+    if (found := artifact.manifest.get("variant")) is None:
         return ""
-    layer, reach = cut["cut"]["first_layer"], cut["cut"]["of"]
-    return f"rank {cut['rank']}: moves the first layer's sums by at most {layer:g}; they are up to {reach:g}"
+    bound, share = found["bound"]["output"], found["products"] / found["products_of_full"]
+    moves = f"moves a colour by at most {max(bound):g}" if bound else "moves colours without a bound"
+    return f"variant {found['name']}: {share:.0%} of the multiplications; {moves}, whatever the picture"

@@ -10,7 +10,8 @@ place of size^2 C D_out. As a matrix with rows (n, dy) and columns (dx, c) the w
 factors [`expand`].
 
 1. A trained layer is cut to the nearest one of rank R by the singular value decomposition [`cut`] (Eckart and
-   Young, "The Approximation of One Matrix by Another of Lower Rank", Psychometrika 1, 1936).
+   Young, "The Approximation of One Matrix by Another of Lower Rank", Psychometrika 1, 1936). Near means that
+   the layer's sums are, over pictures whose neighbouring pixels have something in common [`SHARED`].
 2. Training in this form follows the derivatives by both factors [`backward`]; the network that is evaluated
    has the expanded weights, so that nothing else changes.
 
@@ -28,6 +29,10 @@ from numpy.typing import NDArray
 from .errors import InputError
 
 Array = NDArray[np.floating[Any]]
+
+
+SHARED = 0.5
+"""What two taps of a channel along an axis have in common, by [`cut`], against 1 that is a tap's own."""
 
 
 @dataclass(frozen=True)
@@ -62,15 +67,32 @@ def expand(factors: Factors) -> Array:
     return product.reshape(len(product), -1)
 
 
-def cut(weight: Array, size: int, rank: int) -> Factors:
-    """Return the factors of the nearest weights of rank `rank` (in the Frobenius norm) to (D_out, D_in)."""
+def cut(weight: Array, size: int, rank: int, shared: float = SHARED) -> Factors:
+    """Return the factors of the weights of rank `rank` that give the sums of (D_out, D_in) most nearly.
+
+    Windows x with E[x x^T] = A (rows) times A (columns) of each channel, A = I + shared 1 1^T: the mean
+    square of (W - V H) x is the squared Frobenius norm of A^(1/2) (W - V H) A^(1/2). `shared` 0: the nearest
+    weights.
+    """
     n_out, n_in = weight.shape
     check_rank(rank, size, n_in, n_out)
-    u, s, v = np.linalg.svd(weight.astype(np.float64).reshape(n_out * size, -1), full_matrices=False)
+    root, inverse = (_power_of_ones(size, shared, exponent) for exponent in (0.5, -0.5))
+    taps = weight.astype(np.float64).reshape(n_out, size, size, -1)
+    weighted = np.einsum("ab,nbxc,xy->nayc", root, taps, root)
+    u, s, v = np.linalg.svd(weighted.reshape(n_out * size, -1), full_matrices=False)
     # Each factor takes half of a singular value, so that steps of one length move both alike.
-    root = np.sqrt(s[:rank])
-    vertical, horizontal = u[:, :rank] * root, root[:, np.newaxis] * v[:rank]
-    return Factors(vertical.reshape(n_out, size, rank).astype(weight.dtype), horizontal.astype(weight.dtype))
+    half = np.sqrt(s[:rank])
+    vertical = np.einsum("ab,nbr->nar", inverse, (u[:, :rank] * half).reshape(n_out, size, rank))
+    columns = (half[:, np.newaxis] * v[:rank]).reshape(rank, size, -1)
+    horizontal = np.einsum("rxc,xy->ryc", columns, inverse).reshape(rank, -1)
+    return Factors(vertical.astype(weight.dtype), horizontal.astype(weight.dtype))
+
+
+def _power_of_ones(n: int, shared: float, exponent: float) -> Array:
+    """Return (I + shared 1 1^T)^exponent (n, n): its eigenvalues are 1, and 1 + n shared along 1."""
+    ones: Array = np.ones((n, n)) / n
+    power: Array = np.eye(n) + ((1.0 + n * shared) ** exponent - 1.0) * ones
+    return power
 
 
 def start(weight: Array, size: int, rank: int) -> Factors:

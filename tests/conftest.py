@@ -6,7 +6,8 @@
    denoise alone too [`EXECUTORS`], `mitsuba` gives a peer [`PEERS`]. One that
    is missing fails its tests when WAMNET_REQUIRE names it, as `make test` does; else they are skipped. Either
    way the summary says what was missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
-3. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
+3. The user's cache folder is never touched: tests have one of their own, which their commands inherit.
+4. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
 """
 
 from __future__ import annotations
@@ -154,6 +155,18 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
             text.partition(" ")[0].rstrip(":"), {}
         )
         terminalreporter.write_line(f"{name}: {text}", **colour)
+
+
+# ---- cache ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Put a folder of this session in the place of the user's cache."""
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("WAMNET_CACHE", str(folder))
+        yield folder
 
 
 # ---- golden files ---------------------------------------------------------------------------------------

@@ -52,21 +52,33 @@ def test_cut_finds_factors_again() -> None:
     assert np.abs(again - weight).max() <= 100 * 2.0**-53 * np.linalg.norm(weight)
 
 
+def mean_square_root(difference, shared):
+    """Return the root of E|D x|^2 for windows with E[x x^T] = A (rows) A (columns), A = I + shared 1 1^T."""
+    a = np.eye(SIZE) + shared
+    taps = difference.reshape(N_OUT, SIZE, SIZE, CHANNELS)
+    return np.sqrt(np.einsum("nyxc,yv,xw,nvwc->", taps, a, a, taps))
+
+
+@pytest.mark.parametrize("shared", [0.0, factored.SHARED, 3.0])
 @pytest.mark.parametrize("rank", [1, 2, 5])
-def test_cut_is_the_nearest(rank) -> None:
-    """Its distance is the root of the sum of squares of what is left out; no random neighbour is nearer."""
+def test_cut_is_the_nearest(rank, shared) -> None:
+    """No random neighbour's sums are nearer; with nothing shared it is the Frobenius norm's."""
     rng = np.random.default_rng(3)
     weight = rng.normal(size=(N_OUT, SIZE * SIZE * CHANNELS))
-    factors = factored.cut(weight, SIZE, rank)
-    distance = np.linalg.norm(weight - factored.expand(factors))
-    values = np.linalg.svd(weight.reshape(N_OUT * SIZE, -1), compute_uv=False)
-    assert abs(distance - np.sqrt(np.sum(values[rank:] ** 2))) <= 100 * 2.0**-53 * np.linalg.norm(weight)
-    for scale in (1e-1, 1e-3):
-        moved = Factors(
-            factors.vertical + scale * rng.normal(size=factors.vertical.shape),
-            factors.horizontal + scale * rng.normal(size=factors.horizontal.shape),
-        )
-        assert np.linalg.norm(weight - factored.expand(moved)) > distance
+    factors = factored.cut(weight, SIZE, rank, shared)
+    distance = mean_square_root(weight - factored.expand(factors), shared)
+    for scale in (1e-1, 1e-2, 1e-3):
+        for _ in range(10):
+            moved = Factors(
+                factors.vertical + scale * rng.normal(size=factors.vertical.shape),
+                factors.horizontal + scale * rng.normal(size=factors.horizontal.shape),
+            )
+            assert mean_square_root(weight - factored.expand(moved), shared) > distance
+    if not shared:
+        values = np.linalg.svd(weight.reshape(N_OUT * SIZE, -1), compute_uv=False)
+        # The root of the sum of squares of what is left out.
+        expected = np.sqrt(np.sum(values[rank:] ** 2))
+        assert abs(distance - expected) <= 100 * 2.0**-53 * np.linalg.norm(weight)
 
 
 def test_start_keeps_the_norm() -> None:

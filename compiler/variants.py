@@ -1,0 +1,401 @@
+"""Variants: a trained network with fewer operations, as a named list of approximations, and what each moves.
+
+1. A variant is a text, `window8+rank12`: approximations in the order in which they are made [`parse`]; `full`
+   is the network itself. Each is one function from a network to a network [`KINDS`], [`vary`].
+2. The network is varied, not its program: a varied model is lowered, compiled and trained as any other. A
+   rank is the product of the factors in the model and two passes in the kernel [factor.py]; a sine's degree
+   is a profile [profiles.py].
+3. What is left out is replaced by what is likely there [`_spread`], so that a picture that is constant is
+   denoised as before.
+4. Each varied network is also one of the full network's shape, with zeros where something is left out
+   [`Varied.inside`]. With D = W' - W and d = b' - b a layer's sums move, for inputs in a box with the middle
+   c and the radius r, by at most |D c + d| + |D| r, besides what its inputs' own move passes on through |W'|
+   [`enclose`]. The rules of bounds.py carry that to the output, and add what rounding does.
+
+The bound speaks of all images. Taps that are left out may hold anything: it says little for cuts (a picture
+may be made to suit them) and much for sines; on frames the error is measured [kernels/curve.py].
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..refimpl import factored
+from ..refimpl.dataset import FEATURES, Window
+from ..refimpl.denoise import Model
+from ..refimpl.errors import InputError
+from ..refimpl.siren import Siren
+from . import bounds, factor, ir, sine
+from .artifact import Artifact
+from .bounds import Enclosure
+from .compile import analysed, compile_program, round_up, schedule_named, sine_contract
+from .emit import kernel_gather
+from .ir import Program
+from .lower import lower
+from .schedules import PLAIN
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+FULL = "full"
+"""Name of the network as it was trained."""
+
+PLUS = "+"
+"""What stands between two approximations of a name."""
+
+EXAMPLE = "window8+rank12"
+"""A variant, for messages."""
+
+LARGEST_DIFFERENCE = 1.0
+"""Colours are clipped to [0, 1] by the reference and by every kernel: no two are farther apart."""
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A network on its way: of the full one's shape in float64, with zeros for what is left out.
+
+    `kept[l]` are the inputs of layer l that are left; `window` and `features` are what the first one reads.
+    """
+
+    whole: Model
+    weights: tuple[Array, ...]
+    biases: tuple[Array, ...]
+    kept: tuple[Indices, ...]
+    window: Window
+    features: tuple[str, ...]
+    rank: int = 0
+    degree: int = sine.DEGREE
+
+    @property
+    def model(self) -> Model:
+        """Return the model without what is left out, in the type of the full one's parameters."""
+        siren, last = self.whole.siren, np.arange(len(self.biases[-1]))
+        rows = (*self.kept[1:], last)
+        parts = zip(self.weights, self.biases, self.kept, rows, strict=True)
+        cut = [(w[np.ix_(row, column)], b[row]) for w, b, column, row in parts]
+        found = Siren(
+            tuple(w.astype(siren.dtype) for w, _ in cut),
+            tuple(b.astype(siren.dtype) for _, b in cut),
+            siren.omega_0_first,
+            siren.omega_0_hidden,
+        )
+        return replace(self.whole, siren=found, window=self.window, features=self.features)
+
+    @property
+    def inside(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+        """Return weights and biases of the same function in the full network's shape, rounded as a kernel's.
+
+        Rows of neurons that are left out are as they were: nothing reads them.
+        """
+        weights, biases = (
+            tuple(array.astype(np.float32).astype(np.float64) for array in arrays)
+            for arrays in (self.weights, self.biases)
+        )
+        return weights, biases
+
+    @property
+    def products(self) -> int:
+        """Return the multiplications a pixel."""
+        first, *others = pairwise(self.model.siren.widths)
+        inner = sum(a * b for a, b in others)
+        if not self.rank:
+            return first[0] * first[1] + inner
+        size = self.window.size
+        return self.rank * (first[0] // size + size * first[1]) + inner
+
+    def profile(self, base: str) -> str:
+        """Return the name of the profile that has the variant's sine."""
+        return base if self.degree == sine.DEGREE else f"{base}-sine{self.degree}"
+
+
+# ---- approximations ---------------------------------------------------------------------------------------
+
+
+def narrow_window(varied: Varied, size: int) -> Varied:
+    """Leave out taps around the middle size x size; what they held is taken to be the mean of those left."""
+    before, taps = varied.window.size, varied.window.size**2
+    _check(f"window{size}", 1 <= size < before, f"the window has {before} x {before} taps", "window8")
+    first = before // 2 - size // 2
+    grid = np.arange(len(varied.kept[0])).reshape(before, before, -1)
+    left = grid[first : first + size, first : first + size].ravel()
+    channels = len(varied.kept[0]) // taps
+    # Each channel's taps are told apart by their place in the window vector alone.
+    return replace(_spread(varied, left, channels), window=replace(varied.window, size=size))
+
+
+def leave_out_feature(varied: Varied, name: str) -> Varied:
+    """Leave out a feature; it is taken to be the middle of its range everywhere."""
+    others = [feature for feature in varied.features if feature != name]
+    rule = f"the model reads {', '.join(varied.features)}"
+    _check(f"without-{name}", name in varied.features and bool(others), rule, "name one, not all of them")
+    owner = np.repeat(varied.features, [FEATURES[feature].channels for feature in varied.features])
+    chosen = np.tile(owner, varied.window.size**2) != name
+    gone = varied.kept[0][~chosen]
+    feature = FEATURES[name]
+    weight, bias = varied.weights[0].copy(), varied.biases[0].copy()
+    bias = bias + weight[:, gone].sum(axis=1) * (feature.low + feature.high) / 2
+    weight[:, gone] = 0.0
+    moved = replace(varied, weights=(weight, *varied.weights[1:]), biases=(bias, *varied.biases[1:]))
+    return replace(moved, kept=(varied.kept[0][chosen], *varied.kept[1:]), features=tuple(others))
+
+
+def remove_neurons(varied: Varied, width: int) -> Varied:
+    """Leave `width` neurons in each hidden layer, those that the next one weighs most; others count as 0.
+
+    0 is the middle of what a sine may be.
+    """
+    widest = max((len(kept) for kept in varied.kept[1:]), default=0)
+    rule = f"the widest hidden layer has {widest} neurons"
+    _check(f"hidden{width}", 1 <= width < widest, rule, f"hidden{max(widest * 3 // 4, 1)}")
+    weights, kept = list(varied.weights), list(varied.kept)
+    for layer in range(1, len(weights)):
+        # Neurons of the layer after it that are gone already have no say.
+        rows = kept[layer + 1] if layer + 1 < len(kept) else slice(None)
+        importance = np.linalg.norm(weights[layer][rows][:, kept[layer]], axis=0)
+        # The largest first; equal ones in their order.
+        chosen = np.sort(kept[layer][np.argsort(-importance, kind="stable")[:width]])
+        gone = np.setdiff1d(kept[layer], chosen)
+        weights[layer] = weights[layer].copy()
+        weights[layer][:, gone] = 0.0
+        kept[layer] = chosen
+    return replace(varied, weights=tuple(weights), kept=tuple(kept))
+
+
+def cut_rank(varied: Varied, rank: int) -> Varied:
+    """Cut the first layer to a rank: the nearest weights that two passes can compute [factored.py]."""
+    rows = varied.kept[1] if len(varied.kept) > 1 else np.arange(len(varied.biases[0]))
+    place = np.ix_(rows, varied.kept[0])
+    weight = varied.weights[0].copy()
+    weight[place] = factored.expand(factored.cut(weight[place], varied.window.size, rank))
+    return replace(varied, weights=(weight, *varied.weights[1:]), rank=rank)
+
+
+def choose_sine(varied: Varied, degree: int) -> Varied:
+    """Emit a polynomial of another degree for the sine."""
+    known = ", ".join(f"sine{known}" for known in sine.POLYNOMIALS)
+    _check(f"sine{degree}", degree in sine.POLYNOMIALS, f"there are {known}", "use one of these")
+    return replace(varied, degree=degree)
+
+
+def _spread(varied: Varied, left: Indices, channels: int) -> Varied:
+    """Leave inputs at these positions of `kept`; the weights of others go to all that are left, evenly."""
+    kept, weight = varied.kept[0], varied.weights[0].copy()
+    chosen = kept[left]
+    gone = np.setdiff1d(kept, chosen)
+    channel = dict(zip(kept.tolist(), np.tile(np.arange(channels), len(kept) // channels), strict=True))
+    for c in range(channels):
+        ours, theirs = ([i for i in group.tolist() if channel[i] == c] for group in (chosen, gone))
+        weight[:, ours] += weight[:, theirs].sum(axis=1, keepdims=True) / len(ours)
+    weight[:, gone] = 0.0
+    return replace(varied, weights=(weight, *varied.weights[1:]), kept=(chosen, *varied.kept[1:]))
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of approximation: the beginning of its name, a sentence, its function, what comes before it."""
+
+    name: str
+    text: str
+    apply: Callable[[Varied, Any], Varied]
+    before: tuple[str, ...] = ()
+
+
+KINDS: Mapping[str, Kind] = {
+    kind.name: kind
+    for kind in (
+        Kind("without-", "leave out a feature: without-normal", leave_out_feature),
+        Kind("window", "see N x N pixels: window8", narrow_window),
+        Kind("hidden", "keep N neurons in each hidden layer: hidden24", remove_neurons),
+        # A first layer that is narrowed after the cut would not have its rank any more.
+        Kind("rank", "a first layer of rank N: rank12", cut_rank, ("without-", "window", "hidden")),
+        Kind("sine", "sines of degree N: sine7", choose_sine),
+    )
+}
+"""All approximations, by what their names begin with."""
+
+KNOWN = "; ".join(kind.text for kind in KINDS.values())
+"""What a variant may be made of, for messages."""
+
+
+# ---- names ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Approximations as (kind, number or name), in order; none is the full network."""
+
+    steps: tuple[tuple[str, int | str], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Return the text that [`parse`] reads."""
+        return PLUS.join(f"{kind}{value}" for kind, value in self.steps) or FULL
+
+
+def parse(text: str) -> Variant:
+    """Return the variant that a text names, or say what is wrong with it."""
+    if text == FULL:
+        return Variant()
+    steps: list[tuple[str, int | str]] = []
+    for part in text.split(PLUS):
+        match = re.fullmatch(r"(without-)([a-z]+)|(window|hidden|rank|sine)([1-9][0-9]{0,3})", part)
+        if match is None:
+            rule = f"{part!r} is no approximation; there are: {KNOWN}"
+            raise InputError("variant", text, rule, f"use {FULL}, or some of them, as in {EXAMPLE}")
+        name, feature, kind, number = match.groups()
+        steps.append((name, feature) if name else (kind, int(number)))
+    _check_order(text, steps)
+    return Variant(tuple(steps))
+
+
+def _check_order(text: str, steps: Sequence[tuple[str, int | str]]) -> None:
+    """Refuse approximations that come twice, or after one that rests on them."""
+    done: list[str] = []
+    for kind, value in steps:
+        if kind in done and (kind != "without-" or (kind, value) in steps[: len(done)]):
+            rule = f"{kind.rstrip('-')} comes twice"
+            raise InputError("variant", text, rule, "name each approximation once")
+        for other in done:
+            if kind in KINDS[other].before:
+                rule = f"{kind.rstrip('-')} must come before {other}, which it would undo"
+                raise InputError("variant", text, rule, f"change the order, as in {EXAMPLE}")
+        done.append(kind)
+
+
+def vary(variant: Variant, model: Model) -> Varied:
+    """Return the model with a variant's approximations, or say why it cannot have them."""
+    siren = model.siren
+    wide = [[array.astype(np.float64) for array in arrays] for arrays in (siren.weights, siren.biases)]
+    kept = tuple(np.arange(weight.shape[1]) for weight in siren.weights)
+    varied = Varied(model, tuple(wide[0]), tuple(wide[1]), kept, model.window, model.features)
+    for kind, value in variant.steps:
+        varied = KINDS[kind].apply(varied, value)
+    return varied
+
+
+def _check(name: str, holds: bool, rule: str, way_out: str) -> None:
+    """Refuse an approximation that this model cannot have."""
+    if not holds:
+        raise InputError("variant", name, rule, f"choose another, for example {way_out}")
+
+
+# ---- bounds -----------------------------------------------------------------------------------------------
+
+
+def enclose(varied: Varied, target: str, profile: str, schedule: str = PLAIN) -> list[Enclosure]:
+    """Return enclosures of the full network's values for all images, errors being a variant's kernel's."""
+    whole = analysed(lower(varied.whole))
+    contract = sine_contract(varied.profile(profile), target)
+    box = bounds.window_box(kernel_gather(whole))
+    layers = [index for index, node in enumerate(whole.nodes) if node.op == "affine"]
+    assert len(layers) == len(varied.weights), "a lowered model has one affine map a layer"
+    known: dict[int, Enclosure] = {}
+    for layer, index in enumerate(layers):
+        node = whole.nodes[index]
+        until = replace(whole, nodes=whole.nodes[:index], outputs=())
+        x = bounds.enclose(until, {"window": box}, contract, known=known)[node.args[0]]
+        names = str(node["weight"]), str(node["bias"])
+        inside = dict(zip(names, (arrays[layer] for arrays in varied.inside), strict=True))
+        outside = {name: whole.parameters[name].astype(np.float64) for name in names}
+        wanted, kernel = (
+            bounds.RULES["affine"](bounds.Context(node, parameters, contract), [x])
+            for parameters in (outside, inside)
+        )
+        error = kernel.error
+        if layer == 0:
+            error = _first_error(varied, target, profile, schedule, error)
+        known[index] = replace(
+            kernel,
+            low=wanted.low,
+            high=wanted.high,
+            error=(error + _moved(x, *(inside[n] - outside[n] for n in names))) * (1 + bounds.OUTWARD),
+        )
+    return bounds.enclose(whole, {"window": box}, contract, known=known)
+
+
+def _moved(x: Enclosure, weight: Array, bias: Array) -> Array:
+    """Return how far weights and biases that differ by these move a layer's sums: |D c + d| + |D| r."""
+    middle, radius = (x.low + x.high) / 2, (x.high - x.low) / 2
+    size = np.abs(weight) @ np.broadcast_to(x.largest, weight.shape[1:]) + np.abs(bias)
+    # float64 rounds sums of n + 1 products, the middle and the radius.
+    rounding = (weight.shape[1] + 4) * 2.0**-52 * size
+    found: Array = np.abs(weight @ middle + bias) + np.abs(weight) @ radius + rounding
+    return found
+
+
+def _first_error(varied: Varied, target: str, profile: str, schedule: str, error: Array) -> Array:
+    """Return the error of the first layer's sums as the kernel computes them: one pass, two, or spectra.
+
+    `error` is that of one pass; neurons that are left out keep it.
+    """
+    program, contract = analysed(lower(varied.model)), sine_contract(varied.profile(profile), target)
+    if varied.rank:
+        found = factor.over_images(factor.factor(program, varied.rank), contract)
+    else:
+        found = schedule_named(target, schedule).enclosures(program, contract)
+    layer = next(index for index, node in enumerate(program.nodes) if node.op == "affine")
+    rows = varied.kept[1] if len(varied.kept) > 1 else np.arange(len(varied.biases[0]))
+    errors = np.array(np.broadcast_to(error, varied.biases[0].shape))
+    errors[rows] = found[layer].error
+    return errors
+
+
+def bound_of(varied: Varied, target: str, profile: str, schedule: str = PLAIN) -> Array | None:
+    """Return how far each channel (3,) of a variant's kernel may be from the full network; None: no bound.
+
+    In display-encoded colour, over all images, against float64.
+    """
+    whole = analysed(lower(varied.whole))
+    (errors,) = bounds.output_errors(whole, enclose(varied, target, profile, schedule)).values()
+    return np.minimum(errors, LARGEST_DIFFERENCE) if np.isfinite(errors).all() else None
+
+
+# ---- kernels ----------------------------------------------------------------------------------------------
+
+
+def program_of(model: Model, name: str) -> Program:
+    """Return the program of a variant, without its rank and its sine, which are how it is compiled."""
+    return lower(vary(parse(name), model).model)
+
+
+def compile_variant(
+    model: Model, name: str, target: str, profile: str = "ieee", schedule: str = PLAIN
+) -> Artifact:
+    """Return the kernel of a variant; its manifest says under `variant` what was done and what it moves."""
+    variant = parse(name)
+    varied = vary(variant, model)
+    found = compile_program(lower(varied.model), target, varied.profile(profile), schedule, varied.rank)
+    if not variant.steps:
+        return found
+    used = found.manifest["schedule"]["name"]
+    return replace(
+        found, manifest={**found.manifest, "variant": report(variant, varied, target, profile, used)}
+    )
+
+
+def report(variant: Variant, varied: Varied, target: str, profile: str, schedule: str) -> Mapping[str, Any]:
+    """Return what a manifest says about a variant."""
+    bound = bound_of(varied, target, profile, schedule)
+    return {
+        "name": variant.name,
+        "approximations": [f"{kind}{value}" for kind, value in variant.steps],
+        "program": digest_of(varied.whole),
+        "products": varied.products,
+        "products_of_full": vary(Variant(), varied.whole).products,
+        "bound": {
+            "output": None if bound is None else [round_up(float(error)) for error in bound],
+            "against": "float64 reference of the full network, for all images, in display-encoded colour",
+        },
+    }
+
+
+def digest_of(model: Model) -> str:
+    """Return the digest of the full network's program: what a curve is measured of."""
+    return ir.digest(analysed(lower(model)))

@@ -1,0 +1,105 @@
+"""What wamnet remembers of a machine between runs: one small file an entry, in the user's cache folder.
+
+1. The folder is WAMNET_CACHE, else `wamnet` in XDG_CACHE_HOME, else `~/.cache/wamnet` [`folder`].
+2. An entry is JSON around its data: the form's name and the data's SHA-256 [`write_json`]. It is written
+   under another name and then takes its own, so that no reader sees half of one; the last writer wins.
+3. What cannot be read, is not of this form, or does not have its checksum is as if it were not there, with a
+   line in the log `wamnet` [`read_json`]; the next write replaces it. A cache that cannot be written costs
+   time, never a run.
+
+Names hold all that an entry depends on [`key`]: nothing is ever brought up to date in place.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import secrets
+from pathlib import Path
+from typing import Any
+
+FOLDER_VARIABLE = "WAMNET_CACHE"
+"""Environment variable that names another folder."""
+
+SCHEMA = "wamnet-cache-1"
+"""Name and version of an entry's form."""
+
+LARGEST_BYTES = 1 << 24
+"""Largest file that is taken for an entry: 16 MiB."""
+
+_log = logging.getLogger("wamnet")
+
+
+def folder() -> Path:
+    """Return the folder of this user's entries, which need not exist yet."""
+    if given := os.environ.get(FOLDER_VARIABLE):
+        return Path(given)
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    # The specification of the variable: a path that is not absolute is to be ignored.
+    return (base if base.is_absolute() else Path("~/.cache").expanduser()) / "wamnet"
+
+
+def key(*parts: object) -> str:
+    """Return a short name for all that an entry depends on: JSON's types, in this order."""
+    text = json.dumps(parts, sort_keys=True, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def read_json(name: str) -> Any:
+    """Return the data of the entry `<name>.json`, or None where there is none that can be trusted."""
+    path = _path(name)
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_BYTES + 1)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        _log.warning("cache entry %s cannot be read (%s): it is ignored", path, error.strerror)
+        return None
+    try:
+        entry = json.loads(content)
+        if entry["schema"] == SCHEMA and entry["sha256"] == _checksum(entry["data"]):
+            return entry["data"]
+    except (ValueError, TypeError, KeyError, RecursionError):
+        pass
+    _log.warning("cache entry %s is damaged, or no entry of wamnet: it is ignored and written anew", path)
+    return None
+
+
+def write_json(name: str, data: Any) -> Path | None:
+    """Keep data of JSON's types as the entry `<name>.json`; return its path, or None if it cannot be kept."""
+    entry = {"schema": SCHEMA, "sha256": _checksum(data), "data": data}
+    path = _path(name)
+    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
+    try:
+        # What is kept may become code of this user's processes: nobody else writes here.
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        part.write_text(json.dumps(entry, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        _log.warning("cache entry %s cannot be written (%s): nothing is kept", path, error.strerror)
+        return None
+    finally:
+        _remove(part)
+    return path
+
+
+def _path(name: str) -> Path:
+    """Return the file of an entry."""
+    assert name == Path(name).name, "names of entries are made by the program, and hold no folder"
+    return folder() / f"{name}.json"
+
+
+def _checksum(data: Any) -> str:
+    """Return the SHA-256 of data as JSON, in one form for equal data."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+
+def _remove(path: Path) -> None:
+    """Remove a file that may not be there, in a folder that may not be there."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        return

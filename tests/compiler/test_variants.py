@@ -1,0 +1,273 @@
+"""Tests of variants: names, what is left out, the bound of the move, manifests, refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.compiler import sine, variants
+from wamnet.compiler.compile import TARGETS
+from wamnet.compiler.variants import parse, vary
+from wamnet.refimpl import dataset, factored, siren
+from wamnet.refimpl.dataset import Normalization, Window
+from wamnet.refimpl.denoise import Model, check_model, denoise_pixel
+from wamnet.refimpl.errors import InputError
+
+FEATURES = ("color", "normal")
+"""What the small model sees: 6 channels, colours in [0, 1], normals in [-1, 1]."""
+
+
+def small(size=4, hidden=(7, 6), seed=1, omega=3.0, border="clamp"):
+    """Return a small random model, in float32."""
+    network = siren.init([size * size * 6, *hidden, 3], omega, omega, seed=seed, dtype=np.float32)
+    return Model(network, FEATURES, Window(size, border), Normalization())
+
+
+def image(shape=(5, 6), seed=1):
+    """Return a feature image (H, W, 6) in the features' ranges."""
+    random = np.random.default_rng(seed)
+    return np.concatenate([random.random((*shape, 3)), random.uniform(-1, 1, (*shape, 3))], axis=-1)
+
+
+def denoised(model, picture):
+    """Return the picture (H, W, 3) that a model makes of a feature image, in float64."""
+    wide = replace(
+        model.siren,
+        weights=tuple(w.astype(np.float64) for w in model.siren.weights),
+        biases=tuple(b.astype(np.float64) for b in model.siren.biases),
+    )
+    chosen = [k for k, name in enumerate(np.repeat(FEATURES, 3)) if name in model.features]
+    picture = picture[..., chosen]
+    return denoise_pixel(wide, dataset.all_windows(dataset.pad(picture, model.window), model.window))
+
+
+NAMES = ("window3", "window1", "hidden5", "rank4", "without-color", "without-normal")
+COMBINED = ("window3+rank4", "without-normal+window2+hidden5+rank2", "hidden5+window3", "rank3+sine11")
+
+
+@pytest.mark.parametrize("name", ["full", *NAMES, *COMBINED])
+def test_names_are_read_back(name) -> None:
+    assert parse(name).name == name
+
+
+WRONG = {
+    "": "'' is no approximation; there are: leave out a feature",
+    "rank": "'rank' is no approximation",
+    "rank0": "'rank0' is no approximation",
+    "rank-3": "'rank-3' is no approximation",
+    "full+rank3": "'full' is no approximation",
+    "rank12 ": "'rank12 ' is no approximation",
+    "rank12+": "'' is no approximation",
+    "Rank12": "'Rank12' is no approximation",
+    "rank99999": "'rank99999' is no approximation",
+    "rank3+rank4": "rank comes twice",
+    "without-color+without-color": "without comes twice",
+    "rank4+window3": "window must come before rank, which it would undo",
+    "rank4+without-color": "without must come before rank",
+    "rank4+hidden5": "hidden must come before rank",
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_names_are_refused(name) -> None:
+    with pytest.raises(InputError, match="variant is .*: " + WRONG[name].replace("+", r"\+")):
+        parse(name)
+
+
+IMPOSSIBLE = {
+    "window4": "the window has 4 x 4 taps",
+    "window9": "the window has 4 x 4 taps",
+    "hidden7": "the widest hidden layer has 7 neurons",
+    "without-albedo": "the model reads color, normal",
+    "without-color+without-normal": "the model reads normal",
+    "rank25": "ranks from 1 to 24",
+    "sine4": "there are .*sine11",
+}
+
+
+@pytest.mark.parametrize("name", IMPOSSIBLE)
+def test_what_a_model_cannot_have_is_refused(name) -> None:
+    with pytest.raises(InputError, match=IMPOSSIBLE[name]):
+        vary(parse(name), small())
+
+
+@pytest.mark.parametrize("border", dataset.BORDERS)
+@pytest.mark.parametrize("name", [*NAMES, *COMBINED])
+def test_the_small_network_is_the_one_with_zeros(name, border) -> None:
+    """The varied model, and the full one's shape with zeros, are one function: sums in another order."""
+    model = small(border=border)
+    varied = vary(parse(name), model)
+    check_model(varied.model)
+    weights, biases = varied.inside
+    whole = replace(model, siren=replace(model.siren, weights=weights, biases=biases))
+    picture = image()
+    difference = np.abs(denoised(varied.model, picture) - denoised(whole, picture)).max()
+    # Sums of at most 97 terms below 1, through three layers that stretch by less than 10 each.
+    assert difference <= 1e3 * 97 * 2.0**-52
+
+
+def test_constant_pictures_are_denoised_as_before() -> None:
+    """A narrow window sees the mean of its own taps where taps are left out; clamped borders too."""
+    model = small()
+    picture = np.broadcast_to(image((1, 1)), (5, 6, 6))
+    narrow = vary(parse("window2"), model).model
+    # The weights are rounded to float32 once more: 96 of them, stretched by less than 10 three times.
+    assert np.abs(denoised(narrow, picture) - denoised(model, picture)).max() <= 96 * 1e3 * 2.0**-25 / 16
+    dropped = vary(parse("without-normal"), model).model
+    flat = picture.copy()
+    flat[..., 3:] = 0.0
+    assert np.abs(denoised(dropped, flat) - denoised(model, flat)).max() <= 96 * 1e3 * 2.0**-25 / 16
+
+
+@pytest.mark.parametrize("name", ["window3", "without-normal+window2"])
+def test_a_narrow_window_keeps_each_channel_s_sum(name) -> None:
+    """What a channel adds to a neuron in a picture of one colour."""
+    varied = vary(parse(name), small())
+    before, after = (
+        np.asarray(w, np.float64).reshape(7, 16, 6).sum(axis=1)
+        for w in (small().siren.weights[0], varied.weights[0])
+    )
+    left = slice(0, 3) if "without" in name else slice(0, 6)
+    # Sums of 16 weights below 1, added up in another order, and divided.
+    assert np.abs(after - before)[:, left].max() <= 3 * 16 * 2.0**-52
+
+
+def test_the_middle_of_the_window_stays() -> None:
+    """With weights at the pixel itself alone nothing is lost, for even and odd sizes."""
+    for size in (4, 5):
+        model = small(size)
+        weight = np.zeros_like(model.siren.weights[0]).reshape(7, size, size, 6)
+        weight[:, size // 2, size // 2] = 0.3
+        first = weight.reshape(7, -1)
+        model = replace(model, siren=replace(model.siren, weights=(first, *model.siren.weights[1:])))
+        for narrow in range(1, size):
+            found = vary(parse(f"window{narrow}"), model).model
+            assert np.array_equal(denoised(found, image()), denoised(model, image()))
+
+
+def test_the_heaviest_neurons_stay() -> None:
+    model = small(hidden=(4,))
+    last = np.array([[0.1, 5.0, 0.0, -2.0]] * 3, np.float32)
+    model = replace(model, siren=replace(model.siren, weights=(model.siren.weights[0], last)))
+    found = vary(parse("hidden2"), model)
+    assert found.kept[1].tolist() == [1, 3]
+    assert np.array_equal(found.model.siren.weights[1], last[:, [1, 3]])
+
+
+def test_products_are_counted() -> None:
+    model = small()
+    assert vary(parse("full"), model).products == 96 * 7 + 7 * 6 + 6 * 3
+    assert vary(parse("window3"), model).products == 54 * 7 + 7 * 6 + 6 * 3
+    assert vary(parse("window3+rank2"), model).products == 2 * (18 + 3 * 7) + 7 * 6 + 6 * 3
+    assert vary(parse("hidden5"), model).products == 96 * 5 + 5 * 5 + 5 * 3
+
+
+def test_a_rank_is_cut_among_the_neurons_that_are_left() -> None:
+    model = small()
+    both, alone = (vary(parse(name), model) for name in ("hidden5+rank3", "hidden5"))
+    expected = factored.expand(factored.cut(alone.weights[0][alone.kept[1]], 4, 3))
+    assert np.array_equal(both.weights[0][alone.kept[1]], expected)
+
+
+@st.composite
+def cases(draw):
+    """Draw (model, name of a variant)."""
+    size = draw(st.integers(2, 5))
+    hidden = draw(st.lists(st.integers(2, 8), min_size=1, max_size=3))
+    parts = []
+    if draw(st.booleans()):
+        parts.append(f"without-{draw(st.sampled_from(FEATURES))}")
+    if draw(st.booleans()):
+        parts.append(f"window{draw(st.integers(1, size - 1))}")
+    if draw(st.booleans()):
+        parts.append(f"hidden{draw(st.integers(1, max(hidden) - 1))}")
+    if draw(st.booleans()):
+        parts.append(f"rank{draw(st.integers(1, 3))}")
+    model = small(size, hidden, draw(st.integers(0, 2**31)), draw(st.sampled_from([0.05, 0.3, 2.0])))
+    return model, "+".join(parts) or "full"
+
+
+@given(case=cases(), seed=st.integers(0, 2**31))
+def test_no_picture_moves_by_more_than_the_bound(case, seed) -> None:
+    """On random pictures, and on ones made of the ends of the ranges, in float64."""
+    model, name = case
+    try:
+        varied = vary(parse(name), model)
+    except InputError:
+        return  # a rank that this window does not have
+    bound = variants.bound_of(varied, "opencl", "ieee")
+    for picture in (image(seed=seed), np.where(image(seed=seed) > 0.5, 1.0, 0.0)):
+        moved = np.abs(denoised(varied.model, picture) - denoised(model, picture)).max(axis=(0, 1))
+        assert (moved <= bound).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "neurons"), [("window3", 1), ("hidden1", 2), ("rank2", 1), ("without-normal", 1)]
+)
+def test_the_bound_of_a_linear_network_is_reached(name, neurons) -> None:
+    """Without sines to speak of, and one neuron that moves, the worst window moves the output that far."""
+    model = small(hidden=(neurons,), omega=1e-3)
+    scaled = tuple(w * np.float32(s) for w, s in zip(model.siren.weights, (0.1, 1.0), strict=True))
+    last = np.full(3, 0.5, np.float32)
+    model = replace(model, siren=replace(model.siren, weights=scaled, biases=(model.siren.biases[0], last)))
+    varied = vary(parse(name), model)
+    weights, biases = (tuple(a.astype(np.float64) for a in arrays) for arrays in varied.inside)
+    whole = [a.astype(np.float64) for a in model.siren.weights]
+    offset = [a.astype(np.float64) for a in model.siren.biases]
+    # sin(a) = a up to a^3 / 6: of arguments below 1e-2 that is 2e-7.
+    slope = 1e-3 * (weights[1] @ weights[0] - whole[1] @ whole[0])
+    middle = 1e-3 * (weights[1] @ biases[0] - whole[1] @ offset[0])
+    low, high = (np.tile(np.repeat(ends, 3), 16) for ends in ((0.0, -1.0), (1.0, 1.0)))
+    outward = 1.0 if middle[0] + slope[0] @ (low + high) / 2 >= 0 else -1.0
+    worst = np.where(slope[0] * outward > 0, high, low)
+    moved = abs(middle[0] + slope[0] @ worst)
+    (bound, *_) = variants.bound_of(varied, "opencl", "ieee")
+    # Its sine is not quite the line that `moved` is computed with: see above.
+    curved = 1e-2**3 / 6
+    assert moved <= bound + curved
+    # Beside the move there is rounding: that of a sine, as the next layer weighs it, and of sums below 1.
+    rounding = 2 * sine.POLYNOMIALS[11].error * np.abs(whole[1]).sum(axis=1).max()
+    assert bound <= moved + rounding + 2 * 97 * 2.0**-24
+
+
+def test_a_bound_holds_where_a_weight_is_wrong() -> None:
+    """What is not in the bound shows: a kernel's weight that differs moves beyond that of `full`."""
+    model = small(omega=0.05)
+    full = variants.bound_of(vary(parse("full"), model), "opencl", "ieee")
+    varied = vary(parse("full"), model)
+    weight = varied.weights[0].copy()
+    weight[0, 0] += 0.1
+    wrong = replace(varied, weights=(weight, *varied.weights[1:]))
+    assert (variants.bound_of(wrong, "opencl", "ieee") > 2 * full).any()
+
+
+def test_native_sines_have_no_bound_on_numpy() -> None:
+    assert variants.bound_of(vary(parse("rank2"), small()), "numpy", "native") is None
+    manifest = variants.compile_variant(small(), "rank2", "numpy", "native").manifest
+    assert manifest["variant"]["bound"]["output"] is None
+
+
+def test_other_degrees_are_other_profiles(monkeypatch) -> None:
+    monkeypatch.setattr(sine, "POLYNOMIALS", {7: sine.POLYNOMIALS[11], 11: sine.POLYNOMIALS[11]})
+    assert vary(parse("sine7"), small()).profile("ieee") == "ieee-sine7"
+    assert vary(parse("sine11"), small()).profile("ieee") == "ieee"
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_manifests_say_what_was_done(target) -> None:
+    name = "window3+rank2"
+    found = variants.compile_variant(small(), name, target)
+    said = found.manifest["variant"]
+    assert said["name"] == name
+    assert said["approximations"] == ["window3", "rank2"]
+    assert said["program"] == variants.digest_of(small())
+    assert (said["products"], said["products_of_full"]) == (138, 732)
+    bound = variants.bound_of(vary(parse(name), small()), target, "ieee")
+    assert len(found.kernels) == 2
+    assert (np.array(said["bound"]["output"]) >= bound).all()
+    assert (np.array(said["bound"]["output"]) <= 1.01 * bound).all()
+    assert "variant" not in variants.compile_variant(small(), "full", target).manifest

@@ -74,4 +74,3 @@ class Kit:
         return replace(
             artifact, source=source, manifest={**artifact.manifest, "digest": sha256(source.encode())}
         )
-

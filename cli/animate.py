@@ -190,7 +190,7 @@ def draw_apart(
     for shot in shots:
         frame = render_frame(renderer, shot.scene, shot.noisy, workers=None).frame
         noisy = to_display(frame["color"], model.normalization.exposure_stops)
-        denoised = denoise_on(executor, model, frame, rank=rank).image
+        denoised = denoise_on(executor, model, frame, rank=rank, pictures=len(shots)).image
         reference = None
         if shot.reference is not None:
             reference = render_frame(renderer, shot.scene, shot.reference, workers=None).frame
@@ -220,6 +220,7 @@ def draw_frames(
                     show=("color",),
                     whole=whole,
                     rank=rank,
+                    pictures=len(shots),
                 )
                 pipeline = stack.enter_context(made)
             else:

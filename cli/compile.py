@@ -25,6 +25,7 @@ from .terminal import say
 if TYPE_CHECKING:
     from ..compiler.artifact import Artifact, Files
     from ..compiler.path_kernel import PathArtifact
+    from ..refimpl.denoise import Model
     from ..refimpl.scene import Scene
 
 EXAMPLES = """Examples:
@@ -43,6 +44,9 @@ wamnet compile minicubes --time 2.5 --target glsl -o scene-glsl
 
 wamnet compile mine.json --target opencl --lanes 16 -o scene-opencl"""
 """Shown below the help of `wamnet compile`."""
+
+HERE_SIZE, HERE_PICTURES = (1024, 1024), 1000
+"""What a kernel for this machine is chosen for: the paper's pictures (height, width), and many of them."""
 
 EXECUTOR_OF = {Target.opencl: "opencl", Target.glsl: "opengl", Target.c: "c"}
 """The compiler names a target by the executor that runs it; people know the language."""
@@ -76,6 +80,7 @@ def compile_model(
         typer.Option(help="Paths that a work item follows: 16 suit CPUs, 1 GPUs.", show_default="1"),
     ] = None,
     schedule: options.Schedule = None,
+    here: options.Here = False,
     variant: options.Variant = None,
     max_error: options.MaxError = None,
     max_ms: options.MaxMs = None,
@@ -87,38 +92,59 @@ def compile_model(
     """Compile a model, or a scene, to a kernel: source, weights, and a manifest with its interface.
 
     The source is meant to be read and pasted into another program: a model's denoises, with a bound on its
-    error; a scene's traces paths. No device is needed, unless a variant is to be chosen by limits: then the
-    fastest one that keeps them is, from a curve that is measured once for each device.
+    error; a scene's traces paths. No device is needed, but for --here, or if a variant is to be chosen by
+    limits: then the fastest one that keeps them is, from a curve that is measured once for each device.
     """
     folder, name = output or Path(target.value), EXECUTOR_OF[target]
     request = Request(max_error, max_ms, max_loss_db, curve, frames, size)
     kernel: Files
     if is_scene(model):
-        of_models = {"--schedule": schedule, "--variant": variant, **request.options()}
-        _only_for("a model", of_models, f"{model} is a scene, whose kernels have one schedule, no variants")
+        of_models = {"--schedule": schedule, "--variant": variant, "--here": here or None}
+        rule = f"{model} is a scene, whose kernels have one schedule, no variants"
+        _only_for("a model", of_models | request.options(), rule)
         check_folder(folder, name, of_scene=True)
         scene = load_scene(model, time, parameters or [])
         kernel = _compiled_scene(scene, name, profile, max_depth, sampler, lanes)
     else:
         of_scenes: dict[str, object] = {"--time": time, "--set": parameters, "--lanes": lanes}
         of_scenes |= {"--max-depth": max_depth, "--sampler": sampler and sampler.value}
-        _only_for("a scene", of_scenes, f"{model} is no scene: neither a canonical one nor a .json file")
-        _check_name(model)
+        _check_name(model, of_scenes)
         check_folder(folder, name)
-        kernel = _compiled_model(Path(model), name, profile, schedule, variant, request)
-    _write(kernel, folder, schedule)
+        kernel = _compiled_model(Path(model), name, profile, schedule, variant, request, here)
+    _write(kernel, folder)
 
 
-def _write(kernel: Files, folder: Path, schedule: str | None) -> None:
+def _write(kernel: Files, folder: Path) -> None:
     """Write a kernel, and say its files, and why its schedule is another one."""
     for path in write_kernel(kernel, folder):
         say(str(path))
-    if reason := kernel.manifest.get("schedule", {}).get("reason"):
-        say(f"schedule plain, not {schedule}: {reason}")
+    picked = kernel.manifest.get("schedule", {})
+    if "reason" in picked:
+        say(f"schedule {picked['name']}, not {picked['asked']}: {picked['reason']}")
+
+
+def _chosen_here(model: Model, executor: str, profile: str, schedule: str | None, variant: str) -> str:
+    """Return the schedule of a variant for this machine's device, and say why."""
+    from ..compiler.variants import parse, vary
+    from ..kernels import open_executor, tune
+
+    if schedule is not None:
+        raise InputError("--schedule", schedule, "--here chooses another", "leave one of them out")
+    varied = vary(parse(variant), model)
+    with open_executor(executor) as runner:
+        found = tune.choose(runner, varied.model, HERE_SIZE, profile, varied.rank, HERE_PICTURES)
+        say(f"schedule {found.schedule} for {runner.device}: {found.reason}")
+    return found.schedule
 
 
 def _compiled_model(
-    path: Path, target: str, profile: str, schedule: str | None, variant: str | None, request: Request
+    path: Path,
+    target: str,
+    profile: str,
+    schedule: str | None,
+    variant: str | None,
+    request: Request,
+    here: bool,
 ) -> Artifact:
     """Return the kernel of a model: of a variant that is named, or that keeps limits, or of all of it."""
     from ..compiler.schedules import PLAIN
@@ -127,7 +153,12 @@ def _compiled_model(
     check_request(request, variant)
     model = load_model(path)
     if request.limited:
+        if here:
+            rule = "limits choose the schedule too"
+            raise InputError("--here", "given", rule, "leave it out")
         variant, schedule = choose(model, request, target, profile, schedule)
+    elif here:
+        schedule = _chosen_here(model, target, profile, schedule, variant or FULL)
     return compile_variant(model, variant or FULL, target, profile, schedule or PLAIN)
 
 
@@ -145,8 +176,9 @@ def is_scene(name: str) -> bool:
     return name in CANONICAL or Path(name).suffix.lower() == ".json"
 
 
-def _check_name(name: str) -> None:
-    """Refuse what looks like a scene's name and is none: a model's file has a suffix, or is there."""
+def _check_name(name: str, of_scenes: Mapping[str, Any]) -> None:
+    """Refuse options of scenes, and what looks like a scene's name and is none: a model's file is there."""
+    _only_for("a scene", of_scenes, f"{name} is no scene: neither a canonical one nor a .json file")
     if not Path(name).suffix and not Path(name).exists():
         rule = "neither a canonical scene nor a file"
         raise InputError("model or scene", name, rule, f"scenes are {options.SCENES}")

@@ -61,6 +61,7 @@ def denoise(
     """
     from ..compiler.variants import FULL
     from ..kernels import denoise_on, open_executor
+    from ..kernels.tune import first_time
     from . import exr
 
     check_output(output, (".exr", ".png"), [model, frame])
@@ -71,12 +72,14 @@ def denoise(
     _say_what_is_no_number(frame, noisy, network)
     with open_executor(executor.value) as runner:
         result = denoise_on(runner, network, noisy, profile, schedule, rank, variant or FULL)
+        first = first_time(runner, result.kernel, result.seconds_compile)
     write_denoised(output, result.image, network, noisy)
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")
-    say(f"schedule {result.schedule}")
+    say(f"schedule {result.schedule}; {result.reason}")
     if result.variant:
         say(result.variant)
-    say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation")
+    before = "" if first == result.seconds_compile else f" (the first time {first:.3f} s)"
+    say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation{before}")
     if profile == "exact":
         say(f"sha256 of the float32 result, the same on every executor: {result.digest}")
 

@@ -19,7 +19,7 @@ from typing import Annotated, Any
 import typer
 
 from ..refimpl.errors import WamnetError
-from . import animate, bench, certify, compare, dataset, demo, denoise, render, train, triage
+from . import animate, bench, certify, compare, dataset, demo, denoise, render, train, triage, tune
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
 
@@ -58,6 +58,7 @@ _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)
 _register(triage.triage, triage.EXAMPLES)
 _register(animate.animate, animate.EXAMPLES)
+_register(tune.tune, tune.EXAMPLES)
 _register(bench.bench, bench.EXAMPLES)
 _register(denoise.executors, denoise.EXECUTORS_EXAMPLES)
 _register(demo.demo, demo.EXAMPLES)

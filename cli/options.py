@@ -190,6 +190,10 @@ CurveSize = Annotated[
     int | None,
     typer.Option("--size", metavar="N", help="Times are those of N x N pixels.", show_default="1024"),
 ]
+Here = Annotated[
+    bool,
+    typer.Option("--here", help="Take the schedule that suits this machine: as tuned, or built in."),
+]
 Schedule = Annotated[
     str | None,
     typer.Option(

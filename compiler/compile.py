@@ -27,10 +27,12 @@ from .emit import kernel_gather, output_channels
 from .enclosure import round_up as round_up
 from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
+from .glsl_compute import GLSL_COMPUTE
 from .glsl_inlined import GLSL_LADDER
 from .ir import LEAST, OUTPUT_ENCODING, Gather, Program
 from .opencl import OpenCL
 from .opencl_fourier import OPENCL_FOURIER
+from .opencl_group import OPENCL_GROUPS
 from .opencl_tiled import OPENCL_LADDER
 from .passes import pipeline
 from .profiles import Profile, SineContract
@@ -80,8 +82,8 @@ TARGETS: Mapping[str, Target] = {
             SineContract("np.sin, whose documentation promises nothing", None),
             (Printed(),),
         ),
-        _dialect_target(OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER),
-        _dialect_target(GLSL(), *GLSL_LADDER),
+        _dialect_target(OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_GROUPS),
+        _dialect_target(GLSL(), *GLSL_LADDER, *GLSL_COMPUTE),
     )
 }
 """All targets of paths, encodings and denoisers, by the name of the executor that runs them."""
@@ -302,8 +304,9 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound, pi
     arguments = _arguments(picked, channels).split("\n")
     rows, columns = gather.rows, gather.columns
     tap = f"{rows // 2}" if rows == columns else f"({rows // 2}, {columns // 2})"
+    language = picked.schedule.language or target.language
     return [
-        f"wamnet denoiser, {target.language}. Generated: change the compiler, not this text.",
+        f"wamnet denoiser, {language}. Generated: change the compiler, not this text.",
         f"program   {ir.digest(program)[:32]}",
         f"images    {images[0]}",
         *(f"          {line}" for line in images[1:]),
@@ -354,13 +357,13 @@ def _assemble(
     gather, schedule = kernel_gather(emitted), picked.schedule
     weights, slots = schedule.pack(emitted), schedule.layout(emitted).values()
     raw = weights.astype("<f4").tobytes()
-    source_name = f"denoise{target.suffix}"
+    source_name = f"denoise{schedule.suffix or target.suffix}"
     manifest: dict[str, Any] = {
         "schema": artifact.SCHEMA,
         "digest": ir.sha256(source.encode(), raw),
         "program": ir.digest(common),
         "target": target.name,
-        "language": target.language,
+        "language": schedule.language or target.language,
         "entry_point": target.entry,
         "profile": {"name": profile.name, "text": profile.text},
         "sine": asdict_finite(sine_contract(profile.name, target.name)),

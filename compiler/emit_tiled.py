@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from . import weights
 from .dialect import Dialect
 from .emit import BORDERS, Body, emit, kernel_gather, output_channels, schedule
-from .ir import Node, Program
+from .ir import Gather, Node, Program
 from .ops import OPS
 from .schedules import Schedule
 from .sums import is_split
@@ -104,11 +104,17 @@ class Tiled(Schedule):
         """Return why this schedule cannot hold the program, or nothing."""
         if reason := refused_by_vectors(program, self.dialect):
             return reason
+        if reason := self._shared_matrix(program):
+            return reason
+        if (found := self.private_bytes(program)) > LARGEST_PRIVATE:
+            return f"its arrays take {found} bytes a work item, of at most {LARGEST_PRIVATE}"
+        return ""
+
+    def _shared_matrix(self, program: Program) -> str:
+        """Return a refusal where one matrix is needed in two orders."""
         used = readers_of_window(program)
         if _matrices(used) & _matrices(node for node in program.nodes if node not in used):
             return "a matrix is applied to the window and to a layer, which need it in two orders"
-        if (found := self.private_bytes(program)) > LARGEST_PRIVATE:
-            return f"its arrays take {found} bytes a work item, of at most {LARGEST_PRIVATE}"
         return ""
 
     def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
@@ -150,14 +156,18 @@ class Tiled(Schedule):
         """Return a parameter in its stored shape."""
         rows = np.atleast_2d(program.parameters[name].T)  # (D_in, D_out), or (1, D_out)
         if name in _matrices(readers_of_window(program)):
-            rows = rows[kernel_gather(program).by_image]
+            rows = rows[self._window_rows(kernel_gather(program))]
         blocks = self.blocks(rows.shape[1])
         filled = np.zeros((len(rows), blocks.total * self.lanes), np.float32)
         filled[:, : rows.shape[1]] = rows
         by_block = filled.reshape(len(rows), blocks.count, -1).transpose(1, 0, 2)
         return by_block.reshape(shape)
 
-    def _body(self, program: Program) -> TiledBody:
+    def _window_rows(self, gather: Gather) -> NDArray[np.intp]:
+        """Return the window's indices (n_inputs,): image by image, in each tap by tap, channel by channel."""
+        return np.asarray(gather.by_image, np.intp)
+
+    def _body(self, program: Program) -> Body:
         """Return the writer of the kernel's statements."""
         return TiledBody(program, self.dialect, kernel_gather(program), tile=self)
 

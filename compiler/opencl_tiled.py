@@ -10,8 +10,7 @@ from __future__ import annotations
 from .emit_tiled import Tiled
 from .opencl import OpenCL
 
-BEGIN = """\
-{defines}
+MACROS = """\
 typedef float@lanes@ vector;
 typedef int@lanes@ mask;
 #define MINIMUM(a, b) ((vector)(b) < (vector)(a) ? (vector)(b) : (vector)(a))
@@ -23,20 +22,25 @@ typedef int@lanes@ mask;
 #endif
 #ifndef FLOOR
 #define FLOOR(a) floor(a)
-#endif
-__kernel void {entry}(
-{images},
+#endif"""
+"""The type of vectors and functions on them; `@lanes@` is the length of a vector."""
+
+BEGIN = f"""\
+{{defines}}
+{MACROS}
+__kernel void {{entry}}(
+{{images}},
     __global const float *restrict weights,
     __global float *restrict result,
     int width,
     int height)
-{{
+{{{{
     int x = (int)get_global_id(0) * PIXELS;
     int y = (int)get_global_id(1);
-    if (x >= width || y >= height) {{
+    if (x >= width || y >= height) {{{{
         return;
-    }}"""
-"""What stands before the statements; `@lanes@` is the length of a vector."""
+    }}}}"""
+"""What stands before the statements."""
 
 
 class OpenCLTiled(OpenCL):

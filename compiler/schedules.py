@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -52,13 +52,16 @@ class Schedule(ABC):
     """One way to order a kernel's work; `idea` is the sentence that sets this rung apart from the last.
 
     `arguments` says how to call the kernel, `pixels` how many neighbours of a row a work item computes,
-    `order` how a matrix lies among the weights; `instead` names the schedule of programs that it refuses.
+    `order` how a matrix lies among the weights; `language` and `suffix` are set where they are its own;
+    `instead` names the schedule of programs that it refuses.
     """
 
     name: str
     idea: str
     arguments: str
     pixels: int = 1
+    language: str = ""
+    suffix: str = ""
     instead: str = PLAIN
     order: str = "matrices input-major: D_in x D_out, in C order"
 
@@ -88,6 +91,10 @@ class Schedule(ABC):
     @abstractmethod
     def private_bytes(self, program: Program) -> int:
         """Return the bytes of the arrays that a work item declares."""
+
+    def details(self, program: Program) -> Mapping[str, Any]:
+        """Return what a caller must know besides, for the manifest."""
+        return {}
 
     def layout(self, program: Program) -> Mapping[str, Slot]:
         """Return where each weight lies."""
@@ -141,12 +148,14 @@ class Pick:
     asked: str
     extent: tuple[int, int]
     reason: str = ""
+    details: Mapping[str, Any] = field(default_factory=dict)
 
     def manifest(self) -> Mapping[str, Any]:
         """Return what a manifest says about it."""
         columns, rows = self.extent
         found = {"name": self.schedule.name, "idea": self.schedule.idea, "pixels": columns}
         found = {**found, "rows": rows} if rows > 1 else found
+        found |= self.details
         return {**found, "asked": self.asked, "reason": self.reason} if self.reason else found
 
 
@@ -165,4 +174,4 @@ def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:
     while chosen is not schedules[0] and (reason := chosen.refusal(program)):
         first = first or reason
         chosen = known[chosen.instead]
-    return Pick(chosen, name, chosen.extent(program), first)
+    return Pick(chosen, name, chosen.extent(program), first, chosen.details(program))

@@ -304,11 +304,13 @@ def enclose(varied: Varied, target: str, profile: str, schedule: str = PLAIN) ->
         names = str(node["weight"]), str(node["bias"])
         inside = dict(zip(names, (arrays[layer] for arrays in varied.inside), strict=True))
         outside = {name: whole.parameters[name].astype(np.float64) for name in names}
-        wanted, kernel = (
-            bounds.RULES["affine"](bounds.Context(node, parameters, contract), [x])
-            for parameters in (outside, inside)
-        )
-        error = kernel.error
+        # Where sines promise nothing, an infinite error may meet a weight of 0: NaN is no bound either.
+        with np.errstate(invalid="ignore"):
+            wanted, kernel = (
+                bounds.RULES["affine"](bounds.Context(node, parameters, contract), [x])
+                for parameters in (outside, inside)
+            )
+        error = np.where(np.isnan(kernel.error), np.inf, kernel.error)
         if layer == 0:
             error = _first_error(varied, target, profile, schedule, error)
         known[index] = replace(

@@ -18,6 +18,7 @@ from ..refimpl.errors import InputError
 from ..refimpl.frame import Frame
 from .executor import Executor, Images
 from .memory import keep_freed_memory
+from .tune import Choice, choose
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,8 @@ class RunResult:
 
     `seconds_compile`: tracing, passes, bound, emission, the driver's compilation and one run on a few pixels.
     `seconds_run`: images to the device, the kernel, the result back; not the encoding of the features.
-    `schedule`: what was picked, and why, where it is not what was asked for. `variant`: what it may cost.
+    `schedule`: what was picked, and why, where it is not what was asked for; `reason`: why it was asked for.
+    `kernel`: its digest. `variant`: what it may cost.
     """
 
     image: NDArray[np.float32]
@@ -34,6 +36,8 @@ class RunResult:
     seconds_run: float
     device: str
     schedule: str
+    reason: str
+    kernel: str
     variant: str = ""
 
     @property
@@ -55,9 +59,11 @@ def denoise_on(
     schedule: str | None = None,
     rank: int = 0,
     variant: str = FULL,
+    pictures: int = 1,
 ) -> RunResult:
-    """Return the denoised frame and the times; without a `schedule`, the one that suits device and size.
+    """Return the denoised frame and the times.
 
+    Without a `schedule`, it is the one that suits device, size and so many `pictures` to come [tune.py].
     `variant`: with fewer operations [variants.py]; a `rank` is short for the variant of this name.
     """
     if rank:
@@ -68,15 +74,18 @@ def denoise_on(
     images = images_of(varied.model, frame)
     start = time.perf_counter()
     size = (frame.height, frame.width)
-    wanted = schedule or executor.schedule_for(size)
-    artifact = compile_variant(model, variant, executor.name, profile, wanted)
+    found = Choice(schedule or "", "as asked")
+    if not schedule:
+        found = choose(executor, varied.model, size, profile, varied.rank, pictures)
+    artifact = compile_variant(model, variant, executor.name, profile, found.schedule)
     executor.build(artifact, size)
     keep_freed_memory()
     built = time.perf_counter()
     image = executor.run(artifact, images)
     seconds = time.perf_counter() - built
     picked = schedules.text(artifact.manifest["schedule"])
-    return RunResult(image, built - start, seconds, executor.device, picked, _text_of(artifact))
+    facts = (executor.device, picked, found.reason, artifact.digest, _text_of(artifact))
+    return RunResult(image, built - start, seconds, *facts)
 
 
 def _text_of(artifact: Artifact) -> str:

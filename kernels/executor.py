@@ -55,7 +55,8 @@ class Executor(ABC):
 
     `lanes` is the number of paths that its path kernels should follow at once, `schedule` the name of the
     schedule that suits a denoiser on it, for pictures of at least `schedule_pixels`: smaller ones are done
-    with the plain kernel before the other is compiled. `trains` says whether it has a compiled trainer.
+    with the plain kernel before the other is compiled; `schedule_reason` says why. `driver` is the driver's
+    version, where `device` does not name it. `trains` says whether it has a compiled trainer.
     """
 
     name: str
@@ -63,6 +64,8 @@ class Executor(ABC):
     lanes: int = 1
     schedule: str = PLAIN
     schedule_pixels: int = 0
+    schedule_reason: str = "the only one"
+    driver: str = ""
     trains: bool = False
 
     @abstractmethod
@@ -95,6 +98,9 @@ class Executor(ABC):
             self._check_target(artifact)
         self.check_size(denoise, size)
         return self._passes(encode, denoise, size)
+
+    def forget(self) -> None:
+        """Drop the kernels that were built for denoising: the next build is the driver's."""
 
     def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
         """Return a trainer (opencl_trainer.py) for pictures laid out end to end, or refuse."""

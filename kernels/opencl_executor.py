@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -42,6 +42,9 @@ loop around them."""
 CPU_SCHEDULES = {16: "fft32", 8: "tile8"}
 """Schedule of a denoiser by the floats in a vector register of a processor; others have registers of 4. What
 the first one refuses, `tile16` takes."""
+
+GPU_SCHEDULE = "group4"
+"""Schedule of a denoiser on a graphics processor."""
 
 STACK_BYTES = 2**20
 """Most bytes of a group's arrays on a processor: half the smallest stack that glibc gives a thread."""
@@ -89,7 +92,14 @@ class OpenCLExecutor(Executor):
             self._shares = True
             self.lanes = CPU_LANES
             self.trains = True
-            self.schedule = CPU_SCHEDULES.get(chosen.native_vector_width_float, "tile4")
+            lanes = chosen.native_vector_width_float
+            self.schedule = CPU_SCHEDULES.get(lanes, "tile4")
+            self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
+        elif chosen.type & cl.device_type.GPU:
+            self.schedule = GPU_SCHEDULE
+            self.schedule_reason = "built-in choice for graphics processors, not measured on one"
+        else:
+            self.schedule_reason = "built-in choice for unknown devices"
         self._encoders: dict[str, Any] = {}
         self._kept: Any = None
 
@@ -138,6 +148,9 @@ class OpenCLExecutor(Executor):
 
     def _local_size(self, artifact: Artifact) -> tuple[int, int]:
         """Return the size of a group: smaller on a processor for kernels with large arrays."""
+        if group := artifact.manifest["schedule"].get("group"):
+            self._check_group(artifact.manifest)
+            return group[0], group[1]
         items, used = int(self._device.max_work_group_size), int(artifact.manifest["private_bytes"])
         if self._device.type & cl.device_type.CPU:
             items = min(items, STACK_BYTES // max(used, 1))
@@ -151,6 +164,24 @@ class OpenCLExecutor(Executor):
         wanted = LOCAL_SIZE if artifact.manifest["schedule"]["pixels"] == 1 else TILE_LOCAL_SIZE
         x = min(wanted[0], items)
         return x, min(wanted[1], items // x)
+
+    def _check_group(self, manifest: Mapping[str, Any]) -> None:
+        """Refuse a kernel whose groups the device does not hold."""
+        schedule, device = manifest["schedule"], self._device
+        items = schedule["group"][0] * schedule["group"][1]
+        shared, private = schedule["shared_bytes"], items * manifest["private_bytes"]
+        least = {
+            "items": (items, int(device.max_work_group_size)),
+            "bytes that they share": (shared, int(device.local_mem_size)),
+        }
+        if device.type & cl.device_type.CPU:
+            least["bytes of variables, on a processor's stack"] = (private, STACK_BYTES)
+        for what, (wanted, most) in least.items():
+            if wanted > most:
+                raise CompileError(
+                    f"{self.device}: schedule {schedule['name']} needs groups of {wanted} {what}, and at "
+                    f"most {most} are to be had; use schedule plain"
+                )
 
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
         with self._told(next(iter(images.values())).shape[:2]):
@@ -214,6 +245,10 @@ class OpenCLExecutor(Executor):
         numbers = (np.int32(size[1]), np.int32(size[0]))
         places = _whole(items, built.local)
         built.kernel(self._queue, places, built.local, *inputs, built.weights, output, *numbers)
+
+    def forget(self) -> None:
+        """Drop the kernels that were built for denoising."""
+        self._built.clear()
 
     def kernel_seconds(
         self, artifact: Artifact, images: Images, clock: Callable[[], float] = time.perf_counter

@@ -25,6 +25,7 @@ from ..compiler.emit import output_channels
 from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.factor import HORIZONTAL
 from ..compiler.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
+from ..compiler.glsl_compute import SHADER_VERSION
 from ..compiler.path_kernel import PathArtifact
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import osmesa
@@ -72,6 +73,9 @@ SOFTWARE = "llvmpipe"
 SOFTWARE_SCHEDULE = "inlined"
 """Schedule of a denoiser there: reads of weights are chains of checks and gathers, constants are not."""
 
+GPU_SCHEDULE = "compute4"
+"""Schedule of a denoiser on a graphics processor with compute shaders."""
+
 SOFTWARE_PIXELS = 700_000
 """Pixels of the smallest picture for which that is compiled: llvmpipe compiles a weight in 0.63 ms on one
 core, and on two cores multiplies by it in 0.96 ns with the plain kernel, in 0.04 ns with the other: 690
@@ -80,11 +84,15 @@ thousand pixels pay for the time."""
 
 @dataclass(frozen=True)
 class _Built:
-    """A kernel on the device, with weights or None, and the sizes of which it has drawn a few pixels."""
+    """A kernel on the device, with weights or None, and the sizes of which it has drawn a few pixels.
+
+    A compute shader has no triangle, and the pixels (x, y) of a group's `tile`.
+    """
 
     program: Any
     triangle: Any
     weights: Any
+    tile: tuple[int, int] | None = None
     drawn: set[tuple[int, int]] = field(default_factory=set)
 
     def release(self) -> None:
@@ -107,6 +115,14 @@ class OpenGLExecutor(Executor):
             self.device = f"{self._context.info['GL_RENDERER']} through {kind}"
         if SOFTWARE in self.device:
             self.schedule, self.schedule_pixels = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
+            name, least = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
+            self.schedule_reason = f"built-in choice for software, {name} from {least} pixels on"
+        elif self._context.version_code >= SHADER_VERSION:
+            self.schedule = GPU_SCHEDULE
+            self.schedule_reason = "built-in choice for graphics processors, not measured on one"
+        else:
+            self.schedule_reason = f"built-in choice before OpenGL {SHADER_VERSION / 100:.1f}"
+        self.driver = self._context.info["GL_VERSION"]
         self._built: dict[str, _Built] = {}
         self._paths: dict[str, _Built] = {}
         self._encoders: dict[str, _Built] = {}
@@ -132,12 +148,35 @@ class OpenGLExecutor(Executor):
                 f"{self.device} lacks {ORDER_EXTENSION}, whose `precise` the error bound needs: use profile "
                 "native, which then promises nothing, or executor opencl or numpy"
             )
+        if "group" in artifact.manifest["schedule"]:
+            return self._compile_compute(artifact)
         with self._context, ExitStack() as made:
             weights = self._weights(artifact)
             made.callback(weights.release)
             program, triangle = self._program(artifact.source, made)
             made.pop_all()
             return _Built(program, triangle, weights)
+
+    def _compile_compute(self, artifact: Artifact) -> _Built:
+        """Compile a compute shader, and put the weights into a storage buffer."""
+        schedule = artifact.manifest["schedule"]
+        if self._context.version_code < SHADER_VERSION:
+            raise CompileError(
+                f"{self.device} has OpenGL {self._context.version_code / 100:.1f}: schedule "
+                f"{schedule['name']} is a compute shader, which OpenGL "
+                f"{SHADER_VERSION / 100:.1f} has; use schedule plain"
+            )
+        with self._context, ExitStack() as made:
+            data = artifact.weights.astype("<f4").tobytes() or bytes(16)
+            weights = self._context.buffer(data)
+            made.callback(weights.release)
+            try:
+                program = self._context.compute_shader(artifact.source)
+            except moderngl.Error as error:
+                raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+            made.pop_all()
+            width, height = schedule["group"]
+            return _Built(program, None, weights, (width * schedule["pixels"], height))
 
     def _program(self, source: str, made: ExitStack) -> tuple[Any, Any]:
         """Return the shaders and the triangle that they draw; `made` gives them back if something fails."""
@@ -181,11 +220,24 @@ class OpenGLExecutor(Executor):
         self, artifact: Artifact, textures: Mapping[str, Any], drawn: Sequence[tuple[Any, list[Any]]]
     ) -> None:
         """Draw an artifact's kernels one after another: images (by name), then what each pass has drawn."""
-        for kernel, (frame, targets) in zip(artifact.kernels, drawn, strict=True):
+        for kernel, into in zip(artifact.kernels, drawn, strict=True):
             built = self._built[kernel.digest]
             named = {f"image_{image.name}": textures[image.name] for image in gather_of(kernel).images}
-            self._draw(built, frame, {"weight_texture": built.weights, **named})
-            textures = {f"{HORIZONTAL}_{number}": target for number, target in enumerate(targets)}
+            self._denoise(built, into, named)
+            textures = {f"{HORIZONTAL}_{number}": target for number, target in enumerate(into[1])}
+
+    def _denoise(self, built: _Built, drawn: tuple[Any, list[Any]], textures: Mapping[str, Any]) -> None:
+        """Run a kernel into the textures of a framebuffer: a compute shader has one."""
+        frame, targets = drawn
+        if built.tile is None:
+            self._draw(built, frame, {"weight_texture": built.weights, **textures})
+            return
+        self._bind(built, textures, {})
+        built.weights.bind_to_storage_buffer(0)
+        targets[0].bind_to_image(0, read=False, write=True)
+        groups = (-(-n // size) for n, size in zip(targets[0].size, built.tile, strict=True))
+        built.program.run(*groups, 1)
+        self._context.memory_barrier()
 
     def _draw(
         self,
@@ -195,15 +247,26 @@ class OpenGLExecutor(Executor):
         values: Mapping[str, int] | None = None,
     ) -> None:
         """Draw a built shader into a framebuffer, with textures and numbers under their uniforms' names."""
+        self._bind(built, textures, values or {})
+        frame.use()
+        built.triangle.render(mode=moderngl.TRIANGLES, vertices=3)
+
+    def _bind(self, built: _Built, textures: Mapping[str, Any], values: Mapping[str, int]) -> None:
+        """Give a built shader its textures and numbers."""
         units = {name: unit for unit, name in enumerate(textures)}
         for name, texture in textures.items():
             texture.use(units[name])
-        for name, value in {**units, **(values or {})}.items():
+        for name, value in {**units, **values}.items():
             # A driver removes what the shader does not read, and its name with it.
             if name in built.program:
                 built.program[name].value = value
-        frame.use()
-        built.triangle.render(mode=moderngl.TRIANGLES, vertices=3)
+
+    def forget(self) -> None:
+        """Drop the kernels that were built for denoising."""
+        with self._context:
+            for built in self._built.values():
+                built.release()
+        self._built.clear()
 
     def build_path(self, kernel: PathArtifact) -> None:
         """Compile the shaders and draw one pixel: drivers finish compiling when they draw."""

@@ -34,6 +34,7 @@ from ..refimpl.transport import Settings
 from .executor import Executor, Part
 from .passes import PICTURE
 from .render_on import SAMPLES_AT_ONCE, compile_scene
+from .tune import choose
 
 
 class Pipeline:
@@ -41,8 +42,9 @@ class Pipeline:
 
     `show` names features that are to be readable besides those of the model. With `whole`, paths are traced
     by the kernel of render_on.py, which writes more than is needed: one to compile where both are used. With
-    a `rank` the model's first layer is cut to it, and is two passes [factor.py]. The kernels are `path`,
-    `encode` and `denoise`; `passes` runs them one by one.
+    a `rank` the model's first layer is cut to it, and is two passes [factor.py]. So many `pictures` are to
+    come: what compiles long may pay [tune.py]. The kernels are `path`, `encode` and `denoise`; `passes` runs
+    them one by one.
     """
 
     def __init__(
@@ -57,6 +59,7 @@ class Pipeline:
         show: Sequence[str] = (),
         whole: bool = False,
         rank: int = 0,
+        pictures: int = 1,
     ) -> None:
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
@@ -71,8 +74,8 @@ class Pipeline:
         self.encode = compile_encode(
             self._features, model.normalization, executor.name, profile, self.path.planes
         )
-        schedule = executor.schedule_for(size)
-        self.denoise = compile_program(lower(model), executor.name, profile, schedule, rank)
+        chosen = choose(executor, model, size, profile, rank, pictures)
+        self.denoise = compile_program(lower(model), executor.name, profile, chosen.schedule, rank)
         self._drawn = self._closed = False
         self.passes = executor.passes(self.encode, self.denoise, size)
 

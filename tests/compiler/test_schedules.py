@@ -14,6 +14,7 @@ from wamnet.compiler.compile import TARGETS, compile_program
 from wamnet.compiler.emit_inlined import LARGEST_WEIGHTS
 from wamnet.compiler.emit_tiled import LARGEST_PRIVATE
 from wamnet.compiler.ir import Gather, Image, Type
+from wamnet.compiler.opencl_group import OPENCL_GROUPS
 from wamnet.compiler.opencl_tiled import OPENCL_LADDER
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import siren
@@ -39,9 +40,99 @@ def small(border="zero"):
     return gathered(function, (2, 1), 2, border)
 
 
+W = rounded(3, 3)
+"""A square matrix, which fits the window and a layer."""
+
+SHARED = gathered(lambda x: np.sin(x @ W.T) @ W.T)
+"""A program that applies one matrix to the window and to a layer."""
+
+
 @pytest.mark.parametrize(("name", "border"), [("vector16", "clamp"), ("tile16", "zero")])
 def test_golden_tiles(golden, name, border):
     golden(f"{name}.denoise.cl", compile_program(small(border), "opencl", "ieee", name).source)
+
+
+@pytest.mark.parametrize(
+    ("target", "name", "border"),
+    [
+        ("opencl", "group", "clamp"),
+        ("opencl", "group4", "zero"),
+        ("opengl", "compute", "zero"),
+        ("opengl", "compute4", "clamp"),
+    ],
+)
+def test_golden_groups(golden, target, name, border):
+    found = compile_program(small(border), target, "ieee", name)
+    golden(f"{name}.{found.source_name}", found.source)
+
+
+def test_a_compute_shader_says_what_it_is():
+    found = compile_program(small(), "opengl", "ieee", "compute4")
+    assert found.source_name == "denoise.comp"
+    assert found.manifest["language"] == "GLSL 4.30, compute shader"
+    assert found.manifest["files"].keys() == {"denoise.comp", "weights.bin"}
+    assert found.manifest["schedule"]["group"] == [16, 8]
+    # The tile of 16 * 4 + 1 columns and 8 + 1 rows holds an image's two channels at most.
+    assert found.manifest["schedule"]["shared_bytes"] == 4 * 65 * 9 * 2
+    assert "GLSL 4.30, compute shader. Generated" in found.source
+    assert compile_program(small(), "opengl").source_name == "denoise.frag"
+
+
+def wide(hidden, channels=(3,), size=1):
+    layers = [size * size * sum(channels), *hidden, 1]
+    network = siren.init(layers, 3.0, 3.0, seed=1, dtype=np.float32)
+    return gathered(lambda x: denoise_pixel(network, x), channels, size)
+
+
+@pytest.mark.parametrize(
+    ("program", "reason"),
+    [
+        (wide([200, 100]), r"two layers of 4 pixels are 1200 numbers, of at most 1024: no registers"),
+        (wide([120] * 12), r"it unrolls to \d+ products, of at most 32768: drivers take minutes"),
+        (wide([4], (4,), 33), r"its tile takes 61440 bytes that a group shares, of at most 32768"),
+        (SHARED, "a matrix is applied to the window and to a layer, which need it in two orders"),
+    ],
+)
+def test_what_a_group_does_not_hold_is_plain_with_the_reason(program, reason):
+    found = compile_program(program, "opencl", "ieee", "group4").manifest["schedule"]
+    assert found["name"] in ("plain", "group")
+    assert found["asked"] == "group4"
+    assert re.match(reason, found["reason"])
+    assert ("group" in found) == (found["name"] == "group")
+
+
+def test_an_exact_program_is_plain():
+    found = compile_program(small(), "opencl", "exact", "group4").manifest["schedule"]
+    assert (found["name"], found["asked"]) == ("plain", "group4")
+    assert found["reason"] == "the order of its sums is not pinned as profile exact states"
+
+
+@given(
+    channels=st.lists(st.integers(1, 9), min_size=1, max_size=3),
+    size=st.integers(1, 3),
+    hidden=st.integers(1, 30),
+)
+def test_groups_find_every_weight(channels, size, hidden):
+    """Read the array as the kernel's loops do: image, four channels, tap, channel."""
+    network = siren.init((size * size * sum(channels), hidden, 3), 3.0, 3.0, seed=1, dtype=np.float32)
+    program = gathered(lambda x: denoise_pixel(network, x), channels, size)
+    group = next(s for s in OPENCL_GROUPS if s.name == "group4")
+    packed, layout = group.pack(program), group.layout(program)
+    for name, slot in layout.items():
+        assert slot.offset % 4 == 0
+        array = program.parameters[name]
+        vectors = -(-array.shape[0] // 4)
+        if array.shape != network.weights[0].shape:
+            continue
+        read, at = np.zeros_like(array), slot.offset
+        for image, count in enumerate(channels):
+            for first in range(0, count, 4):
+                for tap in range(size * size):
+                    for c in range(first, min(first + 4, count)):
+                        column = tap * sum(channels) + sum(channels[:image]) + c
+                        read[:, column] = packed[at : at + array.shape[0]]
+                        at += 4 * vectors
+        assert np.array_equal(read, array)
 
 
 def test_golden_inlined(golden):
@@ -79,18 +170,12 @@ OPENCL_PLAIN = TARGETS["opencl"].schedules[0]
 
 
 def test_unknown_schedule_is_told_with_the_known_ones():
-    known = "plain, vector16, tile16, tile8, tile4, fft32"
+    known = "plain, vector16, tile16, tile8, tile4, fft32, group, group4"
     with pytest.raises(CompileError, match=f"schedule 'tile3' does not exist for this target; .*: {known}$"):
         compile_program(small(), "opencl", schedule="tile3")
     with pytest.raises(CompileError, match=r"schedule 'tile16' does not exist .*: plain"):
         compile_program(small(), "numpy", schedule="tile16")
 
-
-W = rounded(3, 3)
-"""A square matrix, which fits the window and a layer."""
-
-SHARED = gathered(lambda x: np.sin(x @ W.T) @ W.T)
-"""A program that applies one matrix to the window and to a layer."""
 
 REFUSED = {
     "component": (gathered(lambda x: x[..., 0] * 2.0), "%1 is component, which has no form on vectors"),

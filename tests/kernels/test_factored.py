@@ -46,6 +46,11 @@ def cases(draw):
     }
 
 
+ONE_IMAGE = ("compute", "compute4")
+"""Schedules that write four channels: a first pass with more is plain. Mesa compiles four layers of straight
+code in a minute, so that the paper's network is left out."""
+
+
 def images_of(channels, shape, seed=1):
     random = np.random.default_rng(seed)
     return {name: random.uniform(-2, 2, (*shape, n)).astype(np.float32) for name, n in channels.items()}
@@ -77,7 +82,9 @@ def test_error_is_within_both_bounds(executor_named, kit, target, schedule, case
     rank = min(case["rank"], TARGETS[target].most or case["rank"])
     artifact = compile_program(program, target, "ieee", schedule, rank)
     for kernel in artifact.kernels:
-        assert kernel.manifest["schedule"]["name"] == schedule
+        picked = kernel.manifest["schedule"]
+        several = schedule in ONE_IMAGE and picked.get("reason") == f"it writes {rank} channels, of at most 4"
+        assert picked["name"] == ("plain" if several else schedule)
     with pytest.MonkeyPatch.context() as patch:
         for name in ("LOCAL_SIZE", "TILE_LOCAL_SIZE"):
             patch.setattr(opencl_executor, name, group)
@@ -95,7 +102,7 @@ def paper_s(kit, border="clamp", rank=0):
 
 
 @pytest.mark.parametrize("border", dataset.BORDERS)
-@pytest.mark.parametrize(("target", "schedule"), WAYS)
+@pytest.mark.parametrize(("target", "schedule"), [way for way in WAYS if way[1] not in ONE_IMAGE])
 def test_the_paper_s_network_of_rank_16(executor_named, kit, target, schedule, border) -> None:
     """A model that was trained so loses nothing: its cut is as small as its own rounding to float32."""
     program = paper_s(kit, border, 16)

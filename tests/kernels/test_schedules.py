@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,8 +12,9 @@ from hypothesis import strategies as st
 from wamnet.compiler import emit_fourier
 from wamnet.compiler.compile import TARGETS, compile_program
 from wamnet.compiler.lower import lower
-from wamnet.kernels import denoise_on, opencl_executor
+from wamnet.kernels import denoise_on, opencl_executor, opengl_executor
 from wamnet.refimpl import dataset, denoise, frame
+from wamnet.refimpl.errors import CompileError
 
 EXAMPLES = max(settings.default.max_examples // 10, 1)
 """Each example compiles a kernel, up to a second: a tenth of what other tests draw."""
@@ -20,9 +23,16 @@ LADDER = [(t.name, s.name) for t in TARGETS.values() for s in t.schedules[1:]]
 """All schedules besides the plain ones, with their targets."""
 
 
-LARGEST = {"inlined": (3, 10), "fft32": (20, 32)}
-"""Largest window and layer by schedule: Mesa compiles two thousand weights a second; a tile's sums must fit
-the stack. The other schedules' layers may have more neurons than a block."""
+LARGEST = {"inlined": (3, 10), "compute": (6, 10), "compute4": (6, 10), "fft32": (20, 32)}
+"""Largest window and layer by schedule: Mesa compiles two thousand weights a second, and layers in straight
+code in a time that grows with the square; a tile's sums must fit the stack. The other schedules' layers may
+have more neurons than a block."""
+
+LARGEST_LAYERS = {"group": (12, 30), "group4": (12, 30)}
+"""The same of schedules that unroll layers on PoCL."""
+
+GROUPED = {s.name: s for t in TARGETS.values() for s in t.schedules if hasattr(s, "group")}
+"""The schedules whose groups share a tile."""
 
 
 @st.composite
@@ -63,15 +73,17 @@ def executor_of(executor_named, target):
 @settings(max_examples=EXAMPLES)
 @given(data=st.data(), group=st.tuples(st.integers(1, 5), st.integers(1, 4)))
 def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, group):
-    case = data.draw(cases(LARGEST.get(schedule, (12, 70))))
+    case = data.draw(cases({**LARGEST, **LARGEST_LAYERS}.get(schedule, (12, 70))))
     executor = executor_of(executor_named, target)
     network = kit.network(case["widths"], (9.0, 3.0), case["seed"])
     program = kit.denoiser(network, case["channels"], case["size"], case["border"])
-    artifact = compile_program(program, target, "ieee", schedule)
-    assert artifact.manifest["schedule"]["name"] == schedule
     with pytest.MonkeyPatch.context() as patch:
         for name in ("LOCAL_SIZE", "TILE_LOCAL_SIZE"):
             patch.setattr(opencl_executor, name, group)
+        if schedule in GROUPED:
+            patch.setattr(GROUPED[schedule], "group", group)
+        artifact = compile_program(program, target, "ieee", schedule)
+        assert artifact.manifest["schedule"]["name"] == schedule
         executor._built.clear()
         assert kit.excess(executor, program, images_of(case), artifact) <= 1
     executor._built.clear()
@@ -81,7 +93,8 @@ def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, 
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 def test_the_paper_s_network(executor_named, kit, target, schedule, border):
     size = LARGEST.get(schedule, (12,))[0]  # the paper's is 12
-    network = kit.network([6 * size * size, 32, 32, 32, 32, 3], (3.0, 3.0))
+    layers = [32] if schedule.startswith("compute") else [32, 32, 32, 32]
+    network = kit.network([6 * size * size, *layers, 3], (3.0, 3.0))
     program = kit.denoiser(network, {"color": 3, "normal": 3}, size, border)
     random = np.random.default_rng(5)
     images = {name: random.uniform(-1, 1, (13, 31, 3)).astype(np.float32) for name in ("color", "normal")}
@@ -189,6 +202,85 @@ def test_a_wrong_inlined_kernel_is_caught(executor_named, kit, fault):
     artifact = compile_program(program, "opengl", "ieee", "inlined")
     assert kit.excess(executor, program, images, artifact) <= 1
     assert kit.excess(executor, program, images, kit.with_source(artifact, *INLINED_FAULTS[fault])) > 1
+
+
+GROUP_FAULTS = {
+    "rows": ("clamp(tile_row, 0, height - 1)", "clamp(tile_row, 1, height - 1)"),
+    "columns": ("clamp(tile_column, 0, width - 1)", "clamp(tile_column, 1, width - 1)"),
+    "apron": ("i < PLANE; i +=", "i < PLANE - 1; i +="),
+    "tap": ("local_x + dx;", "local_x + (dx ^ 1);"),
+    "plane": ("x1_0 = tile[1 * PLANE", "x1_0 = tile[0 * PLANE"),
+    "weight": ("m = w[from + 3 + 1]", "m = w[from + 3 + 0]"),
+    "pixel": ("+ 1 * GROUP_WIDTH];", "+ 0 * GROUP_WIDTH];"),
+    "layer": ("v52_1_0 += m * v51_1_1.y", "v52_1_0 += m * v51_1_1.x"),
+}
+"""Pieces of a grouped kernel of four pixels, and what makes it wrong; none leaves an array."""
+
+
+@pytest.mark.parametrize("fault", GROUP_FAULTS)
+@pytest.mark.parametrize(("target", "schedule"), [("opencl", "group4"), ("opengl", "compute4")])
+def test_a_wrong_group_is_caught(executor_named, kit, target, schedule, fault):
+    executor = executor_of(executor_named, target)
+    program = kit.denoiser(kit.network([48, 9, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
+    images = {"a": np.random.default_rng(8).uniform(-2, 2, (9, 69, 3)).astype(np.float32)}
+    artifact = compile_program(program, target, "ieee", schedule)
+    assert kit.excess(executor, program, images, artifact) <= 1
+    assert kit.excess(executor, program, images, kit.with_source(artifact, *GROUP_FAULTS[fault])) > 1
+
+
+def test_no_barrier_is_a_race_that_groups_do_not_have(kit):
+    """The tile is read only between two barriers: after it was filled, and before it is filled again."""
+    program = compile_program(paper(kit), "opencl", "ieee", "group4")
+    statements = [line.strip() for line in program.source.splitlines()]
+    steps = [s for s in statements if s.startswith(("barrier(", "tile[")) or "= tile[" in s]
+    kinds = [
+        "wait" if s.startswith("barrier(") else "write" if s.startswith("tile[") else "read" for s in steps
+    ]
+    order = [kind for number, kind in enumerate(kinds) if number == 0 or kinds[number - 1] != kind]
+    assert order == ["wait", "write", "wait", "read"] * 2
+
+
+def paper(kit):
+    """Return the paper's network."""
+    network = kit.network([864, 32, 32, 32, 32, 3], (3.0, 3.0))
+    return kit.denoiser(network, {"color": 3, "normal": 3}, 12, "clamp")
+
+
+def test_a_group_that_a_device_does_not_hold(executor_named, kit, monkeypatch):
+    executor = executor_named("opencl")
+    artifact = compile_program(
+        kit.denoiser(kit.network([3, 2], (3.0, 3.0)), {"a": 3}, 1, "clamp"), "opencl", "ieee", "group4"
+    )
+    monkeypatch.setattr(opencl_executor, "STACK_BYTES", 1000)
+    executor._built.clear()
+    with pytest.raises(
+        CompileError,
+        match=r"schedule group4 needs groups of \d+ bytes of variables, on a proc.* at most 1000",
+    ):
+        executor.build(artifact)
+    large = replace(
+        artifact,
+        manifest={**artifact.manifest, "schedule": {**artifact.manifest["schedule"], "group": [2**20, 1]}},
+    )
+    with pytest.raises(
+        CompileError,
+        match=r"needs groups of 1048576 items, and at most \d+ are to be had; use schedule plain",
+    ):
+        executor.build(large)
+
+
+def test_no_compute_shader_before_opengl_4_3(executor_named, kit, monkeypatch):
+    executor = executor_named("opengl-egl")
+    artifact = compile_program(
+        kit.denoiser(kit.network([3, 2], (3.0, 3.0)), {"a": 3}, 1, "clamp"), "opengl", "ieee", "compute"
+    )
+    monkeypatch.setattr(opengl_executor, "SHADER_VERSION", 460)
+    executor._built.clear()
+    with pytest.raises(
+        CompileError,
+        match=r"has OpenGL 4\.5: schedule compute is a compute shader, which OpenGL 4\.6 has; use",
+    ):
+        executor.build(artifact)
 
 
 def test_the_time_of_a_kernel_alone(executor_named, kit):

@@ -1,0 +1,113 @@
+"""`wamnet tune`: measure a denoiser's schedules on this machine, and remember the fastest."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..refimpl.errors import InputError
+from . import options
+from .inputs import load_model
+from .options import ExecutorName
+from .terminal import say, table
+
+if TYPE_CHECKING:
+    from ..kernels.tune import Table
+    from ..refimpl.denoise import Model
+
+EXAMPLES = """Examples:
+
+wamnet tune
+
+wamnet tune model.safetensors --executor opengl --size 512 --force"""
+"""Shown below the help of `wamnet tune`."""
+
+LARGEST_SIZE = 2**13
+"""Largest width and height that is measured: a picture of 64 million pixels takes gigabytes."""
+
+PAPER_WINDOW, PAPER_LAYERS, PAPER_OMEGA = 12, (32, 32, 32, 32, 3), 3.0
+"""The paper's network, where no model is given."""
+
+MANY = 1000
+"""Pictures of an animation, for which a long compilation may pay."""
+
+
+def tune(
+    model: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="MODEL", help="Trained model (.safetensors).", show_default="a network like the paper's"
+        ),
+    ] = None,
+    executor: options.Executor = ExecutorName.opencl,
+    size: Annotated[int, typer.Option(help="Width and height of the picture, in pixels.")] = 512,
+    rank: options.CutRank = 0,
+    force: Annotated[bool, typer.Option("--force", help="Measure again what is known.")] = False,
+    cache: Annotated[
+        Path | None,
+        typer.Option(
+            "--cache",
+            metavar="DIR",
+            help="Folder for what is measured; other commands look there if WAMNET_CACHE names it.",
+            show_default="~/.cache/wamnet",
+        ),
+    ] = None,
+) -> None:
+    """Measure which schedule of the denoiser is fastest here, and remember it.
+
+    Every schedule that the device holds is checked against the reference, then timed. Other commands take the
+    fastest for networks of this shape and pictures of about this size.
+    """
+    from ..kernels import open_executor
+    from ..kernels import tune as tuning
+
+    if not 1 <= size <= LARGEST_SIZE:
+        raise InputError("--size", size, f"it must be from 1 to {LARGEST_SIZE}", "for example --size 512")
+    if cache is not None:
+        os.environ["WAMNET_CACHE"] = str(cache)
+    network = load_model(model) if model else paper()
+    square = (size, size)
+    with open_executor(executor.value) as runner:
+        known = None if force else tuning.remembered(runner, network, square, rank=rank)
+        found = known or tuning.tune(runner, network, square, rank=rank)
+        picks = {n: tuning.choose(runner, network, square, rank=rank, pictures=n) for n in (1, MANY)}
+    show(found)
+    if known:
+        say(f"measured on {found.day}; --force measures again")
+    for count, pick in picks.items():
+        say(f"for {count} picture{'s' if count > 1 else ''}: {pick.schedule}; {pick.reason}")
+
+
+def paper() -> Model:
+    """Return a network of the paper's shape, untrained: times do not depend on weights."""
+    import numpy as np
+
+    from ..refimpl import siren
+    from ..refimpl.dataset import Normalization, Window
+    from ..refimpl.denoise import Model
+
+    widths = (PAPER_WINDOW**2 * 6, *PAPER_LAYERS)
+    network = siren.init(widths, PAPER_OMEGA, PAPER_OMEGA, 1, np.float32)
+    return Model(network, ("color", "normal"), Window(PAPER_WINDOW, "clamp"), Normalization(), {})
+
+
+def show(found: Table) -> None:
+    """Print what was measured, the fastest first."""
+    rows = sorted(found.rows, key=lambda row: float("inf") if row.ms is None else row.ms)
+    texts = [
+        (
+            row.schedule,
+            "" if row.ms is None else f"{row.ms:.3g}",
+            f"{row.first_s:.2f}" if row.first_s else "",
+            f"{row.again_s:.2f}" if row.again_s else "",
+            row.note,
+        )
+        for row in rows
+    ]
+    height, width = found.size
+    heads = ("schedule", "ms", "s to compile", "s again", "why it was not timed")
+    say(f"{found.device}, {width}x{height}, {found.network}")
+    table("Schedules", heads, texts, texts=len(heads))

@@ -1,0 +1,322 @@
+"""The grouped schedule, for graphics processors: a work group shares a tile of the image, an item its pixels.
+
+1. The image is cut into tiles: a group of `width` x `height` items computes as many pixels, times `pixels`
+   along the row. Item and pixel p are `p * width` columns apart, so that neighbours in a group read and write
+   neighbours in memory at every step.
+2. All that the group's windows touch, at most [`MOST_CHANNELS`] channels of one image at a time, is loaded
+   once into memory that the group shares, channel by channel, under the border rule [`GroupBody._load`]; the
+   loops over taps know no border.
+3. The numbers of a layer are variables of four, one set a pixel: the emitter writes every statement out, no
+   array is indexed by a variable, so that a compiler can keep all of them in registers
+   [`LARGEST_NUMBERS`, `LARGEST_STATEMENTS`]. Only the loop over taps is a loop.
+4. A weight is read once by an item for all its pixels, four neurons at a time, and all items of a group read
+   the same one at the same moment: it is broadcast.
+5. Elementwise operations are functions on four numbers.
+
+No item ends before the others: those beyond the image's edge load, wait, compute, and store nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .dialect import Dialect
+from .emit import kernel_gather
+from .emit_inlined import InlinedBody
+from .emit_tiled import Tiled, refused_by_vectors
+from .ir import Gather, Image, Node, Program
+from .schedules import PLAIN
+
+MOST_CHANNELS = 4
+"""Most channels of a tile: one of 64 x 8 pixels for windows of 12 x 12 then takes 23 KB, of the 32 KB that
+OpenCL 1.2 (CL_DEVICE_LOCAL_MEM_SIZE) and OpenGL 4.3 (MAX_COMPUTE_SHARED_MEMORY_SIZE) promise."""
+
+LARGEST_SHARED = 2**15
+"""Most bytes of a tile: what both standards promise."""
+
+LARGEST_NUMBERS = 1024
+"""Most numbers of a layer and the one before it, over an item's pixels: four times the registers that an item
+has on graphics processors; beyond, a compiler spills more than it keeps."""
+
+LARGEST_STATEMENTS = 2**15
+"""Most products of four in straight code: more take drivers minutes to compile."""
+
+ORDER = (
+    "vectors filled up to multiples of 4 with zeros; matrices D_in x neurons; the rows of one that reads the "
+    f"window go image by image, at most {MOST_CHANNELS} channels at a time, then tap by tap in rows, then "
+    "channel by channel"
+)
+"""The order of the weights, in words."""
+
+
+class GroupDialect(Dialect):
+    """What a language says besides: its vectors of four, how to `wait` for the group, how a pixel is read.
+
+    `stored`: statements before and after those that store a pixel's numbers.
+    """
+
+    kind: str
+    wait: str
+    literal_zero: str
+    pixel_at: str
+    stored: tuple[tuple[str, ...], tuple[str, ...]]
+
+
+class Grouped(Tiled):
+    """A tile for each group of items `group` (x, y), `pixels` of a row for each item."""
+
+    order = ORDER
+
+    def __init__(
+        self,
+        name: str,
+        idea: str,
+        dialect: GroupDialect,
+        pixels: int,
+        group: tuple[int, int] = (16, 8),
+        instead: str = PLAIN,
+    ) -> None:
+        super().__init__(name, idea, dialect, lanes=4, pixels=pixels, vectors=LARGEST_NUMBERS)
+        self.words, self.group, self.instead = dialect, group, instead
+        self.arguments = self.arguments.replace("{group}", f"{group[0]} x {group[1]}")
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        if program.exact:
+            return "the order of its sums is not pinned as profile exact states"
+        if reason := refused_by_vectors(program, self.dialect) or self._shared_matrix(program):
+            return reason
+        gather = kernel_gather(program)
+        if gather.joined or any(image.channels > MOST_CHANNELS for image in gather.images):
+            return f"a tile holds {MOST_CHANNELS} channels at once, and one row of taps is one partial sum"
+        if (numbers := self._numbers(program)) > LARGEST_NUMBERS:
+            return (
+                f"two layers of {self.pixels} pixels are {numbers} numbers, of at most {LARGEST_NUMBERS}: "
+                "no registers hold them"
+            )
+        if (count := self._statements(program)) > LARGEST_STATEMENTS:
+            return f"it unrolls to {count} products, of at most {LARGEST_STATEMENTS}: drivers take minutes"
+        if (shared := self.shared_bytes(program)) > LARGEST_SHARED:
+            return f"its tile takes {shared} bytes that a group shares, of at most {LARGEST_SHARED}"
+        return ""
+
+    def shared_bytes(self, program: Program) -> int:
+        """Return the bytes of the tile."""
+        gather = kernel_gather(program)
+        width = self.group[0] * self.pixels + gather.columns - 1
+        channels = max(last - first for _, first, last in chunks(gather))
+        return 4 * width * (self.group[1] + gather.rows - 1) * channels
+
+    def private_bytes(self, program: Program) -> int:
+        """Return the bytes of an item's variables that live from one statement to another."""
+        body = self._body(program)
+        return sum(16 * self.pixels * body.vectors(i) for i in body.group_of if body.declares(i))
+
+    def details(self, program: Program) -> Mapping[str, Any]:
+        """Return the size of a group and what it shares."""
+        return {"group": list(self.group), "shared_bytes": self.shared_bytes(program)}
+
+    def _numbers(self, program: Program) -> int:
+        """Return the numbers of the widest two layers that meet in an affine map, over all pixels."""
+        pairs = [(node, program.nodes[node.args[0]]) for node in program.nodes if node.op == "affine"]
+        sizes = [n.type.shape[0] + (0 if s.op == "input" else s.type.shape[0]) for n, s in pairs]
+        return self.pixels * max(sizes, default=0)
+
+    def _statements(self, program: Program) -> int:
+        """Return the products of four that stand in straight code, over all pixels."""
+        affine = [node for node in program.nodes if node.op == "affine"]
+        rows = [
+            max(image.channels for image in kernel_gather(program).images)
+            if program.nodes[node.args[0]].op == "input"
+            else program.nodes[node.args[0]].type.shape[0]
+            for node in affine
+        ]
+        return sum(self.pixels * n * -(-a.type.shape[0] // 4) for a, n in zip(affine, rows, strict=True))
+
+    def _window_rows(self, gather: Gather) -> NDArray[np.intp]:
+        """Return the window's indices (n_inputs,) in the order of the loops."""
+        starts = dict(zip((i.name for i in gather.images), _starts(gather), strict=True))
+        taps = np.arange(gather.rows * gather.columns)[:, None] * gather.channels
+        pieces = [
+            (taps + starts[image.name] + np.arange(first, last)).ravel()
+            for image, first, last in chunks(gather)
+        ]
+        return np.concatenate(pieces)
+
+    def _body(self, program: Program) -> GroupBody:
+        """Return the writer of the kernel's statements."""
+        return GroupBody(program, self.dialect, kernel_gather(program), grouped=self)
+
+
+def chunks(gather: Gather) -> Iterator[tuple[Image, int, int]]:
+    """Yield each image with the first channel, and the one after the last, of what a tile holds of it."""
+    for image in gather.images:
+        for first in range(0, image.channels, MOST_CHANNELS):
+            yield image, first, min(first + MOST_CHANNELS, image.channels)
+
+
+def _starts(gather: Gather) -> list[int]:
+    """Return the place of each image's first channel in a tap."""
+    return [0, *np.cumsum([image.channels for image in gather.images])[:-1].tolist()]
+
+
+@dataclass
+class GroupBody(InlinedBody):
+    """The statements of a grouped kernel; functions of elementwise groups stand before it."""
+
+    grouped: Grouped = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.words = self.grouped.words
+        self.slots = self.grouped.layout(self.program)
+
+    def defines(self) -> list[str]:
+        """Return the sizes of group and tile, and the functions of elementwise groups."""
+        grouped, names = self.grouped, self.sides
+        channels = max(last - first for _, first, last in chunks(self.gather))
+        self.functions = [
+            line
+            for group in self.groups
+            if self.program.nodes[group[0]].op not in ("input", "affine")
+            for result in self._results(group)
+            for line in self._function_of(group, result)
+        ]
+        return [
+            f"#define GROUP_WIDTH {grouped.group[0]} /* items of a group along a row */",
+            f"#define GROUP_HEIGHT {grouped.group[1]}",
+            f"#define PIXELS {grouped.pixels} /* pixels of an item, GROUP_WIDTH columns apart */",
+            f"#define TILE_WIDTH (GROUP_WIDTH * PIXELS + {names.columns} - 1) /* all that windows touch */",
+            f"#define TILE_HEIGHT (GROUP_HEIGHT + {names.rows} - 1)",
+            "#define PLANE (TILE_WIDTH * TILE_HEIGHT) /* numbers of a channel */",
+            f"#define TILE_NUMBERS (PLANE * {channels})",
+            *self.functions,
+        ]
+
+    def _function_of(self, group: tuple[int, ...], result: int) -> list[str]:
+        """Return the function that computes one value of a group from other groups' vectors."""
+        kind = self.words.kind
+        read = [f"{kind} {self._element(index, '')}" for index in self._operands(group)]
+        lines = [f"{kind} elementwise_{result}({', '.join(read)})", "{"]
+        for index in group:
+            if index <= result:
+                variable = self.dialect.variable(self.program.nodes[index].type.dtype)
+                lines.append(f"    {variable} t{index} = {self._expression(index, '')};")
+        return [*lines, f"    return t{result};", "}"]
+
+    def _elementwise(self, group: tuple[int, ...]) -> None:
+        """Write the calls of a group's functions, one for each pixel and vector."""
+        span = f"%{group[0]}" if len(group) == 1 else f"%{group[0]} to %{group[-1]}"
+        self._comment(f"{span}: elementwise on {self.program.nodes[group[0]].type.shape[0]} numbers")
+        for result in self._results(group):
+            for p, vector in self._places(group[0]):
+                operands = [self._at(index, p, vector) for index in self._operands(group)]
+                name = f"v{result}_{p}_{vector}"
+                self._line(f"{self.words.kind} {name} = elementwise_{result}({', '.join(operands)});")
+
+    def _places(self, index: int) -> list[tuple[int, int]]:
+        """Return all (pixel, vector) of a value."""
+        return [(p, j) for p in range(self.grouped.pixels) for j in range(self.vectors(index))]
+
+    def _at(self, index: int, p: int, vector: int) -> str:
+        """Return the text of four numbers of a value at a pixel."""
+        node = self.program.nodes[index]
+        if node.op == "parameter":
+            return self._numbers_at(str(node["name"]), vector)
+        return f"v{index}_{p}_{vector}"
+
+    def _numbers_at(self, name: str, vector: int) -> str:
+        """Return the text of four numbers of a parameter that is a vector."""
+        return f"w[{self.slots[name].offset // 4 + vector}]"
+
+    def _affine(self, index: int, node: Node) -> None:
+        """Write v = W x + b for all pixels."""
+        weight, source = self.slots[str(node["weight"])], self.program.nodes[node.args[0]]
+        n_in, bias = weight.shape[1], node.get("bias")
+        self._comment(f"%{index}: affine map {node['weight']} from {n_in} to {node.type.shape[0]}")
+        for p, j in self._places(index):
+            start = self._numbers_at(str(bias), j) if bias else self.words.literal_zero
+            self._line(f"{self.words.kind} v{index}_{p}_{j} = {start};")
+        first = weight.offset // 4
+        if source.op == "input":
+            for image, begin, end in chunks(self.gather):
+                self._load(image, begin, end)
+                self._products_of_taps(index, first, end - begin)
+                first += self.gather.rows * self.gather.columns * (end - begin) * self.vectors(index)
+            return
+        for i in range(n_in):
+            values = [f"v{node.args[0]}_{p}_{i // 4}.{'xyzw'[i % 4]}" for p in range(self.grouped.pixels)]
+            self._multiply_by(index, str(first + i * self.vectors(index)), values)
+
+    def _prepare(self) -> None:
+        """Write where the tile begins."""
+        self._line(f"int left = x - local_x - {self.sides.column};")
+        self._line(f"int top = y - local_y - {self.sides.row};")
+
+    def _load(self, image: Image, begin: int, end: int) -> None:
+        """Write the copy of channels [begin, end) of what the group's windows touch, by all its items."""
+        border = self.gather.window.border
+        self._line(self.words.wait)
+        self._open("for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {")
+        self._line("int tile_row = top + i / TILE_WIDTH;")
+        self._line("int tile_column = left + i % TILE_WIDTH;")
+        self._line("int row = clamp(tile_row, 0, height - 1);")
+        self._line("int column = clamp(tile_column, 0, width - 1);")
+        if border == "zero":
+            self._line("bool inside = row == tile_row && column == tile_column;")
+        for c in range(begin, end):
+            pixel = self.words.pixel_at.format(image=image.name, channels=image.channels, c=c)
+            value = {"clamp": pixel, "zero": f"inside ? {pixel} : 0.0f"}[border]
+            self._line(f"tile[{c - begin} * PLANE + i] = {value};")
+        self._close()
+        self._line(self.words.wait)
+
+    def _products_of_taps(self, index: int, first: int, channels: int) -> None:
+        """Write the products of the tile's taps with the weights from vector `first` on."""
+        step, places = channels * self.vectors(index), self._places(index)
+        self._open(f"for (int dy = 0; dy < {self.sides.rows}; ++dy) {{")
+        # A partial sum for each row of taps [sums.py].
+        for p, j in places:
+            self._line(f"{self.words.kind} part_{p}_{j} = {self.words.literal_zero};")
+        self._open(f"for (int dx = 0; dx < {self.sides.columns}; ++dx) {{")
+        self._line("int at = (local_y + dy) * TILE_WIDTH + local_x + dx;")
+        self._line(f"int from = {first} + (dy * {self.sides.columns} + dx) * {step};")
+        for c in range(channels):
+            names = [f"x{c}_{p}" for p in range(self.grouped.pixels)]
+            for p, name in enumerate(names):
+                self._line(f"float {name} = tile[{c} * PLANE + at + {p} * GROUP_WIDTH];")
+            self._multiply_by(index, f"from + {c * self.vectors(index)}", names, "part")
+        self._close()
+        for p, j in places:
+            self._line(f"v{index}_{p}_{j} += part_{p}_{j};")
+        self._close()
+
+    def _multiply_by(self, index: int, first: str, values: Sequence[str], sums_of: str = "") -> None:
+        """Write the additions of a row of weights times each pixel's value, each weight read once."""
+        name = sums_of or f"v{index}"
+        for j in range(self.vectors(index)):
+            sums = " ".join(f"{name}_{p}_{j} += m * {value};" for p, value in enumerate(values))
+            self._line(f"{{ {self.words.kind} m = w[{first} + {j}]; {sums} }}")
+
+    def _outputs(self) -> None:
+        """Write the only output of each pixel that lies in the image."""
+        name, index = self.program.outputs[0]
+        channels = self.program.nodes[index].type.shape[0]
+        self._comment(f"output {name}")
+        for p in range(self.grouped.pixels):
+            self._open(f"if (x + {p} * GROUP_WIDTH < width && y < height) {{")
+            for line in self._stores(index, p, channels):
+                self._line(line)
+            self._close()
+
+    def _stores(self, index: int, p: int, channels: int) -> list[str]:
+        """Return the statements that write one pixel: its numbers one by one."""
+        store, (before, after) = self.dialect.store, self.words.stored
+        values = [f"v{index}_{p}_{i // 4}.{'xyzw'[i % 4]}" for i in range(channels)]
+        lines = [store.format(p=p, channels=channels, i=i, value=value) for i, value in enumerate(values)]
+        return [*before, *lines, *(line.format(p=p) for line in after)]

@@ -1,0 +1,201 @@
+"""The autotuner: what it times, what it leaves out and says, and when its table is taken."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.compiler.compile import TARGETS
+from wamnet.kernels import Pipeline, cache, denoise_on, tune
+from wamnet.kernels.tune import Row, Table, choose
+from wamnet.refimpl import dataset, denoise, frame, siren
+from wamnet.refimpl.scenes import canonical
+
+SIZE = (12, 20)
+"""Height and width of the pictures."""
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv(cache.FOLDER_VARIABLE, str(tmp_path / "cache"))
+
+
+def model(hidden=(8,), window=3):
+    network = siren.init((window * window * 6, *hidden, 3), 3.0, 3.0, 1, np.float32)
+    return denoise.Model(network, ("color", "normal"), dataset.Window(window), dataset.Normalization())
+
+
+def keep(executor, table, **where):
+    """Put a table into the cache as if it had been measured."""
+    found = {"device": "d", "network": "n", "size": list(SIZE), "day": "2026-01-02", "rows": table}
+    asked = {"profile": "ieee", "rank": 0, **where}
+    assert cache.write_json(tune._entry(executor, model(), SIZE, **asked), found)
+
+
+def row(schedule, ms, again_s=0.1):
+    return {"schedule": schedule, "ms": ms, "first_s": 1.0, "again_s": again_s, "note": ""}
+
+
+def test_every_schedule_is_checked_and_the_fastest_is_taken(executor_named):
+    executor = executor_named("opencl")
+    table = tune.tune(executor, model(), SIZE, repeats=1)
+    assert {r.schedule for r in table.rows} == {s.name for s in TARGETS["opencl"].schedules}
+    assert all((r.ms is None) == bool(r.note) for r in table.rows)
+    assert all(r.again_s > 0 for r in table.rows if r.ms is not None)
+    assert table.network == "54-8-3, color + normal, window 3 (clamp)"
+    assert tune.remembered(executor, model(), SIZE) == table
+    best = min((r for r in table.rows if r.ms is not None), key=lambda r: r.ms)
+    found = choose(executor, model(), SIZE, pictures=10**9)
+    assert found.schedule == best.schedule
+    assert found.reason.startswith(f"tuned on this device on {table.day}: {best.ms:.3g} ms at 20x12, ")
+
+
+@pytest.mark.parametrize("name", ["opencl", "opengl-egl"])
+def test_a_rank_is_tuned_by_itself(executor_named, name):
+    """A compute shader's first pass is a fragment shader where it writes more than four channels."""
+    executor = executor_named(name)
+    rank = {"opencl": 2, "opengl-egl": 6}[name]
+    table = tune.tune(executor, model(), SIZE, rank=rank, repeats=1)
+    assert not [r for r in table.rows if "wrong" in r.note]
+    assert choose(executor, model(), SIZE, rank=rank).reason.startswith("tuned on")
+    assert choose(executor, model(), SIZE).reason.startswith("built-in choice for ")
+
+
+@pytest.mark.parametrize("fault", [lambda image: image + 0.01, lambda image: image * np.nan])
+def test_a_schedule_with_a_wrong_result_is_not_timed(executor_named, monkeypatch, fault):
+    executor = executor_named("opencl")
+    run = executor.run
+    wrong = lambda artifact, images: fault(run(artifact, images))  # noqa: E731
+    chosen = lambda artifact, images: (  # noqa: E731
+        wrong if artifact.manifest["schedule"]["name"] == "tile16" else run
+    )(artifact, images)
+    monkeypatch.setattr(executor, "run", chosen)
+    table = tune.tune(executor, model(), SIZE, repeats=1)
+    (bad,) = [r for r in table.rows if r.schedule == "tile16"]
+    assert bad.ms is None
+    assert bad.note.startswith("its result is wrong on this device: ")
+    assert choose(executor, model(), SIZE).schedule != "tile16"
+
+
+def test_what_does_not_hold_the_program_says_why(executor_named, monkeypatch):
+    monkeypatch.setattr("wamnet.compiler.emit_group.LARGEST_NUMBERS", 30)
+    table = tune.tune(executor_named("opencl"), model((8, 8), 1), SIZE, repeats=1)
+    notes = {r.schedule: r.note for r in table.rows}
+    assert notes["group4"].startswith("two layers of 4 pixels are 64 numbers, of at most 30")
+    assert "numbers" not in notes["group"]
+
+
+def test_weights_in_the_source_are_compiled_for_each_model(executor_named):
+    table = tune.tune(executor_named("opengl-egl"), model((), 1), SIZE, repeats=1)
+    (inlined,) = [r for r in table.rows if r.schedule == "inlined"]
+    assert inlined.again_s == inlined.first_s
+    assert {r.schedule for r in table.rows} == {"plain", "inlined", "compute", "compute4"}
+    assert not [r for r in table.rows if "wrong" in r.note]
+
+
+def test_compilation_counts_for_few_pictures():
+    rows = (Row("a", 100.0, 9.0, 0.5), Row("b", 50.0, 9.0, 20.0), Row("c", note="none"))
+    table = Table("d", "n", SIZE, "2026-01-02", rows)
+    assert [table.best(n).schedule for n in (1, 389, 391)] == ["a", "a", "b"]
+    assert replace(table, rows=rows[2:]).best(1) is None
+
+
+def test_without_a_table_the_choice_is_built_in(executor):
+    found = choose(executor, model(), SIZE)
+    assert found.schedule == executor.schedule_for(SIZE)
+    assert found.reason == executor.schedule_reason
+    assert found.reason.startswith("built-in choice" if executor.name != "numpy" else "the only one")
+
+
+CHANGES = {
+    "device": lambda executor, patch: patch.setattr(executor, "device", "another"),
+    "driver": lambda executor, patch: patch.setattr(executor, "driver", "4.7"),
+    "cores": lambda executor, patch: patch.setattr("os.sched_getaffinity", lambda _: range(99)),
+    "compiler": lambda executor, patch: patch.setattr(tune, "schedules_version", lambda: "another"),
+}
+"""What makes a table useless."""
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_table_of_another_machine_is_not_taken(executor_named, monkeypatch, change):
+    executor = executor_named("opencl")
+    keep(executor, [row("plain", 1.0)])
+    assert choose(executor, model(), SIZE).schedule == "plain"
+    CHANGES[change](executor, monkeypatch)
+    assert choose(executor, model(), SIZE).reason.startswith("built-in")
+
+
+def test_a_table_of_another_network_or_size_is_not_taken(executor_named):
+    executor = executor_named("opencl")
+    keep(executor, [row("plain", 1.0)])
+    assert choose(executor, model(), (16, 16)).schedule == "plain"  # 240 and 256 pixels: 2^7 to 2^8
+    zero = replace(model(), window=dataset.Window(3, "zero"))
+    albedo = replace(model(), features=("color", "albedo"))
+    cases = [(model((9,)), SIZE), (zero, SIZE), (albedo, SIZE), (model(), (13, 20)), (model(), (12, 10))]
+    for other, size in cases:
+        assert choose(executor, other, size).reason.startswith("built-in")
+    assert choose(executor, model(), SIZE, "native").reason.startswith("built-in")
+
+
+@given(height=st.integers(1, 5000), width=st.integers(1, 5000))
+def test_size_classes_are_powers_of_two(height, width):
+    k = tune.size_class((height, width))
+    assert 2**k / 2 < height * width <= 2**k
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {"rows": 3},
+        [],
+        {"rows": [{"schedule": "plain", "color": 1}], "size": [1, 1], "device": "", "network": "", "day": ""},
+        {"rows": [row("tile99", 1.0)], "size": [1, 1], "device": "", "network": "", "day": ""},
+        {"rows": [row("plain", 1.0)], "size": [1], "device": "", "network": "", "day": ""},
+    ],
+)
+def test_an_entry_that_is_no_table_is_none(executor_named, data):
+    executor = executor_named("opencl")
+    cache.write_json(tune._entry(executor, model(), SIZE, "ieee", 0), data)
+    assert choose(executor, model(), SIZE).reason.startswith("built-in")
+
+
+def test_a_damaged_table_is_measured_anew(executor_named, caplog):
+    executor = executor_named("opencl")
+    keep(executor, [row("plain", 1.0)])
+    (path,) = cache.folder().iterdir()
+    path.write_text(path.read_text().replace("plain", "tile4"))
+    assert choose(executor, model(), SIZE).reason.startswith("built-in")
+    assert "is damaged, or no entry of wamnet: it is ignored" in caplog.text
+    table = tune.tune(executor, model(), SIZE, repeats=1)
+    assert tune.remembered(executor, model(), SIZE) == table
+
+
+def test_pictures_are_made_with_the_schedule_of_the_table(executor_named):
+    executor = executor_named("opencl")
+    keep(executor, [row("vector16", 5.0, 1.0), row("tile4", 6.0, 0.1)])
+    noisy = frame.Frame({name: np.zeros((*SIZE, 3), np.float32) for name in ("color", "normal")})
+    one = denoise_on(executor, model(), noisy)
+    assert one.schedule.startswith("tile4: ")
+    assert one.reason == "tuned on this device on 2026-01-02: 6 ms at 20x12, 0.1 s to build"
+    assert denoise_on(executor, model(), noisy, pictures=1000).schedule.startswith("vector16: ")
+    asked = denoise_on(executor, model(), noisy, schedule="plain")
+    assert asked.schedule.startswith("plain: ")
+    assert asked.reason == "as asked"
+    for pictures, name in ((1, "tile4"), (1000, "vector16")):
+        with Pipeline(executor, canonical("lone_light"), model(), SIZE, pictures=pictures) as pipeline:
+            assert pipeline.denoise.manifest["schedule"]["name"] == name
+
+
+def test_the_first_compilation_is_remembered(executor_named, monkeypatch):
+    executor = executor_named("numpy")
+    assert tune.first_time(executor, "a", 2.5) == 2.5
+    assert tune.first_time(executor, "a", 0.5) == 2.5
+    monkeypatch.setattr(tune, "FIRSTS", 2)
+    assert [tune.first_time(executor, name, 1.0) for name in "bc"] == [1.0, 1.0]
+    assert tune.first_time(executor, "a", 0.25) == 0.25, "the oldest was forgotten"
+    monkeypatch.setattr(executor, "driver", "another")
+    assert tune.first_time(executor, "c", 4.0) == 4.0

@@ -9,7 +9,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import shlex
@@ -114,7 +113,7 @@ def triage(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )
     compiled = kept_kernel(kernel, network, profile) if kernel else compile_program
-    task = Task(network, noisy, images_of(network, noisy), profile, schedules, compiled)
+    task = Task(network, noisy, images_of(network, noisy), profile, schedules, compiled, bool(kernel))
     with ExitStack() as opened:
         runners = open_runners(executor or [], opened)
         verdicts = _judged(task, runners)
@@ -129,7 +128,10 @@ def triage(
 
 @dataclass(frozen=True)
 class Task:
-    """What is asked for: a model on a frame, whose encoded images are `images`, and how."""
+    """What is asked for: a model on a frame, whose encoded images are `images`, and how.
+
+    `kept`: `compiled` has the files of a kept kernel in it.
+    """
 
     model: Model
     frame: Frame
@@ -137,6 +139,7 @@ class Task:
     profile: str
     schedules: str
     compiled: Compile
+    kept: bool
 
 
 def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Runner]:
@@ -194,6 +197,8 @@ def _concluded(task: Task, verdicts: Sequence[Verdict]) -> Reduced | None:
     say(f"smallest part that shows it: {found.box.text}{again}")
     for stage in found.stages:
         say(stage.text)
+    if task.kept:
+        say("stages are compiled anew: the kept kernel's files have none")
     return found
 
 
@@ -376,8 +381,10 @@ def kept_kernel(folder: Path, model: Model, profile: str) -> Compile:
             return made
         source = (folder / made.source_name).read_text(encoding="utf-8")
         raw = (folder / artifact.WEIGHTS_NAME).read_bytes()
-        digest = hashlib.sha256(source.encode() + raw).hexdigest()
         weights = np.frombuffer(raw, "<f4").astype(np.float32)
-        return replace(made, source=source, weights=weights, manifest={**made.manifest, "digest": digest})
+        own = {made.source_name: ir.sha256(source.encode()), artifact.WEIGHTS_NAME: ir.sha256(raw)}
+        files = {**made.manifest["files"], **own}
+        manifest = {**made.manifest, "digest": ir.sha256(source.encode(), raw), "files": files}
+        return replace(made, source=source, weights=weights, manifest=manifest)
 
     return compiled

@@ -99,7 +99,7 @@ def test_the_odd_one_out_is_kept(wamnet, here, fault) -> None:
     assert not list(here.glob(".wamnet-*"))
 
 
-def test_the_kept_command_repeats_it(wamnet, here, fault, monkeypatch) -> None:
+def test_the_kept_command_repeats_it(wamnet, here, fault, monkeypatch, capsys) -> None:
     """With the kept kernel also when the compiler is mended; without it no longer."""
     assert wamnet("triage", "model.safetensors", "noisy.exr", *TWO, "-o", "odd").status == 1
     fault()
@@ -110,6 +110,10 @@ def test_the_kept_command_repeats_it(wamnet, here, fault, monkeypatch) -> None:
     again = json.loads((here / "odd/triage/report.json").read_text())
     assert (again["part"]["height"], again["part"]["width"]) == (6, 5)
     assert again["verdicts"][0]["pixel"] == [5, 4]
+    assert "stages are compiled anew" in capsys.readouterr().out
+    kernel = here / "odd/triage/opencl-plain"
+    files = json.loads((kernel / "manifest.json").read_text())["files"]
+    assert files["denoise.cl"] == sha256((kernel / "denoise.cl").read_bytes())
     shutil.rmtree(here / "odd/triage")
     assert main(shlex.split(commands[1])) == 0
     # A kernel that somebody mends by hand is run as it is.

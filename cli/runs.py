@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..compiler.schedules import PLAIN
 from ..refimpl.errors import CompileError, ExecutorUnavailable
 
 if TYPE_CHECKING:
@@ -85,7 +84,9 @@ def run_one(name: str, kernel: Artifact, model: Model, frame: Frame, truth: Any)
     return second.image, run
 
 
-def frame_bound(model: Model, frame: Frame, target: str, profile: str, schedule: str = PLAIN) -> float | None:
+def frame_bound(
+    model: Model, frame: Frame, target: str, profile: str, schedule: str = "plain"
+) -> float | None:
     """Return the compiler's bound on a kernel's largest error in this frame, or None where it has none."""
     import numpy as np
 

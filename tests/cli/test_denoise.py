@@ -99,10 +99,11 @@ def test_a_rank_that_cannot_be_is_refused(wamnet, here, options, reason) -> None
     ("target", "source"), [("opencl", "denoise.cl"), ("glsl", "denoise.frag"), ("c", "denoise.h")]
 )
 def test_compile_writes_a_kernel(wamnet, here, target, source) -> None:
-    """Source, weights, manifest; by default into a folder that is named after the language."""
+    """Source, weights, certificate, manifest; by default into a folder that is named after the language."""
     outcome = wamnet("compile", "model.safetensors", "--target", target)
     assert outcome.status == 0
-    assert outcome.out.split() == [f"{target}/{name}" for name in (source, "weights.bin", "manifest.json")]
+    names = (source, "weights.bin", "denoise.certificate.json", "manifest.json")
+    assert outcome.out.split() == [f"{target}/{name}" for name in names]
     assert json.loads((here / target / "manifest.json").read_text())["profile"]["name"] == "ieee"
     first = (here / target / source).read_text()
     assert (

@@ -19,7 +19,20 @@ from typing import Annotated, Any
 import typer
 
 from ..refimpl.errors import WamnetError
-from . import animate, bench, certify, compare, conformance, dataset, demo, denoise, render, train, tune
+from . import (
+    animate,
+    bench,
+    certify,
+    compare,
+    conformance,
+    dataset,
+    demo,
+    denoise,
+    render,
+    train,
+    triage,
+    tune,
+)
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
 
@@ -56,6 +69,7 @@ _register(compile_model, COMPILE_EXAMPLES, "compile")
 _register(certify.certify, certify.EXAMPLES)
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)
+_register(triage.triage, triage.EXAMPLES)
 _register(animate.animate, animate.EXAMPLES)
 _register(tune.tune, tune.EXAMPLES)
 _register(bench.bench, bench.EXAMPLES)

@@ -5,11 +5,13 @@
 2. The content goes into a new file of another name in the same folder; only when it is complete does it take
    the output's name, in one step of the file system [`replacing`]. Whatever ends the writer before that (an
    error, Ctrl-C) removes the new file and leaves the old one.
+3. A folder that is written as a whole appears in the same way [`check_new_folder`], [`making_folder`].
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -91,8 +93,34 @@ def write_text(path: Path, text: str) -> None:
         new.write_text(text, encoding="utf-8")
 
 
-def _give_usual_rights(path: Path) -> None:
+def check_new_folder(folder: Path) -> None:
+    """Refuse a folder that holds something, or could not be made."""
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise InputError("output folder", str(folder), "it is a file", "choose another name with -o")
+    if folder.is_dir() and any(folder.iterdir()):
+        raise InputError("output folder", str(folder), "it is not empty", "choose another with -o")
+    check_parent(folder)
+
+
+@contextmanager
+def making_folder(folder: Path) -> Iterator[Path]:
+    """Yield a new folder beside `folder`: when the block ends well it takes its name, else it goes."""
+    check_new_folder(folder)
+    new: Path | None = None
+    try:
+        new = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=folder.parent))
+        yield new
+        _give_usual_rights(new, 0o777)
+        new.replace(folder)
+    except OSError as error:
+        raise unwritable(folder, error, "output folder") from None
+    finally:
+        if new is not None:
+            shutil.rmtree(new, ignore_errors=True)
+
+
+def _give_usual_rights(path: Path, rights: int = 0o666) -> None:
     """Give a temporary file, which only its owner may read, the rights of any new file."""
     mask = os.umask(0)
     os.umask(mask)
-    path.chmod(0o666 & ~mask)
+    path.chmod(rights & ~mask)

@@ -45,6 +45,16 @@ EXECUTORS: Mapping[str, Callable[..., Executor]] = {
 }
 """How to open each executor; the name is also the target that the compiler takes."""
 
+OPTIONS: Mapping[str, tuple[Mapping[str, str], ...]] = {"opengl": ({"context": "egl"}, {"context": "osmesa"})}
+"""Options of executors that can be opened in several ways, each perhaps another driver."""
+
+WAYS: Mapping[str, tuple[str, Mapping[str, str]]] = {
+    "-".join((name, *options.values())): (name, options)
+    for name in EXECUTORS
+    for options in OPTIONS.get(name, ({},))
+}
+"""Every way to open an executor: numpy, opencl, opengl-egl, ...; its name and its options."""
+
 
 def open_executor(name: str, **options: Any) -> Executor:
     """Return an open executor, or raise ExecutorUnavailable that says what is missing and how to get it."""

@@ -29,6 +29,7 @@ COMMANDS = (
     "compile",
     "denoise",
     "compare",
+    "triage",
     "animate",
     "executors",
     "demo",

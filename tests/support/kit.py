@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.compiler import bounds
 from wamnet.compiler.artifact import Artifact
-from wamnet.compiler.compile import analysed, compile_program, schedule_named, sine_contract
-from wamnet.compiler.interpret import interpret
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.expected import expected
 from wamnet.compiler.ir import Gather, Image, Program, Type, sha256
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import dataset, siren
@@ -63,16 +62,10 @@ class Kit:
     ) -> float:
         """Return the largest error / bound against the float64 reference: at most 1 for a right kernel."""
         artifact = artifact or compile_program(program, executor.name)
-        windows = self.windows(program, images)
-        (expected,) = interpret(program, {"window": windows}, np.float64).values()
-        contract = sine_contract(artifact.profile, artifact.target)
-        schedule = schedule_named(artifact.target, artifact.manifest["schedule"]["name"])
-        enclosed = schedule.enclosures(analysed(program), contract, images)
-        (bound,) = bounds.output_errors(analysed(program), enclosed).values()
+        held = expected(program, artifact, images)
         found = executor.run(artifact, images).astype(np.float64)
-        expected, bound = (_per_pixel(array, found.shape[:2]) for array in (expected, bound))
-        assert np.isfinite(bound).all(), "a bound that is infinite holds for every kernel"
-        return float(np.max(np.abs(found - expected) / bound))
+        assert np.isfinite(held.bound).all(), "a bound that is infinite holds for every kernel"
+        return float(np.max(np.abs(found - held.value) / held.bound))
 
     def with_source(self, artifact: Artifact, old: str, new: str) -> Artifact:
         """Return the artifact with a piece of its source replaced, under a digest of its own."""
@@ -81,8 +74,3 @@ class Kit:
         return replace(
             artifact, source=source, manifest={**artifact.manifest, "digest": sha256(source.encode())}
         )
-
-
-def _per_pixel(array: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return (H, W, C) of an array that may lack the last axis, or all but it (constants)."""
-    return array.reshape(*size, -1) if np.ndim(array) >= 2 else np.atleast_1d(array)

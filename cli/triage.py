@@ -1,0 +1,390 @@
+"""`wamnet triage`: one frame on every executor, each held against its bound, and who is the odd one out.
+
+1. Run the model's kernels and judge them [kernels/triage.py].
+2. If one deviates, make the failure small [kernels/reduce.py], and keep it: model, part of the frame, the
+   odd kernels' files and a report, all or nothing [`keep`]. Its README has the command that repeats it.
+3. `--kernel` runs such a kernel's files, as they are or as somebody has changed them, in the place of what
+   the compiler makes [`kept_kernel`].
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..refimpl.errors import ExecutorUnavailable, InputError
+from . import machine, options
+from .inputs import load_model, need_layers
+from .outputs import check_new_folder, making_folder
+from .terminal import progress, say, table
+
+if TYPE_CHECKING:
+    from ..compiler.artifact import Artifact
+    from ..kernels.apart import Runner
+    from ..kernels.executor import Images
+    from ..kernels.reduce import Box, Reduced
+    from ..kernels.triage import Compile, Kernel, Verdict
+    from ..refimpl.denoise import Model
+    from ..refimpl.frame import Frame
+
+EXAMPLES = """Examples:
+
+wamnet triage model.safetensors noisy.exr
+
+wamnet triage model.safetensors noisy.exr --schedules all --profile exact
+
+wamnet triage model.safetensors noisy.exr --executor opencl --executor numpy -o odd"""
+"""Shown below the help of `wamnet triage`."""
+
+STATUS_DEVIATES = 1
+"""Exit status when a kernel is beyond its bound."""
+
+SCHEMA = "wamnet-triage-1"
+"""Name and version of the report's form; described in spec/triage.md."""
+
+REPORT, README, MODEL, FRAME = "report.json", "README.md", "model.safetensors", "frame.exr"
+"""Files of a reproducer."""
+
+Executors = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--executor",
+        metavar="NAME",
+        help="Only this executor; repeat for more. opengl means opengl-egl and opengl-osmesa.",
+        show_default="all that are here",
+    ),
+]
+Schedules = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME",
+        help="Schedules: [bold]picked[/] by each executor, [bold]all[/] that its target has, or one by name.",
+    ),
+]
+KeptKernel = Annotated[
+    Path | None,
+    typer.Option(
+        "--kernel",
+        metavar="FOLDER",
+        help="Run this kernel's files in the place of what the compiler makes for its target and schedule.",
+        show_default=False,
+    ),
+]
+
+
+def triage(
+    model: options.ModelFile,
+    frame: Annotated[
+        Path,
+        typer.Argument(metavar="FRAME", help="Frame with the model's layers (.exr).", show_default=False),
+    ],
+    executor: Executors = None,
+    profile: options.Profile = "ieee",
+    schedules: Schedules = "picked",
+    kernel: KeptKernel = None,
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the reproducer, if one is needed."),
+    ] = Path("triage"),
+) -> None:
+    """Run a model on every executor, and name the one that is beyond its error bound.
+
+    Each kernel is held against the float64 reference and the bound that its schedule has at this frame. If
+    one deviates, the first stage that does is looked for, and the smallest part of the frame that shows it is
+    kept in FOLDER with the kernel's source. Exit status 1 says that a kernel deviates.
+    """
+    from ..compiler.compile import compile_program
+    from ..compiler.profiles import profile_named
+    from ..kernels.denoise_on import images_of
+    from . import exr
+
+    check_new_folder(output)
+    profile_named(profile)
+    network, noisy = load_model(model), exr.read_frame(frame, finite=False)
+    need_layers(
+        frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
+    )
+    compiled = kept_kernel(kernel, network, profile) if kernel else compile_program
+    task = Task(network, noisy, images_of(network, noisy), profile, schedules, compiled, bool(kernel))
+    with ExitStack() as opened:
+        runners = open_runners(executor or [], opened)
+        verdicts = _judged(task, runners)
+        _print(f"{model} on {frame}, {noisy.width}x{noisy.height}, profile {profile}", verdicts)
+        found = _concluded(task, verdicts)
+    if found is None:
+        return
+    keep(output, task, verdicts, found, model)
+    say(f"{output}: kept what repeats it; {output / README} has the command")
+    raise typer.Exit(STATUS_DEVIATES)
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is asked for: a model on a frame, whose encoded images are `images`, and how.
+
+    `kept`: `compiled` has the files of a kept kernel in it.
+    """
+
+    model: Model
+    frame: Frame
+    images: Images
+    profile: str
+    schedules: str
+    compiled: Compile
+    kept: bool
+
+
+def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Runner]:
+    """Open executors by name, each in a process of its own: all that are here, or those that are wanted."""
+    from ..kernels.apart import Apart
+    from ..kernels.registry import EXECUTORS, WAYS
+
+    for name in wanted:
+        if name not in {*WAYS, *EXECUTORS}:
+            rule = f"must be one of {', '.join(dict.fromkeys([*EXECUTORS, *WAYS]))}"
+            raise InputError("--executor", name, rule, "see wamnet executors")
+    runners: list[Runner] = []
+    for way, (name, _) in WAYS.items():
+        if wanted and not {way, name} & set(wanted):
+            continue
+        try:
+            runners.append(opened.enter_context(Apart(way)))
+        except ExecutorUnavailable as error:
+            if way in wanted:
+                raise
+            say(f"not here: {error}")
+    if not runners:
+        raise ExecutorUnavailable(f"none of {', '.join(wanted)} is here; see wamnet executors")
+    return runners
+
+
+def _judged(task: Task, runners: Sequence[Runner]) -> list[Verdict]:
+    """Run all kernels on the whole frame."""
+    from ..compiler.lower import lower
+    from ..kernels.triage import Judge, kernels_of
+
+    program, size = lower(task.model), (task.frame.height, task.frame.width)
+    kernels = kernels_of(runners, program, task.profile, size, task.schedules, task.compiled)
+    judge, verdicts = Judge(program, task.images), []
+    with progress("kernels", len(kernels)) as advance:
+        for kernel in kernels:
+            verdicts.append(judge.verdict(kernel))
+            advance(1)
+    return verdicts
+
+
+def _concluded(task: Task, verdicts: Sequence[Verdict]) -> Reduced | None:
+    """Say who is the odd one out; return the failure made small, or None where there is none."""
+    from ..kernels.reduce import reduced
+    from ..kernels.triage import conclusion, odd_ones
+
+    text = conclusion(verdicts)
+    if not any(verdict.ran for verdict in verdicts):
+        raise InputError("--schedules", task.schedules, text, f"the first reason: {verdicts[0].state}")
+    say(text)
+    if not odd_ones(verdicts):
+        return None
+    found = reduced(verdicts, task.model, task.profile, task.images, task.compiled)
+    again = "" if found.repeats else ", because it did not show again"
+    say(f"smallest part that shows it: {found.box.text}{again}")
+    for stage in found.stages:
+        say(stage.text)
+    if task.kept:
+        say("stages are compiled anew: the kept kernel's files have none")
+    return found
+
+
+def _print(title: str, verdicts: Sequence[Verdict]) -> None:
+    """Print a line for each kernel."""
+    heads = ("executor", "schedule", "device", "verdict", "worst number", "largest error", "error / bound")
+    rows = []
+    for v in verdicts:
+        numbers = (f"{v.error:.3g}", f"{v.ratio:.3g}" if v.promised else "-") if v.pixel else ("", "")
+        where = "row {}, column {}, channel {}".format(*v.pixel) if v.pixel else ""
+        runner = v.kernel.runner
+        rows.append((runner.way, v.kernel.schedule, runner.device, v.state, where, *numbers))
+    table(title, heads, rows, texts=5)
+
+
+# ---- the reproducer -----------------------------------------------------------------------------------
+
+
+def keep(folder: Path, task: Task, verdicts: Sequence[Verdict], found: Reduced, model_path: Path) -> None:
+    """Write model, part of the frame, the odd kernels and the report: all of it or nothing."""
+    from ..compiler import artifact
+    from ..kernels.triage import odd_ones
+    from . import exr
+
+    odd = [verdict.kernel for verdict in odd_ones(found.verdicts)]
+    with making_folder(folder) as new:
+        (new / MODEL).write_bytes(model_path.read_bytes())
+        exr.write_frame(new / FRAME, part_of(task, found.box))
+        for kernel in odd:
+            assert kernel.artifact is not None
+            artifact.write(kernel.artifact, new / _folder_of(kernel))
+        report = _report(task, verdicts, found)
+        text = json.dumps(report, indent=2, sort_keys=True, allow_nan=False) + "\n"
+        (new / REPORT).write_text(text, encoding="utf-8")
+        (new / README).write_text(_readme(task, report, odd), encoding="utf-8")
+
+
+def part_of(task: Task, box: Box) -> Frame:
+    """Return the part of the frame with the layers that the model reads, in numbers that files may hold.
+
+    NaN is 0, and infinities the largest numbers: they are encoded alike.
+    """
+    import numpy as np
+
+    from ..refimpl.dataset import FEATURES
+
+    names = dict.fromkeys(FEATURES[name].layer for name in task.model.features)
+    largest = float(np.finfo(np.float32).max)
+    layers = {
+        name: np.nan_to_num(array, nan=0.0, posinf=largest, neginf=-largest)
+        for name, array in box.cut({name: task.frame[name] for name in names}).items()
+    }
+    return replace(task.frame, layers=layers)
+
+
+def _folder_of(kernel: Kernel) -> str:
+    """Return the name of a kernel's folder in a reproducer."""
+    return f"{kernel.runner.way}-{kernel.schedule}"
+
+
+def _report(task: Task, verdicts: Sequence[Verdict], found: Reduced) -> dict[str, Any]:
+    """Return what report.json holds; numbers that JSON does not know are words."""
+    from dataclasses import asdict
+
+    from ..compiler import ir
+    from ..compiler.compile import analysed
+    from ..compiler.lower import lower
+    from ..kernels.triage import conclusion
+
+    return {
+        "schema": SCHEMA,
+        "conclusion": conclusion(verdicts),
+        "profile": task.profile,
+        "schedules": task.schedules,
+        "program": ir.digest(analysed(lower(task.model), task.profile)),
+        "frame": {"height": task.frame.height, "width": task.frame.width},
+        "verdicts": [_entry(verdict) for verdict in verdicts],
+        "part": {**asdict(found.box), "verdicts": [_entry(verdict) for verdict in found.verdicts]},
+        "stages": [
+            {
+                "executor": s.kernel.runner.way,
+                "schedule": s.kernel.schedule,
+                "stage": s.stage.text if s.stage else None,
+                "neurons_from": s.stage.first if s.stage else None,
+                "worst": _entry(s.verdict) if s.verdict else None,
+            }
+            for s in found.stages
+        ],
+        "machine": machine.describe(),
+        "versions": machine.versions(),
+    }
+
+
+def _entry(verdict: Verdict) -> dict[str, Any]:
+    """Return a verdict for JSON; a pixel is (row, column), its channel beside it."""
+    runner, pixel = verdict.kernel.runner, verdict.pixel
+    return {
+        "executor": runner.way,
+        "schedule": verdict.kernel.schedule,
+        "device": runner.device,
+        "kernel": verdict.kernel.artifact.digest if verdict.kernel.artifact else None,
+        "state": verdict.state,
+        "deviates": verdict.deviates,
+        "largest_error": _number(verdict.error),
+        "error_over_bound": _number(verdict.ratio),
+        "pixel": pixel and pixel[:2],
+        "channel": pixel and pixel[2],
+        "found": _number(verdict.found),
+        "expected": _number(verdict.expected),
+        "bound": _number(verdict.bound),
+        "other_bits": verdict.bits,
+    }
+
+
+def _number(value: float) -> float | str:
+    """Return a number for JSON, or its name: nan, inf, -inf."""
+    return value if math.isfinite(value) else str(value)
+
+
+def _readme(task: Task, report: dict[str, Any], odd: Sequence[Kernel]) -> str:
+    """Return the text that says what this is, and the commands that repeat it."""
+    lines = [
+        "# A kernel beyond its bound",
+        "",
+        f"{report['conclusion']}.",
+        "",
+        "In this folder:",
+        "",
+        "```sh",
+    ]
+    lines += [shlex.join(_command(task, kernel, kept=True)) for kernel in odd]
+    lines += [
+        "```",
+        "",
+        "With the kernel that the compiler makes now, in place of the kept one:",
+        "",
+        "```sh",
+    ]
+    lines += [shlex.join(_command(task, kernel, kept=False)) for kernel in odd]
+    lines += ["```", "", f"{REPORT} holds what was found, expected and promised, devices and versions.", ""]
+    return "\n".join(lines)
+
+
+def _command(task: Task, kernel: Kernel, kept: bool) -> list[str]:
+    """Return the command that runs one kernel on the kept frame."""
+    words = ["wamnet", "triage", MODEL, FRAME, "--executor", kernel.runner.way]
+    words += ["--profile", task.profile, "--schedules", kernel.schedule]
+    return [*words, "--kernel", _folder_of(kernel)] if kept else words
+
+
+def kept_kernel(folder: Path, model: Model, profile: str) -> Compile:
+    """Return a compiler that has the files in `folder` for the kernel whose manifest lies there.
+
+    They may have been changed: their hashes are not asked for. The manifest says of what they are the kernel.
+    """
+    import numpy as np
+
+    from ..compiler import artifact, ir
+    from ..compiler.compile import analysed, compile_program
+    from ..compiler.lower import lower
+
+    path = folder / artifact.MANIFEST_NAME
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        wanted = (manifest["program"], manifest["target"], manifest["schedule"]["name"])
+        name = manifest["profile"]["name"]
+    except (OSError, ValueError, KeyError, TypeError):
+        rule = f"it must hold a {artifact.MANIFEST_NAME} that wamnet wrote beside a model's kernel"
+        raise InputError(
+            "--kernel", str(folder), rule, "give a folder that triage or compile wrote"
+        ) from None
+    if wanted[0] != ir.digest(analysed(lower(model), profile)) or name != profile:
+        rule = f"its kernel is of another model or profile ({name})"
+        raise InputError("--kernel", str(folder), rule, "give the model and --profile that it was made with")
+
+    def compiled(program: ir.Program, target: str, profile: str, schedule: str) -> Artifact:
+        """Return the kept kernel where it is asked for, else a new one."""
+        made = compile_program(program, target, profile, schedule)
+        if (made.manifest["program"], target, made.manifest["schedule"]["name"]) != wanted:
+            return made
+        source = (folder / made.source_name).read_text(encoding="utf-8")
+        raw = (folder / artifact.WEIGHTS_NAME).read_bytes()
+        weights = np.frombuffer(raw, "<f4").astype(np.float32)
+        own = {made.source_name: ir.sha256(source.encode()), artifact.WEIGHTS_NAME: ir.sha256(raw)}
+        files = {**made.manifest["files"], **own}
+        manifest = {**made.manifest, "digest": ir.sha256(source.encode(), raw), "files": files}
+        return replace(made, source=source, weights=weights, manifest=manifest)
+
+    return compiled

@@ -109,3 +109,10 @@ def test_every_reference_module_has_a_chapter(house):
     stems = {Path(source.path).stem for source in house.python("refimpl")} - NO_CHAPTER
     wrong = [f"refimpl/{stem}.py" for stem in sorted(stems) if not (house.root / f"spec/{stem}.md").exists()]
     house.refuse(wrong, "A module of refimpl has a chapter of the same stem in spec/: write it.")
+
+
+def test_the_index_lists_every_chapter(house):
+    index = (house.root / "spec/README.md").read_text()
+    chapters = sorted(path.name for path in (house.root / "spec").glob("*.md") if path.name != "README.md")
+    wrong = [f"spec/{name}" for name in chapters if f"]({name})" not in index]
+    house.refuse(wrong, "spec/README.md lists every chapter: add a line with a link.")

@@ -24,10 +24,10 @@ from .artifact import Artifact
 from .c import C
 from .dialect import Dialect
 from .emit import kernel_gather, output_channels
+from .emit_inlined import Inlined
 from .enclosure import round_up as round_up
 from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
-from .emit_inlined import Inlined
 from .glsl_compute import GLSL_COMPUTE
 from .glsl_es import GLSLES, GLSLESInlined
 from .glsl_inlined import GLSL_LADDER
@@ -226,8 +226,8 @@ def compile_program(
     common = analysed(program, profile)
     if common.exact and chosen.assumes:
         raise CompileError(
-            f"profile {profile}: {chosen.language} has no word that keeps operations in order; use profile ieee, "
-            f"or a target that has one"
+            f"profile {profile}: {chosen.language} has no word that keeps operations in order; use profile "
+            "ieee, or a target that has one"
         )
     if not rank:
         picked = _picked(common, chosen, profile, schedule).schedule

@@ -9,9 +9,9 @@ declaration. The text between is the language's own, its braces doubled. An oper
 for a kind of operand: `minimum.int32`. More channels than `channels_per_result` go into several results.
 `exact` are the lines that an exact kernel needs at its top, `magnitude` the absolute value of a number,
 `clamp` the name of the function that limits an index. `first` are the lines that the language wants before
-any comment, `indexes_results` says whether a result's channel may be chosen by a variable, `counted` opens a loop on a counter from 0 on, `define` names a number, `choice` is one between
-two numbers; `assumes` says what a bound
-rests on that the language itself does not promise.
+any comment; `indexes_results` says whether a variable may choose a result's channel; `counted` opens a loop
+on a counter from 0 on, `define` names a number, `choice` is one between two numbers; `assumes` says what a
+bound rests on that the language itself does not promise.
 """
 
 from __future__ import annotations

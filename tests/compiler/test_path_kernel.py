@@ -119,7 +119,9 @@ def test_a_scene_s_name_is_no_code(target):
     evil = "a */ evil\n#error\r\\ ??/ \u2028 " + 200 * "x"
     plain, found = (
         compile_path(
-            lower_scene(replace(scenes.canonical("empty"), name=name), Settings(max_depth=0)), target
+            lower_scene(replace(scenes.canonical("empty"), name=name), Settings(max_depth=0)),
+            target,
+            groups=("color",),
         ).source.split("\n")
         for name in ("a", evil)
     )

@@ -149,7 +149,7 @@ def test_more_planes_than_a_fragment_writes():
 
 
 def test_unknown_target_and_profile():
-    with pytest.raises(CompileError, match="target 'metal' does not exist"):
-        kernel(target="metal")
+    with pytest.raises(CompileError, match="target 'abacus' does not exist"):
+        kernel(target="abacus")
     with pytest.raises(CompileError, match="profile 'fast' does not exist"):
         kernel(profile="fast")

@@ -73,6 +73,7 @@ def test_the_bound_catches_an_exponent_of_2_2():
 
 @pytest.mark.parametrize("target", ["opencl", "opengl"])
 def test_golden_source(golden, target):
+    """PPL-5, PPL-6: arguments, strides and textures of both languages."""
     made = compile_encode(ALL, SCALES, target)
     golden(f"ieee.{made.source_name}", made.source)
 

@@ -17,7 +17,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from worked import LINES
+from worked import LINES, decided
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -111,6 +111,21 @@ def test_paths_exist() -> None:
         if not (ROOT / named).exists()
     ]
     assert not wrong, f"a path that the text names exists: {wrong}"
+
+
+def test_decisions_about_the_paper_are_in_the_appendix() -> None:
+    """What a chapter decides because the paper is silent, or against it, stands in departures.md in words."""
+    by_hand = WORKED.sub("", (ROOT / "spec/departures.md").read_text())
+    about = {
+        clause
+        for _, clause, text in decided()
+        if re.search(r"\b[Tt]he paper\b(?!'s (network|first layer))", text)
+    }
+    assert len(about) >= 8, "decisions that name the paper are found"
+    missing = sorted(clause for clause in about if not re.search(rf"\b{clause}\b", by_hand))
+    assert not missing, (
+        f"spec/departures.md says how {missing} departs from the paper, or what it leaves open"
+    )
 
 
 SAMPLE = """

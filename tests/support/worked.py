@@ -1,4 +1,4 @@
-"""The worked examples of the spec: functions that compute, from the reference, the lines that a chapter shows.
+"""The worked examples of the spec: functions that compute, from the reference, what a chapter shows.
 
 1. A chapter holds `<!-- worked: name -->`, the lines, `<!-- end -->`; comments are not seen where it is read.
 2. `LINES[name]()` gives the lines; `tests/meta/test_spec_examples.py` compares, and writes them with a flag.
@@ -10,7 +10,9 @@ numbers are not shown.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,6 +41,9 @@ from wamnet.refimpl import (
 
 SEED, SAMPLE, X, Y, SIZE_PX = 7, 5, 6, 10, 16
 """The path that several chapters follow: sample 5 of pixel (6, 10) of a picture of 16 x 16, seed 7."""
+
+SPEC = Path(__file__).resolve().parents[2] / "spec"
+"""The chapters, whose decisions are an appendix."""
 
 LINES: dict[str, Callable[[], list[str]]] = {}
 """The examples by name."""
@@ -301,8 +306,8 @@ def low_rank() -> list[str]:
     factors = factored.Factors(np.array([[[2.0], [3.0]]]), np.array([[5.0, 7.0]]))
     weights = factored.expand(factors)
     return [
-        "Example: one neuron, a window of 2 x 2, one channel, V = (2, 3) down the rows, H = (5, 7) along them:",
-        f"the weights, in the order of a window vector, are {short(weights)}.",
+        "Example: one neuron, a window of 2 x 2, one channel, V = (2, 3) down the rows, H = (5, 7)",
+        f"along them: the weights, in the order of a window vector, are {short(weights)}.",
     ]
 
 
@@ -366,3 +371,62 @@ def sine_steps() -> list[str]:
         columns.append([*reduced, *found])
     names = ("x", "k", "x - k P1", "r", "sign", "p(r), degree 11", "result", "sin(x), exact")
     return table(("", "first", "second", "third"), [[n, *c] for n, *c in zip(names, *columns, strict=True)])
+
+
+# ---- the appendix ---------------------------------------------------------------------------------------
+
+
+@worked
+def table_1() -> list[str]:
+    """The paper's Table 1 with both logarithms."""
+    printed = {
+        "input": (82.93, 66.67),
+        "DnCNN": (79.03, 67.16),
+        "WAMnet": (48.04, 72.17),
+        "pix2pix": (39.28, 74.18),
+    }
+    rows = []
+    for name, (mse, psnr) in printed.items():
+        ratio = 255.0**2 / mse
+        assert abs(10 * np.log(ratio) - psnr) <= 0.07, "the spec says that all rows fit to 0.07"
+        found = (f"{10 * f(ratio):.2f}" for f in (np.log, np.log10))
+        rows.append([name, f"{mse}", f"{psnr}", *found, f"{mse / 255.0**2:.6f}"])
+    header = ("", "MSE", "PSNR as printed", "10 ln(255^2/MSE)", "decibels", "MSE in [0, 1]")
+    return table(header, rows)
+
+
+def decided() -> list[tuple[str, str, str]]:
+    """Return (chapter, clause before it or "", text) of every decision."""
+    found = []
+    for path in sorted(SPEC.glob("*.md")):
+        clause = ""
+        for paragraph in path.read_text().split("\n\n"):
+            clause = (re.findall(r"^\*\*([A-Z0-9]+-\d+[a-z]?)\*\*", paragraph, re.MULTILINE) or [clause])[-1]
+            if paragraph.lstrip("\n").startswith("> Decision: "):
+                lines = " ".join(line.removeprefix(">").strip() for line in paragraph.strip().splitlines())
+                found.append((path.name, clause, lines.removeprefix("Decision: ")))
+    return found
+
+
+def opening(text: str) -> str:
+    """Return a text's first sentences, so many that they say something, as a cell of a table."""
+    sentences = re.split(r"(?<=\.) ", text)
+    count = next((n for n in range(1, len(sentences)) if len(" ".join(sentences[:n])) >= 60), len(sentences))
+    return " ".join(sentences[:count]).removesuffix(":").replace("|", "\\|")
+
+
+@worked
+def decisions() -> list[str]:
+    """All decisions of the chapters, with links."""
+    rows = [[f"[{clause}]({name})", opening(text)] for name, clause, text in decided()]
+    return table(("clause", "decision"), rows)
+
+
+@worked
+def sine_errors() -> list[str]:
+    """The proven errors by degree (SIN-6)."""
+    rows = [
+        [str(degree), *(f"{e:.3g}" for e in (p.approximation_error, p.error, p.cosine_error))]
+        for degree, p in sine.POLYNOMIALS.items()
+    ]
+    return table(("degree", "of the polynomial", "of the sine", "of the cosine"), rows)

@@ -31,7 +31,9 @@ def test_a_good_frame_passes(dtype: type) -> None:
 
 def test_negative_radiance_is_data() -> None:
     """FRM-6: a filter upstream may have made it."""
-    validate(Frame({"color": np.full((2, 3, 3), -0.25)}))
+    frame = Frame({"color": np.full((2, 3, 3), -0.25)})
+    validate(frame)
+    assert np.all(frame["color"] == -0.25)
 
 
 def test_a_missing_layer_is_named() -> None:

@@ -2100,8 +2100,8 @@ static network read_layers(const container *in) {
     const char *type = NULL;
     char name[40];
     for (size_t i = 0; i < in->count; i++) {
-        const char *end = strstr(in->tensors[i].name->text, ".weight");
-        layers += !strncmp(in->tensors[i].name->text, "layer", 5) && end && !end[7];
+        const char *text_end = in->tensors[i].name->text + in->tensors[i].name->length;
+        layers += in->tensors[i].name->length >= 7 && !strcmp(text_end - 7, ".weight");
     }
     if (!layers || layers > MOST_LAYERS) refuse("a network has 1 to %d layers", MOST_LAYERS);
     for (size_t l = 0; l < layers; l++) {

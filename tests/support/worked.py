@@ -24,6 +24,7 @@ from wamnet.compiler.encode_kernel import compile_encode
 from wamnet.compiler.lower import lower
 from wamnet.compiler.lower_scene import lower_scene
 from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.step_kernel import compile_step
 from wamnet.kernels.conformance.numbers import number_text
 from wamnet.refimpl import (
     adam,
@@ -434,6 +435,17 @@ def encode_bindings() -> list[str]:
         made = compile_encode(("color", "depth"), dataset.Normalization(), target)
         lines += ["", f"{made.manifest['language']}:", "", *signature(made.source, language)]
     return lines[1:]
+
+
+@worked
+def train_bindings() -> list[str]:
+    """What the kernels of a step ask for."""
+    source = compile_step((12, 20, 3), (1.0, 1.0), 32, 2).source
+    found = [
+        re.sub(r"\n +", "\n    ", match)
+        for match in re.findall(r"(?ms)^(?:__kernel [^\n]*\n)?(?:__kernel )?void wamnet_\w+\(.*?\)", source)
+    ]
+    return ["```c", *found, "```"]
 
 
 @worked

@@ -29,6 +29,7 @@ import cells
 import chapters
 import formulas
 import links
+import listing_page
 import sources
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -66,6 +67,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         "index.md",
         {"Tutorial": pages("tutorial")},
         {"Exercises": pages("exercises")},
+        "listing.md",
         {"Spec": parts},
     ]
     return config
@@ -112,7 +114,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 
 def _into_site(markdown: str, uri: str) -> str:
-    """Return a page's Markdown with its links to the spec as they are on the site, which holds docs/ itself."""
+    """Return a page's Markdown with its links to the spec as they are on the site, whose root is docs/."""
 
     def link(match: re.Match[str]) -> str:
         path = posixpath.normpath(posixpath.join("docs", posixpath.dirname(uri), match[1]))
@@ -131,6 +133,8 @@ def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -
     def link(address: str) -> str:
         return get_relative_url(address, page.url)
 
+    if uri == "listing.md":
+        html = listing_page.page(html)
     html = formulas.rendered(html, f"docs/{uri}")
     return chapters.linked(html, config.extra["places"], config.extra["sources"], link)
 

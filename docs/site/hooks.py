@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
 import shutil
 import sys
@@ -28,6 +29,7 @@ import cells
 import chapters
 import formulas
 import links
+import listing_page
 import sources
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,6 +40,9 @@ SPEC = ROOT / "spec"
 
 SECTION = re.compile(r"^## (.+)$|^\* \[.*?\]\((\w+\.md)\)", re.MULTILINE)
 """A heading of the spec's index, or a line of its list."""
+
+LEAVING = re.compile(r"\]\(((?:\.\./)+spec/[\w./-]+)")
+"""A link from a page of docs/ to the spec, as it works in the repository."""
 
 FOREIGN = re.compile(r"https://(?:unpkg\.com|api\.github\.com)/[\w./@-]*")
 """Addresses in the theme's scripts, for diagrams and counts of stars that this site does not have."""
@@ -62,6 +67,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         "index.md",
         {"Tutorial": pages("tutorial")},
         {"Exercises": pages("exercises")},
+        "listing.md",
         {"Spec": parts},
     ]
     return config
@@ -103,8 +109,18 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     if page.file.src_uri.startswith("spec/"):
         return chapters.anchored(markdown)
     if page.file.src_uri.startswith("tutorial/"):
-        return cells.executed(markdown, f"docs/{page.file.src_uri}")
-    return markdown
+        markdown = cells.executed(markdown, f"docs/{page.file.src_uri}")
+    return _into_site(markdown, page.file.src_uri)
+
+
+def _into_site(markdown: str, uri: str) -> str:
+    """Return a page's Markdown with its links to the spec as they are on the site, whose root is docs/."""
+
+    def link(match: re.Match[str]) -> str:
+        path = posixpath.normpath(posixpath.join("docs", posixpath.dirname(uri), match[1]))
+        return f"]({posixpath.relpath(path, posixpath.dirname(uri) or '.')}"
+
+    return LEAVING.sub(link, markdown)
 
 
 def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
@@ -117,6 +133,8 @@ def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -
     def link(address: str) -> str:
         return get_relative_url(address, page.url)
 
+    if uri == "listing.md":
+        html = listing_page.page(html)
     html = formulas.rendered(html, f"docs/{uri}")
     return chapters.linked(html, config.extra["places"], config.extra["sources"], link)
 

@@ -41,7 +41,7 @@ def _named(node: ast.stmt) -> Iterator[tuple[str, int]]:
 def coloured(text: str) -> list[str]:
     """Return the lines of a Python text as HTML."""
     html = highlight(text, PythonLexer(stripnl=False, ensurenl=False), HtmlFormatter(nowrap=True))
-    return html.split("\n")
+    return html.rstrip("\n").split("\n")
 
 
 def page(text: str) -> str:

@@ -128,9 +128,7 @@ def name_of(factor: Factor, value: float) -> str:
 
 def configurations(scale: str) -> dict[str, tuple[Factor, float]]:
     """Return every factor and value by the configuration's name."""
-    return {
-        name_of(factor, value): (factor, value) for factor in FACTORS for value in factor.values[scale]
-    }
+    return {name_of(factor, value): (factor, value) for factor in FACTORS for value in factor.values[scale]}
 
 
 def work(ground: Ground, factor: Factor, value: float) -> Callable[[int], Values]:

@@ -9,8 +9,8 @@
     python experiments/generalisation.py
     python experiments/generalisation.py --scale paper -o out/generalisation-paper
 
-The camera turns about the vertical through the cubes (`orbit_deg` of the scene). The first line of the table is
-the training times themselves: what is lost at unseen times is the difference of the first two.
+The camera turns about the vertical through the cubes (`orbit_deg` of the scene). The first column of the table
+is of training times with other noise: what is lost at unseen times is the difference of the first two.
 """
 
 from __future__ import annotations
@@ -60,9 +60,7 @@ def trained_on(ground: Ground, kind: str) -> list[Pair]:
         return ground.seen()
     degrees = SEVERAL_DEGREES if kind == "several" else (float(kind),)
     shots = [
-        replace(
-            ground.shots([time], seed_of(turned) + 4000 + k)[0], parameters={"orbit_deg": turned}
-        )
+        replace(ground.shots([time], seed_of(turned) + 4000 + k)[0], parameters={"orbit_deg": turned})
         for k, time in enumerate(times)
         for turned in [degrees[k % len(degrees)]]
     ]
@@ -122,7 +120,10 @@ def works(ground: Ground, scale: str) -> dict[str, partial[Values]]:
 def report(ground: Ground, results: Results, scale: str, seed: int, folder: Path) -> None:
     """Write the table, the curve, and pictures of one seed."""
     degrees = TEST_DEGREES[scale]
-    heads = {"psnr at training times": "training times", **{f"psnr at {d:g}": f"{d:g} degrees" for d in degrees}}
+    heads = {
+        "psnr at training times": "training times",
+        **{f"psnr at {d:g}": f"{d:g} degrees" for d in degrees},
+    }
     shown = ["input", *(f"{name}, {kind}" for name in RECIPES for kind in ("one", "several"))]
     names = {name: name for name in shown}
     columns = [Column(value, head, 2) for value, head in heads.items()]

@@ -48,7 +48,7 @@ def stops(steps: int) -> list[int]:
 
 
 Trainer = Callable[..., TrainState]
-"""What trains on pairs, and hands out its states: [`refimpl.train.train`], or [`kernels.train_on`] with its executor."""
+"""What trains on pairs and hands out its states: [`refimpl.train.train`], or [`kernels.train_on`] on a device."""
 
 
 def follow(
@@ -112,7 +112,9 @@ def report(results: Results, names: Sequence[str], folder: Path) -> None:
     for name, found in curves.items():
         cells = [_cell([at(curve, mark, "psnr") for curve in found]) for mark in shown]
         last = [curve[-1] for curve in found]
-        ends = [f"{_cell([end[what] for end in last], digits)}" for what, digits in (("psnr", 2), ("seconds", 0))]
+        ends = [
+            f"{_cell([end[what] for end in last], digits)}" for what, digits in (("psnr", 2), ("seconds", 0))
+        ]
         rows.append([name, *cells, *ends])
     heads = ["preset", *(f"after {mark:g} s" for mark in shown), "at the end, dB", "s"]
     write_table(folder / "table.md", tables.markdown(heads, rows))

@@ -59,7 +59,7 @@ def excess_flip(pictures: Floats, references: Floats) -> float:
 
 
 def slice_over_time(pictures: Floats, row: int, repeat: int = 1) -> Floats:
-    """Return one row of all frames, time downwards: (T * repeat, W, 3). What stands still is a vertical line."""
+    """Return a row of all frames, time downwards: (T * repeat, W, 3). What stands still is a column."""
     return np.repeat(np.asarray(pictures)[:, row], repeat, axis=0)
 
 

@@ -48,7 +48,7 @@ def stops(steps: int) -> list[int]:
 
 
 Trainer = Callable[..., TrainState]
-"""What trains on pairs and hands out its states: [`refimpl.train.train`], or [`kernels.train_on`] on a device."""
+"""What trains on pairs and hands out its states: [`refimpl.train.train`], or on a device [`train_on`]."""
 
 
 def follow(

@@ -287,7 +287,7 @@ def lamp(side, height, color=(1.0, 0.5, 0.25), power=3.0, x=0.0):
 
 @pytest.mark.parametrize("height", [0.1, 1.0, 7.0])
 def test_unshadowed_light_on_the_axis_is_that_of_a_disk(height):
-    """E = pi L sin^2 of the rim's angle = pi L R^2 / (h^2 + R^2), R^2 = side^2 / pi, L = power color / pi A."""
+    """E = pi L R^2 / (h^2 + R^2), where R^2 = side^2 / pi and L = power color / (pi A)."""
     side, square = 2.0, 4.0 / np.pi
     radiance = 3.0 * np.array([1.0, 0.5, 0.25]) / (np.pi * side**2)
     expected = 0.5 * radiance * square / (height**2 + square)
@@ -327,8 +327,8 @@ def test_unshadowed_light_is_bounded_and_dark_behind_a_lamp(dtype):
 def test_frames_have_unshadowed_light():
     """At one sample the layers are of one hit: the formula, written once more, of what they say of it.
 
-    Points are at least 0.2 from the lamps' middles, where light changes by at most (2 / 0.2 + 2 / R) L a unit,
-    R = 0.6; float32 knows points below 8 to 2^-21, and normals and products to less.
+    Points are at least 0.2 from the lamps' middles, where light changes by at most (2 / 0.2 + 2 / R) L
+    a unit, R = 0.6; float32 knows points below 8 to 2^-21, and normals and products to less.
     """
     scene = scenes.canonical("minicubes")
     frame = render(scene, 12, 1).frame

@@ -9,8 +9,8 @@
     python experiments/generalisation.py
     python experiments/generalisation.py --scale paper -o out/generalisation-paper
 
-The camera turns about the vertical through the cubes (`orbit_deg` of the scene). The first column
-of the table is of training times with other noise: what is lost at unseen times is the difference of the first two.
+The camera turns about the vertical through the cubes (`orbit_deg` of the scene). The first column of the
+table is of training times with other noise: what is lost at unseen times is the difference of the first two.
 """
 
 from __future__ import annotations

@@ -63,9 +63,9 @@ SCALES: Mapping[str, Scale] = {
         ladder=(1, 2, 4, 8, 16, 32, 64, 128, 256),
         short_frames=24,
         paper={"steps": 4000},
-        dncnn={"steps": 400, "batch": 8, "crop": 40, "half": True},
-        shrunk={"steps": 200, "batch": 8, "crop": 40, "half": True, "shrink": 4},
-        pix2pix={"steps": 800, "batch": 1, "crop": 128, "width": 32},
+        dncnn={"steps": 250, "batch": 8, "crop": 40, "half": True},
+        shrunk={"steps": 100, "batch": 8, "crop": 40, "half": True, "shrink": 4},
+        pix2pix={"steps": 500, "batch": 1, "crop": 128, "width": 32},
     ),
     "paper": Scale(
         size=1024,

@@ -114,7 +114,7 @@ SHORT = Recipe(
 )
 """Better than the paper's protocol on unseen frames in about a minute; chosen by `experiments/presets.py`."""
 
-BEST = replace(SHORT, steps=40_000)
+BEST = replace(SHORT, steps=30_000)
 """The same for longer, which pays with many frames; chosen by `experiments/quality.py`."""
 
 PRESETS: Mapping[str, Recipe] = {"best": BEST, "paper": PAPER, "short": SHORT}

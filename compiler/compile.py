@@ -27,7 +27,9 @@ from .emit import kernel_gather, output_channels
 from .enclosure import round_up as round_up
 from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
+from .emit_inlined import Inlined
 from .glsl_compute import GLSL_COMPUTE
+from .glsl_es import GLSLES, GLSLESInlined
 from .glsl_inlined import GLSL_LADDER
 from .ir import LEAST, OUTPUT_ENCODING, Gather, Program
 from .opencl import OpenCL
@@ -45,6 +47,7 @@ class Target:
     """Something that runs kernels: how its source is made, and what its own sine promises.
 
     `widest`: most channels of an image that a kernel reads, `most` of all that it writes; None: any number.
+    `assumes`: what a bound rests on that the language does not promise.
     """
 
     name: str
@@ -55,6 +58,7 @@ class Target:
     schedules: tuple[Schedule, ...]
     widest: int | None = None
     most: int | None = None
+    assumes: str = ""
 
 
 def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
@@ -68,6 +72,7 @@ def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
         (Plain(dialect), *ladder),
         widest=dialect.channels_per_result,
         most=dialect.max_output_channels,
+        assumes=dialect.assumes,
     )
 
 
@@ -90,6 +95,11 @@ TARGETS: Mapping[str, Target] = {
 
 DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C())}
 """All targets of denoisers: those, and C, which is made to be pasted."""
+
+EXPORTED: Mapping[str, Target] = {
+    target.name: target for target in (_dialect_target(GLSLES(), Inlined(GLSLESInlined())),)
+}
+"""Targets that are written for other programs to run: kernels/export has what runs them in tests."""
 
 
 KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
@@ -187,15 +197,16 @@ def _refuse_domain(
 
 def target_named(name: str) -> Target:
     """Return the target, or say which ones there are."""
-    if name not in DENOISERS:
-        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(DENOISERS)}")
-    return DENOISERS[name]
+    known = {**DENOISERS, **EXPORTED}
+    if name not in known:
+        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(known)}")
+    return known[name]
 
 
 def target_of_pipelines(name: str) -> Target:
     """Return a target that has kernels of all kinds, or refuse one whose kernels denoise alone."""
     found = target_named(name)
-    if name not in TARGETS:
+    if name not in TARGETS and name not in EXPORTED:
         raise CompileError(
             f"target {name} has denoisers alone; for other kernels there are {', '.join(TARGETS)}"
         )
@@ -213,6 +224,11 @@ def compile_program(
     chosen = target_named(target)
     kernel_gather(program)
     common = analysed(program, profile)
+    if common.exact and chosen.assumes:
+        raise CompileError(
+            f"profile {profile}: {chosen.language} has no word that keeps operations in order; use profile ieee, "
+            f"or a target that has one"
+        )
     if not rank:
         picked = _picked(common, chosen, profile, schedule).schedule
         bound = bound_over_images(common, profile, target, schedule=picked)
@@ -316,6 +332,7 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound, pi
         f"profile   {profile.name}: {profile.text}",
         f"sine      {sine_contract(profile.name, target.name).text}",
         f"bound     {_bound_text(bound)}",
+        *(_wrapped("assumes", target.assumes) if target.assumes and bound.output else []),
         *([SUMS] if is_split(gather) and type(picked.schedule).enclosures is Schedule.enclosures else []),
         *([] if picked.schedule.name == PLAIN else [f"schedule  {schedules.text(picked.manifest())}"]),
         f"arguments {arguments[0]}",
@@ -334,7 +351,12 @@ def _weight_lines(program: Program, schedule: Schedule) -> list[str]:
     places = schedule.layout(program).values()
     slots = [f"{s.name} ({' x '.join(map(str, s.shape))}) at {s.offset}" for s in places]
     text = f"{', '.join(slots) or 'none'}; {schedule.order}"
-    return textwrap.wrap(text, 98, initial_indent="weights   ", subsequent_indent=" " * 10)
+    return _wrapped("weights", text)
+
+
+def _wrapped(name: str, text: str) -> list[str]:
+    """Return the lines of a header's entry."""
+    return textwrap.wrap(text, 98, initial_indent=f"{name:10}", subsequent_indent=" " * 10)
 
 
 def _bound_text(bound: Bound) -> str:

@@ -8,7 +8,10 @@ with one), `index` into the weights, `i` and `value` of an output channel, `0`, 
 declaration. The text between is the language's own, its braces doubled. An operation's template may differ
 for a kind of operand: `minimum.int32`. More channels than `channels_per_result` go into several results.
 `exact` are the lines that an exact kernel needs at its top, `magnitude` the absolute value of a number,
-`clamp` the name of the function that limits an index.
+`clamp` the name of the function that limits an index. `first` are the lines that the language wants before
+any comment, `indexes_results` says whether a result's channel may be chosen by a variable, `counted` opens a loop on a counter from 0 on, `define` names a number, `choice` is one between
+two numbers; `assumes` says what a bound
+rests on that the language itself does not promise.
 """
 
 from __future__ import annotations
@@ -42,8 +45,14 @@ class Dialect:
     arguments: str
     max_output_channels: int
     channels_per_result: int | None = None
+    indexes_results: bool = True
     native_sine: SineContract
     unordered: tuple[str, str] = ("", "")
+    assumes: str = ""
+    first: tuple[str, ...] = ()
+    counted: str = "for (int {i} = 0; {i} < {count}; ++{i}) {{"
+    define: str = "#define {name} {value}"
+    choice: str = "{0} ? {1} : {2}"
     exact: tuple[str, ...] = ()
     magnitude: str = "fabs({0})"
     clamp: str = "clamp"
@@ -90,6 +99,35 @@ class Dialect:
         """Return the words before the name of a variable of this kind."""
         return self.qualifiers.get(dtype, "") + self.types[dtype]
 
+    def let(self, dtype: str, name: str, value: str, kept: bool = False) -> str:
+        """Return the declaration of a value; `kept`: its operations stay in order where the language can."""
+        return f"{self.variable(dtype) if kept else self.types[dtype]} {name} = {value};"
+
+    def single(self, name: str, value: str) -> str:
+        """Return the declaration of one number, also in a language whose values are vectors."""
+        return f"float {name} = {value};"
+
+    def index(self, name: str, value: str) -> str:
+        """Return the declaration of a place in an image or a window."""
+        return f"int {name} = {value};"
+
+    def var(self, dtype: str, name: str, value: str = "", kept: bool = False) -> str:
+        """Return the declaration of a variable that is assigned later, or again."""
+        kind = self.variable(dtype) if kept else self.types[dtype]
+        return f"{kind} {name}{f' = {value}' if value else ''};"
+
+    def array(self, dtype: str, name: str, count: int, kept: bool = False) -> str:
+        """Return the declaration of an array."""
+        return f"{self.variable(dtype) if kept else self.types[dtype]} {name}[{count}];"
+
+    def loop(self, counter: str, count: int | str) -> str:
+        """Return the line that opens a loop of a counter from 0 on."""
+        return self.counted.format(i=counter, count=count)
+
+    def select(self, condition: str, yes: str, no: str) -> str:
+        """Return the text of a choice between two numbers."""
+        return self.choice.format(condition, yes, no)
+
     def expression(self, node: Node, kind: str, operands: Sequence[str]) -> str:
         """Return the text of an operation on operands, the last of which is of the given kind."""
         template = self.operations.get(f"{node.op}.{kind}") or self.operations[node.op]
@@ -97,7 +135,7 @@ class Dialect:
 
     def kept(self, value: str) -> str:
         """Return the text of a number as an exact program reads it."""
-        return f"{self.magnitude.format(value)} < {self.literal(LEAST)} ? 0.0f : {value}"
+        return self.select(f"{self.magnitude.format(value)} < {self.literal(LEAST)}", "0.0f", value)
 
     def constant(self, node: Node) -> str:
         """Return the text of a constant."""

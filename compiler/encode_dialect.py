@@ -7,7 +7,6 @@ place where a texture holds several; `image`, `channels`, `channel`, `value` and
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 
 from .dialect import Dialect
 from .glsl import GLSL, PREAMBLE
@@ -96,7 +95,3 @@ void main()
         "nothing). Draw one triangle that covers them: row 0 stays row 0"
     )
     planes_per_input = 4
-
-
-ENCODE_DIALECTS: Mapping[str, EncodeDialect] = {"opencl": OpenCLEncode(), "opengl": GLSLEncode()}
-"""By target; the interpreter needs the program alone."""

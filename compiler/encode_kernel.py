@@ -23,13 +23,21 @@ from ..refimpl.errors import CompileError
 from . import bounds, ir, profiles
 from .artifact import OneSource
 from .compile import sine_contract, target_of_pipelines
-from .encode_dialect import ENCODE_DIALECTS, EncodeDialect
+from .encode_dialect import EncodeDialect, GLSLEncode, OpenCLEncode
+from .glsl_es import GLSLESEncode
 from .ir import Image, Program
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
 from .passes import pipeline
 
 SCHEMA = "wamnet-encode-kernel-1"
 """Name and version of the manifest's form; described in spec/pipeline.md."""
+
+ENCODE_DIALECTS: Mapping[str, EncodeDialect] = {
+    "opencl": OpenCLEncode(),
+    "opengl": GLSLEncode(),
+    "glsl-es": GLSLESEncode(),
+}
+"""By target; the interpreter needs the program alone."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +176,7 @@ def _emit(
     )
     comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
     body = [f"    {line}" for line in lines]
-    return "\n".join([*comment, begin, *body, dialect.encode_end.format()]) + "\n"
+    return "\n".join([*dialect.first, *comment, begin, *body, dialect.encode_end.format()]) + "\n"
 
 
 def _statements(program: Program, dialect: EncodeDialect, lines: list[str]) -> list[str]:
@@ -182,6 +190,6 @@ def _statements(program: Program, dialect: EncodeDialect, lines: list[str]) -> l
         else:
             kind = program.nodes[node.args[-1]].type.dtype
             expression = dialect.expression(node, kind, [texts[arg] for arg in node.args])
-            lines.append(f"{dialect.variable(node.type.dtype)} t{index} = {expression};")
+            lines.append(dialect.let(node.type.dtype, f"t{index}", expression, kept=True))
             texts.append(f"t{index}")
     return texts

@@ -25,6 +25,7 @@ class PathDialect(Dialect):
     path_begin: str
     path_end: str
     path_arguments: str
+    bounces = "for (uint bounce = 0u; bounce <= MAX_DEPTH; ++bounce) {"
     splat = "{value}"
     any_lane = "{mask}"
     lane_numbers: str

@@ -21,6 +21,7 @@ from ..refimpl.errors import CompileError
 from . import emit_path, ir, opencl_path, profiles
 from .artifact import OneSource
 from .compile import asdict_finite, sine_contract, target_of_pipelines
+from .glsl_es import GLSLESPath
 from .glsl_path import GLSLPath
 from .lower_scene import MOST_UNROLLED, PASSES, PathPrograms
 from .passes import pipeline
@@ -64,11 +65,12 @@ SCHEDULES: Mapping[str, tuple[Callable[[int], PathDialect | None], tuple[int, ..
     "numpy": (_no_dialect, (1,)),
     "opencl": (opencl_path.schedule, (1, *opencl_path.VECTORS)),
     "opengl": (lambda lanes: GLSLPath(), (1,)),
+    "glsl-es": (lambda lanes: GLSLESPath(), (1,)),
 }
 """By target: the dialect for a number of paths at once, and the numbers that there are."""
 
 
-UNROLLED: Mapping[str, int] = {"opengl": 128}
+UNROLLED: Mapping[str, int] = {"opengl": 128, "glsl-es": 128}
 """By target, where it is not MOST_UNROLLED: most primitives of a scene that become statements each. llvmpipe
 reads a table at a loop's counter lane by lane, so a loop that Mesa does not unroll itself (it does up to some
 30 trips) is two to four times slower than statements; but it compiles the statements of 100 primitives in 1

@@ -103,9 +103,10 @@ class _Built:
 
 
 class OpenGLExecutor(Executor):
-    """One OpenGL context."""
+    """One OpenGL context; another version of the language has another `vertex_shader`."""
 
     name = "opengl"
+    vertex_shader = VERTEX_SHADER
 
     def __init__(self, context: str | None = None) -> None:
         kind, self._context = _open(context or os.environ.get(CONTEXT_VARIABLE) or "auto")
@@ -181,7 +182,7 @@ class OpenGLExecutor(Executor):
     def _program(self, source: str, made: ExitStack) -> tuple[Any, Any]:
         """Return the shaders and the triangle that they draw; `made` gives them back if something fails."""
         try:
-            program = self._context.program(vertex_shader=VERTEX_SHADER, fragment_shader=source)
+            program = self._context.program(vertex_shader=self.vertex_shader, fragment_shader=source)
         except moderngl.Error as error:
             raise CompileError(f"{self.device} does not build the kernel: {error}") from None
         made.callback(program.release)

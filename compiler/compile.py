@@ -24,12 +24,13 @@ from .artifact import Artifact
 from .c import C
 from .dialect import Dialect
 from .emit import kernel_gather, output_channels
+from .emit_inlined import Inlined
+from .emit_packed import Packed
 from .enclosure import round_up as round_up
 from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
-from .emit_inlined import Inlined
 from .glsl_compute import GLSL_COMPUTE
-from .glsl_es import GLSLES, GLSLESInlined
+from .glsl_es import GLSLES, GLSLESInlined, GLSLESPacked
 from .glsl_inlined import GLSL_LADDER
 from .ir import LEAST, OUTPUT_ENCODING, Gather, Program
 from .opencl import OpenCL
@@ -97,7 +98,8 @@ DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C())}
 """All targets of denoisers: those, and C, which is made to be pasted."""
 
 EXPORTED: Mapping[str, Target] = {
-    target.name: target for target in (_dialect_target(GLSLES(), Inlined(GLSLESInlined())),)
+    target.name: target
+    for target in (_dialect_target(GLSLES(), Inlined(GLSLESInlined()), Packed(GLSLESPacked())),)
 }
 """Targets that are written for other programs to run: kernels/export has what runs them in tests."""
 

@@ -7,7 +7,6 @@ place where a texture holds several; `image`, `channels`, `channel`, `value` and
 
 from __future__ import annotations
 
-
 from .dialect import Dialect
 from .glsl import GLSL, PREAMBLE
 from .opencl import OpenCL

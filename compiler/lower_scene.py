@@ -144,9 +144,7 @@ def lower_scene(
     def scatter(given: Mapping[str, Any]) -> dict[str, Any]:
         surface, hit = _surface(given)
         counters = Counters(*(given[name] for name in COUNTERS))
-        path, alive = transport.scatter(
-            world_of(given), _path(given), surface, hit, given["depth"], counters
-        )
+        path, alive = transport.scatter(world_of(given), _path(given), surface, hit, given["depth"], counters)
         return {**_taken(PATH, path), "alive": alive}
 
     numbers = {**dict.fromkeys(("x", "y", "seed", "sample_number"), (NUMBER, COUNTER))}

@@ -39,8 +39,7 @@ def test_the_program_is_the_reference(samples):
     sums = sums_of(samples)
     wide = {name: values.astype(np.float64) for name, values in sums.items()}
     layers = {
-        "color": np.stack([wide[f"color_{c}"] for c in "rgb"], axis=-1),
-        "albedo": np.stack([wide[f"albedo_{c}"] for c in "rgb"], axis=-1),
+        **{n: np.stack([wide[f"{n}_{c}"] for c in "rgb"], -1) for n in ("color", "albedo", "unshadowed")},
         "depth": wide["depth"],
         **{n: np.stack([wide[f"{n}_{c}"] for c in "xyz"], -1) for n in ("normal", "position", "direction")},
     }
@@ -73,6 +72,7 @@ def test_the_bound_catches_an_exponent_of_2_2():
 
 @pytest.mark.parametrize("target", ["opencl", "opengl"])
 def test_golden_source(golden, target):
+    """PPL-5, PPL-6: arguments, strides and textures of both languages."""
     made = compile_encode(ALL, SCALES, target)
     golden(f"ieee.{made.source_name}", made.source)
 

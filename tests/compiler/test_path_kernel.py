@@ -63,7 +63,7 @@ def test_the_manifest_names_what_was_made():
     assert made.manifest["files"] == {"path.frag": ir.sha256(made.source.encode())}
     assert made.digest == ir.sha256(made.source.encode())
     assert made.manifest["planes"] == planes(
-        ("color", "deviation", "albedo", "normal", "depth", "position", "direction")
+        ("color", "deviation", "albedo", "normal", "depth", "position", "direction", "unshadowed")
     )
     assert made.manifest["bound"] is None
     assert made.manifest["settings"]["max_depth"] == 3
@@ -143,6 +143,7 @@ def test_unknown_group_of_planes():
 
 
 def test_more_planes_than_a_fragment_writes():
+    """PTK-8."""
     with pytest.raises(CompileError, match=r"adds up \d+ planes: GLSL 3.30, .* writes at most 32; ask for"):
         kernel(target="opengl", lanes=1, groups=tuple(GROUPS))
     assert len(kernel(lanes=1, groups=tuple(GROUPS)).planes) > 32

@@ -1,10 +1,11 @@
-"""A small picture to check an integration with: inputs, what the reference makes of them, how far off it may be.
+"""A small picture to check an integration with: inputs, the reference's output, how far off it may be.
 
 1. Its sides are the window's and a few pixels more: most pixels see a border [`SIDES`].
 2. With a scene its images are those of one sample a pixel, rounded to float32; else every number of an image
    lies in its range, spread by multiples of the golden ratio [`_spread`].
-3. The output is the reference's in float64, rounded to float32; the bound is computed for this picture, of this
-   kernel, and holds the rounding. A kernel without a bound states what the emitted sine's would have.
+   Of several contrasts the one is taken whose output is clipped least [`_livelier`].
+3. The output is the reference's in float64, rounded to float32; the bound is computed for this picture, of
+   this kernel, and holds the rounding. A kernel without a bound states what the emitted sine's would have.
 
 Files are raw little-endian float32, rows from the top, channels interleaved; check.json names their shapes.
 """
@@ -12,7 +13,7 @@ Files are raw little-endian float32, rows from the top, channels interleaved; ch
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,10 +23,15 @@ from numpy.typing import NDArray
 from ...compiler import emit_path
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_program
+from ...compiler.emit import kernel_gather
 from ...compiler.expected import expected
-from ...compiler.ir import Gather
+from ...compiler.interpret import interpret
+from ...compiler.ir import Gather, Program
 from ...compiler.lower import lower
-from ...compiler.path_kernel import PathArtifact, compile_path
+from ...compiler.lower_encode import layers_of
+from ...compiler.lower_scene import PathPrograms
+from ...compiler.path_kernel import compile_path
+from ...compiler.schedules import windows
 from ...compiler.variants import parse, vary
 from ...refimpl.dataset import FEATURES, encode_sums
 from ...refimpl.denoise import Model
@@ -37,6 +43,9 @@ SIDES = (1, 3)
 
 SEED = 7
 """Seed of the sample that a scene's picture has."""
+
+CONTRASTS = (1.0, 0.5, 0.25, 0.1)
+"""Shares of an image's range that are tried: a trained network clips most of what is pure noise."""
 
 GOLDEN = (5.0**0.5 - 1) / 2
 """Multiples of this, modulo 1, are spread evenly and repeat nothing."""
@@ -92,18 +101,24 @@ class Pair:
         }
 
 
-def pair(model: Model, variant: str, denoiser: Artifact | None, path: PathArtifact | None) -> Pair:
-    """Return the pair of a model's variant: with the bound of its kernel, and a scene's picture if it has one."""
+def pair(
+    model: Model,
+    variant: str,
+    denoiser: Artifact | None = None,
+    programs: PathPrograms | None = None,
+    profile: str = "ieee",
+) -> Pair:
+    """Return the pair of a model's variant, with its kernel's bound; with a scene, of its picture."""
     varied = vary(parse(variant), model)
     program = lower(varied.model)
-    gather = program.gather
-    assert gather is not None, "models have windows"
+    gather = kernel_gather(program)
     size = (gather.rows + SIDES[0], gather.columns + SIDES[1])
-    sums, planes = None, ()
-    if path is None:
-        images = _spread(gather, size)
+    sums: NDArray[np.float32] | None = None
+    planes: tuple[str, ...] = ()
+    if programs is None:
+        images = _livelier(program, size)
     else:
-        sums, planes = _sums(path, size), path.planes
+        planes, sums = _sums(programs, varied.features, profile, size)
         images = _encoded(varied.model, dict(zip(planes, sums, strict=True)))
     promised = denoiser is not None and denoiser.manifest["bound"]["output"] is not None
     one_pass = denoiser is not None and denoiser.before is None and promised
@@ -116,25 +131,37 @@ def pair(model: Model, variant: str, denoiser: Artifact | None, path: PathArtifa
     return Pair(images, output, rounded, promised, sums, planes)
 
 
-def _spread(gather: Gather, size: tuple[int, int]) -> dict[str, NDArray[np.float32]]:
-    """Return images (H, W, C) whose numbers lie in their ranges."""
+def _livelier(program: Program, size: tuple[int, int]) -> dict[str, NDArray[np.float32]]:
+    """Return the images of the contrast whose output has most numbers that are not clipped."""
+    gather = kernel_gather(program)
+    best, most = {}, -1
+    for contrast in CONTRASTS:
+        images = _spread(gather, size, contrast)
+        (value,) = interpret(program, {"window": windows(gather, images)}, np.float64).values()
+        lively = int(((value > 0) & (value < 1)).sum())
+        if lively > most:
+            best, most = images, lively
+    return best
+
+
+def _spread(gather: Gather, size: tuple[int, int], contrast: float) -> dict[str, NDArray[np.float32]]:
+    """Return images (H, W, C) whose numbers lie in that share of their ranges, around the middle."""
     found = {}
     for number, image in enumerate(gather.images):
         count = size[0] * size[1] * image.channels
-        shares = ((np.arange(count) + 1) * GOLDEN + number / 7) % 1.0
+        shares = 0.5 + contrast * (((np.arange(count) + 1) * GOLDEN + number / 7) % 1.0 - 0.5)
         values = (image.low + (image.high - image.low) * shares).reshape(*size, image.channels)
         found[image.name] = np.clip(values.astype(np.float32), np.float32(image.low), np.float32(image.high))
     return found
 
 
-def _sums(path: PathArtifact, size: tuple[int, int]) -> NDArray[np.float32]:
-    """Return the interpreter's sums (planes, H, W) over one sample of a path kernel's planes."""
-    groups = tuple(g for g, planes in emit_path.GROUPS.items() if set(planes) <= set(path.planes))
-    kernel = compile_path(path.programs, "numpy", path.profile, groups=groups)
+def _sums(
+    programs: PathPrograms, features: Sequence[str], profile: str, size: tuple[int, int]
+) -> tuple[tuple[str, ...], NDArray[np.float32]]:
+    """Return the planes of features, and the interpreter's sums (planes, H, W) over one sample."""
+    kernel = compile_path(programs, "numpy", profile, groups=tuple(dict.fromkeys(layers_of(features))))
     with open_executor("numpy") as executor:
-        found = executor.trace(kernel, Part(size[1], size[0], 0, size[0], 0, 1, SEED))
-    named = dict(zip(kernel.planes, found, strict=True))
-    return np.stack([named[plane] for plane in path.planes])
+        return kernel.planes, executor.trace(kernel, Part(size[1], size[0], 0, size[0], 0, 1, SEED))
 
 
 def _encoded(model: Model, sums: Mapping[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:

@@ -2,8 +2,8 @@
 
 1. Compile the denoiser for the target's language and place of weights, and with a scene its paths and the
    encoding of features [`export`]; what the host cannot take is refused with the name of its limit.
-2. Each kernel has a folder of its own, as `wamnet compile` writes it, with its certificate; translations stand
-   beside the source that they are made of.
+2. Each kernel has a folder of its own, as `wamnet compile` writes it, with its certificate; translations
+   stand beside the source that they are made of.
 3. `check/` holds inputs, the reference's output and how far off each number may be [check_pair.py].
 4. `manifest.json` says what there is and how it is bound [`manifest_of`], `README.md` how to call it.
 
@@ -27,7 +27,7 @@ from ...compiler.encode_kernel import EncodeArtifact, compile_encode
 from ...compiler.host_pass import feature_pass
 from ...compiler.ir import sha256
 from ...compiler.lower_encode import layers_of
-from ...compiler.lower_scene import lower_scene
+from ...compiler.lower_scene import PathPrograms, lower_scene
 from ...compiler.path_kernel import PathArtifact, compile_path, most_unrolled
 from ...compiler.variants import FULL, compile_variant, parse, vary
 from ...refimpl.denoise import Model
@@ -41,8 +41,8 @@ SCHEMA = "wamnet-export-1"
 """Name and version of the manifest's form; spec/export.schema.json."""
 
 LICENCE = (
-    "The compiler's licence, Apache-2.0, makes no claim on what it writes: kernels, weights and texts of this "
-    "export are yours, as the model is, without any condition of ours"
+    "The compiler's licence, Apache-2.0, makes no claim on what it writes: kernels, weights and texts of "
+    "this export are yours, as the model is, without any condition of ours"
 )
 """What a manifest says about rights."""
 
@@ -102,7 +102,8 @@ def export(request: Request) -> Export:
     for kernel, folder in _folders(denoiser):
         files |= _written(kernel, folder)
         files |= {f"{folder}/{n}": data for n, data in row.files("denoise", kernel.source).items()}
-    path, encoder, passes = _of_scene(request, row)
+    programs = _programs(request, row)
+    path, encoder, passes = _of_scene(request, row, programs)
     for name, made in (("path", path), ("encode", encoder)):
         if made is not None:
             files |= _written(made, name)
@@ -111,7 +112,7 @@ def export(request: Request) -> Export:
         found = row.files(f"feature.{name}", text)
         files |= {f"features/{n}": data for n, data in found.items()}
         _check(row.source, max(map(len, found.values())), row.name)
-    pair = check_pair.pair(request.model, request.variant, denoiser, path)
+    pair = check_pair.pair(request.model, request.variant, denoiser, programs, request.profile)
     files |= {f"check/{name}": data for name, data in pair.files().items()}
     facts = _facts(request, row, how, denoiser, limits)
     facts["kernels"] = bindings.kernels(row, denoiser, path, encoder, passes)
@@ -127,7 +128,7 @@ def _graph(request: Request) -> Export:
         raise InputError("--weights", request.weights, "a graph holds its weights", "leave it out")
     varied = vary(parse(request.variant), request.model)
     data = onnx_export.graph(varied.model)
-    pair = check_pair.pair(request.model, request.variant, None, None)
+    pair = check_pair.pair(request.model, request.variant)
     files = {"denoise/denoise.onnx": data}
     files |= {f"check/{name}": content for name, content in pair.files().items()}
     model = varied.model
@@ -174,7 +175,7 @@ def _facts(
     """Return what a manifest says besides kernels and files."""
     held = denoiser.manifest
     first = denoiser.kernels[0].manifest
-    window = first["window"]
+    size = vary(parse(request.variant), request.model).model.window.size
     return {
         "language": row.text,
         "profile": held["profile"],
@@ -183,10 +184,7 @@ def _facts(
         if request.scene is None
         else {"name": request.scene.name, "settings": request.settings.facts()},
         "images": first["images"],
-        "window": {
-            "size": vary(parse(request.variant), request.model).model.window.size,
-            "border": window["border"],
-        },
+        "window": {"size": size, "border": first["window"]["border"]},
         "output": held["output"],
         "bound": held["bound"],
         "assumes": target_named(denoiser.target).assumes,
@@ -271,15 +269,25 @@ def _written(kernel: artifacts.Files, folder: str) -> dict[str, bytes]:
     return {f"{folder}/{name}": data for name, data in held.items()}
 
 
+def _programs(request: Request, row: Row) -> PathPrograms | None:
+    """Return the programs of a scene's paths, as the target unrolls them."""
+    if request.scene is None:
+        return None
+    return lower_scene(request.scene, request.settings, most_unrolled(_usual(row)))
+
+
+def _usual(row: Row) -> str:
+    """Return the compiler's name of a target, wherever weights are."""
+    return next(iter(row.places.values())).kernel.partition(":")[0]
+
+
 def _of_scene(
-    request: Request, row: Row
+    request: Request, row: Row, programs: PathPrograms | None
 ) -> tuple[PathArtifact | None, EncodeArtifact | None, Mapping[str, str]]:
     """Return the kernels of a scene: paths and encoding, or passes that write a feature each."""
-    if request.scene is None:
+    if request.scene is None or programs is None:
         return None, None, {}
-    model = vary(parse(request.variant), request.model).model
-    target = next(iter(row.places.values())).kernel.partition(":")[0]
-    programs = lower_scene(request.scene, request.settings, most_unrolled(target))
+    model, target = vary(parse(request.variant), request.model).model, _usual(row)
     if row.single:
         header = [f"wamnet: a noisy feature of scene {_plain(request.scene.name)}, one sample a pixel."]
         return (

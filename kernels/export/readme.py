@@ -33,24 +33,12 @@ IMAGE_LINES: Mapping[str, str] = {
 
 def readme(facts: Mapping[str, Any], files: Sequence[str]) -> str:
     """Return the text for what a manifest says."""
-    bound, check = facts["bound"]["output"], facts["check"]
-    promise = (
-        f"at most {max(bound):g} from the float64 reference, for every picture in the stated ranges"
-        if bound
-        else f"no promise ({facts['bound']['against']})"
-    )
     lines = [
         f"# Denoiser for {facts['target']}",
         "",
         f"{facts['language']}. Written by `wamnet export`; `manifest.json` says the same for programs.",
         "",
-        f"* Error: {promise}.",
-        *([f"* This assumes: {facts['assumes']}."] if facts["assumes"] else []),
-        f"* Window: {facts['window']['size']} x {facts['window']['size']} pixels, border rule `{facts['window']['border']}`.",
-        f"* Weights: {facts['weights']['count'] or 'all'} numbers, {facts['weights']['where']}.",
-        f"* Output: {facts['output']['encoding'] or 'linear'}.",
-        *(f"* Image `{i['name']}`: {i['channels']} channels in [{i['low']:g}, {i['high']:g}]; {i['encoding']}." for i in facts["images"]),
-        *(f"* Limit: {x['name']}: needs {x['needs']} of {x['most']}." for x in facts["limits"]),
+        *_facts(facts),
         "",
         "## Kernels, in the order in which they run",
         "",
@@ -65,27 +53,61 @@ def readme(facts: Mapping[str, Any], files: Sequence[str]) -> str:
         "",
         "## Check",
         "",
-        f"`check/` holds a picture of {check['width']} x {check['height']} pixels, raw {check['format']}: feed the "
-        "images to the denoiser,",
-        f"and compare with output.f32: {check['rule']} (bound.f32"
-        + (")." if check["bound"]["promised"] else "; expected, not promised, for this target)."),
-        *(["`sums.f32` are the paths' sums of the same picture, for seed "
-           f"{check['sums']['seed']}; a path that passes an edge within rounding may differ."] if check["sums"] else []),
+        *_check(facts["check"]),
         "",
         "## Rights",
         "",
         facts["licence"] + ".",
         "",
-    ]  # fmt: skip
+    ]
     return "\n".join(lines)
+
+
+def _facts(facts: Mapping[str, Any]) -> list[str]:
+    """Return the lines about the whole."""
+    bound, window, weights = facts["bound"]["output"], facts["window"], facts["weights"]
+    promise = (
+        f"at most {max(bound):g} from the float64 reference, for every picture in the stated ranges"
+        if bound
+        else f"no promise ({facts['bound']['against']})"
+    )
+    images = [
+        f"* Image `{i['name']}`: {i['channels']} channels in [{i['low']:g}, {i['high']:g}]; {i['encoding']}."
+        for i in facts["images"]
+    ]
+    return [
+        f"* Error: {promise}.",
+        *([f"* This assumes: {facts['assumes']}."] if facts["assumes"] else []),
+        f"* Window: {window['size']} x {window['size']} pixels, border rule `{window['border']}`.",
+        f"* Weights: {weights['count'] or 'all'} numbers, {weights['where']}.",
+        f"* Output: {facts['output']['encoding'] or 'linear'}.",
+        *images,
+        *(f"* Limit: {x['name']}: needs {x['needs']} of {x['most']}." for x in facts["limits"]),
+    ]
+
+
+def _check(check: Mapping[str, Any]) -> list[str]:
+    """Return the lines about the check pair."""
+    promised = "" if check["bound"]["promised"] else "; expected, not promised, for this target"
+    found = [
+        f"`check/` holds a picture of {check['width']} x {check['height']} pixels, raw {check['format']}:",
+        "feed the images to the denoiser, and compare with output.f32:",
+        f"{check['rule']} (bound.f32{promised}).",
+    ]
+    if check["sums"]:
+        found += [
+            f"`sums.f32` are the paths' sums of the same picture, for seed {check['sums']['seed']}; a path",
+            "that passes an edge within rounding may differ.",
+        ]
+    return found
 
 
 def _kernel(kernel: Mapping[str, Any]) -> list[str]:
     """Return the lines about one kernel."""
-    rows = [
-        f"| {b['slot']} | `{b['name']}` | {b['access']} | {b['type']} | {', '.join(map(str, b['shape'])) or '1'} |"
-        for b in kernel["bindings"]
-    ]
+    rows = []
+    for b in kernel["bindings"]:
+        shape = ", ".join(map(str, b["shape"])) or "1"
+        rows.append(f"| {b['slot']} | `{b['name']}` | {b['access']} | {b['type']} | {shape} |")
     named = ", ".join(f"`{name}`" for name in kernel["files"])
     return [
         f"**{kernel['role']}**: {named}, entry point `{kernel['entry_point']}`.",

@@ -1,7 +1,7 @@
-"""The targets of `wamnet export`: which kernels are written for each, what they are bound to, and what is checked.
+"""The targets of `wamnet export`: which kernels are written for each, how they are called, what limits hold.
 
-One row a target [`TARGETS`]. A row names a compiler target for each place that weights can have, the first one
-being the usual one, and says how the kernels' files are called, how they are called, and which limits hold.
+One row a target [`TARGETS`]. A row names a compiler target for each place that weights can have, the first
+one being the usual one, and says how files are named, how kernels are called, and which limits hold.
 """
 
 from __future__ import annotations
@@ -267,7 +267,7 @@ def _rows() -> tuple[Row, ...]:
             {INLINE: Place("shadertoy", "inlined", limit=INLINED, each=1.0)},
             _as(".glsl"),
             "channels",
-            "1. Make buffers A, B, ... and paste feature.<name>.glsl into one each, in the manifest's order.\n"
+            "1. Make buffers A, B, ... and paste features/feature.<name>.glsl into one each, in this order.\n"
             "2. Paste denoise.glsl into the tab Image.\n"
             "3. In Image, set iChannel0, iChannel1, ... to the buffers in that order:\n"
             "{images}\n"
@@ -292,7 +292,7 @@ def _rows() -> tuple[Row, ...]:
             "names",
             "var material = ShaderMaterial.new()\n"
             'material.shader = load("res://denoise.gdshader")\n'
-            "# Images: Image.FORMAT_RGBF, row 0 the top row; weights: FORMAT_RF, 1024 wide, padded with zeros.\n"
+            "# Images: FORMAT_RGBF, row 0 the top row; weights: FORMAT_RF, 1024 wide, padded with zeros.\n"
             "{images}\n"
             'material.set_shader_parameter("weight_texture", ImageTexture.create_from_image(weights))\n'
             "$Picture.material = material   # a TextureRect of the picture's size\n"

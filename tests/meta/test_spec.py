@@ -20,6 +20,9 @@ CLAUSE = re.compile(r"^\*\*([A-Z0-9]+-\d+[a-z]?)\*\*", re.MULTILINE)
 CODE = re.compile(r"`((?:refimpl|compiler|kernels|cli)/[\w/]+\.py): *([\w., ]+)`")
 """Code is named by path and names: `refimpl/rng.py: pcg4d`; several names are separated by commas."""
 
+BROKEN = re.compile(r"`((?:refimpl|compiler|kernels|cli)/[\w/]+\.py:)[^`\n]*\n[^`]*`")
+"""Names of code over two lines, which nobody would see."""
+
 REFERENCE = re.compile(r"\b([A-Z]{2,5}-\d+[a-z]?)\b")
 """A mention of a clause, in the spec or in the code."""
 
@@ -86,6 +89,15 @@ def test_clauses_name_code(house):
     house.refuse(
         wrong, "A clause names the code that it governs: add (`refimpl/rng.py: pcg4d`), or remove the clause."
     )
+
+
+def test_names_of_code_stand_on_one_line(house):
+    wrong = [
+        f"spec/{path.name}: {found}"
+        for path in sorted((house.root / "spec").glob("*.md"))
+        for found in BROKEN.findall(path.read_text())
+    ]
+    house.refuse(wrong, "Code is named on one line, so that links find it: join `path: names` that is broken.")
 
 
 def test_named_code_exists(house):

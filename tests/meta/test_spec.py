@@ -97,7 +97,9 @@ def test_names_of_code_stand_on_one_line(house):
         for path in sorted((house.root / "spec").glob("*.md"))
         for found in BROKEN.findall(path.read_text())
     ]
-    house.refuse(wrong, "Code is named on one line, so that links find it: join `path: names` that is broken.")
+    house.refuse(
+        wrong, "Code is named on one line, so that links find it: join `path: names` that is broken."
+    )
 
 
 def test_named_code_exists(house):

@@ -40,7 +40,7 @@ def case(kit):
     return program, images
 
 
-@pytest.mark.parametrize("schedule", ["plain", "inlined"])
+@pytest.mark.parametrize("schedule", ["plain", "inlined", "packed"])
 def test_denoiser_keeps_its_bound(runner, kit, case, schedule):
     artifact = compile_program(case[0], "glsl-es", schedule=schedule)
     assert artifact.manifest["schedule"]["name"] == schedule
@@ -75,7 +75,7 @@ def test_more_than_four_buffers_are_refused():
         compile_path(programs, "glsl-es")
 
 
-@pytest.mark.parametrize("kind", ["plain", "inlined", "path", "encode"])
+@pytest.mark.parametrize("kind", ["plain", "inlined", "packed", "path", "encode"])
 def test_another_compiler_takes_the_source(case, kind, tmp_path):
     if kind == "path":
         programs = lower_scene(canonical("minicubes"), Settings())

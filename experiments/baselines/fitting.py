@@ -218,6 +218,13 @@ def fit(
     return facts
 
 
+def seconds_a_step(method: Method, recipe: Recipe, data: Examples) -> float:
+    """Do a step of a method that nothing else uses; return its seconds."""
+    begun = time.perf_counter()
+    _one(method, recipe, data, 0)
+    return time.perf_counter() - begun
+
+
 @contextmanager
 def whole_steps() -> Iterator[list[int]]:
     """Put Ctrl-C off until the block is done: half a step could not be gone on with. Yield what came."""

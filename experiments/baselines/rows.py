@@ -11,6 +11,7 @@ use them; without them these rows say so.
 from __future__ import annotations
 
 import itertools
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -81,12 +82,14 @@ class Case:
 class Ready:
     """A way that is made ready: `picture` of a case, and facts: parameters, seconds of training, choices.
 
-    `seconds`: how long a picture takes, if calling `picture` says something else.
+    `seconds`: how long a picture takes, if calling `picture` says something else; `step`: how long a step of
+    its training takes.
     """
 
     picture: Callable[[Case], Picture]
     facts: Mapping[str, Any] = field(default_factory=dict)
     seconds: Callable[[Case], float] | None = None
+    step: Callable[[], float] | None = None
 
 
 @dataclass(frozen=True)
@@ -172,7 +175,8 @@ def wamnet(base: Recipe, kind: str, bench: Bench, seed: int, **changes: Any) -> 
     model, seconds = training.trained(recipe, pairs, bench.cache / "networks", bench.executor)
     facts = {"parameters": parameters(model), "training_s": seconds, "steps": recipe.steps}
     facts |= {"training_frames": len(pairs)}
-    return Ready(partial(_by_network, bench, model), facts, partial(_network_seconds, bench, model))
+    step = partial(training.seconds_a_step, recipe, pairs, bench.device)
+    return Ready(partial(_by_network, bench, model), facts, partial(_network_seconds, bench, model), step)
 
 
 def _by_network(bench: Bench, model: Model, case: Case) -> Picture:
@@ -184,8 +188,6 @@ def _by_network(bench: Bench, model: Model, case: Case) -> Picture:
 
 def _network_seconds(bench: Bench, model: Model, case: Case) -> float:
     """Return the seconds of a frame: features encoded, images to the device, kernel, result back."""
-    import time
-
     begun = time.perf_counter()
     images_of(model, case.noisy)
     encoded = time.perf_counter() - begun
@@ -212,21 +214,22 @@ def dncnn(kind: str, bench: Bench, seed: int) -> Ready:
     """Train DnCNN on all training frames."""
     need("torch", "for DnCNN", "baselines")
     from . import dncnn as module
-    from .fitting import Recipe, examples, fit
+    from .fitting import Recipe, examples, fit, seconds_a_step
 
     recipe = Recipe("dncnn", learning_rate=1e-3, seed=seed, **getattr(bench.scale, kind))
     data = examples(recipe, bench.train_files(seed), bench.cache / "networks")
     made = module.DnCNN(recipe)
     run = fit(made, recipe, data, bench.cache / "networks")
     facts = {"parameters": run["parameters"]["dncnn"], "training_s": run["seconds"], "steps": recipe.steps}
-    return Ready(lambda case: (made.picture(case.noisy), None), facts)
+    step = partial(seconds_a_step, module.DnCNN(recipe), recipe, data)
+    return Ready(lambda case: (made.picture(case.noisy), None), facts, step=step)
 
 
 def pix2pix(bench: Bench, seed: int) -> Ready:
     """Train pix2pix on patches of all training frames; its parameters are those of the generator."""
     need("torch", "for pix2pix", "baselines")
     from . import pix2pix as module
-    from .fitting import Recipe, examples, fit
+    from .fitting import Recipe, examples, fit, seconds_a_step
 
     chosen = {"features": ("color", "normal"), "tiles": True, **bench.scale.pix2pix}
     recipe = Recipe("pix2pix", learning_rate=2e-4, seed=seed, **chosen)
@@ -235,7 +238,8 @@ def pix2pix(bench: Bench, seed: int) -> Ready:
     run = fit(made, recipe, data, bench.cache / "networks")
     facts = {"parameters": run["parameters"]["generator"], "training_s": run["seconds"]}
     facts |= {"parameters_of_discriminator": run["parameters"]["discriminator"], "steps": recipe.steps}
-    return Ready(lambda case: (made.picture(case.noisy), None), facts)
+    step = partial(seconds_a_step, module.Pix2pix(recipe), recipe, data)
+    return Ready(lambda case: (made.picture(case.noisy), None), facts, step=step)
 
 
 # ---- what today's users would ask for ---------------------------------------------------------------------

@@ -82,6 +82,11 @@ def test_the_generator_depends_on_its_noise():
     assert 0.0 <= float(one.detach().min()) <= float(one.detach().max()) <= 1.0
 
 
+def test_patches_must_halve_evenly():
+    with pytest.raises(InputError, match="side of pix2pix's patches is 96: 6 levels halve it"):
+        make(replace(PIX2PIX, crop=96))
+
+
 # ---- losses, by hand -------------------------------------------------------------------------------------
 
 

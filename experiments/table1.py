@@ -87,7 +87,7 @@ SCALES: Mapping[str, Scale] = {
 CROP_PX = 96
 """Side of the crop that is shown."""
 
-SHOWN = ("input", "dncnn", "wamnet", "wamnet-short", "pix2pix", "oidn-noisy", "render30")
+SHOWN = ("input", "dncnn", "wamnet", "wamnet-best", "pix2pix", "oidn-noisy", "render30")
 """Rows of which a crop is shown."""
 
 ROUNDS = 5
@@ -99,7 +99,7 @@ def judged(row: str, bench: Bench, ladder: scores.Ladder, pictures: Path, seed: 
     ready = ROWS[row].make(bench, seed)
     own = ready.facts.get("case")
     found, pairs = [], []
-    for case in bench.cases(seed) if own is None else [own]:
+    for case in bench.cases(seed, ready.rays) if own is None else [own]:
         picture, linear = ready.picture(case)
         found.append(scores.score(picture, case.reference["color"], linear))
         pairs.append((picture, to_display(case.reference["color"])))
@@ -137,9 +137,9 @@ def timed(rows: Sequence[str], bench: Bench, kept: Results, rounds: int) -> None
     left = [row for row in rows if kept.get(row, 0) is None and row not in ("input", "wamnet-own")]
     if not left:
         return
-    case = next(iter(bench.cases(0)))
     made = {row: ROWS[row].make(bench, 0) for row in left}
-    ways = {row: _way(row, ready, bench, case) for row, ready in made.items()}
+    cases = {rays: next(iter(bench.cases(0, rays))) for rays in {ready.rays for ready in made.values()}}
+    ways = {row: _way(row, ready, bench, cases[ready.rays]) for row, ready in made.items()}
     times = in_turns(ways, rounds)
     steps = in_turns({row: ready.step for row, ready in made.items() if ready.step is not None}, rounds)
     for row, found in times.items():

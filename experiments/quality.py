@@ -257,7 +257,10 @@ def report(kept: Results, clock: Results, scenes: Sequence[str], rows: Sequence[
             for name, s in times["seconds"].items()
         ]
         heads = ["a frame, in turns", "ms, median", "ms, range"]
-        parts += [f"## Time ({times['device']}, schedule {times['schedule']})\n", tables.markdown(heads, cells)]
+        parts += [
+            f"## Time ({times['device']}, schedule {times['schedule']})\n",
+            tables.markdown(heads, cells),
+        ]
     return "\n".join(part for part in parts if part)
 
 

@@ -235,6 +235,7 @@ def first_hit_layers(world: World, surface: Surface, hit: Hit, direction: Any) -
         "depth": np.where(found, hit.t, 0.0)[..., np.newaxis],
         "position": intersection.choose_or_zero(found, surface.point),
         "direction": direction,
+        "unshadowed": transport.unshadowed(world, surface),
     }
 
 

@@ -13,9 +13,8 @@ Global Illumination", High Performance Graphics 2017 (section 4.3, equations 1 t
 Sewtz, Hanika, Lensch, "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering", High
 Performance Graphics 2010. Without the temporal half of SVGF: its input is a single frame.
 
-Departures: depth here is the distance along the ray; its gradient is that of central differences. The
-luminance is that of Rec. 709. The first pass's luminance weights use the 3x3 Gaussian of the variance, as in
-equation 5.
+Departures: depth here is the distance along the ray; its gradient is the smaller of the differences to both
+sides. The luminance is that of Rec. 709.
 """
 
 from __future__ import annotations
@@ -38,6 +37,9 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 ALBEDO_EPSILON = 1e-3
 """Reflectance below this one is none: the colour is emitted, or there is no surface."""
+
+DEPTH_EPSILON = 1e-3
+"""Depth, in scene units, by which neighbours of a surface that faces the camera may differ."""
 
 VARIANCE_RADIUS_PX = 3
 """Half the 7x7 window from which variance is estimated (Schied et al. 2017, section 4.2)."""
@@ -86,11 +88,16 @@ def guides_of(frame: Frame) -> Guides:
     depth = frame["depth"][..., 0].astype(np.float64)
     normal = frame["normal"].astype(np.float64)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    slopes = np.stack(
-        [np.gradient(depth, axis=axis) if depth.shape[axis] > 1 else np.zeros_like(depth) for axis in (0, 1)],
-        axis=-1,
-    )
+    slopes = np.stack([slope(depth, axis) for axis in (0, 1)], axis=-1)
     return Guides(depth, slopes, normal / np.maximum(length, 1e-12))
+
+
+def slope(depth: Array, axis: int) -> Array:
+    """Return the smaller difference (H, W) to the pixels before and after: an edge is no slope."""
+    steps = np.diff(depth, axis=axis)
+    first, last = np.take(steps, [0], axis), np.take(steps, [-1], axis)
+    before, after = np.concatenate([first, steps], axis), np.concatenate([steps, last], axis)
+    return np.where(np.abs(before) < np.abs(after), before, after)
 
 
 def local_variance(light: Array, guides: Guides, settings: Settings) -> Array:
@@ -136,7 +143,7 @@ def geometry_weight(guides: Guides, dy: int, dx: int, settings: Settings) -> Arr
     """
     inside = shifted(np.ones_like(guides.depth), dy, dx, outside=0.0)
     far = np.abs(guides.depth - shifted(guides.depth, dy, dx))
-    allowed = settings.sigma_depth * np.abs(guides.gradient @ np.array([dy, dx], np.float64)) + 1e-3
+    allowed = settings.sigma_depth * np.abs(guides.gradient @ np.array([dy, dx], np.float64)) + DEPTH_EPSILON
     cosine = (guides.normal * shifted(guides.normal, dy, dx)).sum(axis=-1)
     alike = np.clip(cosine, 0.0, 1.0) ** settings.sigma_normal
     nothing = (guides.depth == 0.0) & (shifted(guides.depth, dy, dx) == 0.0)

@@ -3,9 +3,9 @@
     python experiments/models.py
     python experiments/models.py --scenes minicubes -o out/models --write cli/models
 
-1. Each is the network of that experiment's row `best-16`, seed 0, trained again only if its cache is not there.
-2. Its scores on the test frames, with features of 16 rays and of one, and those of Open Image Denoise on the
-   same frames go into its facts, beside the recipe [`scored`].
+1. Each is the network of that experiment's row `best-16`, seed 0; it is trained where the cache lacks it.
+2. Its scores on the test frames, with features of 16 rays and of one, and those of Open Image Denoise there
+   go into its facts, beside the recipe [`scored`].
 3. The folder gets a file for each scene, and `SHA256SUMS` [`written`].
 """
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -108,7 +107,7 @@ def test_the_longest_name_is_written(wamnet, here) -> None:
 
 
 def test_models_have_names(samples, monkeypatch, tmp_path) -> None:
-    """A file that is there comes first; then a name, with or without the prefix; else the names are listed."""
+    """A file that is there comes first; then a name, with a prefix or not; else the names are listed."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(inputs, "MODELS", tmp_path / "along")
     (tmp_path / "along").mkdir()
@@ -141,7 +140,10 @@ def test_models_have_names(samples, monkeypatch, tmp_path) -> None:
         (
             {"scene": "empty"},
             {"scene": "cornell", "spp": "1", "feature_spp": "4"},
-            ["it shows cornell", "its features are of --feature-spp 4, those that the model learned from of 1"],
+            [
+                "it shows cornell",
+                "its features are of --feature-spp 4, those that the model learned from of 1",
+            ],
         ),
     ],
 )

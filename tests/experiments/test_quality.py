@@ -57,7 +57,10 @@ def test_what_open_image_denoise_is_given(monkeypatch):
     assert [how for *_, how in seen] == ["high", "high", "high", "high", "fast"]
     # What is judged is its radiance as a screen shows it.
     pictures, _ = quality.denoised(
-        SimpleNamespace(executor="numpy"), quality.ROWS["oidn-1"], [frame], 0  # type: ignore[arg-type]
+        SimpleNamespace(executor="numpy"),
+        quality.ROWS["oidn-1"],
+        [frame],
+        0,  # type: ignore[arg-type]
     )
     assert np.array_equal(pictures[0][0], to_display(frame["color"]))
 
@@ -90,7 +93,8 @@ def test_gaps_are_to_the_best_peer_with_the_same_features(tmp_path):
             kept.put(f"cornell: {row}", seed, {"psnr": number})
     lines = quality._ahead(kept, "cornell", list(values)).splitlines()
     assert lines == [
-        "wamnet, best, features of 1 ray: 2.50 ± 0.71 dB ahead of Open Image Denoise, high, features of 1 ray.",
+        "wamnet, best, features of 1 ray: 2.50 ± 0.71 dB ahead of "
+        "Open Image Denoise, high, features of 1 ray.",
         "wamnet, best, 16 rays: 3.50 ± 0.71 dB ahead of Open Image Denoise, high, clean, 16 rays.",
     ]
 

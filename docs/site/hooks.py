@@ -110,10 +110,10 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         return chapters.anchored(markdown)
     if page.file.src_uri.startswith("tutorial/"):
         markdown = cells.executed(markdown, f"docs/{page.file.src_uri}")
-    return _into_site(markdown, page.file.src_uri)
+    return into_site(markdown, page.file.src_uri)
 
 
-def _into_site(markdown: str, uri: str) -> str:
+def into_site(markdown: str, uri: str) -> str:
     """Return a page's Markdown with its links to the spec as they are on the site, whose root is docs/."""
 
     def link(match: re.Match[str]) -> str:

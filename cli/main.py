@@ -28,6 +28,7 @@ from . import (
     dataset,
     demo,
     denoise,
+    listing,
     render,
     train,
     triage,
@@ -67,6 +68,7 @@ _register(render.scene, render.SCENE_EXAMPLES)
 _register(dataset.dataset, dataset.EXAMPLES)
 _register(train.train, train.EXAMPLES)
 _register(compile_model, COMPILE_EXAMPLES, "compile")
+_register(listing.listing, listing.EXAMPLES)
 _register(certify.certify, certify.EXAMPLES)
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)

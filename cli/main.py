@@ -28,6 +28,7 @@ from . import (
     dataset,
     demo,
     denoise,
+    export,
     listing,
     render,
     train,
@@ -69,6 +70,7 @@ _register(dataset.dataset, dataset.EXAMPLES)
 _register(train.train, train.EXAMPLES)
 _register(compile_model, COMPILE_EXAMPLES, "compile")
 _register(listing.listing, listing.EXAMPLES)
+_register(export.export, export.EXAMPLES)
 _register(certify.certify, certify.EXAMPLES)
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)

@@ -2,8 +2,8 @@
 
 1. The scene at the times of its animation [`animation_of`]; one that time does not change is still.
 2. Kernels, weights and numbers come from kernels/page.py, as JSON in the page.
-3. The page is a template with one style sheet and some scripts beside it [`SCRIPTS`], which are put into it as
-   they are: nothing is built, nothing is fetched; the page forbids itself to (its Content-Security-Policy).
+3. The page is a template with one style sheet and some scripts beside it [`SCRIPTS`], which are put into it
+   as they are: nothing is built, nothing is fetched; its Content-Security-Policy forbids it to.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ FPS = 30.0
 at time 0, where their boxes are parallel to the axes."""
 
 LEAD = (
-    "One random path per pixel gives the noisy picture; a small network, compiled to a fragment shader with a "
-    "bound on its error, makes the calm one of it. All of it runs on your device: nothing is loaded or sent."
+    "One random path per pixel gives the noisy picture; a small network, compiled to a fragment shader with "
+    "a bound on its error, makes the calm one of it. All of it runs on your device: nothing is loaded or sent."
 )
 """The sentence below the title."""
 

@@ -22,6 +22,7 @@ from ..refimpl.errors import CompileError
 from . import artifact, bounds, certificate, ir, profiles, schedules
 from .artifact import Artifact
 from .c import C
+from .cuda import CUDA
 from .dialect import Dialect
 from .emit import kernel_gather, output_channels
 from .emit_inlined import Inlined
@@ -29,10 +30,12 @@ from .emit_packed import Packed
 from .enclosure import round_up as round_up
 from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
+from .glsl_buffers import ComputeDenoise, VulkanDenoise
 from .glsl_compute import GLSL_COMPUTE
 from .glsl_es import GLSLES, GLSLESInlined, GLSLESPacked
 from .glsl_inlined import GLSL_LADDER
 from .ir import LEAST, OUTPUT_ENCODING, Gather, Program
+from .metal import Metal
 from .opencl import OpenCL
 from .opencl_fourier import OPENCL_FOURIER
 from .opencl_group import OPENCL_GROUPS
@@ -41,6 +44,7 @@ from .passes import pipeline
 from .profiles import Profile, SineContract
 from .schedules import PLAIN, Pick, Plain, Printed, Schedule, pick
 from .sums import is_split
+from .wgsl import WGSL
 
 
 @dataclass(frozen=True)
@@ -95,11 +99,18 @@ TARGETS: Mapping[str, Target] = {
 """All targets of paths, encodings and denoisers, by the name of the executor that runs them."""
 
 DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C())}
-"""All targets of denoisers: those, and C, which is made to be pasted."""
+"""All targets that an executor of the registry runs: those, and C, whose executor denoises alone."""
 
 EXPORTED: Mapping[str, Target] = {
     target.name: target
-    for target in (_dialect_target(GLSLES(), Inlined(GLSLESInlined()), Packed(GLSLESPacked())),)
+    for target in (
+        _dialect_target(GLSLES(), Inlined(GLSLESInlined()), Packed(GLSLESPacked())),
+        _dialect_target(ComputeDenoise(), *GLSL_COMPUTE),
+        _dialect_target(VulkanDenoise()),
+        _dialect_target(WGSL()),
+        _dialect_target(CUDA()),
+        _dialect_target(Metal()),
+    )
 }
 """Targets that are written for other programs to run: kernels/export has what runs them in tests."""
 
@@ -205,16 +216,6 @@ def target_named(name: str) -> Target:
     return known[name]
 
 
-def target_of_pipelines(name: str) -> Target:
-    """Return a target that has kernels of all kinds, or refuse one whose kernels denoise alone."""
-    found = target_named(name)
-    if name not in TARGETS and name not in EXPORTED:
-        raise CompileError(
-            f"target {name} has denoisers alone; for other kernels there are {', '.join(TARGETS)}"
-        )
-    return found
-
-
 def compile_program(
     program: Program, target: str, profile: str = "ieee", schedule: str = PLAIN, rank: int = 0
 ) -> Artifact:
@@ -228,8 +229,8 @@ def compile_program(
     common = analysed(program, profile)
     if common.exact and chosen.assumes:
         raise CompileError(
-            f"profile {profile}: {chosen.language} has no word that keeps operations in order; use profile ieee, "
-            f"or a target that has one"
+            f"profile {profile}: {chosen.language} has no word that keeps operations in order; use profile "
+            "ieee, or a target that has one"
         )
     if not rank:
         picked = _picked(common, chosen, profile, schedule).schedule

@@ -1,17 +1,18 @@
 """What a target's language looks like: templates and a table of operations, no decisions.
 
-emit.py fills the templates in. Names in braces: `image` and `channels` of a feature image, `entry`,
-`images`, their `names`, `results`, `starts` and `defines` of the whole kernel (`number` and `result` of each
-result), `unordered` (what stands where the language cannot keep operations in order: without an error bound,
-with one), `index` into the weights, `i` and `value` of an output channel, `0`, `1`, `2` the operands of one,
-`type` the type of its result, `table` the name of its table, `name`, `count` and `values` of a table's
-declaration. The text between is the language's own, its braces doubled. An operation's template may differ
-for a kind of operand: `minimum.int32`. More channels than `channels_per_result` go into several results.
+emit.py fills the templates in. Names in braces: `image`, `channels` and `binding` of a feature image,
+`entry`, `images`, their `names`, `results`, `starts` and `defines` of the whole kernel (`number` and
+`result` of each result), `unordered` (what stands where the language cannot keep operations in order:
+without an error bound, with one), `index` into the weights, `i` and `value` of an output channel, `0`, `1`,
+`2` the operands of one, `type` the type of its result, `table` the name of its table, `name`, `count` and
+`values` of a table's declaration. The text between is the language's own, its braces doubled. An
+operation's template may differ for a kind of operand: `minimum.int32`. More channels than
+`channels_per_result` go into several results.
 `exact` are the lines that an exact kernel needs at its top, `magnitude` the absolute value of a number,
 `clamp` the name of the function that limits an index. `first` are the lines that the language wants before
-any comment, `indexes_results` says whether a result's channel may be chosen by a variable, `counted` opens a loop on a counter from 0 on, `define` names a number, `choice` is one between
-two numbers; `assumes` says what a bound
-rests on that the language itself does not promise.
+any comment; `indexes_results` says whether a variable may choose a result's channel; `counted` opens a loop
+on a counter from 0 on, `define` names a number, `choice` is one between two numbers; `assumes` says what a
+bound rests on that the language itself does not promise.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ class Dialect:
     entry: str
     image_declaration: str
     image_separator: str
+    first_binding: int = 0
     begin: str
     end = "}}"
     pixel: str

@@ -77,7 +77,10 @@ def emit(
     gather = kernel_gather(program)
     _check_channels(program, dialect)
     body = body or Body(program, dialect, gather)
-    images = [dialect.image_declaration.format(image=i.name, channels=i.channels) for i in gather.images]
+    images = [
+        dialect.image_declaration.format(image=i.name, channels=i.channels, binding=binding)
+        for binding, i in enumerate(gather.images, dialect.first_binding)
+    ]
     defines = [*(dialect.exact if program.exact else ()), *_window_defines(gather, dialect), *body.defines()]
     declared = [dialect.table_declaration(name, array) for name, array in tables(program).items()]
     begin = dialect.begin.format(

@@ -22,12 +22,17 @@ from ..refimpl.dataset import FEATURES, Normalization
 from ..refimpl.errors import CompileError
 from . import bounds, ir, profiles
 from .artifact import OneSource
-from .compile import sine_contract, target_of_pipelines
+from .c_path import CEncode
+from .compile import sine_contract, target_named
+from .cuda import CUDAEncode
 from .encode_dialect import EncodeDialect, GLSLEncode, OpenCLEncode
+from .glsl_buffers import FIRST_IMAGE, ComputeEncode, VulkanEncode
 from .glsl_es import GLSLESEncode
 from .ir import Image, Program
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
+from .metal import MetalEncode
 from .passes import pipeline
+from .wgsl import WGSLEncode
 
 SCHEMA = "wamnet-encode-kernel-1"
 """Name and version of the manifest's form; described in spec/pipeline.md."""
@@ -36,6 +41,12 @@ ENCODE_DIALECTS: Mapping[str, EncodeDialect] = {
     "opencl": OpenCLEncode(),
     "opengl": GLSLEncode(),
     "glsl-es": GLSLESEncode(),
+    "glsl-compute": ComputeEncode(),
+    "glsl-vulkan": VulkanEncode(),
+    "wgsl": WGSLEncode(),
+    "cuda": CUDAEncode(),
+    "metal": MetalEncode(),
+    "c": CEncode(),
 }
 """By target; the interpreter needs the program alone."""
 
@@ -66,7 +77,7 @@ def compile_encode(
 
     `planes` are those that the sums have, in order; by default the features' own alone.
     """
-    chosen, promised = target_of_pipelines(target), profiles.unpinned(profile, "encodings of features")
+    chosen, promised = target_named(target), profiles.unpinned(profile, "encodings of features")
     program = pipeline.run(lower_encode(features, normalization), promised.passes)
     planes = tuple(planes or planes_of(features))
     lacking = set(planes_of(features)) - set(planes)
@@ -164,7 +175,7 @@ def _emit(
             place = {"image": image.name, "channels": image.channels, "channel": channel}
             lines.append(store.format(value=value, **place))
     declared = [
-        dialect.output_declaration.format(image=image.name, location=location)
+        dialect.output_declaration.format(image=image.name, location=location, binding=location + FIRST_IMAGE)
         for location, image in enumerate(images)
     ]
     inputs = range(-(-len(planes) // dialect.planes_per_input))

@@ -106,13 +106,15 @@ def lower_scene(
     scene: Scene,
     settings: Settings,
     most_unrolled: int | None = MOST_UNROLLED,
+    keep_places: bool = False,
     moving: SceneInputs | None = None,
 ) -> PathPrograms:
     """Return the programs of a path through a scene, in float32.
 
     The primitives of a scene that has more than `most_unrolled` of them are tables and loops, else statements
-    for each; None unrolls any scene. What stands alone in its table is no loop. The numbers that are `moving`
-    are inputs, not constants.
+    for each; None unrolls any scene. What stands alone in its table is no loop. `keep_places`: nodes know
+    the lines of the reference that they came from, for listings. The numbers that are `moving` are inputs,
+    not constants.
     """
     laid = lay_out(scene, settings)
 
@@ -151,7 +153,7 @@ def lower_scene(
     size = dict.fromkeys(("width", "height"), (NUMBER, FLOAT))
     scene_numbers = dict.fromkeys(moving.names if moving else (), (NUMBER, FLOAT))
     few = most_unrolled is None or primitives(scene) <= most_unrolled
-    lowered = partial(_lowered, most_unrolled=None if few else 1)
+    lowered = partial(_lowered, most_unrolled=None if few else 1, keep_places=keep_places)
     return PathPrograms(
         scene.name,
         scene_digest(scene),
@@ -183,11 +185,16 @@ def kinds(values: Values) -> dict[str, str]:
     return {name + end: kind for name, (ends, kind) in values.items() for end in ends}
 
 
-def _lowered(name: str, function: Any, values: Values, most_unrolled: int | None) -> Program:
+def _lowered(
+    name: str, function: Any, values: Values, most_unrolled: int | None, keep_places: bool
+) -> Program:
     """Trace a function of named numbers, and run the passes."""
     inputs = {component: Type(kind) for component, kind in kinds(values).items()}
     program = trace(
-        lambda *given: function(dict(zip(inputs, given, strict=True))), inputs, most_unrolled=most_unrolled
+        lambda *given: function(dict(zip(inputs, given, strict=True))),
+        inputs,
+        most_unrolled=most_unrolled,
+        keep_places=keep_places,
     )
     return pipeline.run(verify(program, f"traced {name}"), PASSES)
 

@@ -17,7 +17,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
+from types import FrameType
 from typing import Any, NoReturn
 
 import numpy as np
@@ -48,16 +50,24 @@ TRACEABLE = (
 
 
 class Tracer(Builder):
-    """A builder that knows how many rows of a fold are unrolled at most, and counts the loops."""
+    """A builder that knows how many rows of a fold are unrolled at most, and counts the loops.
 
-    def __init__(self, most_unrolled: int | None = None) -> None:
+    `keeps_places`: nodes get the lines of the reference that are being executed.
+    """
+
+    def __init__(self, most_unrolled: int | None = None, keeps_places: bool = False) -> None:
         super().__init__()
         self.most_unrolled = most_unrolled
+        self.keeps_places = keeps_places
         self.loops = 0
 
     def unrolls(self, rows: int) -> bool:
         """Tell whether a fold over so many rows is unrolled."""
         return self.most_unrolled is None or rows <= self.most_unrolled
+
+    def where(self) -> tuple[str, ...]:
+        """Return the lines of the reference that are being executed, callers first."""
+        return _reference_lines() if self.keeps_places else ()
 
 
 class Traced(NDArrayOperatorsMixin):
@@ -171,13 +181,15 @@ def trace(
     output: str = "color",
     info: Mapping[str, str] | None = None,
     most_unrolled: int | None = None,
+    keep_places: bool = False,
 ) -> Program:
     """Return the program of `function`, called with one tracing value for each of `inputs`, in their order.
 
     A mapping that `function` returns gives several outputs by name; anything else is the one named `output`.
-    Folds over more rows than `most_unrolled` become loops; None unrolls all of them.
+    Folds over more rows than `most_unrolled` become loops; None unrolls all of them. `keep_places`: nodes
+    know the lines of the reference that they came from, for listings.
     """
-    builder = Tracer(most_unrolled)
+    builder = Tracer(most_unrolled, keep_places)
     values = [Traced(builder, _add(builder, "input", (), name=n, type=t)) for n, t in inputs.items()]
     result = function(*values)
     results = result if isinstance(result, Mapping) else {output: result}
@@ -408,6 +420,28 @@ def _call(builder: Builder, function: Any, args: Any, options: Any) -> Any:
 def _refuse(what: str) -> NoReturn:
     """Raise for an operation outside the closed list."""
     raise CompileError(f"{_place()}: {what} cannot be traced; use only {', '.join(TRACEABLE)}")
+
+
+REFERENCE = Path(vectors.__file__).parent
+"""The folder of the reference: lines of its files are the places of nodes."""
+
+
+@cache
+def _reference_file(path: str) -> str:
+    """Return the name of a file of the reference, refimpl/siren.py; nothing for another file."""
+    found = Path(path)
+    return found.relative_to(REFERENCE.parent).as_posix() if REFERENCE in found.parents else ""
+
+
+def _reference_lines() -> tuple[str, ...]:
+    """Return file:line of each line of the reference that is being executed, callers first."""
+    places = []
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None:
+        if name := _reference_file(frame.f_code.co_filename):
+            places.append(f"{name}:{frame.f_lineno}")
+        frame = frame.f_back
+    return tuple(places[::-1])
 
 
 def _place() -> str:

@@ -102,7 +102,8 @@ def test_the_paths_are_the_reference_s(still, options):
     told = draw(still, **options)
     scene = scenes.canonical("minicubes", time=told["time"])
     camera = replace(scene.camera, position=tuple(told["camera"]["position"]))
-    lights = tuple(replace(l, color=tuple(c)) for l, c in zip(scene.lights, told["colors"], strict=True))
+    pairs = zip(scene.lights, told["colors"], strict=True)
+    lights = tuple(replace(light, color=tuple(color)) for light, color in pairs)
     assert (camera == scene.camera) == ("turn" not in options)
     kernel = compile_path(
         lower_scene(replace(scene, camera=camera, lights=lights), SETTINGS), "numpy", groups=FEATURES

@@ -53,7 +53,7 @@ def test_the_bound_says_what_it_assumes(case):
 
 
 def test_a_profile_that_needs_an_order_is_refused(case):
-    with pytest.raises(CompileError, match="profile exact: GLSL ES .* has no word that keeps operations in"):
+    with pytest.raises(CompileError, match=r"profile exact: GLSL ES .* has no word that keeps operations in"):
         compile_program(case[0], "glsl-es", "exact")
 
 
@@ -69,7 +69,9 @@ def test_paths_are_those_of_the_reference(runner):
 
 def test_more_than_four_buffers_are_refused():
     programs = lower_scene(canonical("empty"), Settings())
-    with pytest.raises(CompileError, match="adds up 19 planes: GLSL ES 3.00, fragment shader writes at most"):
+    with pytest.raises(
+        CompileError, match=r"adds up 19 planes: GLSL ES 3\.00, fragment shader writes at most"
+    ):
         compile_path(programs, "glsl-es")
 
 

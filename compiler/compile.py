@@ -34,6 +34,7 @@ from .glsl_buffers import ComputeDenoise, VulkanDenoise
 from .glsl_compute import GLSL_COMPUTE
 from .glsl_es import GLSLES, GLSLESInlined, GLSLESPacked
 from .glsl_inlined import GLSL_LADDER
+from .hosts import GodotDenoise, ShadertoyDenoise
 from .ir import LEAST, OUTPUT_ENCODING, Gather, Program
 from .metal import Metal
 from .opencl import OpenCL
@@ -44,6 +45,7 @@ from .passes import pipeline
 from .profiles import Profile, SineContract
 from .schedules import PLAIN, Pick, Plain, Printed, Schedule, pick
 from .sums import is_split
+from .weight_homes import HOMES
 from .wgsl import WGSL
 
 
@@ -110,8 +112,10 @@ EXPORTED: Mapping[str, Target] = {
         _dialect_target(WGSL()),
         _dialect_target(CUDA()),
         _dialect_target(Metal()),
+        replace(_dialect_target(ShadertoyDenoise()), schedules=(Inlined(ShadertoyDenoise()),)),
+        _dialect_target(GodotDenoise()),
     )
-}
+} | {name: _dialect_target(dialect) for name, dialect in HOMES.items()}
 """Targets that are written for other programs to run: kernels/export has what runs them in tests."""
 
 

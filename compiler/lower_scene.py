@@ -67,6 +67,7 @@ LAYERS: Values = {
     "depth": (NUMBER, FLOAT),
     "position": (XYZ, FLOAT),
     "direction": (XYZ, FLOAT),
+    "unshadowed": (RGB, FLOAT),
 }
 """The feature layers of the first hit, as refimpl/render.py: first_hit_layers."""
 

@@ -39,8 +39,7 @@ def test_the_program_is_the_reference(samples):
     sums = sums_of(samples)
     wide = {name: values.astype(np.float64) for name, values in sums.items()}
     layers = {
-        "color": np.stack([wide[f"color_{c}"] for c in "rgb"], axis=-1),
-        "albedo": np.stack([wide[f"albedo_{c}"] for c in "rgb"], axis=-1),
+        **{n: np.stack([wide[f"{n}_{c}"] for c in "rgb"], -1) for n in ("color", "albedo", "unshadowed")},
         "depth": wide["depth"],
         **{n: np.stack([wide[f"{n}_{c}"] for c in "xyz"], -1) for n in ("normal", "position", "direction")},
     }

@@ -63,7 +63,7 @@ def test_the_manifest_names_what_was_made():
     assert made.manifest["files"] == {"path.frag": ir.sha256(made.source.encode())}
     assert made.digest == ir.sha256(made.source.encode())
     assert made.manifest["planes"] == planes(
-        ("color", "deviation", "albedo", "normal", "depth", "position", "direction")
+        ("color", "deviation", "albedo", "normal", "depth", "position", "direction", "unshadowed")
     )
     assert made.manifest["bound"] is None
     assert made.manifest["settings"]["max_depth"] == 3

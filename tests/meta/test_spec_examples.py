@@ -51,6 +51,7 @@ def filled(text: str) -> str:
 
 @pytest.mark.parametrize("path", CHAPTERS, ids=lambda p: p.name)
 def test_worked_examples(path: Path, pytestconfig: pytest.Config) -> None:
+    """Numbers, and the bindings of emitted kernels (KER-21, PTK-15, PPL-11)."""
     text = path.read_text()
     unknown = [name for name, _ in WORKED.findall(text) if name not in LINES]
     assert not unknown, f"{path.name}: write {unknown} in tests/support/worked.py"

@@ -29,6 +29,7 @@ from . import (
     demo,
     denoise,
     export,
+    listing,
     render,
     train,
     triage,
@@ -68,6 +69,7 @@ _register(render.scene, render.SCENE_EXAMPLES)
 _register(dataset.dataset, dataset.EXAMPLES)
 _register(train.train, train.EXAMPLES)
 _register(compile_model, COMPILE_EXAMPLES, "compile")
+_register(listing.listing, listing.EXAMPLES)
 _register(export.export, export.EXAMPLES)
 _register(certify.certify, certify.EXAMPLES)
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)

@@ -177,12 +177,12 @@ class VulkanEncode(_Vulkan, EncodeDialect):
     )
 
 
-class _Compute:
+class _Compute(_Vulkan):
     """The same for OpenGL 4.3."""
 
     target = "glsl-compute"
     language = "GLSL 4.30, compute shader"
-    first = ("#version 430 core", "#define PRECISE precise")
+    first: tuple[str, ...] = ("#version 430 core", "#define PRECISE precise")
     native_sine = SineContract("sin() of GLSL 4.30, which promises nothing", None)
 
 

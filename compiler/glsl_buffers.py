@@ -67,7 +67,7 @@ class _Vulkan(Dialect):
     target = "glsl-vulkan"
     language = "GLSL 4.50 for Vulkan, compute shader"
     suffix = ".comp"
-    first = ("#version 450", "#define PRECISE precise")
+    first: tuple[str, ...] = ("#version 450", "#define PRECISE precise")
     native_sine = SineContract(
         "sin() of Vulkan, which promises 2^-11 on [-pi, pi] alone, and that absolutely", None
     )

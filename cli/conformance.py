@@ -236,8 +236,11 @@ def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:
 
 def _print_failures(failed: Sequence[Verdict], cases: Mapping[str, Sequence[Case]], again: str) -> None:
     """Print the first failures in full."""
-    from ..kernels.conformance.report import about
+    from ..kernels.conformance.report import about, first_blamed
 
+    first = first_blamed(failed)
+    if first is not None and len(failed) > 1:
+        say(f"look first at {first.clause}: {first.id} fails, and what others are made of comes before them")
     by_id = {case.id: case for some in cases.values() for case in some}
     for verdict in failed[:SHOWN_FAILURES]:
         for line in about(verdict, by_id[verdict.id], f"{again} {verdict.id}"):

@@ -2182,6 +2182,14 @@ static void do_random_block(const json *in) {
     answer_array("floats", (array){.axes = 1, .shape = {4}, .count = 4, .values = floats});
 }
 
+static void do_sobol(const json *in) {
+    uint32_t seed = counter(in, "seed"), pixel = counter(in, "pixel"), sample = counter(in, "sample");
+    words found = sobol_block(seed, pixel, sample, counter(in, "block"));
+    double floats[4];
+    for (int i = 0; i < 4; i++) floats[i] = uniform(found.w[i]);
+    answer_array("floats", (array){.axes = 1, .shape = {4}, .count = 4, .values = floats});
+}
+
 static void do_disk(const json *in) {
     double x, y;
     concentric_disk(number(in, "u0"), number(in, "u1"), &x, &y);
@@ -2689,6 +2697,7 @@ static const struct {
     void (*answer)(const json *in);
 } KINDS[] = {
     {"random.block", do_random_block},
+    {"random.sobol", do_sobol},
     {"sampling.concentric_disk", do_disk},
     {"sampling.cosine_hemisphere", do_hemisphere},
     {"sampling.spherical_cauchy", do_cauchy},

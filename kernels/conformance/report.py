@@ -1,6 +1,7 @@
 """What is told of verdicts: counts, one text a failure, JSON, JUnit, and what changed since the last time.
 
-1. [`counts`] counts verdicts by kind; [`about`] tells all of one failure.
+1. [`counts`] counts verdicts by kind; [`about`] tells all of one failure, [`first_blamed`] finds the
+   one to mend first.
 2. [`to_json`] and [`to_junit`] are for other programs.
 3. A track is a file of the last verdicts: [`changes`] are the cases that differ from it, and those that are
    [`worse`] are failures; known ones are not. It is written anew unless something is worse.
@@ -54,6 +55,44 @@ def counts(verdicts: Sequence[Verdict]) -> list[Kinds]:
         )
         for kind, some in by_kind.items()
     ]
+
+
+ELEMENTARY = (
+    "random.",
+    "sampling.",
+    "camera.",
+    "intersection.sphere",
+    "intersection.quad",
+    "intersection.box",
+    "intersection.",
+    "material.",
+    "transport.",
+    "sky.",
+    "path.start",
+    "path.arrive",
+    "path.scatter",
+    "path.whole",
+    "encoding.",
+    "sine",
+    "network.",
+    "adam.",
+    "image.",
+    "metric.",
+    "file.",
+    "picture.",
+)
+"""How kinds begin, those that others are made of first: what fails there makes the others fail."""
+
+
+def first_blamed(verdicts: Sequence[Verdict]) -> Verdict | None:
+    """Return the failure to look at first: of the most elementary kind that fails, the first case."""
+
+    def rank(verdict: Verdict) -> int:
+        known = [i for i, start in enumerate(ELEMENTARY) if verdict.kind.startswith(start)]
+        return min(known, default=len(ELEMENTARY))
+
+    failed = [verdict for verdict in verdicts if verdict.failed]
+    return min(failed, key=rank, default=None)
 
 
 def about(verdict: Verdict, case: Case, again: str) -> list[str]:

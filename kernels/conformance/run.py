@@ -84,7 +84,7 @@ def chosen(cases: Mapping[str, Sequence[Case]], words: Sequence[str]) -> dict[st
     """
 
     def wanted(case: Case) -> bool:
-        known = (case.id, case.clause, *case.flags)
+        known = (case.id, *case.clauses, *case.flags)
         return not words or any(word in known or ("/" not in word and word in case.id) for word in words)
 
     found = {kind: [case for case in some if wanted(case)] for kind, some in cases.items()}
@@ -150,11 +150,12 @@ def judge(kind: str, case: Case, answer: Mapping[str, Any]) -> Verdict:
         return Verdict(case.id, kind, case.clause, GARBAGE, "the answer has no output")
     largest = 0.0
     for name, expected in case.expected.items():
+        blamed = expected.clause or case.clause
         if name not in outputs:
-            return Verdict(case.id, kind, case.clause, FAIL, "the output is missing", name)
+            return Verdict(case.id, kind, blamed, FAIL, "the output is missing", name)
         wrong, ratio = _compared(name, expected, outputs[name], outputs)
         if wrong:
-            return Verdict(case.id, kind, case.clause, FAIL, *wrong, ratio)
+            return Verdict(case.id, kind, blamed, FAIL, *wrong, ratio)
         largest = max(largest, ratio)
     return Verdict(case.id, kind, case.clause, PASS, ratio=largest)
 

@@ -38,7 +38,9 @@ def named_by_vectors(folder: Path) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for path in sorted(folder.glob("*.json")):
         for case in json.loads(path.read_text()).get("cases", ()):
-            found.setdefault(case["clause"], []).append(case["id"])
+            for part in (case, *case.get("expected", {}).values()):
+                if "clause" in part:
+                    found.setdefault(part["clause"], []).append(case["id"])
     return found
 
 

@@ -169,6 +169,8 @@ DIELECTRIC = Function(
         ("out, refracted", _at(0, 0, 0.9, wo=(0.28, 0.96, 0.0), ior=1.5, outside=0)),
         ("out, totally reflected", _at(0, 0, 0.999, wo=(0.96, 0.28, 0.0), ior=1.5, outside=0)),
         ("an index of 1: the body is not there", _at(0, 0, 0.5, ior=1.0, outside=1)),
+        ("below the mean of both polarisations, above one", _at(0, 0, 0.03125, ior=1.5, outside=1), "DIE-3"),
+        ("above the mean, below the other", _at(0, 0, 0.0625, ior=1.5, outside=1), "DIE-3"),
     ],
     lambda u: {**_vertex(u), "ior": 1.0 + u[12], "outside": round(u[13])},
 )
@@ -211,7 +213,10 @@ RADIANCE = Function(
     f"{SKY}".replace("Sky(", "The sky with ").rstrip(")"),
     "ENV-1",
     {"direction": Field("unit direction", 3, -1.0)},
-    {"radiance": Field("radiance from there", 3), "pdf": Field("density of the direction, 1/sr")},
+    {
+        "radiance": Field("radiance from there", 3),
+        "pdf": Field("density of the direction, 1/sr", clause="ENV-3"),
+    },
     _sky,
     [
         ("the zenith", {"direction": (0.0, 1.0, 0.0)}),

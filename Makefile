@@ -8,7 +8,7 @@
 VENV ?= .venv
 PYTHON ?= python3
 comma := ,
-WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba$(if $(shell $(CC) -E -include math.h -x c /dev/null >/dev/null 2>&1 && echo yes),$(comma)c)
+WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba,chromium$(if $(shell $(CC) -E -include math.h -x c /dev/null >/dev/null 2>&1 && echo yes),$(comma)c)
 PYTEST_OPTIONS ?= -n 2
 export VENV PYTHON WAMNET_REQUIRE
 
@@ -16,7 +16,7 @@ export VENV PYTHON WAMNET_REQUIRE
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint clean distclean
+.PHONY: help setup demo docs test lint clean distclean
 
 help: ## List the targets
 	@grep -hE '^[a-z]+: .*## ' Makefile | sed -E 's/^([a-z]+):.*## (.*)/  make \1	\2/' | expand -t 20
@@ -27,6 +27,10 @@ setup: ## Make the environment with everything in it
 demo: ## Render, train, compile, run and compare; results in out/demo (5 minutes on two cores)
 	@.ci/setup opencl,opengl,cli,report
 	@$(VENV)/bin/wamnet demo -o out/demo
+
+docs: ## Build the web site: spec, tutorial, exercises; open out/site/index.html
+	@.ci/setup opencl,opengl,cli,report,docs
+	@$(VENV)/bin/python docs/site/build.py
 
 test: setup ## Run all tests (15 minutes at most on two cores)
 	@$(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS)

@@ -34,6 +34,7 @@ CHANNELS: Mapping[str, tuple[str, ...]] = {
     "depth": ("depth.Z",),
     "position": ("position.X", "position.Y", "position.Z"),
     "direction": ("direction.X", "direction.Y", "direction.Z"),
+    "unshadowed": ("unshadowed.R", "unshadowed.G", "unshadowed.B"),
 }
 """The channels that hold each layer in the files that are written here."""
 
@@ -44,6 +45,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "depth": ("depth", "z", "denoising depth", ""),
     "position": ("position", "p"),
     "direction": ("direction", "raydirection"),
+    "unshadowed": ("unshadowed",),
 }
 """Names of each layer on reading, lower case, best first: as in Blender, pbrt, Mitsuba, Arnold and here."""
 

@@ -32,6 +32,7 @@ from . import (
     train,
     triage,
     tune,
+    view,
 )
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
@@ -71,6 +72,7 @@ _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)
 _register(triage.triage, triage.EXAMPLES)
 _register(animate.animate, animate.EXAMPLES)
+_register(view.view, view.EXAMPLES)
 _register(tune.tune, tune.EXAMPLES)
 _register(bench.bench, bench.EXAMPLES)
 _register(denoise.executors, denoise.EXECUTORS_EXAMPLES)

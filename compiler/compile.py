@@ -22,14 +22,21 @@ from ..refimpl.errors import CompileError
 from . import artifact, bounds, certificate, ir, profiles, schedules
 from .artifact import Artifact
 from .c import C
+from .cuda import CUDA
 from .dialect import Dialect
 from .emit import kernel_gather, output_channels
+from .emit_inlined import Inlined
+from .emit_packed import Packed
 from .enclosure import round_up as round_up
 from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
+from .glsl_buffers import ComputeDenoise, VulkanDenoise
 from .glsl_compute import GLSL_COMPUTE
+from .glsl_es import GLSLES, GLSLESInlined, GLSLESPacked
 from .glsl_inlined import GLSL_LADDER
+from .hosts import GodotDenoise, ShadertoyDenoise
 from .ir import LEAST, OUTPUT_ENCODING, Gather, Program
+from .metal import Metal
 from .opencl import OpenCL
 from .opencl_fourier import OPENCL_FOURIER
 from .opencl_group import OPENCL_GROUPS
@@ -38,6 +45,8 @@ from .passes import pipeline
 from .profiles import Profile, SineContract
 from .schedules import PLAIN, Pick, Plain, Printed, Schedule, pick
 from .sums import is_split
+from .weight_homes import HOMES
+from .wgsl import WGSL
 
 
 @dataclass(frozen=True)
@@ -45,6 +54,7 @@ class Target:
     """Something that runs kernels: how its source is made, and what its own sine promises.
 
     `widest`: most channels of an image that a kernel reads, `most` of all that it writes; None: any number.
+    `assumes`: what a bound rests on that the language does not promise.
     """
 
     name: str
@@ -55,6 +65,7 @@ class Target:
     schedules: tuple[Schedule, ...]
     widest: int | None = None
     most: int | None = None
+    assumes: str = ""
 
 
 def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
@@ -68,6 +79,7 @@ def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
         (Plain(dialect), *ladder),
         widest=dialect.channels_per_result,
         most=dialect.max_output_channels,
+        assumes=dialect.assumes,
     )
 
 
@@ -89,7 +101,22 @@ TARGETS: Mapping[str, Target] = {
 """All targets of paths, encodings and denoisers, by the name of the executor that runs them."""
 
 DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C())}
-"""All targets of denoisers: those, and C, which is made to be pasted."""
+"""All targets that an executor of the registry runs: those, and C, whose executor denoises alone."""
+
+EXPORTED: Mapping[str, Target] = {
+    target.name: target
+    for target in (
+        _dialect_target(GLSLES(), Inlined(GLSLESInlined()), Packed(GLSLESPacked())),
+        _dialect_target(ComputeDenoise(), *GLSL_COMPUTE),
+        _dialect_target(VulkanDenoise()),
+        _dialect_target(WGSL()),
+        _dialect_target(CUDA()),
+        _dialect_target(Metal()),
+        replace(_dialect_target(ShadertoyDenoise()), schedules=(Inlined(ShadertoyDenoise()),)),
+        _dialect_target(GodotDenoise()),
+    )
+} | {name: _dialect_target(dialect) for name, dialect in HOMES.items()}
+"""Targets that are written for other programs to run: kernels/export has what runs them in tests."""
 
 
 KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
@@ -187,19 +214,10 @@ def _refuse_domain(
 
 def target_named(name: str) -> Target:
     """Return the target, or say which ones there are."""
-    if name not in DENOISERS:
-        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(DENOISERS)}")
-    return DENOISERS[name]
-
-
-def target_of_pipelines(name: str) -> Target:
-    """Return a target that has kernels of all kinds, or refuse one whose kernels denoise alone."""
-    found = target_named(name)
-    if name not in TARGETS:
-        raise CompileError(
-            f"target {name} has denoisers alone; for other kernels there are {', '.join(TARGETS)}"
-        )
-    return found
+    known = {**DENOISERS, **EXPORTED}
+    if name not in known:
+        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(known)}")
+    return known[name]
 
 
 def compile_program(
@@ -213,6 +231,11 @@ def compile_program(
     chosen = target_named(target)
     kernel_gather(program)
     common = analysed(program, profile)
+    if common.exact and chosen.assumes:
+        raise CompileError(
+            f"profile {profile}: {chosen.language} has no word that keeps operations in order; use profile "
+            "ieee, or a target that has one"
+        )
     if not rank:
         picked = _picked(common, chosen, profile, schedule).schedule
         bound = bound_over_images(common, profile, target, schedule=picked)
@@ -316,6 +339,7 @@ def _header(program: Program, target: Target, profile: Profile, bound: Bound, pi
         f"profile   {profile.name}: {profile.text}",
         f"sine      {sine_contract(profile.name, target.name).text}",
         f"bound     {_bound_text(bound)}",
+        *(_wrapped("assumes", target.assumes) if target.assumes and bound.output else []),
         *([SUMS] if is_split(gather) and type(picked.schedule).enclosures is Schedule.enclosures else []),
         *([] if picked.schedule.name == PLAIN else [f"schedule  {schedules.text(picked.manifest())}"]),
         f"arguments {arguments[0]}",
@@ -334,7 +358,12 @@ def _weight_lines(program: Program, schedule: Schedule) -> list[str]:
     places = schedule.layout(program).values()
     slots = [f"{s.name} ({' x '.join(map(str, s.shape))}) at {s.offset}" for s in places]
     text = f"{', '.join(slots) or 'none'}; {schedule.order}"
-    return textwrap.wrap(text, 98, initial_indent="weights   ", subsequent_indent=" " * 10)
+    return _wrapped("weights", text)
+
+
+def _wrapped(name: str, text: str) -> list[str]:
+    """Return the lines of a header's entry."""
+    return textwrap.wrap(text, 98, initial_indent=f"{name:10}", subsequent_indent=" " * 10)
 
 
 def _bound_text(bound: Bound) -> str:

@@ -1,14 +1,18 @@
 """What a target's language looks like: templates and a table of operations, no decisions.
 
-emit.py fills the templates in. Names in braces: `image` and `channels` of a feature image, `entry`,
-`images`, their `names`, `results`, `starts` and `defines` of the whole kernel (`number` and `result` of each
-result), `unordered` (what stands where the language cannot keep operations in order: without an error bound,
-with one), `index` into the weights, `i` and `value` of an output channel, `0`, `1`, `2` the operands of one,
-`type` the type of its result, `table` the name of its table, `name`, `count` and `values` of a table's
-declaration. The text between is the language's own, its braces doubled. An operation's template may differ
-for a kind of operand: `minimum.int32`. More channels than `channels_per_result` go into several results.
+emit.py fills the templates in. Names in braces: `image`, `channels` and `binding` of a feature image,
+`entry`, `images`, their `names`, `results`, `starts` and `defines` of the whole kernel (`number` and
+`result` of each result), `unordered` (what stands where the language cannot keep operations in order:
+without an error bound, with one), `index` into the weights, `i` and `value` of an output channel, `0`, `1`,
+`2` the operands of one, `type` the type of its result, `table` the name of its table, `name`, `count` and
+`values` of a table's declaration. The text between is the language's own, its braces doubled. An
+operation's template may differ for a kind of operand: `minimum.int32`. More channels than
+`channels_per_result` go into several results.
 `exact` are the lines that an exact kernel needs at its top, `magnitude` the absolute value of a number,
-`clamp` the name of the function that limits an index.
+`clamp` the name of the function that limits an index. `first` are the lines that the language wants before
+any comment; `indexes_results` says whether a variable may choose a result's channel; `counted` opens a loop
+on a counter from 0 on, `define` names a number, `choice` is one between two numbers; `assumes` says what a
+bound rests on that the language itself does not promise.
 """
 
 from __future__ import annotations
@@ -22,6 +26,9 @@ from numpy.typing import NDArray
 from .ir import LEAST, Node
 from .profiles import SineContract
 
+LONG_TABLE, TABLE_ROW = 200, 8
+"""Numbers of a constant table from which on it stands in rows, and the numbers of a row."""
+
 
 class Dialect:
     """One language; a subclass sets every attribute that has no value here."""
@@ -32,18 +39,26 @@ class Dialect:
     entry: str
     image_declaration: str
     image_separator: str
+    first_binding: int = 0
     begin: str
     end = "}}"
     pixel: str
     weight: str
+    weights_table: bool = False
     store: str
     result_declaration: str = ""
     result_start: str = ""
     arguments: str
     max_output_channels: int
     channels_per_result: int | None = None
+    indexes_results: bool = True
     native_sine: SineContract
     unordered: tuple[str, str] = ("", "")
+    assumes: str = ""
+    first: tuple[str, ...] = ()
+    counted: str = "for (int {i} = 0; {i} < {count}; ++{i}) {{"
+    define: str = "#define {name} {value}"
+    choice: str = "{0} ? {1} : {2}"
     exact: tuple[str, ...] = ()
     magnitude: str = "fabs({0})"
     clamp: str = "clamp"
@@ -90,6 +105,35 @@ class Dialect:
         """Return the words before the name of a variable of this kind."""
         return self.qualifiers.get(dtype, "") + self.types[dtype]
 
+    def let(self, dtype: str, name: str, value: str, kept: bool = False) -> str:
+        """Return the declaration of a value; `kept`: its operations stay in order where the language can."""
+        return f"{self.variable(dtype) if kept else self.types[dtype]} {name} = {value};"
+
+    def single(self, name: str, value: str) -> str:
+        """Return the declaration of one number, also in a language whose values are vectors."""
+        return f"float {name} = {value};"
+
+    def index(self, name: str, value: str) -> str:
+        """Return the declaration of a place in an image or a window."""
+        return f"int {name} = {value};"
+
+    def var(self, dtype: str, name: str, value: str = "", kept: bool = False) -> str:
+        """Return the declaration of a variable that is assigned later, or again."""
+        kind = self.variable(dtype) if kept else self.types[dtype]
+        return f"{kind} {name}{f' = {value}' if value else ''};"
+
+    def array(self, dtype: str, name: str, count: int, kept: bool = False) -> str:
+        """Return the declaration of an array."""
+        return f"{self.variable(dtype) if kept else self.types[dtype]} {name}[{count}];"
+
+    def loop(self, counter: str, count: int | str) -> str:
+        """Return the line that opens a loop of a counter from 0 on."""
+        return self.counted.format(i=counter, count=count)
+
+    def select(self, condition: str, yes: str, no: str) -> str:
+        """Return the text of a choice between two numbers."""
+        return self.choice.format(condition, yes, no)
+
     def expression(self, node: Node, kind: str, operands: Sequence[str]) -> str:
         """Return the text of an operation on operands, the last of which is of the given kind."""
         template = self.operations.get(f"{node.op}.{kind}") or self.operations[node.op]
@@ -97,7 +141,7 @@ class Dialect:
 
     def kept(self, value: str) -> str:
         """Return the text of a number as an exact program reads it."""
-        return f"{self.magnitude.format(value)} < {self.literal(LEAST)} ? 0.0f : {value}"
+        return self.select(f"{self.magnitude.format(value)} < {self.literal(LEAST)}", "0.0f", value)
 
     def constant(self, node: Node) -> str:
         """Return the text of a constant."""
@@ -115,7 +159,11 @@ class Dialect:
     def table_declaration(self, name: str, array: NDArray[Any]) -> str:
         """Return the declaration of a constant table."""
         dtype = str(array.dtype)
-        values = ", ".join(self.number(value, dtype) for value in array)
+        texts = [self.number(value, dtype) for value in array]
+        values = ", ".join(texts)
+        if len(texts) > LONG_TABLE:
+            rows = (", ".join(texts[i : i + TABLE_ROW]) for i in range(0, len(texts), TABLE_ROW))
+            values = "\n    " + ",\n    ".join(rows)
         return self.table.format(type=self.types[dtype], name=name, count=len(array), values=values)
 
     @staticmethod

@@ -21,7 +21,7 @@ from .ir import Gather, Image, Node, Program, users
 from .lines import Lines
 from .ops import LOOPS, OPS
 from .sums import is_split
-from .weights import layout, tables
+from .weights import layout, pack, tables
 
 BORDERS: Mapping[str, tuple[str, str]] = {
     "clamp": ("", "{pixel}"),
@@ -55,15 +55,15 @@ def sides(gather: Gather) -> Sides:
     return SQUARE if gather.axes == (0, 1) else OBLONG
 
 
-def _window_defines(gather: Gather) -> list[str]:
+def _window_defines(gather: Gather, dialect: Dialect) -> list[str]:
     """Return the lines that give the window's names their values."""
     names, pixel = sides(gather), "/* the tap that lies on the pixel itself */"
-    rows = [f"#define {names.rows} {gather.rows}"]
-    columns = [f"#define {names.columns} {gather.columns}"]
-    centres = [f"#define {names.row} {gather.rows // 2} {pixel}"]
-    if names is SQUARE:
-        return rows + centres
-    return [*rows, *columns, *centres, f"#define {names.column} {gather.columns // 2}"]
+    # The rows and columns of a square window share their names.
+    values = {names.rows: gather.rows, names.columns: gather.columns}
+    values |= {names.row: gather.rows // 2, names.column: gather.columns // 2}
+    lines = {name: dialect.define.format(name=name, value=value) for name, value in values.items()}
+    lines[names.row] += f" {pixel}"
+    return list(lines.values())
 
 
 def emit(
@@ -77,9 +77,15 @@ def emit(
     gather = kernel_gather(program)
     _check_channels(program, dialect)
     body = body or Body(program, dialect, gather)
-    images = [dialect.image_declaration.format(image=i.name, channels=i.channels) for i in gather.images]
-    defines = [*(dialect.exact if program.exact else ()), *_window_defines(gather), *body.defines()]
+    images = [
+        dialect.image_declaration.format(image=i.name, channels=i.channels, binding=binding)
+        for binding, i in enumerate(gather.images, dialect.first_binding)
+    ]
+    defines = [*(dialect.exact if program.exact else ()), *_window_defines(gather, dialect), *body.defines()]
     declared = [dialect.table_declaration(name, array) for name, array in tables(program).items()]
+    packed = pack(program)
+    if dialect.weights_table:
+        declared.append(dialect.table_declaration("weights", packed))
     begin = dialect.begin.format(
         defines="\n".join([*defines, *declared]),
         entry=dialect.entry,
@@ -89,9 +95,10 @@ def emit(
         results=_each_result(dialect.result_declaration, program, dialect),
         starts=_each_result(dialect.result_start, program, dialect),
         unordered=dialect.unordered[bounded or program.exact],
+        quads=-(-packed.size // 4),
     )
     comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
-    return "\n".join([*comment, begin, *body.text(), dialect.end.format()]) + "\n"
+    return "\n".join([*dialect.first, *comment, begin, *body.text(), dialect.end.format()]) + "\n"
 
 
 def _each_result(template: str, program: Program, dialect: Dialect) -> str:
@@ -234,14 +241,14 @@ class Body(Lines):
         self._declare(index, f"%{index}: affine map {node['weight']} from {n_in} to {n_out}")
         bias = node.get("bias")
         start = self._weight(_plus(self.slots[str(bias)].offset, "j")) if bias else "0.0f"
-        neurons = f"for (int j = 0; j < {n_out}; ++j) {{"
+        neurons = self.dialect.loop("j", n_out)
         self._nest([neurons], [f"v{index}[j] = {start};"])
         if source.op == "input":
             sums, zero, add = f"v{index}", [], []
             if is_split(self.gather):
                 sums = f"part{index}"
                 zero, add = [f"{sums}[j] = 0.0f;"], [f"v{index}[j] += {sums}[j];"]
-                self._line(f"{self.dialect.variable('float32')} {sums}[{n_out}];")
+                self._line(self.dialect.array("float32", sums, n_out, kept=True))
             self._over_window(
                 lambda tap: self._accumulate(sums, neurons, _plus(weight.offset, f"({tap}) * {n_out}", "j")),
                 lambda: self._nest([neurons] if zero else [], zero),
@@ -249,8 +256,8 @@ class Body(Lines):
             )
         else:
             inner = self._accumulate(f"v{index}", neurons, _plus(weight.offset, f"i * {n_out}", "j"))
-            value = f"float value = {self._read(node.args[0], 'i')};"
-            self._nest([f"for (int i = 0; i < {n_in}; ++i) {{"], [value, *inner])
+            value = self.dialect.let("float32", "value", self._read(node.args[0], "i"))
+            self._nest([self.dialect.loop("i", n_in)], [value, *inner])
 
     def _accumulate(self, sums: str, neurons: str, weight: str) -> list[str]:
         """Return the loop that adds `value` times one row of weights to all neurons' sums."""
@@ -269,11 +276,11 @@ class Body(Lines):
         for index in group:
             if self._fuses(index):
                 continue
-            kind = self.dialect.variable(self.program.nodes[index].type.dtype)
-            statements.append(f"{kind} t{index} = {self._expression(index, lane)};")
+            kind, text = self.program.nodes[index].type.dtype, self._expression(index, lane)
+            statements.append(self.dialect.let(kind, f"t{index}", text, kept=True))
             if shape and self._is_array(index):
                 statements.append(f"{self._element(index, 'i')} = t{index};")
-        self._nest([f"for (int i = 0; i < {self._count(shape[0])}; ++i) {{"] if shape else [], statements)
+        self._nest([self.dialect.loop("i", self._count(shape[0]))] if shape else [], statements)
 
     def _expression(self, index: int, lane: str) -> str:
         """Return the right side of an elementwise node or a component."""
@@ -299,13 +306,19 @@ class Body(Lines):
             return
         each = self.dialect.channels_per_result or channels
         for first, result in zip(range(0, channels, each), results, strict=True):
-            value = self._written(self._read(index, _plus(first, "i")))
-            line = store.format(result=result, channels=channels, i="i", value=value)
-            self._nest([f"for (int i = 0; i < {min(each, channels - first)}; ++i) {{"], [line])
+            count = min(each, channels - first)
+            if self.dialect.indexes_results:
+                value = self._written(self._read(index, _plus(first, "i")))
+                line = store.format(result=result, channels=channels, i="i", value=value)
+                self._nest([self.dialect.loop("i", count)], [line])
+                continue
+            for i in range(count):
+                value = self._written(self._read(index, str(first + i)))
+                self._line(store.format(result=result, channels=channels, i=i, value=value))
 
     def _written(self, value: str) -> str:
         """Return the text of a number as it is written: an exact program has one zero."""
-        return f"{value} == 0.0f ? 0.0f : {value}" if self.program.exact else value
+        return self.dialect.select(f"{value} == 0.0f", "0.0f", value) if self.program.exact else value
 
     # ---- the window --------------------------------------------------------------------------------------
 
@@ -319,28 +332,34 @@ class Body(Lines):
 
         `body` takes the index into the window; `before` and `after` write what stands around an image's row.
         """
-        (inside, value), names = BORDERS[self.gather.window.border], self.sides
+        dialect, names = self.dialect, self.sides
+        row = f"{dialect.clamp}(y + dy - {names.row}, 0, height - 1)"
+        column = f"{dialect.clamp}(x + dx - {names.column}, 0, width - 1)"
+        inside = f"row == y + dy - {names.row} && column == x + dx - {names.column}"
         for group in self.gather.groups:
-            self._open(f"for (int dy = 0; dy < {names.rows}; ++dy) {{")
-            self._line(f"int row = {self.dialect.clamp}(y + dy - {names.row}, 0, height - 1);")
+            self._open(dialect.loop("dy", names.rows))
+            self._line(dialect.index("row", row))
             before()
-            self._open(f"for (int dx = 0; dx < {names.columns}; ++dx) {{")
-            self._line(f"int column = {self.dialect.clamp}(x + dx - {names.column}, 0, width - 1);")
-            if inside:
-                self._line(inside.format(sides=names))
-            self._line(f"int tap = (dy * {names.columns} + dx) * {self.gather.channels};")
+            self._open(dialect.loop("dx", names.columns))
+            self._line(dialect.index("column", column))
+            if self.gather.window.border == "zero":
+                self._line(dialect.let("bool", "inside", inside))
+            tap = f"(dy * {names.columns} + dx) * {self.gather.channels}"
+            self._line(dialect.index("tap", tap))
             for image, first in group:
-                self._channels(image, value, body(_plus("tap", first, "c")))
+                self._channels(image, body(_plus("tap", first, "c")))
             self._close()
             after()
             self._close()
 
-    def _channels(self, image: Image, value: str, lines: list[str]) -> None:
+    def _channels(self, image: Image, lines: list[str]) -> None:
         """Write the loop over an image's channels at a tap."""
-        pixel = self.dialect.pixel.format(image=image.name, channels=image.channels)
-        kept = [f"value = {self.dialect.kept('value')};"] if self.program.exact else []
-        value = f"float value = {value.format(pixel=pixel)};"
-        self._nest([f"for (int c = 0; c < {image.channels}; ++c) {{"], [value, *kept, *lines])
+        dialect = self.dialect
+        pixel = dialect.pixel.format(image=image.name, channels=image.channels)
+        value = dialect.select("inside", pixel, "0.0f") if self.gather.window.border == "zero" else pixel
+        kept = [f"value = {dialect.kept('value')};"] if self.program.exact else []
+        declared = (dialect.var if self.program.exact else dialect.let)("float32", "value", value)
+        self._nest([dialect.loop("c", image.channels)], [declared, *kept, *lines])
 
     # ---- values ------------------------------------------------------------------------------------------
 
@@ -365,10 +384,9 @@ class Body(Lines):
 
     def _declaration(self, index: int) -> str:
         """Return the declaration of the array of a value."""
-        kind, node = self._type(index), self.program.nodes[index]
+        node = self.program.nodes[index]
         # Sums of an exact program have one order too.
-        kind = self.dialect.variable(node.type.dtype) if self.program.exact else kind
-        return f"{kind} v{index}[{node.type.shape[0]}];"
+        return self.dialect.array(node.type.dtype, f"v{index}", node.type.shape[0], self.program.exact)
 
     def declares(self, index: int) -> bool:
         """Return whether the kernel has an array for this value."""
@@ -393,10 +411,6 @@ class Body(Lines):
         """Write a comment and the declaration of an array."""
         self._comment(comment)
         self._line(self._declaration(index))
-
-    def _type(self, index: int) -> str:
-        """Return the type of a value's numbers."""
-        return self.dialect.types[self.program.nodes[index].type.dtype]
 
     def _nest(self, loops: Sequence[str], body: Sequence[str]) -> None:
         """Write loops around a body whose lines carry their own further indentation."""

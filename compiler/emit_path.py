@@ -109,12 +109,17 @@ class _Kernel(Lines):
                 f"the kernel adds up {len(self.planes)} planes: {self.dialect.language} writes at most "
                 f"{self.dialect.max_planes}; ask for fewer groups"
             )
+        if self.programs.inputs and not self.dialect.scene_number:
+            raise CompileError(
+                f"{self.dialect.language}: its path kernels take no numbers of the scene; only those of web "
+                "pages do: compile the scene at one time"
+            )
         comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
         self._sums()
         self._samples()
         self._stores()
         end = self.dialect.path_end.format()
-        return "\n".join([*comment, self._begin(), *self.lines, end]) + "\n"
+        return "\n".join([*self.dialect.first, *comment, self._begin(), *self.lines, end]) + "\n"
 
     # ---- the skeleton ------------------------------------------------------------------------------------
 
@@ -143,6 +148,7 @@ class _Kernel(Lines):
             ),
             max_depth=self.programs.settings.max_depth,
             unordered=self.dialect.unordered[False],
+            scene=self.dialect.scene_numbers.format(vectors=-(-len(self.programs.inputs) // 4)),
             counter=self.dialect.types["uint32"],
             **uniforms,
         )
@@ -157,24 +163,25 @@ class _Kernel(Lines):
 
     def _sums(self) -> None:
         """Declare the image's size in lanes, and the sums."""
-        real, zero = self.dialect.types["float32"], self.dialect.number(0.0, "float32")
+        zero = self.dialect.number(0.0, "float32")
         for name in ("width", "height"):
             size = self._splat(self.dialect.uniforms[name], "float32")
-            self._line(f"{real} image_{name} = {size};")
+            self._line(self.dialect.let("float32", f"image_{name}", size))
         for plane in self.planes:
-            self._line(f"{real} sum_{plane} = {zero};")
+            self._line(self.dialect.var("float32", f"sum_{plane}", zero))
 
     def _samples(self) -> None:
         """Write the loop over the samples."""
-        self._open("for (int n = 0; n < samples; ++n) {")
-        sample = self._splat(self.dialect.uniforms["sample"], "uint32")
-        self._line(f"{self.dialect.types['uint32']} sample_number = {sample};")
-        self._line(f"{self.dialect.types['uint32']} pixel;")
+        dialect = self.dialect
+        self._open(dialect.loop("n", "samples"))
+        sample = self._splat(dialect.uniforms["sample"], "uint32")
+        self._line(dialect.let("uint32", "sample_number", sample))
+        self._line(dialect.var("uint32", "pixel"))
         self._declare({**PATH, **SURFACE})
-        self._line(f"{self.dialect.types['bool']} alive = {self.dialect.number(True, 'bool')};")
+        self._line(dialect.var("bool", "alive", dialect.number(True, "bool")))
         self.block("start", "the path at the camera", {"width": "image_width", "height": "image_height"})
-        self._open("for (uint bounce = 0u; bounce <= MAX_DEPTH; ++bounce) {")
-        self._line(f"{self.dialect.types['uint32']} depth = {self._splat('bounce', 'uint32')};")
+        self._open(dialect.bounces)
+        self._line(dialect.let("uint32", "depth", self._splat("bounce", "uint32")))
         self.block("arrive", "the next surface", masked=("radiance_r", "radiance_g", "radiance_b"))
         if set(self.groups) & set(FIRST):
             self._open("if (bounce == 0u) {")
@@ -194,18 +201,20 @@ class _Kernel(Lines):
     def _declare(self, values: Values) -> None:
         """Declare the variables of some values."""
         for name, kind in kinds(values).items():
-            self._line(f"{self.dialect.types[kind]} {name};")
+            self._line(self.dialect.var(kind, name))
 
     def _gather(self) -> None:
         """Add what a path has gathered."""
         self.lines.append("")
         self._line("/* what the path has gathered */")
         if "deviation" in self.groups:
-            self._line(f"float count = {self.dialect.scalar_float.format('n')};")
-            self._line("float weight = n > 0 ? 1.0f / (count * (count + 1.0f)) : 0.0f;")
+            # Single numbers, also where paths are vectors.
+            share = self.dialect.select("n > 0", "1.0f / (count * (count + 1.0f))", "0.0f")
+            self._line(self.dialect.single("count", self.dialect.scalar_float.format("n")))
+            self._line(self.dialect.single("weight", share))
             for c in "rgb":
-                real = self.dialect.types["float32"]
-                self._line(f"{real} difference_{c} = radiance_{c} * count - sum_color_{c};")
+                difference = f"radiance_{c} * count - sum_color_{c}"
+                self._line(self.dialect.let("float32", f"difference_{c}", difference))
                 self._line(f"sum_deviation_{c} += difference_{c} * difference_{c} * weight;")
         for group in self.groups:
             for plane in GROUPS[group]:
@@ -233,6 +242,13 @@ class _Kernel(Lines):
             store = self.dialect.sum_store
             self._line(store.format(plane=number, output=output, component=component, value=f"sum_{plane}"))
 
+    def _scene_numbers(self) -> dict[str, str]:
+        """Return the text of each of the scene's numbers that are inputs."""
+        return {
+            name: self.dialect.scene_number.format(vector=number // 4, component="xyzw"[number % 4])
+            for number, name in enumerate(self.programs.inputs)
+        }
+
     # ---- one program -------------------------------------------------------------------------------------
 
     def block(
@@ -249,10 +265,11 @@ class _Kernel(Lines):
         assigned where a path is alive.
         """
         program = self.programs.parts()[part]
+        renamed = {**self._scene_numbers(), **(renamed or {})}
         self.lines.append("")
         self._line(f"/* {part}: {comment} */")
         self._open("{")
-        texts = self._statements(part, program, renamed or {})
+        texts = self._statements(part, program, renamed)
         for line in self._added(program, texts) if summed else self._assignments(program, texts, masked):
             self._line(line)
         self._close()
@@ -281,11 +298,16 @@ class _Kernel(Lines):
         """Write the statement that computes a value."""
         node = program.nodes[index]
         expression = self._expression(part, program, node, texts)
-        self._line(f"{self.dialect.variable(node.type.dtype)} {texts[index]} = {expression};")
+        declared = self.dialect.var if node.op == "carried" else self.dialect.let
+        self._line(declared(node.type.dtype, texts[index], expression, kept=True))
+
+    def _kept(self, dtype: str, name: str, value: str) -> str:
+        """Return the declaration of a value whose operations stay in order."""
+        return self.dialect.let(dtype, name, value, kept=True)
 
     def _loop(self, part: str, program: Program, texts: Sequence[str], loop: Loop) -> None:
         """Write a loop over the rows of tables: its body, then the assignments of what it carries."""
-        self._open(f"for (int {TRIP} = 0; {TRIP} < {loop.trips}; ++{TRIP}) {{")
+        self._open(self.dialect.loop(TRIP, loop.trips))
         for index in loop.body:
             self._statement(part, program, texts, index)
         before, after = [], []
@@ -293,8 +315,7 @@ class _Kernel(Lines):
             value = texts[new]
             if new in loop.carried and new != carried:
                 # Another carried number, which may be assigned before it is read: keep its value.
-                kind = self.dialect.variable(program.nodes[new].type.dtype)
-                before.append(f"{kind} new_{texts[carried]} = {value};")
+                before.append(self._kept(program.nodes[new].type.dtype, f"new_{texts[carried]}", value))
                 value = f"new_{texts[carried]}"
             if new != carried:
                 after.append(f"{texts[carried]} = {value};")
@@ -326,8 +347,7 @@ class _Kernel(Lines):
             value = texts[index]
             if value in inputs and value != name:
                 # The variable may be assigned before it is read: keep its value.
-                kind = self.dialect.variable(program.nodes[index].type.dtype)
-                before.append(f"{kind} new_{name} = {value};")
+                before.append(self._kept(program.nodes[index].type.dtype, f"new_{name}", value))
                 value = f"new_{name}"
             if name == "alive":
                 after.append(f"alive = alive && {value};")

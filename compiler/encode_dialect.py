@@ -7,8 +7,6 @@ place where a texture holds several; `image`, `channels`, `channel`, `value` and
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from .dialect import Dialect
 from .glsl import GLSL, PREAMBLE
 from .opencl import OpenCL
@@ -96,7 +94,3 @@ void main()
         "nothing). Draw one triangle that covers them: row 0 stays row 0"
     )
     planes_per_input = 4
-
-
-ENCODE_DIALECTS: Mapping[str, EncodeDialect] = {"opencl": OpenCLEncode(), "opengl": GLSLEncode()}
-"""By target; the interpreter needs the program alone."""

@@ -22,14 +22,33 @@ from ..refimpl.dataset import FEATURES, Normalization
 from ..refimpl.errors import CompileError
 from . import bounds, ir, profiles
 from .artifact import OneSource
-from .compile import sine_contract, target_of_pipelines
-from .encode_dialect import ENCODE_DIALECTS, EncodeDialect
+from .c_path import CEncode
+from .compile import sine_contract, target_named
+from .cuda import CUDAEncode
+from .encode_dialect import EncodeDialect, GLSLEncode, OpenCLEncode
+from .glsl_buffers import FIRST_IMAGE, ComputeEncode, VulkanEncode
+from .glsl_es import GLSLESEncode
 from .ir import Image, Program
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
+from .metal import MetalEncode
 from .passes import pipeline
+from .wgsl import WGSLEncode
 
 SCHEMA = "wamnet-encode-kernel-1"
 """Name and version of the manifest's form; described in spec/pipeline.md."""
+
+ENCODE_DIALECTS: Mapping[str, EncodeDialect] = {
+    "opencl": OpenCLEncode(),
+    "opengl": GLSLEncode(),
+    "glsl-es": GLSLESEncode(),
+    "glsl-compute": ComputeEncode(),
+    "glsl-vulkan": VulkanEncode(),
+    "wgsl": WGSLEncode(),
+    "cuda": CUDAEncode(),
+    "metal": MetalEncode(),
+    "c": CEncode(),
+}
+"""By target; the interpreter needs the program alone."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +77,7 @@ def compile_encode(
 
     `planes` are those that the sums have, in order; by default the features' own alone.
     """
-    chosen, promised = target_of_pipelines(target), profiles.unpinned(profile, "encodings of features")
+    chosen, promised = target_named(target), profiles.unpinned(profile, "encodings of features")
     program = pipeline.run(lower_encode(features, normalization), promised.passes)
     planes = tuple(planes or planes_of(features))
     lacking = set(planes_of(features)) - set(planes)
@@ -142,6 +161,27 @@ def _emit(
 
     `bounded`: the language must keep the order of operations, on which bounds rest.
     """
+    lines = _body(program, dialect, planes, images)
+    declared = [
+        dialect.output_declaration.format(image=image.name, location=location, binding=location + FIRST_IMAGE)
+        for location, image in enumerate(images)
+    ]
+    inputs = range(-(-len(planes) // dialect.planes_per_input))
+    begin = dialect.encode_begin.format(
+        entry=dialect.entry,
+        inputs="\n".join(dialect.input_declaration.format(buffer=buffer) for buffer in inputs),
+        outputs=dialect.output_separator.join(declared),
+        unordered=dialect.unordered[bounded],
+    )
+    comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
+    body = [f"    {line}" for line in lines]
+    return "\n".join([*dialect.first, *comment, begin, *body, dialect.encode_end.format()]) + "\n"
+
+
+def _body(
+    program: Program, dialect: EncodeDialect, planes: Sequence[str], images: Sequence[Image]
+) -> list[str]:
+    """Return the statements: loads of planes, operations, stores of channels."""
     lines = []
     for name in planes_of([image.name for image in images]):
         number = planes.index(name)
@@ -155,20 +195,17 @@ def _emit(
             store = dialect.image_store
             place = {"image": image.name, "channels": image.channels, "channel": channel}
             lines.append(store.format(value=value, **place))
-    declared = [
-        dialect.output_declaration.format(image=image.name, location=location)
-        for location, image in enumerate(images)
-    ]
-    inputs = range(-(-len(planes) // dialect.planes_per_input))
-    begin = dialect.encode_begin.format(
-        entry=dialect.entry,
-        inputs="\n".join(dialect.input_declaration.format(buffer=buffer) for buffer in inputs),
-        outputs=dialect.output_separator.join(declared),
-        unordered=dialect.unordered[bounded],
-    )
-    comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
-    body = [f"    {line}" for line in lines]
-    return "\n".join([*comment, begin, *body, dialect.encode_end.format()]) + "\n"
+    return lines
+
+
+def encode_source(
+    features: Sequence[str], normalization: Normalization, dialect: EncodeDialect, profile: str = "ieee"
+) -> str:
+    """Return the statements alone, for a kernel that has the sums of these features in variables."""
+    program = pipeline.run(lower_encode(features, normalization), profiles.profile_named(profile).passes)
+    known = [FEATURES[name] for name in features]
+    images = [Image(f.name, f.channels, f.low, f.high, f.encoding(normalization)) for f in known]
+    return "\n".join(f"    {line}" for line in _body(program, dialect, planes_of(features), images))
 
 
 def _statements(program: Program, dialect: EncodeDialect, lines: list[str]) -> list[str]:
@@ -182,6 +219,6 @@ def _statements(program: Program, dialect: EncodeDialect, lines: list[str]) -> l
         else:
             kind = program.nodes[node.args[-1]].type.dtype
             expression = dialect.expression(node, kind, [texts[arg] for arg in node.args])
-            lines.append(f"{dialect.variable(node.type.dtype)} t{index} = {expression};")
+            lines.append(dialect.let(node.type.dtype, f"t{index}", expression, kept=True))
             texts.append(f"t{index}")
     return texts

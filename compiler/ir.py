@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from typing import Any
 
@@ -57,12 +57,17 @@ Attribute = str | int | float | Type
 
 @dataclass(frozen=True)
 class Node:
-    """One operation: `args` are indices of earlier nodes, `attributes` are sorted by name."""
+    """One operation: `args` are indices of earlier nodes, `attributes` are sorted by name.
+
+    `places` are the lines of the reference that asked for it, callers first: for listings alone, no part of
+    what the node is.
+    """
 
     op: str
     args: tuple[int, ...]
     type: Type
     attributes: tuple[tuple[str, Attribute], ...] = ()
+    places: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def __getitem__(self, name: str) -> Attribute:
         return dict(self.attributes)[name]
@@ -154,9 +159,13 @@ class Program:
 
 
 class Builder:
-    """Makes nodes; the same operation on the same operands is made once (value numbering)."""
+    """Makes nodes; the same operation on the same operands is made once (value numbering).
+
+    `places` are those of new nodes that have none: a pass sets them to those of the node that it replaces.
+    """
 
     def __init__(self) -> None:
+        self.places: tuple[str, ...] = ()
         self.nodes: list[Node] = []
         self.parameters: dict[str, NDArray[Any]] = {}
         self._numbers: dict[tuple[object, ...], int] = {}
@@ -168,8 +177,14 @@ class Builder:
         key = (node.op, node.args, node.type, repr(node.attributes))
         if key not in self._numbers:
             self._numbers[key] = len(self.nodes)
+            if not node.places and (places := self.where()):
+                node = replace(node, places=places)
             self.nodes.append(node)
         return self._numbers[key]
+
+    def where(self) -> tuple[str, ...]:
+        """Return the places of a new node."""
+        return self.places
 
     def parameter(self, array: NDArray[Any]) -> str:
         """Return the name of an array of weights: W0, W1, ... for matrices, b0, b1, ... for vectors."""

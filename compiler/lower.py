@@ -14,8 +14,11 @@ from .trace import trace
 from .verify import verify
 
 
-def lower(model: Model) -> Program:
-    """Return the program of `denoise_pixel` for this model, with its weights rounded to float32."""
+def lower(model: Model, keep_places: bool = False) -> Program:
+    """Return the program of `denoise_pixel` for this model, with its weights rounded to float32.
+
+    `keep_places`: its nodes know the lines of the reference that they came from, for listings.
+    """
     check_model(model)
     features = [FEATURES[name] for name in model.features]
     scales = model.normalization
@@ -32,5 +35,6 @@ def lower(model: Model) -> Program:
         {"window": Type(shape=(gather.n_inputs,))},
         gather,
         info=info,
+        keep_places=keep_places,
     )
     return verify(program, "lowered model")

@@ -9,7 +9,7 @@ A path is four pure functions of the reference, each a program; a kernel's skele
 
 Values between them have names [`PATH`, `SURFACE`, `COUNTERS`]: a vector is three numbers, `origin_x` and so
 on. The scene is constants by then: what it lacks (a kind of primitive, a second light, a rotation) is in no
-program.
+program. Numbers of it that shall move are inputs of all four [scene_inputs.py].
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 
 from ..refimpl import render, transport, vectors
-from ..refimpl.camera import camera_basis
 from ..refimpl.intersection import Hit, Surface
 from ..refimpl.scene import Scene, scene_digest
-from ..refimpl.transport import Counters, Path, Settings
+from ..refimpl.transport import Counters, Path, Settings, World
 from .ir import Program, Type
 from .passes import pipeline
+from .scene_inputs import SceneInputs, lay_out
 from .trace import Traced, trace
 from .verify import verify
 
@@ -67,6 +67,7 @@ LAYERS: Values = {
     "depth": (NUMBER, FLOAT),
     "position": (XYZ, FLOAT),
     "direction": (XYZ, FLOAT),
+    "unshadowed": (RGB, FLOAT),
 }
 """The feature layers of the first hit, as refimpl/render.py: first_hit_layers."""
 
@@ -83,7 +84,10 @@ PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "elimina
 
 @dataclass(frozen=True)
 class PathPrograms:
-    """The programs of one path in one scene; `alive`, `scatter`'s truth value, says whether it goes on."""
+    """The programs of one path in one scene; `alive`, `scatter`'s truth value, says whether it goes on.
+
+    `inputs` are the names of the scene's numbers that all four are given [scene_inputs.py].
+    """
 
     scene: str
     scene_digest: str
@@ -92,20 +96,32 @@ class PathPrograms:
     arrive: Program
     look: Program
     scatter: Program
+    inputs: tuple[str, ...] = ()
 
     def parts(self) -> Mapping[str, Program]:
         """Return the programs by name."""
         return {name: getattr(self, name) for name in ("start", "arrive", "look", "scatter")}
 
 
-def lower_scene(scene: Scene, settings: Settings, most_unrolled: int | None = MOST_UNROLLED) -> PathPrograms:
+def lower_scene(
+    scene: Scene,
+    settings: Settings,
+    most_unrolled: int | None = MOST_UNROLLED,
+    keep_places: bool = False,
+    moving: SceneInputs | None = None,
+) -> PathPrograms:
     """Return the programs of a path through a scene, in float32.
 
     The primitives of a scene that has more than `most_unrolled` of them are tables and loops, else statements
-    for each; None unrolls any scene. What stands alone in its table is no loop.
+    for each; None unrolls any scene. What stands alone in its table is no loop. `keep_places`: nodes know
+    the lines of the reference that they came from, for listings. The numbers that are `moving` are inputs,
+    not constants.
     """
-    world = transport.build(scene, settings, np.float32)
-    basis = camera_basis(scene.camera, np.float32)
+    laid = lay_out(scene, settings)
+
+    def world_of(given: Mapping[str, Any]) -> World:
+        world: World = (moving.opened(laid, given) if moving else laid)["world"]
+        return world
 
     def start(given: Mapping[str, Any]) -> dict[str, Any]:
         # A pixel's counter, as in refimpl/render.py: pixel_counter.
@@ -113,16 +129,17 @@ def lower_scene(scene: Scene, settings: Settings, most_unrolled: int | None = MO
         counters = Counters(given["seed"], pixel, given["sample_number"])
         x, y = given["x"].astype(np.float32), given["y"].astype(np.float32)
         size = given["width"], given["height"]
+        basis = (moving.opened(laid, given) if moving else laid)["camera"]
         path = render.start(basis, x, y, *size, counters, np.float32, settings.sampler)
         return {**_taken(PATH, path), "pixel": pixel}
 
     def arrive(given: Mapping[str, Any]) -> dict[str, Any]:
-        path, surface, hit = transport.arrive(world, _path(given))
+        path, surface, hit = transport.arrive(world_of(given), _path(given))
         return {**_taken({"radiance": PATH["radiance"]}, path), **_taken(SURFACE, surface, hit)}
 
     def look(given: Mapping[str, Any]) -> dict[str, Any]:
         surface, hit = _surface(given)
-        layers = render.first_hit_layers(world, surface, hit, _vector(given, "direction", XYZ))
+        layers = render.first_hit_layers(world_of(given), surface, hit, _vector(given, "direction", XYZ))
         return {
             name: value for layer, (ends, _) in LAYERS.items() for name, value in _split(layer, ends, layers)
         }
@@ -130,21 +147,27 @@ def lower_scene(scene: Scene, settings: Settings, most_unrolled: int | None = MO
     def scatter(given: Mapping[str, Any]) -> dict[str, Any]:
         surface, hit = _surface(given)
         counters = Counters(*(given[name] for name in COUNTERS))
-        path, alive = transport.scatter(world, _path(given), surface, hit, given["depth"], counters)
+        path, alive = transport.scatter(world_of(given), _path(given), surface, hit, given["depth"], counters)
         return {**_taken(PATH, path), "alive": alive}
 
     numbers = {**dict.fromkeys(("x", "y", "seed", "sample_number"), (NUMBER, COUNTER))}
     size = dict.fromkeys(("width", "height"), (NUMBER, FLOAT))
+    scene_numbers = dict.fromkeys(moving.names if moving else (), (NUMBER, FLOAT))
     few = most_unrolled is None or primitives(scene) <= most_unrolled
-    lowered = partial(_lowered, most_unrolled=None if few else 1)
+    lowered = partial(_lowered, most_unrolled=None if few else 1, keep_places=keep_places)
     return PathPrograms(
         scene.name,
         scene_digest(scene),
         settings,
-        lowered("start", start, {**numbers, **size}),
-        lowered("arrive", arrive, PATH),
-        lowered("look", look, {**SURFACE, "direction": PATH["direction"]}),
-        lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, "depth": (NUMBER, COUNTER)}),
+        lowered("start", start, {**numbers, **size, **scene_numbers}),
+        lowered("arrive", arrive, {**PATH, **scene_numbers}),
+        lowered("look", look, {**SURFACE, "direction": PATH["direction"], **scene_numbers}),
+        lowered(
+            "scatter",
+            scatter,
+            {**PATH, **SURFACE, **COUNTERS, "depth": (NUMBER, COUNTER), **scene_numbers},
+        ),
+        moving.names if moving else (),
     )
 
 
@@ -163,11 +186,16 @@ def kinds(values: Values) -> dict[str, str]:
     return {name + end: kind for name, (ends, kind) in values.items() for end in ends}
 
 
-def _lowered(name: str, function: Any, values: Values, most_unrolled: int | None) -> Program:
+def _lowered(
+    name: str, function: Any, values: Values, most_unrolled: int | None, keep_places: bool
+) -> Program:
     """Trace a function of named numbers, and run the passes."""
     inputs = {component: Type(kind) for component, kind in kinds(values).items()}
     program = trace(
-        lambda *given: function(dict(zip(inputs, given, strict=True))), inputs, most_unrolled=most_unrolled
+        lambda *given: function(dict(zip(inputs, given, strict=True))),
+        inputs,
+        most_unrolled=most_unrolled,
+        keep_places=keep_places,
     )
     return pipeline.run(verify(program, f"traced {name}"), PASSES)
 

@@ -20,12 +20,18 @@ from typing import Any
 from ..refimpl.errors import CompileError
 from . import emit_path, ir, opencl_path, profiles
 from .artifact import OneSource
-from .compile import asdict_finite, sine_contract, target_of_pipelines
+from .c_path import CPath
+from .compile import asdict_finite, sine_contract, target_named
+from .cuda import CUDAPath
+from .glsl_buffers import ComputePath, VulkanPath
+from .glsl_es import GLSLESPath
 from .glsl_path import GLSLPath
 from .lower_scene import MOST_UNROLLED, PASSES, PathPrograms
+from .metal import MetalPath
 from .passes import pipeline
 from .path_dialect import PathDialect
 from .profiles import Profile
+from .wgsl import WGSLPath
 
 SCHEMA = "wamnet-path-kernel-1"
 """Name and version of the manifest's form; described in spec/path_kernel.md."""
@@ -64,11 +70,18 @@ SCHEDULES: Mapping[str, tuple[Callable[[int], PathDialect | None], tuple[int, ..
     "numpy": (_no_dialect, (1,)),
     "opencl": (opencl_path.schedule, (1, *opencl_path.VECTORS)),
     "opengl": (lambda lanes: GLSLPath(), (1,)),
+    "glsl-es": (lambda lanes: GLSLESPath(), (1,)),
+    "glsl-compute": (lambda lanes: ComputePath(), (1,)),
+    "glsl-vulkan": (lambda lanes: VulkanPath(), (1,)),
+    "wgsl": (lambda lanes: WGSLPath(), (1,)),
+    "cuda": (lambda lanes: CUDAPath(), (1,)),
+    "metal": (lambda lanes: MetalPath(), (1,)),
+    "c": (lambda lanes: CPath(), (1,)),
 }
 """By target: the dialect for a number of paths at once, and the numbers that there are."""
 
 
-UNROLLED: Mapping[str, int] = {"opengl": 128}
+UNROLLED: Mapping[str, int] = {"opengl": 128, "glsl-es": 128}
 """By target, where it is not MOST_UNROLLED: most primitives of a scene that become statements each. llvmpipe
 reads a table at a loop's counter lane by lane, so a loop that Mesa does not unroll itself (it does up to some
 30 trips) is two to four times slower than statements; but it compiles the statements of 100 primitives in 1
@@ -88,7 +101,7 @@ def compile_path(
     groups: Sequence[str] = emit_path.FRAME_GROUPS,
 ) -> PathArtifact:
     """Return the kernel that follows the paths of a scene, `lanes` at once, and adds up groups of planes."""
-    chosen, promised = target_of_pipelines(target), profiles.unpinned(profile, "paths")
+    chosen, promised = target_named(target), profiles.unpinned(profile, "paths")
     make, known = SCHEDULES[target]
     if lanes not in known:
         raise CompileError(

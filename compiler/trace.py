@@ -7,7 +7,8 @@
    selection; np.take from a constant table (made one by `np.asarray(table, like=index)`) a look-up;
    `x[..., i]` a component; `x[..., None]` nothing, since a number goes with every component anyway.
 4. A fold over the rows of constant tables (refimpl/vectors.py: fold_rows) is unrolled up to a number of rows,
-   and a loop (loops.py) above it [`Tracer`].
+   and a loop (loops.py) above it [`Tracer`]. A table with traced numbers in it is always unrolled, and a
+   look-up in it selects them one by one.
 5. A Python number takes the kind of the values beside it; other kinds are never mixed.
 6. Anything else raises: the closed list of operations is what makes one definition serve every executor.
 """
@@ -16,7 +17,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
+from types import FrameType
 from typing import Any, NoReturn
 
 import numpy as np
@@ -47,16 +50,24 @@ TRACEABLE = (
 
 
 class Tracer(Builder):
-    """A builder that knows how many rows of a fold are unrolled at most, and counts the loops."""
+    """A builder that knows how many rows of a fold are unrolled at most, and counts the loops.
 
-    def __init__(self, most_unrolled: int | None = None) -> None:
+    `keeps_places`: nodes get the lines of the reference that are being executed.
+    """
+
+    def __init__(self, most_unrolled: int | None = None, keeps_places: bool = False) -> None:
         super().__init__()
         self.most_unrolled = most_unrolled
+        self.keeps_places = keeps_places
         self.loops = 0
 
     def unrolls(self, rows: int) -> bool:
         """Tell whether a fold over so many rows is unrolled."""
         return self.most_unrolled is None or rows <= self.most_unrolled
+
+    def where(self) -> tuple[str, ...]:
+        """Return the lines of the reference that are being executed, callers first."""
+        return _reference_lines() if self.keeps_places else ()
 
 
 class Traced(NDArrayOperatorsMixin):
@@ -170,13 +181,15 @@ def trace(
     output: str = "color",
     info: Mapping[str, str] | None = None,
     most_unrolled: int | None = None,
+    keep_places: bool = False,
 ) -> Program:
     """Return the program of `function`, called with one tracing value for each of `inputs`, in their order.
 
     A mapping that `function` returns gives several outputs by name; anything else is the one named `output`.
-    Folds over more rows than `most_unrolled` become loops; None unrolls all of them.
+    Folds over more rows than `most_unrolled` become loops; None unrolls all of them. `keep_places`: nodes
+    know the lines of the reference that they came from, for listings.
     """
-    builder = Tracer(most_unrolled)
+    builder = Tracer(most_unrolled, keep_places)
     values = [Traced(builder, _add(builder, "input", (), name=n, type=t)) for n, t in inputs.items()]
     result = function(*values)
     results = result if isinstance(result, Mapping) else {output: result}
@@ -212,11 +225,18 @@ def _operand(builder: Builder, value: Any, beside: str | None = None) -> int:
         return value.index
     if isinstance(value, Planes):
         _refuse("np.stack with axis=0 outside of np.moveaxis(np.stack(...), 0, -1)")
+    if _is_mixed(value):
+        return _operand(builder, emit(builder, "stack", *value) if value.ndim else value.item(), beside)
     if isinstance(value, np.ndarray) and value.ndim:
         return _add(builder, "parameter", (), name=builder.parameter(_exact_float32(value)))
     if not isinstance(value, int | float | np.number | np.bool_ | np.ndarray):
         _refuse(f"a {type(value).__name__} as an operand")
     return _constant(builder, value, _kind(value, beside))
+
+
+def _is_mixed(value: Any) -> bool:
+    """Tell whether an array holds objects: traced numbers among constants [scene_inputs.py]."""
+    return isinstance(value, np.ndarray) and value.dtype == object
 
 
 def _kind(value: Any, beside: str | None) -> str:
@@ -328,13 +348,21 @@ def _take(builder: Builder, table: Any, index: Any) -> Traced:
     """np.take from a table at a traced index."""
     if not isinstance(table, Table):
         _refuse("np.take from anything but np.asarray(table, like=index)")
-    return emit(builder, "take", index, table=builder.table(_known(table.array)))
+    if not _is_mixed(table.array):
+        return emit(builder, "take", index, table=builder.table(_known(table.array)))
+    # The constants are a table as ever; each traced entry is a selection.
+    traced = {i: entry for i, entry in enumerate(table.array) if isinstance(entry, Traced)}
+    constants = np.array([0.0 if i in traced else entry for i, entry in enumerate(table.array)], np.float32)
+    value = emit(builder, "take", index, table=builder.table(constants))
+    for i, entry in traced.items():
+        value = emit(builder, "select", emit(builder, "equal", index, i), entry, value)
+    return value
 
 
 def _fold_rows(builder: Builder, step: Any, tables: Any, start: Any) -> Any:
     """A fold over more rows than are unrolled is a loop whose body is one step."""
     trips = len(tables[0])
-    if not isinstance(builder, Tracer) or builder.unrolls(trips):
+    if not isinstance(builder, Tracer) or builder.unrolls(trips) or any(map(_is_mixed, tables)):
         return NotImplemented
     number, builder.loops = builder.loops, builder.loops + 1
     carried = [
@@ -392,6 +420,28 @@ def _call(builder: Builder, function: Any, args: Any, options: Any) -> Any:
 def _refuse(what: str) -> NoReturn:
     """Raise for an operation outside the closed list."""
     raise CompileError(f"{_place()}: {what} cannot be traced; use only {', '.join(TRACEABLE)}")
+
+
+REFERENCE = Path(vectors.__file__).parent
+"""The folder of the reference: lines of its files are the places of nodes."""
+
+
+@cache
+def _reference_file(path: str) -> str:
+    """Return the name of a file of the reference, refimpl/siren.py; nothing for another file."""
+    found = Path(path)
+    return found.relative_to(REFERENCE.parent).as_posix() if REFERENCE in found.parents else ""
+
+
+def _reference_lines() -> tuple[str, ...]:
+    """Return file:line of each line of the reference that is being executed, callers first."""
+    places = []
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None:
+        if name := _reference_file(frame.f_code.co_filename):
+            places.append(f"{name}:{frame.f_lineno}")
+        frame = frame.f_back
+    return tuple(places[::-1])
 
 
 def _place() -> str:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
+from ..compiler.emit_packed import WEIGHTS_A_TEXEL
 from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.factor import HORIZONTAL
 from ..compiler.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
@@ -103,9 +104,10 @@ class _Built:
 
 
 class OpenGLExecutor(Executor):
-    """One OpenGL context."""
+    """One OpenGL context; another version of the language has another `vertex_shader`."""
 
     name = "opengl"
+    vertex_shader = VERTEX_SHADER
 
     def __init__(self, context: str | None = None) -> None:
         kind, self._context = _open(context or os.environ.get(CONTEXT_VARIABLE) or "auto")
@@ -181,7 +183,7 @@ class OpenGLExecutor(Executor):
     def _program(self, source: str, made: ExitStack) -> tuple[Any, Any]:
         """Return the shaders and the triangle that they draw; `made` gives them back if something fails."""
         try:
-            program = self._context.program(vertex_shader=VERTEX_SHADER, fragment_shader=source)
+            program = self._context.program(vertex_shader=self.vertex_shader, fragment_shader=source)
         except moderngl.Error as error:
             raise CompileError(f"{self.device} does not build the kernel: {error}") from None
         made.callback(program.release)
@@ -189,14 +191,15 @@ class OpenGLExecutor(Executor):
 
     def _weights(self, artifact: Artifact) -> Any:
         """Return the weights as a texture of whole rows."""
-        rows = max(1, -(-artifact.weights.size // WEIGHT_TEXTURE_WIDTH))
+        texel = artifact.manifest["schedule"].get(WEIGHTS_A_TEXEL, 1)
+        rows = max(1, -(-artifact.weights.size // (WEIGHT_TEXTURE_WIDTH * texel)))
         largest = self._context.info["GL_MAX_TEXTURE_SIZE"]
         if rows > largest:
             raise CompileError(
                 f"{artifact.weights.size} weights fill {rows} rows of a texture: this OpenGL takes at most "
                 f"{largest}; use narrower layers, or executor opencl or numpy"
             )
-        padded = np.zeros((rows, WEIGHT_TEXTURE_WIDTH, 1), np.float32)
+        padded = np.zeros((rows, WEIGHT_TEXTURE_WIDTH, texel), np.float32)
         padded.reshape(-1)[: artifact.weights.size] = artifact.weights
         return self._texture("weights", padded)
 

@@ -85,6 +85,11 @@ def encode_albedo(values: Array, normalization: Normalization) -> Array:
     return np.clip(values, 0.0, 1.0)
 
 
+def encode_light(values: Array, normalization: Normalization) -> Array:
+    """Encode the lamps' unshadowed light (..., 3) as colour is, to [0, 1]."""
+    return to_display(values, normalization.exposure_stops)
+
+
 def encode_signed(values: Array, normalization: Normalization) -> Array:
     """Clip components of a unit vector (..., 3) to [-1, 1]; a pixel's mean may be shorter than 1."""
     return np.clip(values, -1.0, 1.0)
@@ -154,6 +159,15 @@ FEATURES: Mapping[str, Feature] = {
             1.0,
             encode_signed,
             "unit direction of the camera ray in world space",
+        ),
+        Feature(
+            "unshadowed",
+            "unshadowed",
+            3,
+            0.0,
+            1.0,
+            encode_light,
+            "the lamps' radiance off the first hit, were it matt and nothing in between: " + DISPLAY_FORMULA,
         ),
     )
 }

@@ -49,6 +49,9 @@ LAYERS: Mapping[str, Layer] = {
         Layer("depth", 1, "distance along the ray to the first hit, in scene units; 0 where nothing is hit"),
         Layer("position", 3, "first hit in world space, in scene units; 0 where nothing is hit"),
         Layer("direction", 3, "unit direction of the camera ray in world space"),
+        Layer(
+            "unshadowed", 3, "radiance of the first hit by the lamps alone, were nothing in between, if matt"
+        ),
     )
 }
 """Every layer that a frame may have; a new one is one line here."""

@@ -317,6 +317,36 @@ def direct_light(
     return color, vectors.scale(radiance, np.where(visible, weight, 0.0))
 
 
+def unshadowed(world: World, surface: Surface) -> Any:
+    """Return the radiance (..., 3) that the lamps alone would give a surface, were it matt and all in sight.
+
+    Each lamp, of area A and radiance L, is taken for a disk of the same area around its middle, in direction
+    wi at distance d: its irradiance L A cos_s cos_l / (d^2 + A / pi). On the axis of a disk that faces the
+    surface that is exact, pi L sin^2 of the angle of its rim, since A / pi is the square of its radius;
+    nowhere does it exceed pi L. No random number enters, and the result is linear in the lamps' colours.
+    """
+    black = np.zeros_like(surface.reflectance[..., 0])
+    if world.lights is None:
+        return vectors.vector(black, black, black)
+    lights = world.lights
+    middle = lights.corner + (lights.edge_u + lights.edge_v) / 2
+
+    def add(values: tuple[Any, ...], middle: Any, normal: Any, radiance: Any, area: Any) -> tuple[Any, ...]:
+        """Add what one lamp gives to each channel's irradiance (...)."""
+        offset = middle - surface.point
+        square = vectors.dot(offset, offset)
+        # Cosines are products by the distance here: their two divisions are one by its square.
+        along_surface = np.maximum(vectors.dot(surface.normal, offset), 0.0)
+        along_light = np.maximum(-vectors.dot(normal, offset), 0.0)
+        near = np.maximum(square, LEAST_SQUARE) * (square + area * world.geometry.dtype.type(1 / np.pi))
+        factor = area * along_surface * along_light / near
+        return tuple(value + factor * radiance[..., i] for i, value in enumerate(values))
+
+    tables = middle.astype(world.geometry.dtype), lights.normal, lights.radiance, lights.area
+    irradiance = vectors.fold_rows(add, tables, (black, black, black))
+    return surface.reflectance * vectors.vector(*irradiance) * world.geometry.dtype.type(1 / np.pi)
+
+
 class Towards(NamedTuple):
     """A sampled way to light: unit wi (..., 3), cosines (...) at both ends, and more.
 

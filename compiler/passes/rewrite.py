@@ -18,6 +18,7 @@ def rewrite(program: Program, rule: Rule) -> Program:
     moved: list[int] = []
     for node in program.nodes:
         args = tuple(moved[arg] for arg in node.args)
+        builder.places = node.places
         index = rule(builder, node, args)
         moved.append(builder.add(replace(node, args=args)) if index is None else index)
     outputs = tuple((name, moved[index]) for name, index in program.outputs)

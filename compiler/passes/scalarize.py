@@ -22,6 +22,7 @@ def scalarize(program: Program) -> Program:
     builder.parameters.update(program.parameters)
     numbers: list[tuple[int, ...]] = []
     for node in program.nodes:
+        builder.places = node.places
         numbers.append(_numbers(builder, program, node, [numbers[arg] for arg in node.args]))
     outputs = tuple(
         (name, _joined(builder, numbers[index], program.nodes[index].type)) for name, index in program.outputs

@@ -100,7 +100,7 @@ def test_the_odd_one_out_is_kept(wamnet, here, fault) -> None:
 
 
 def test_the_kept_command_repeats_it(wamnet, here, fault, monkeypatch, capsys) -> None:
-    """With the kept kernel also when the compiler is mended; without it no longer."""
+    """With the kept kernel (TRI-11) also when the compiler is mended; without it no longer."""
     assert wamnet("triage", "model.safetensors", "noisy.exr", *TWO, "-o", "odd").status == 1
     fault()
     commands = re.findall(r"^wamnet (triage .*)$", (here / "odd/README.md").read_text(), re.MULTILINE)

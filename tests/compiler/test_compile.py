@@ -165,9 +165,9 @@ def test_two_writers_at_once_leave_whole_files(tmp_path):
 
 def test_unknown_target_and_profile():
     with pytest.raises(
-        CompileError, match="target 'metal' does not exist; there are: numpy, opencl, opengl, c"
+        CompileError, match="target 'abacus' does not exist; there are: numpy, opencl, opengl, c"
     ):
-        compile_program(lower(model()), "metal")
+        compile_program(lower(model()), "abacus")
     with pytest.raises(CompileError, match="profile 'fast' does not exist; there are: ieee, exact, native"):
         compile_program(lower(model()), "opencl", "fast")
 

@@ -39,8 +39,7 @@ def test_the_program_is_the_reference(samples):
     sums = sums_of(samples)
     wide = {name: values.astype(np.float64) for name, values in sums.items()}
     layers = {
-        "color": np.stack([wide[f"color_{c}"] for c in "rgb"], axis=-1),
-        "albedo": np.stack([wide[f"albedo_{c}"] for c in "rgb"], axis=-1),
+        **{n: np.stack([wide[f"{n}_{c}"] for c in "rgb"], -1) for n in ("color", "albedo", "unshadowed")},
         "depth": wide["depth"],
         **{n: np.stack([wide[f"{n}_{c}"] for c in "xyz"], -1) for n in ("normal", "position", "direction")},
     }
@@ -73,6 +72,7 @@ def test_the_bound_catches_an_exponent_of_2_2():
 
 @pytest.mark.parametrize("target", ["opencl", "opengl"])
 def test_golden_source(golden, target):
+    """PPL-5, PPL-6: arguments, strides and textures of both languages."""
     made = compile_encode(ALL, SCALES, target)
     golden(f"ieee.{made.source_name}", made.source)
 
@@ -129,8 +129,8 @@ def test_refusals():
         compile_encode(("heat",), SCALES, "opencl")
     with pytest.raises(InputError, match=r"depth_scale is 0\.0: finite, and > 0"):
         compile_encode(ALL, Normalization(depth_scale=0.0), "opencl")
-    with pytest.raises(CompileError, match="target 'metal' does not exist"):
-        compile_encode(ALL, SCALES, "metal")
+    with pytest.raises(CompileError, match="target 'abacus' does not exist"):
+        compile_encode(ALL, SCALES, "abacus")
     with pytest.raises(CompileError, match="sums have no planes normal_y, normal_z: the features normal are"):
         compile_encode(("normal",), SCALES, "opencl", planes=("normal_x",))
     with pytest.raises(CompileError, match="profile 'fast' does not exist"):

@@ -93,6 +93,7 @@ def test_a_broken_model_is_not_saved(tmp_path: Path) -> None:
 def test_a_failed_or_interrupted_write_leaves_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """MOD-5."""
     path = tmp_path / "model.safetensors"
     model_file.save_model(path, model_of())
     before = path.read_bytes()

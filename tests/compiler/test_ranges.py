@@ -98,7 +98,7 @@ def test_one_float(op, data):
 
 @given(op=st.sampled_from(["add", "subtract", "multiply"]), a=numbers, b=numbers)
 def test_points_round_to_the_neighbours_of_the_exact_result(op, a, b):
-    """The range of two numbers is one float32, or two neighbours where the exact result is their middle."""
+    """RAN-6: the range of two numbers is one float32, or two where the exact result is their middle."""
     exact = {"add": Fraction(a) + Fraction(b), "subtract": Fraction(a) - Fraction(b)}
     exact["multiply"] = Fraction(a) * Fraction(b)
     assume(exact[op] == 0 or abs(exact[op]) >= 2 * FLUSH)

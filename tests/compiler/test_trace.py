@@ -50,6 +50,7 @@ def test_the_same_operation_is_made_once():
 
 
 def test_zeros_of_both_signs_are_two_constants():
+    """IR-6."""
     assert ops(traced(lambda x: np.maximum(x, 0.0) + -0.0)).count("constant") == 2
 
 

@@ -111,7 +111,7 @@ def test_the_small_network_is_the_one_with_zeros(name, border) -> None:
 
 
 def test_constant_pictures_are_denoised_as_before() -> None:
-    """A narrow window sees the mean of its own taps where taps are left out; clamped borders too."""
+    """VAR-3: a narrow window sees the mean of its own taps where taps are left out; clamped borders too."""
     model = small()
     picture = np.broadcast_to(image((1, 1)), (5, 6, 6))
     narrow = vary(parse("window2"), model).model

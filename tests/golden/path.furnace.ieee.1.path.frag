@@ -16,7 +16,7 @@
  *           of sums_k:
  *           color_r, color_g, color_b, deviation_r, deviation_g, deviation_b, albedo_r, albedo_g, albedo_b,
  *           normal_x, normal_y, normal_z, depth, position_x, position_y, position_z, direction_x, direction_y,
- *           direction_z.
+ *           direction_z, unshadowed_r, unshadowed_g, unshadowed_b.
  *           Draw one triangle that covers them: fragment (x, y) follows pixel x of row first_row + y
  */
 #version 330 core
@@ -33,6 +33,7 @@ layout(location = 1) out vec4 sums_1;
 layout(location = 2) out vec4 sums_2;
 layout(location = 3) out vec4 sums_3;
 layout(location = 4) out vec4 sums_4;
+layout(location = 5) out vec4 sums_5;
 uniform int width;
 uniform int height;
 uniform int first_row;
@@ -66,6 +67,9 @@ void main()
     float sum_direction_x = 0.0f;
     float sum_direction_y = 0.0f;
     float sum_direction_z = 0.0f;
+    float sum_unshadowed_r = 0.0f;
+    float sum_unshadowed_g = 0.0f;
+    float sum_unshadowed_b = 0.0f;
     for (int n = 0; n < samples; ++n) {
         uint sample_number = first_sample + uint(n);
         uint pixel;
@@ -317,6 +321,9 @@ void main()
                     sum_direction_x += direction_x;
                     sum_direction_y += direction_y;
                     sum_direction_z += direction_z;
+                    sum_unshadowed_r += 0.0f;
+                    sum_unshadowed_g += 0.0f;
+                    sum_unshadowed_b += 0.0f;
                 }
             }
             if (bounce == MAX_DEPTH) {
@@ -557,4 +564,7 @@ void main()
     sums_4[0] = sum_direction_x;
     sums_4[1] = sum_direction_y;
     sums_4[2] = sum_direction_z;
+    sums_4[3] = sum_unshadowed_r;
+    sums_5[0] = sum_unshadowed_g;
+    sums_5[1] = sum_unshadowed_b;
 }

@@ -14,7 +14,7 @@
  * arguments sums: float, one plane of global_size(1) rows of global_size(0) * 16 numbers for each of:
  *           color_r, color_g, color_b, deviation_r, deviation_g, deviation_b, albedo_r, albedo_g, albedo_b,
  *           normal_x, normal_y, normal_z, depth, position_x, position_y, position_z, direction_x, direction_y,
- *           direction_z;
+ *           direction_z, unshadowed_r, unshadowed_g, unshadowed_b;
  *           width, height of the image; first_row; first_sample; samples to add up; seed.
  *           Work item (i, j) follows the pixels from 16 * i of row first_row + j on
  */
@@ -66,6 +66,9 @@ __kernel void wamnet_trace(
     float16 sum_direction_x = (float16)(0.0f);
     float16 sum_direction_y = (float16)(0.0f);
     float16 sum_direction_z = (float16)(0.0f);
+    float16 sum_unshadowed_r = (float16)(0.0f);
+    float16 sum_unshadowed_g = (float16)(0.0f);
+    float16 sum_unshadowed_b = (float16)(0.0f);
     for (int n = 0; n < samples; ++n) {
         uint16 sample_number = (uint16)(first_sample + (uint)n);
         uint16 pixel;
@@ -317,6 +320,9 @@ __kernel void wamnet_trace(
                     sum_direction_x += direction_x;
                     sum_direction_y += direction_y;
                     sum_direction_z += direction_z;
+                    sum_unshadowed_r += (float16)(0.0f);
+                    sum_unshadowed_g += (float16)(0.0f);
+                    sum_unshadowed_b += (float16)(0.0f);
                 }
             }
             if (bounce == MAX_DEPTH) {
@@ -557,4 +563,7 @@ __kernel void wamnet_trace(
     vstore16(sum_direction_x, 0, sums + 16 * plane + at);
     vstore16(sum_direction_y, 0, sums + 17 * plane + at);
     vstore16(sum_direction_z, 0, sums + 18 * plane + at);
+    vstore16(sum_unshadowed_r, 0, sums + 19 * plane + at);
+    vstore16(sum_unshadowed_g, 0, sums + 20 * plane + at);
+    vstore16(sum_unshadowed_b, 0, sums + 21 * plane + at);
 }

@@ -14,7 +14,7 @@
  * arguments sums: float, one plane of global_size(1) rows of global_size(0) * 1 numbers for each of:
  *           color_r, color_g, color_b, deviation_r, deviation_g, deviation_b, albedo_r, albedo_g, albedo_b,
  *           normal_x, normal_y, normal_z, depth, position_x, position_y, position_z, direction_x, direction_y,
- *           direction_z;
+ *           direction_z, unshadowed_r, unshadowed_g, unshadowed_b;
  *           width, height of the image; first_row; first_sample; samples to add up; seed.
  *           Work item (i, j) follows the pixels from 1 * i of row first_row + j on
  */
@@ -59,6 +59,9 @@ __kernel void wamnet_trace(
     float sum_direction_x = 0.0f;
     float sum_direction_y = 0.0f;
     float sum_direction_z = 0.0f;
+    float sum_unshadowed_r = 0.0f;
+    float sum_unshadowed_g = 0.0f;
+    float sum_unshadowed_b = 0.0f;
     for (int n = 0; n < samples; ++n) {
         uint sample_number = first_sample + (uint)n;
         uint pixel;
@@ -365,6 +368,41 @@ __kernel void wamnet_trace(
                     float t18 = t15 ? point_x : 0.0f;
                     float t19 = t15 ? point_y : 0.0f;
                     float t20 = t15 ? point_z : 0.0f;
+                    float t22 = 0.0f - point_x;
+                    float t23 = 1.0f - point_y;
+                    float t24 = 0.0f - point_z;
+                    float t25 = t22 * t22;
+                    float t26 = t23 * t23;
+                    float t27 = t25 + t26;
+                    float t28 = t24 * t24;
+                    float t29 = t27 + t28;
+                    float t30 = normal_x * t22;
+                    float t31 = normal_y * t23;
+                    float t32 = t30 + t31;
+                    float t33 = normal_z * t24;
+                    float t34 = t32 + t33;
+                    float t35 = max(t34, 0.0f);
+                    float t36 = 0.0f * t22;
+                    float t38 = (-1.0f) * t23;
+                    float t39 = t36 + t38;
+                    float t40 = 0.0f * t24;
+                    float t41 = t39 + t40;
+                    float t42 = -t41;
+                    float t43 = max(t42, 0.0f);
+                    float t45 = max(t29, 1e-30f);
+                    float t47 = t29 + 1.27323949f;
+                    float t48 = t45 * t47;
+                    float t50 = 4.0f * t35;
+                    float t51 = t50 * t43;
+                    float t52 = t51 / t48;
+                    float t54 = t52 * 0.795774698f;
+                    float t55 = 0.0f + t54;
+                    float t56 = reflectance_r * t55;
+                    float t57 = reflectance_g * t55;
+                    float t58 = reflectance_b * t55;
+                    float t60 = t56 * 0.318309873f;
+                    float t61 = t57 * 0.318309873f;
+                    float t62 = t58 * 0.318309873f;
                     sum_albedo_r += reflectance_r;
                     sum_albedo_g += reflectance_g;
                     sum_albedo_b += reflectance_b;
@@ -378,6 +416,9 @@ __kernel void wamnet_trace(
                     sum_direction_x += direction_x;
                     sum_direction_y += direction_y;
                     sum_direction_z += direction_z;
+                    sum_unshadowed_r += t60;
+                    sum_unshadowed_g += t61;
+                    sum_unshadowed_b += t62;
                 }
             }
             if (bounce == MAX_DEPTH) {
@@ -756,4 +797,7 @@ __kernel void wamnet_trace(
     sums[16 * plane + at] = sum_direction_x;
     sums[17 * plane + at] = sum_direction_y;
     sums[18 * plane + at] = sum_direction_z;
+    sums[19 * plane + at] = sum_unshadowed_r;
+    sums[20 * plane + at] = sum_unshadowed_g;
+    sums[21 * plane + at] = sum_unshadowed_b;
 }

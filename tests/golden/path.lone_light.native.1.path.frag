@@ -16,7 +16,7 @@
  *           of sums_k:
  *           color_r, color_g, color_b, deviation_r, deviation_g, deviation_b, albedo_r, albedo_g, albedo_b,
  *           normal_x, normal_y, normal_z, depth, position_x, position_y, position_z, direction_x, direction_y,
- *           direction_z.
+ *           direction_z, unshadowed_r, unshadowed_g, unshadowed_b.
  *           Draw one triangle that covers them: fragment (x, y) follows pixel x of row first_row + y
  */
 #version 330 core
@@ -33,6 +33,7 @@ layout(location = 1) out vec4 sums_1;
 layout(location = 2) out vec4 sums_2;
 layout(location = 3) out vec4 sums_3;
 layout(location = 4) out vec4 sums_4;
+layout(location = 5) out vec4 sums_5;
 uniform int width;
 uniform int height;
 uniform int first_row;
@@ -66,6 +67,9 @@ void main()
     float sum_direction_x = 0.0f;
     float sum_direction_y = 0.0f;
     float sum_direction_z = 0.0f;
+    float sum_unshadowed_r = 0.0f;
+    float sum_unshadowed_g = 0.0f;
+    float sum_unshadowed_b = 0.0f;
     for (int n = 0; n < samples; ++n) {
         uint sample_number = first_sample + uint(n);
         uint pixel;
@@ -372,6 +376,41 @@ void main()
                     PRECISE float t18 = t15 ? point_x : 0.0f;
                     PRECISE float t19 = t15 ? point_y : 0.0f;
                     PRECISE float t20 = t15 ? point_z : 0.0f;
+                    PRECISE float t22 = 0.0f - point_x;
+                    PRECISE float t23 = 1.0f - point_y;
+                    PRECISE float t24 = 0.0f - point_z;
+                    PRECISE float t25 = t22 * t22;
+                    PRECISE float t26 = t23 * t23;
+                    PRECISE float t27 = t25 + t26;
+                    PRECISE float t28 = t24 * t24;
+                    PRECISE float t29 = t27 + t28;
+                    PRECISE float t30 = normal_x * t22;
+                    PRECISE float t31 = normal_y * t23;
+                    PRECISE float t32 = t30 + t31;
+                    PRECISE float t33 = normal_z * t24;
+                    PRECISE float t34 = t32 + t33;
+                    PRECISE float t35 = max(t34, 0.0f);
+                    PRECISE float t36 = 0.0f * t22;
+                    PRECISE float t38 = (-1.0f) * t23;
+                    PRECISE float t39 = t36 + t38;
+                    PRECISE float t40 = 0.0f * t24;
+                    PRECISE float t41 = t39 + t40;
+                    PRECISE float t42 = -t41;
+                    PRECISE float t43 = max(t42, 0.0f);
+                    PRECISE float t45 = max(t29, 1e-30f);
+                    PRECISE float t47 = t29 + 1.27323949f;
+                    PRECISE float t48 = t45 * t47;
+                    PRECISE float t50 = 4.0f * t35;
+                    PRECISE float t51 = t50 * t43;
+                    PRECISE float t52 = t51 / t48;
+                    PRECISE float t54 = t52 * 0.795774698f;
+                    PRECISE float t55 = 0.0f + t54;
+                    PRECISE float t56 = reflectance_r * t55;
+                    PRECISE float t57 = reflectance_g * t55;
+                    PRECISE float t58 = reflectance_b * t55;
+                    PRECISE float t60 = t56 * 0.318309873f;
+                    PRECISE float t61 = t57 * 0.318309873f;
+                    PRECISE float t62 = t58 * 0.318309873f;
                     sum_albedo_r += reflectance_r;
                     sum_albedo_g += reflectance_g;
                     sum_albedo_b += reflectance_b;
@@ -385,6 +424,9 @@ void main()
                     sum_direction_x += direction_x;
                     sum_direction_y += direction_y;
                     sum_direction_z += direction_z;
+                    sum_unshadowed_r += t60;
+                    sum_unshadowed_g += t61;
+                    sum_unshadowed_b += t62;
                 }
             }
             if (bounce == MAX_DEPTH) {
@@ -763,4 +805,7 @@ void main()
     sums_4[0] = sum_direction_x;
     sums_4[1] = sum_direction_y;
     sums_4[2] = sum_direction_z;
+    sums_4[3] = sum_unshadowed_r;
+    sums_5[0] = sum_unshadowed_g;
+    sums_5[1] = sum_unshadowed_b;
 }

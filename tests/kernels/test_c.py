@@ -11,15 +11,10 @@ import pytest
 
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.encode_kernel import compile_encode
 from wamnet.compiler.interpret import interpret
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
 from wamnet.kernels import c_executor
 from wamnet.kernels.executor import Part
-from wamnet.refimpl import dataset, scenes
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
-from wamnet.refimpl.transport import Settings
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror")
 """What a careful project compiles with."""
@@ -181,16 +176,6 @@ def test_picture_too_large_for_indices(executor_named, kit, monkeypatch):
         InputError, match="size of the picture for C is 4 x 3 with 1 channels: one image must hold"
     ):
         executor_named("c").run(artifact, {"a": np.zeros((3, 4, 1), np.float32)})
-
-
-def test_paths_and_encodings_are_refused():
-    programs = lower_scene(scenes.CANONICAL["empty"](0.0), Settings())
-    with pytest.raises(
-        CompileError, match="target c has denoisers alone; for other kernels there are numpy, opencl"
-    ):
-        compile_path(programs, "c")
-    with pytest.raises(CompileError, match="target c has denoisers alone"):
-        compile_encode(("color",), dataset.Normalization(), "c")
 
 
 def test_rendering_is_refused(executor_named, case):

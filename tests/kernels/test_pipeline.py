@@ -135,7 +135,7 @@ def test_the_whole_separate_way(executor, model_of, case):
 
 
 def test_the_definition_is_the_composition(executor_named, model_of):
-    """On the interpreter the picture is what its kernels give one after another, to the bit."""
+    """PPL-7: on the interpreter the picture is what its kernels give one after another, to the bit."""
     executor, model, size = executor_named("numpy"), model_of(ALL, 4, "clamp"), (11, 23)
     with Pipeline(executor, scene("cornell"), model, size, settings=SETTINGS) as pipeline:
         found = pipeline.run(5, 2)

@@ -196,6 +196,7 @@ INLINED_FAULTS = {
 
 @pytest.mark.parametrize("fault", INLINED_FAULTS)
 def test_a_wrong_inlined_kernel_is_caught(executor_named, kit, fault):
+    """KER-13: the right one is within its bound, each fault is not."""
     executor = executor_named("opengl-egl")
     program = kit.denoiser(kit.network([48, 5, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
     images = {"a": np.random.default_rng(8).uniform(-2, 2, (6, 7, 3)).astype(np.float32)}

@@ -20,7 +20,7 @@ PEERS = {
 ALLOWED = {
     "refimpl": {"numpy"},
     "compiler": {"numpy", "safetensors"},
-    "kernels": {"numpy", "pyopencl", "pocl", "moderngl", *PEERS},
+    "kernels": {"numpy", "pyopencl", "pocl", "moderngl", "wgpu", *PEERS},
     "cli": {
         "numpy",
         "OpenEXR",
@@ -84,7 +84,7 @@ def test_devices_are_used_in_kernels_only(house):
         for source in house.python()
         if source.part not in {"kernels", "tests"}
         for node, name in imports(source)
-        if name.partition(".")[0] in {"pyopencl", "moderngl", "pocl"}
+        if name.partition(".")[0] in {"pyopencl", "moderngl", "pocl", "wgpu"}
     ]
     house.refuse(wrong, "Only kernels/ talks to devices: call wamnet.kernels.open_executor instead.")
 

@@ -1,4 +1,10 @@
-"""House rules about the spec: a clause has one number and names code that exists; a module has a chapter."""
+"""House rules about the spec: text, code and numbers hold on to each other, so that no link can rot.
+
+1. A clause has a number of its own and names code that exists [`test_clauses_name_code`].
+2. A module of refimpl has a chapter, and every public function and class of refimpl and compiler a clause
+   [`test_public_code_has_a_clause`].
+3. Vectors and their clauses: tests/meta/test_vectors.py. Examples: tests/meta/test_spec_examples.py.
+"""
 
 from __future__ import annotations
 
@@ -92,6 +98,42 @@ def test_named_code_exists(house):
             missing = {n.strip() for n in names.split(",")} - defined_names(house, path)
             wrong += [f"spec/{chapter.name}: {path} has no {name}" for name in sorted(missing)]
     house.refuse(wrong, "Code that the spec names exists: correct the name in the spec.")
+
+
+def public_names(tree: ast.Module) -> list[str]:
+    """Return the public functions and classes of a module, but for a second definition of a name."""
+    found = [n.name for n in tree.body if isinstance(n, ast.FunctionDef | ast.ClassDef)]
+    return [name for name in dict.fromkeys(found) if not name.startswith("_")]
+
+
+def named_by_clauses(house) -> dict[str, set[str]]:
+    """Return what clauses name of each module; `Class.member` names its class."""
+    named: dict[str, set[str]] = {}
+    for clause in clauses(house):
+        for path, names in CODE.findall(clause.text):
+            each = {name.strip() for name in names.split(",")}
+            named.setdefault(path, set()).update(each | {name.partition(".")[0] for name in each})
+    return named
+
+
+def test_public_code_has_a_clause(house):
+    named = named_by_clauses(house)
+    wrong = [
+        f"{source.path}: {name}"
+        for source in house.python("refimpl", "compiler")
+        for name in public_names(source.tree)
+        if name not in named.get(source.path, set())
+    ]
+    house.refuse(
+        wrong,
+        "A public function or class of refimpl and compiler is named by a clause: add it to the clause that "
+        "it serves, as (`refimpl/rng.py: pcg4d`), or begin its name with _.",
+    )
+
+
+def test_the_rule_knows_public_code():
+    tree = ast.parse("def a(): ...\ndef a(): ...\ndef _b(): ...\nclass C:\n    def d(self): ...\nE = 1\n")
+    assert public_names(tree) == ["a", "C"]
 
 
 def test_mentioned_clauses_exist(house):

@@ -1,7 +1,9 @@
-"""House rules about vectors: clauses that they name exist, and a report of clauses that nothing proves.
+"""House rules about vectors: they and the clauses name each other, and no clause is without a proof.
 
-The report is `golden/clauses_without_proof.txt` of the tests: a clause that no vector names, and no test
-either, by its number or by a name of its code. It can only change where a commit shows it.
+1. A clause says which kinds of vectors test it, `vectors: `random.block``, and these vectors name it
+   [`test_clauses_and_vectors_name_each_other`]. So a clause that goes, or a kind, is missed.
+2. A clause has a proof: a vector names it, or a test, by its number or by a name of its code
+   [`test_every_clause_has_a_proof`].
 """
 
 from __future__ import annotations
@@ -21,16 +23,27 @@ CODE = re.compile(r"`(?:refimpl|compiler|kernels|cli)/[\w/]+\.py: *([\w., ]+)`")
 """The names of code that a clause is about."""
 
 
-def clauses(folder: Path) -> dict[str, set[str]]:
-    """Return the names of code of each clause."""
+VECTORS = re.compile(r"; vectors: ((?:`[\w.]+`(?:, *)?)+)\)")
+"""The kinds of vectors that test a clause, at the end of the names of its code."""
+
+
+def texts(folder: Path) -> dict[str, str]:
+    """Return the text of each clause."""
     found = {}
     for path in sorted(folder.glob("*.md")):
         text = path.read_text()
         starts = list(CLAUSE.finditer(text))
         for match, after in zip(starts, [*starts[1:], None], strict=False):
-            body = text[match.end() : after.start() if after else len(text)]
-            found[match[1]] = {name.strip() for names in CODE.findall(body) for name in names.split(",")}
+            found[match[1]] = text[match.end() : after.start() if after else len(text)]
     return found
+
+
+def clauses(folder: Path) -> dict[str, set[str]]:
+    """Return the names of code of each clause."""
+    return {
+        clause: {name.strip() for names in CODE.findall(body) for name in names.split(",")}
+        for clause, body in texts(folder).items()
+    }
 
 
 def named_by_vectors(folder: Path) -> dict[str, list[str]]:
@@ -70,10 +83,43 @@ def test_clauses_that_vectors_name_exist(house):
     house.refuse(wrong, "A clause that a vector names exists: correct the kind, and write the vectors anew.")
 
 
-def test_report_of_clauses_without_proof(house, golden):
+def said_by_clauses(folder: Path) -> set[tuple[str, str]]:
+    """Return (clause, kind) for the kinds of vectors that clauses name."""
+    found = ((clause, VECTORS.findall(body)) for clause, body in texts(folder).items())
+    return {(clause, kind) for clause, lists in found for kind in re.findall(r"[\w.]+", " ".join(lists))}
+
+
+def said_by_vectors(folder: Path) -> set[tuple[str, str]]:
+    """Return (clause, kind) for the clauses that vectors name."""
+    loaded = [(path.stem, json.loads(path.read_text())) for path in sorted(folder.glob("*.json"))]
+    parts = (
+        (part, kind)
+        for kind, data in loaded
+        for case in data.get("cases", ())
+        for part in (case, *case.get("expected", {}).values())
+    )
+    return {(part["clause"], kind) for part, kind in parts if "clause" in part}
+
+
+def test_clauses_and_vectors_name_each_other(house):
+    by_text, by_vectors = (
+        said_by_clauses(house.root / "spec"),
+        said_by_vectors(house.root / "spec/vectors"),
+    )
+    wrong = [f"{clause} does not name `{kind}`" for clause, kind in sorted(by_vectors - by_text)]
+    wrong += [f"no vector of `{kind}` names {clause}" for clause, kind in sorted(by_text - by_vectors)]
+    house.refuse(
+        wrong, "A clause names its vectors, as (`refimpl/rng.py: random_block`; vectors: `random.block`)."
+    )
+
+
+def test_every_clause_has_a_proof(house):
     known, vectors = clauses(house.root / "spec"), named_by_vectors(house.root / "spec/vectors")
-    missing = without_proof(known, vectors, words_of_tests())
-    golden("clauses_without_proof.txt", "".join(f"{clause}\n" for clause in missing))
+    house.refuse(
+        without_proof(known, vectors, words_of_tests()),
+        "A clause is tested: by a vector, or by a test that names it or its code. Write one, or name the "
+        "clause in the docstring of the test that holds it.",
+    )
 
 
 @pytest.mark.parametrize(
@@ -88,3 +134,13 @@ def test_report_of_clauses_without_proof(house, golden):
 )
 def test_the_rule_knows_a_proof(names, vectors, words, missing):
     assert without_proof({"RNG-2": names}, vectors, words) == missing
+
+
+def test_the_rule_knows_named_vectors(tmp_path):
+    (tmp_path / "x.md").write_text(
+        "**RNG-3** (`refimpl/rng.py: a`; vectors: `random.block`, `random.more`).\n**RNG-4** (`b.py: c`)\n"
+    )
+    cases = [{"id": "random.block/0", "clause": "RNG-3"}, {"id": "random.block/1", "clause": "RNG-4"}]
+    (tmp_path / "random.block.json").write_text(json.dumps({"cases": cases}))
+    assert said_by_clauses(tmp_path) == {("RNG-3", "random.block"), ("RNG-3", "random.more")}
+    assert said_by_vectors(tmp_path) == {("RNG-3", "random.block"), ("RNG-4", "random.block")}

@@ -129,7 +129,7 @@ def test_feature_ranges_channels_and_order() -> None:
     scales = Normalization(depth_scale=1.5, position_scale=1.5)
     image = dataset.feature_image(frame, tuple(FEATURES), scales)
     assert image.dtype == np.float32
-    assert image.shape == (5, 4, dataset.channels_of(tuple(FEATURES))) == (5, 4, 16)
+    assert image.shape == (5, 4, dataset.channels_of(tuple(FEATURES))) == (5, 4, 19)
     first = 0
     for feature in FEATURES.values():
         assert feature.channels == LAYERS[feature.layer].channels
@@ -154,6 +154,7 @@ def test_features_by_hand() -> None:
             "depth": one * [3.0],
             "position": one * [1.0, 5.0, -9.0],
             "direction": one * [0.0, -1.0, 0.5],
+            "unshadowed": one * [0.0, 0.25, 9.0],
         }
     )
     scales = Normalization(2.0, 4.0, (1.0, 1.0, 1.0), 8.0)
@@ -164,6 +165,7 @@ def test_features_by_hand() -> None:
         "depth": [0.75],
         "position": [0.0, 0.5, -1.0],
         "direction": [0.0, -1.0, 0.5],
+        "unshadowed": [0.0, 1.0, 1.0],  # exposed as colour is
     }
     for name, values in expected.items():
         assert dataset.feature_image(frame, (name,), scales)[0, 0].tolist() == values

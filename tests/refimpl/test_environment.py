@@ -147,7 +147,7 @@ def test_camera_sees_the_sky_itself():
 )
 @pytest.mark.parametrize("lit", [False, True])
 def test_strategies_agree(strategy, heuristic, lit):
-    """The sky alone, and the sky beside a lamp: all ways to find light estimate the same image (Welch)."""
+    """The sky alone, and beside a lamp (ENV-4): all ways to find light estimate the same image (Welch)."""
     lamp = Light((-0.5, 2.0, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0), 4.0)
     ball = Sphere((0.0, 0.6, 0.0), 0.6, (0.8, 0.4, 0.4))
     scene = Scene("day", Camera((0.0, 1.0, 3.5), (0.0, 0.4, 0.0)), quads=(PLANE,), spheres=(ball,))

@@ -29,6 +29,13 @@ def test_a_good_frame_passes(dtype: type) -> None:
     assert "alpha" not in frame
 
 
+def test_negative_radiance_is_data() -> None:
+    """FRM-6: a filter upstream may have made it."""
+    frame = Frame({"color": np.full((2, 3, 3), -0.25)})
+    validate(frame)
+    assert np.all(frame["color"] == -0.25)
+
+
 def test_a_missing_layer_is_named() -> None:
     """The message names the wish and what there is."""
     frame = Frame({"color": np.zeros((1, 1, 3))})

@@ -135,7 +135,7 @@ def test_quad_equals_rational_arithmetic(foot, slope, height):
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_rays_parallel_to_an_axis(dtype, scale, axis, sign):
-    """Two zero components, zeros of both signs: the distance is exact, and a ray beside the box misses."""
+    """ISC-5. Two zero components, of both signs: the distance is exact, and a ray beside the box misses."""
     scene = scene_of(boxes=(Box((0.0, 0.0, 0.0), (scale,) * 3, GREY),))
     direction = np.full(3, np.copysign(0.0, sign))
     direction[axis] = sign

@@ -16,6 +16,7 @@ from wamnet.refimpl import render as R
 from wamnet.refimpl import rng, scenes, transport
 from wamnet.refimpl.camera import camera_basis, camera_ray
 from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.intersection import Surface
 from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene
 from wamnet.refimpl.transport import Settings
 
@@ -268,3 +269,83 @@ def test_mis_weights_by_hand():
     one, three = np.array([1.0]), np.array([3.0])
     assert transport.mis_weight(Settings(heuristic="balance"), one, three)[0] == 0.25
     assert transport.mis_weight(Settings(heuristic="power"), one, three)[0] == 0.1
+
+
+def lit_by(*lights, reflectance=0.5, point=(0.0, 0.0, 0.0), dtype="float64"):
+    """Return the unshadowed light (3,) of a horizontal surface under some lights."""
+    scene = Scene("lit", Camera((0.0, 1.0, 5.0), (0.0, 0.0, 0.0)), lights=lights)
+    world = transport.build(scene, Settings(), dtype)
+    rows = [np.array([row], dtype) for row in (point, (0.0, 1.0, 0.0), (reflectance,) * 3, (0.0, 0.0, 0.0))]
+    return transport.unshadowed(world, Surface(*rows, np.array([-1], np.int32)))[0]
+
+
+def lamp(side, height, color=(1.0, 0.5, 0.25), power=3.0, x=0.0):
+    """Return a square lamp that looks down, its middle above (x, 0, 0)."""
+    corner = (x - side / 2, height, -side / 2)
+    return Light(corner, (side, 0.0, 0.0), (0.0, 0.0, side), color, power)
+
+
+@pytest.mark.parametrize("height", [0.1, 1.0, 7.0])
+def test_unshadowed_light_on_the_axis_is_that_of_a_disk(height):
+    """E = pi L R^2 / (h^2 + R^2), where R^2 = side^2 / pi and L = power color / (pi A)."""
+    side, square = 2.0, 4.0 / np.pi
+    radiance = 3.0 * np.array([1.0, 0.5, 0.25]) / (np.pi * side**2)
+    expected = 0.5 * radiance * square / (height**2 + square)
+    found = lit_by(lamp(side, height))
+    # A dozen operations, each off by half a unit in the last place at most.
+    assert np.all(np.abs(found - expected) <= 12 * np.finfo(np.float64).eps * expected)
+
+
+def test_unshadowed_light_of_a_far_lamp_falls_with_the_square_and_both_cosines():
+    """A small lamp 45 degrees off: L A cos cos / d^2, both cosines sqrt(1/2); A / (pi d^2) is below 2e-9."""
+    found = lit_by(lamp(1e-3, 10.0, x=10.0), reflectance=1.0)
+    expected = 3.0 * np.array([1.0, 0.5, 0.25]) / np.pi**2 * 0.5 / 200.0
+    assert np.all(np.abs(found / expected - 1.0) <= 2e-9)
+
+
+def test_unshadowed_light_is_linear_in_colours_and_adds_up():
+    warm, cool = lamp(1.0, 2.0, (1.0, 0.6, 0.2)), lamp(0.5, 1.0, (0.1, 0.3, 0.9), x=1.0)
+    both = lit_by(warm, cool)
+    # Three roundings more or less for each of the two terms.
+    assert np.all(np.abs(both - lit_by(warm) - lit_by(cool)) <= 6 * np.finfo(np.float64).eps * both)
+    other = lit_by(replace(warm, color=(0.25, 0.15, 0.05)))
+    assert np.all(np.abs(other - lit_by(warm) / 4.0) <= 6 * np.finfo(np.float64).eps * other)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_unshadowed_light_is_bounded_and_dark_behind_a_lamp(dtype):
+    """At most reflectance L, wherever the surface is; nothing below the horizon, behind a lamp, or unlit."""
+    limit = 0.5 * 3.0 / (np.pi * 1.0) * (1.0 + 1e-5)
+    for height in (0.0, 1e-20, 1e-6, 1e-3, 0.3):
+        assert 0.0 <= lit_by(lamp(1.0, height), dtype=dtype)[0] / limit <= 1.0
+    assert not lit_by(lamp(1.0, -1.0), dtype=dtype).any()
+    facing_up = replace(lamp(1.0, 1.0), edge_u=(0.0, 0.0, 1.0), edge_v=(1.0, 0.0, 0.0))
+    assert not lit_by(facing_up, dtype=dtype).any()
+    assert not lit_by(dtype=dtype).any()
+
+
+def test_frames_have_unshadowed_light():
+    """At one sample the layers are of one hit: the formula, written once more, of what they say of it.
+
+    Points are at least 0.2 from the lamps' middles, where light changes by at most (2 / 0.2 + 2 / R) L
+    a unit, R = 0.6; float32 knows points below 8 to 2^-21, and normals and products to less.
+    """
+    scene = scenes.canonical("minicubes")
+    frame = render(scene, 12, 1).frame
+    point, normal, albedo = (frame[name].astype(np.float64) for name in ("position", "normal", "albedo"))
+    expected, bound = np.zeros_like(point), 0.0
+    for light in scene.lights:
+        u, v = np.array(light.edge_u), np.array(light.edge_v)
+        area = np.linalg.norm(np.cross(u, v))
+        radiance = light.power * np.array(light.color) / (np.pi * area)
+        offset = light.corner + u / 2 + v / 2 - point
+        distance = np.linalg.norm(offset, axis=-1)
+        assert distance.min() >= 0.2
+        to_light = offset / distance[..., None]
+        cosines = np.clip((to_light * normal).sum(-1), 0, 1) * np.clip(
+            -to_light @ np.cross(u, v) / area, 0, 1
+        )
+        expected += (cosines * area / (distance**2 + area / np.pi))[..., None] * radiance * albedo / np.pi
+        bound += 14.0 * radiance.max() * 2.0**-20
+    assert np.max(np.abs(frame["unshadowed"] - expected)) <= bound
+    assert expected.max() >= 1000 * bound

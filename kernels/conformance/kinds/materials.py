@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 
 from ....refimpl import environment, transport
+from ....refimpl.intersection import Surface
 from ....refimpl.materials import Conductor, Dielectric, Lambertian, Mirror
 from ....refimpl.materials.material import Site
 from ....refimpl.scene import Sky
 from ..functions import Field, Function, Numbers
 from .light import UNIFORM, _unit
+from .terrace import TERRACE
 
 VERTEX = {
     "wo": Field("unit direction back along the path", 3, -1.0),
@@ -249,5 +251,50 @@ SKY_SAMPLE = Function(
 )
 """Samples of the sky."""
 
-FUNCTIONS = (LAMBERTIAN, MIRROR, CONDUCTOR, CONDUCTOR_VALUE, DIELECTRIC, MIS, RADIANCE, SKY_SAMPLE)
+
+def _unshadowed(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return the light of the terrace's lamps at points of its surfaces."""
+    world = transport.build(TERRACE, transport.Settings(), dtype)
+    surface = Surface(given["point"], given["normal"], given["reflectance"], None, None)
+    return {"unshadowed": transport.unshadowed(world, surface)}
+
+
+def _lit(point: Any, normal: Any) -> dict[str, Any]:
+    """Return the inputs of a point of a surface."""
+    return {"point": point, "normal": normal, "reflectance": GOLD}
+
+
+UNSHADOWED = Function(
+    "transport.unshadowed",
+    "Light of the lamps of scenes/terrace.json, as if nothing stood in between",
+    "LTR-11",
+    {
+        "point": Field("point of a surface", 3, -2.0, 2.0),
+        "normal": Field("unit normal", 3, -1.0),
+        "reflectance": Field("of the surface", 3),
+    },
+    {"unshadowed": Field("radiance", 3)},
+    _unshadowed,
+    [
+        ("under a lamp", _lit((0.5, 0.0, 0.5), (0.0, 1.0, 0.0))),
+        ("close to it", _lit((0.5, 1.6875, 0.5), (0.0, 1.0, 0.0))),
+        ("below all lamps, facing away", _lit((0.5, 0.0, 0.5), (0.0, -1.0, 0.0))),
+        ("behind both lamps", _lit((-0.5, 2.0, 3.0), (0.0, 0.0, -1.0))),
+    ],
+    lambda u: _lit(4.0 * u[:3] - 2.0, _unit(u[3:])),
+    draws=4,
+)
+"""Light without shadows."""
+
+FUNCTIONS = (
+    LAMBERTIAN,
+    MIRROR,
+    CONDUCTOR,
+    CONDUCTOR_VALUE,
+    DIELECTRIC,
+    MIS,
+    UNSHADOWED,
+    RADIANCE,
+    SKY_SAMPLE,
+)
 """The functions of this module."""

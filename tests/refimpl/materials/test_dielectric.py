@@ -18,7 +18,7 @@ from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.materials import Dielectric
 from wamnet.refimpl.materials.dielectric import fresnel, refract
 from wamnet.refimpl.materials.material import SINGLE_PDF
-from wamnet.refimpl.scene import Box, Camera, Quad, Scene, Sphere
+from wamnet.refimpl.scene import Box, Camera, Light, Quad, Scene, Sphere
 from wamnet.refimpl.transport import Settings
 
 EPS = 2.0**-52
@@ -128,6 +128,25 @@ def test_no_light_sample_is_worth_anything():
     at = site(local_direction(np.array([0.5])), Dielectric(1.5))
     assert Dielectric.value(at, at.wo, np.array([0.5]))[1] == 0.0
     assert Dielectric.pdf(at, at.wo, np.array([0.5])) == 0.0
+
+
+def test_glass_is_an_obstacle_to_light_samples():
+    """DIE-6: behind glass a light is found by directions alone, in front of it by light samples too."""
+    lamp = Light((-0.5, 2.0, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), WHITE, 4.0)
+    floor = Quad((-2.0, -1.0, -2.0), (0.0, 0.0, 4.0), (4.0, 0.0, 0.0), (0.5, 0.5, 0.5))
+    pane = Box((0.0, 1.0, 0.0), (9.0, 0.1, 9.0), WHITE, material=Dielectric())
+    found = {}
+    for name, boxes in (("open", ()), ("behind glass", (pane,))):
+        room = replace(scene(*boxes), quads=(floor,), lights=(lamp,), background=(0.0, 0.0, 0.0))
+        camera = Camera((0.0, 0.0, 3.0), (0.0, -1.0, 0.0))
+        for strategy in ("light", "bsdf"):
+            settings = Settings(max_depth=3, strategy=strategy)
+            picture = R.render(replace(room, camera=camera), R.Job(8, 8, 32, 5, settings)).frame["color"]
+            found[name, strategy] = float(picture.mean())
+    # Light samples, which all end at the glass, add nothing: the same directions find the same light.
+    assert found["behind glass", "light"] == found["behind glass", "bsdf"]
+    assert found["behind glass", "light"] > 0
+    assert found["open", "light"] != found["open", "bsdf"]
 
 
 # ---- rendered ------------------------------------------------------------------------------------------

@@ -1,0 +1,156 @@
+"""What MkDocs calls while it builds the site; see mkdocs.yml.
+
+1. Bring in the spec from its folder, the page of the vectors' formats, and a page for each source file that a
+   text names [`on_files`]; order the pages as spec/README.md does [`on_config`].
+2. Give clauses their anchors, and execute the cells of the tutorial [`on_page_markdown`].
+3. Set formulas, and link what is named [`on_page_content`].
+4. Cut the addresses of other hosts out of the theme's scripts, and refuse a site with a link that leads
+   nowhere, or to another host [`on_post_build`].
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.exceptions import PluginError
+from mkdocs.plugins import event_priority
+from mkdocs.structure.files import File, Files, InclusionLevel
+from mkdocs.structure.pages import Page
+from mkdocs.utils import get_relative_url
+
+sys.path.insert(0, str(Path(__file__).parent))
+import cells
+import chapters
+import formulas
+import links
+import listing_page
+import sources
+
+ROOT = Path(__file__).resolve().parents[2]
+"""The repository's root folder."""
+
+SPEC = ROOT / "spec"
+"""The spec's chapters."""
+
+SECTION = re.compile(r"^## (.+)$|^\* \[.*?\]\((\w+\.md)\)", re.MULTILINE)
+"""A heading of the spec's index, or a line of its list."""
+
+LEAVING = re.compile(r"\]\(((?:\.\./)+spec/[\w./-]+)")
+"""A link from a page of docs/ to the spec, as it works in the repository."""
+
+FOREIGN = re.compile(r"https://(?:unpkg\.com|api\.github\.com)/[\w./@-]*")
+"""Addresses in the theme's scripts, for diagrams and counts of stars that this site does not have."""
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Order the pages."""
+    docs = Path(config.docs_dir)
+
+    def pages(folder: str) -> list[str]:
+        found = [path.relative_to(docs).as_posix() for path in sorted((docs / folder).glob("*.md"))]
+        return sorted(found, key=lambda name: not name.endswith("index.md"))
+
+    parts: list[Any] = ["spec/README.md"]
+    for title, chapter in SECTION.findall((SPEC / "README.md").read_text()):
+        if title:
+            parts.append({title: (section := [])})
+        else:
+            section.append(f"spec/{chapter}")
+    parts.append({"Vectors' formats": "spec/vectors/README.md"})
+    config.nav = [
+        "index.md",
+        {"Tutorial": pages("tutorial")},
+        {"Exercises": pages("exercises")},
+        "listing.md",
+        {"Spec": parts},
+    ]
+    return config
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Bring in the spec and the source files that texts name."""
+    texts = {path: path.read_text() for path in [*SPEC.glob("*.md"), *Path(config.docs_dir).rglob("*.md")]}
+    for path in [*sorted(SPEC.glob("*.md")), SPEC / "vectors/README.md"]:
+        name = path.relative_to(ROOT).as_posix()
+        files.append(File.generated(config, name, abs_src_path=str(path)))
+    named = {path for text in texts.values() for path in chapters.named_files(text)}
+    for path in sorted(named):
+        if (ROOT / path).exists():
+            heading = f"---\nsearch:\n  exclude: true\nhide: [toc]\n---\n# {path}\n"
+            name = chapters.source_page(path).replace(".html", ".md")
+            hidden = InclusionLevel.NOT_IN_NAV
+            files.append(File.generated(config, name, content=heading, inclusion=hidden))
+    config.extra["sources"] = {
+        path: set(sources.definitions((ROOT / path).read_text())) for path in named if (ROOT / path).exists()
+    }
+    config.extra["places"] = _places()
+    return files
+
+
+def _places() -> dict[str, str]:
+    """Return the site's address of each clause and of each chapter."""
+    found = {}
+    for path in sorted(SPEC.glob("*.md")):
+        address = f"spec/{'index' if path.stem == 'README' else path.stem}.html"
+        if path.stem != "README":
+            found[path.stem] = address
+        found |= {clause: f"{address}#{clause.lower()}" for clause in chapters.clauses(path.read_text())}
+    return found
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Give clauses their anchors, and execute cells."""
+    if page.file.src_uri.startswith("spec/"):
+        return chapters.anchored(markdown)
+    if page.file.src_uri.startswith("tutorial/"):
+        markdown = cells.executed(markdown, f"docs/{page.file.src_uri}")
+    return _into_site(markdown, page.file.src_uri)
+
+
+def _into_site(markdown: str, uri: str) -> str:
+    """Return a page's Markdown with its links to the spec as they are on the site, whose root is docs/."""
+
+    def link(match: re.Match[str]) -> str:
+        path = posixpath.normpath(posixpath.join("docs", posixpath.dirname(uri), match[1]))
+        return f"]({posixpath.relpath(path, posixpath.dirname(uri) or '.')}"
+
+    return LEAVING.sub(link, markdown)
+
+
+def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Set formulas, link what is named, and show sources."""
+    uri = page.file.src_uri
+    if uri.startswith("source/"):
+        path = uri.removeprefix("source/").removesuffix(".md") + ".py"
+        return html + sources.page((ROOT / path).read_text())
+
+    def link(address: str) -> str:
+        return get_relative_url(address, page.url)
+
+    if uri == "listing.md":
+        html = listing_page.page(html)
+    html = formulas.rendered(html, f"docs/{uri}")
+    return chapters.linked(html, config.extra["places"], config.extra["sources"], link)
+
+
+@event_priority(-200)  # after the plugins
+def on_post_build(config: MkDocsConfig) -> None:
+    """Cut the addresses of other hosts, and refuse links that lead nowhere."""
+    folder = Path(config.site_dir)
+    for path in [*folder.rglob("*.js"), *folder.rglob("*.css")]:
+        text = path.read_text(encoding="utf-8")
+        if (cut := FOREIGN.sub("about:blank", text)) != text:
+            path.write_text(cut, encoding="utf-8")
+    # Maps for debuggers, and the search's grammar of other languages, name other hosts and are not needed.
+    for path in folder.rglob("*.map"):
+        path.unlink()
+    shutil.rmtree(folder / "assets/javascripts/lunr", ignore_errors=True)
+    if wrong := links.broken(folder):
+        shown = "\n  ".join(wrong[:40])
+        raise PluginError(f"the site has {len(wrong)} links that lead nowhere or elsewhere:\n  {shown}")

@@ -1,0 +1,59 @@
+"""How every experiment begins: the same options, and errors as the `wamnet` command tells them.
+
+1. `--scale` chooses among the sizes that the experiment offers; `-o` names the folder of its results; frames
+   and networks that several experiments share lie in `--cache` [`parser`].
+2. What a user can cause ends with one line on standard error and status 2; Ctrl-C with status 130 [`begin`].
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from wamnet.refimpl.errors import WamnetError
+
+SCALES = ("small", "paper")
+"""Minutes on two cores, or the paper's sizes."""
+
+SEEDS = (0, 1, 2)
+"""What is repeated, so that a spread can be told."""
+
+HIDDEN_SCALE = "toy"
+"""A scale for tests: seconds, and numbers that mean nothing."""
+
+
+def parser(text: str, name: str) -> argparse.ArgumentParser:
+    """Return a parser with the options that all experiments have; `text` is the module's docstring."""
+    made = argparse.ArgumentParser(
+        prog=f"python experiments/{name}.py",
+        description=text,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    made.add_argument(
+        "--scale",
+        choices=(*SCALES, HIDDEN_SCALE),
+        default=SCALES[0],
+        metavar="{small,paper}",
+        help="minutes on two cores, or the paper's sizes",
+    )
+    made.add_argument("-o", "--output", type=Path, default=Path("out") / name, help="folder of the results")
+    made.add_argument("--cache", type=Path, default=Path("out/lab"), help="folder of frames and networks")
+    made.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS), help="what is repeated")
+    made.add_argument(
+        "--executor", choices=("opencl", "numpy"), default="opencl", help="what renders, trains and denoises"
+    )
+    return made
+
+
+def begin(main: Callable[[Sequence[str] | None], None], arguments: Sequence[str] | None = None) -> None:
+    """Run an experiment; tell errors in one line and leave with a status."""
+    try:
+        main(arguments)
+    except WamnetError as error:
+        sys.stderr.write(f"wamnet: {error}\n")
+        raise SystemExit(2) from None
+    except KeyboardInterrupt:
+        sys.stderr.write("wamnet: interrupted\n")
+        raise SystemExit(130) from None

@@ -1,0 +1,152 @@
+"""Frames of canonical scenes, rendered once: a folder keeps them, each under the checksum of its file.
+
+1. What is wanted is data: a scene at a time with its parameters, a size, samples, a seed [`Shot`].
+2. Its file is named after all that determines its pixels, and ends in the SHA-256 of its bytes, so that file
+   and checksum appear in one step [`path_of`]. One that was damaged is rendered again [`find`].
+3. Whatever is missing is rendered by a device or by the reference, with progress [`render_all`].
+
+A frame depends on the version of this package: whoever changes light transport without a new version
+empties the folder. A new layer makes new files by itself.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from wamnet.cli import exr
+from wamnet.cli.dataset_files import sum_of
+from wamnet.cli.terminal import hint_on_interrupt, progress
+from wamnet.kernels.frame_plan import version
+from wamnet.kernels.render_frame import render_frame
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.frame import LAYERS, Frame
+from wamnet.refimpl.render import Job
+from wamnet.refimpl.scene import Scene, scene_digest
+from wamnet.refimpl.scenes import canonical
+
+NOISY_SPP = 1
+"""Samples per pixel of what is denoised."""
+
+DIGITS = 16
+"""Hexadecimal digits of a shot's digest in a file's name: two shots never share them."""
+
+Pair = tuple[Frame, Frame]
+"""A noisy frame and its reference."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A picture to be rendered; `parameters` are those of the canonical scene, without its time.
+
+    Its features are means over `feature_spp` camera rays; 0: over the colour's.
+    """
+
+    scene: str = "minicubes"
+    time: float = 0.0
+    size: int = 128
+    spp: int = NOISY_SPP
+    seed: int = 0
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    feature_spp: int = 0
+
+    @property
+    def job(self) -> Job:
+        """Return size, samples and seed as the renderer wants them."""
+        return Job(self.size, self.size, self.spp, self.seed, feature_spp=self.feature_spp)
+
+    def build(self) -> Scene:
+        """Return the scene at its time."""
+        return canonical(self.scene, **{**self.parameters, "time": self.time})
+
+
+def path_of(folder: Path, shot: Shot, executor: str) -> Path:
+    """Return the name of a shot's file without checksum and suffix."""
+    job = asdict(shot.job)
+    if not shot.feature_spp:
+        del job["feature_spp"]  # these files are older than it is
+    made_from = [scene_digest(shot.build()), job, executor, sorted(LAYERS), version()]
+    digest = hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:DIGITS]
+    return folder / f"{shot.scene}-{shot.time:.4g}s-{shot.size}px-{shot.spp}spp-{digest}"
+
+
+def find(folder: Path, shot: Shot, executor: str = "opencl") -> Path | None:
+    """Return the whole file of a shot, if it is there; one that is damaged is removed."""
+    name = path_of(folder, shot, executor)
+    for path in sorted(folder.glob(f"{name.name}.*.exr")):
+        if path.name == f"{name.name}.{sum_of(path).sha256}.exr":
+            return path
+        path.unlink()
+    return None
+
+
+def render_all(folder: Path, shots: Iterable[Shot], executor: str = "opencl") -> list[Path]:
+    """Return the files of all shots, in their order, after rendering those that are not there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    wanted = list(shots)
+    there = {id(shot): find(folder, shot, executor) for shot in wanted}
+    left = [shot for shot in wanted if there[id(shot)] is None]
+    samples = sum(shot.job.samples for shot in left)
+    with (
+        hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"),
+        progress(f"rendering {len(left)} frames", samples) as advance,
+    ):
+        for shot in left:
+            # A shot that is asked for twice is there by now.
+            known = find(folder, shot, executor)
+            there[id(shot)] = known or _render(folder, shot, executor, advance)
+    return [path for shot in wanted if (path := there[id(shot)]) is not None]
+
+
+def _render(folder: Path, shot: Shot, executor: str, advance: Any) -> Path:
+    """Render a shot and give its file the name that ends in its checksum."""
+    frame = render_frame(executor, shot.build(), shot.job, workers=None, on_progress=advance).frame
+    name = path_of(folder, shot, executor)
+    new = folder / f".{name.name}.exr"
+    exr.write_frame(new, frame)
+    return new.replace(folder / f"{name.name}.{sum_of(new).sha256}.exr")
+
+
+def frames(folder: Path, shots: Iterable[Shot], executor: str = "opencl") -> list[Frame]:
+    """Return the frames of all shots, rendered where they are not there."""
+    return [exr.read_frame(path) for path in render_all(folder, shots, executor)]
+
+
+def reference(shot: Shot, spp: int) -> Shot:
+    """Return the shot of a noisy shot's reference: more samples, and random numbers of its own.
+
+    Seeds of references are odd and those of noisy shots even, so that none share their random numbers.
+    """
+    return replace(shot, spp=spp, seed=2 * shot.seed + 1, feature_spp=0)
+
+
+def noisy(shot: Shot) -> Shot:
+    """Return the noisy shot itself, with an even seed."""
+    return replace(shot, spp=NOISY_SPP, seed=2 * shot.seed)
+
+
+def pairs(folder: Path, shots: Sequence[Shot], spp: int, executor: str = "opencl") -> list[Pair]:
+    """Return a noisy frame and a reference of `spp` samples of each shot."""
+    if spp <= NOISY_SPP:
+        raise InputError("samples of a reference", spp, f"more than {NOISY_SPP}", "a thousand are clean")
+    found = frames(folder, [make(shot) for shot in shots for make in (noisy, _with(spp))], executor)
+    return list(zip(found[::2], found[1::2], strict=True))
+
+
+def _with(spp: int) -> Any:
+    """Return what makes a reference of so many samples."""
+    return lambda shot: reference(shot, spp)
+
+
+def split_times(train: int, test: int, seconds: float, start: float = 0.0) -> tuple[list[float], list[float]]:
+    """Return times of training frames, evenly over an animation, and of tests, each amid a gap."""
+    step = seconds / train
+    gaps = [j * train // test for j in range(test)]
+    if len(set(gaps)) < test:
+        rule = f"a gap between {train} training times has one at most"
+        raise InputError("number of test times", test, rule, "take fewer, or train on more")
+    return [start + k * step for k in range(train)], [start + (gap + 0.5) * step for gap in gaps]

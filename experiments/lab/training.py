@@ -1,0 +1,63 @@
+"""Networks trained once: a folder keeps each under its recipe and its data, with the seconds it took.
+
+1. The file is named after the recipe, the training frames and the executor [`path_of`].
+2. Training goes through the command's own code: progress, checkpoints, and a run that was interrupted goes on
+   to the same bits [`trained`]. Its seconds are those of
+   the steps of the last part, in proportion.
+3. A picture is made by the executor, or by the reference [`denoised`].
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from wamnet.cli.outputs import write_text
+from wamnet.cli.train import checkpoint_path, fit
+from wamnet.compiler.model_file import load_checkpoint, load_model
+from wamnet.kernels import denoise_on, open_executor
+from wamnet.refimpl import dataset
+from wamnet.refimpl.denoise import Model, denoise
+from wamnet.refimpl.frame import Floats, Frame
+from wamnet.refimpl.train import Recipe, recipe_to_json
+
+from .frames import DIGITS, Pair
+
+
+def path_of(folder: Path, recipe: Recipe, pairs: Sequence[Pair], executor: str) -> Path:
+    """Return the file of a network."""
+    scales = dataset.normalization_of([noisy for noisy, _ in pairs])
+    data = dataset.build(pairs, recipe.features, recipe.window, scales).digest
+    text = json.dumps([recipe_to_json(recipe), data, executor])
+    return folder / f"{hashlib.sha256(text.encode()).hexdigest()[:DIGITS]}.safetensors"
+
+
+def trained(
+    recipe: Recipe, pairs: Sequence[Pair], folder: Path, executor: str = "opencl"
+) -> tuple[Model, float]:
+    """Return the network of a recipe trained on pairs, and the seconds of its training."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = path_of(folder, recipe, pairs, executor)
+    clock, checkpoint = path.with_suffix(".json"), checkpoint_path(path)
+    if path.exists() and clock.exists():
+        return load_model(path), float(json.loads(clock.read_text(encoding="utf-8"))["seconds"])
+    state = load_checkpoint(checkpoint) if checkpoint.exists() else None
+    if state is not None and state.step >= recipe.steps:
+        state = None  # its seconds are not known
+    share = 1.0 if state is None else 1.0 - state.step / recipe.steps
+    _, seconds = fit(recipe, pairs, path, state, executor=executor)
+    # A run that went on has timed its own steps: all of them took as long, in proportion.
+    total = seconds / share
+    write_text(clock, json.dumps({"seconds": total, "recipe": json.loads(recipe_to_json(recipe))}) + "\n")
+    checkpoint.unlink(missing_ok=True)
+    return load_model(path), total
+
+
+def denoised(model: Model, frames: Sequence[Frame], executor: str = "opencl") -> list[Floats]:
+    """Return the display-encoded pictures (H, W, 3) of some frames."""
+    if executor == "numpy":
+        return [denoise(model, frame) for frame in frames]
+    with open_executor(executor) as device:
+        return [denoise_on(device, model, frame).image for frame in frames]

@@ -1,0 +1,107 @@
+"""What runners of kernels on numbered buffers share: sizes 0, what is read 1, what is written 2, images 3.
+
+A language without numbers takes the same buffers in that order [host_runner.py].
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.artifact import Artifact, OneSource
+from ...compiler.emit import output_channels
+from ...compiler.encode_kernel import EncodeArtifact
+from ...compiler.glsl_buffers import FIRST_IMAGE
+from ...compiler.path_kernel import PathArtifact
+from ...compiler.weight_homes import INLINE
+from ...refimpl.errors import InputError
+from ..executor import Executor, Images, Part, gather_of
+from ..passes import Passes
+
+READ, WRITTEN = 1, 2
+"""Bindings of what is read besides images, and of what is written."""
+
+
+@dataclass(frozen=True)
+class Launch:
+    """One call: `sizes` as 32-bit integers, buffers by binding, those that come back, threads (x, y)."""
+
+    sizes: Sequence[int]
+    buffers: Mapping[int, NDArray[np.float32]]
+    back: Sequence[int]
+    threads: tuple[int, int]
+
+
+class BufferRunner(Executor):
+    """Runs denoisers, paths and encodings of one target; a subclass runs one kernel [`_launch`]."""
+
+    @abstractmethod
+    def _prepare(self, source: str, entry: str, count: int) -> Any:
+        """Return a kernel, built from its source, that takes `count` images."""
+
+    @abstractmethod
+    def _launch(self, prepared: Any, launch: Launch) -> list[NDArray[np.float32]]:
+        """Run a kernel, and return the buffers that come back, flat."""
+
+    def _kernel(self, artifact: Artifact | OneSource, entry: str, count: int) -> Any:
+        """Return a built kernel; again costs nothing."""
+        if not hasattr(self, "_kernels"):
+            self._kernels: dict[str, Any] = {}
+        if artifact.digest not in self._kernels:
+            self._kernels[artifact.digest] = self._prepare(artifact.source, entry, count)
+        return self._kernels[artifact.digest]
+
+    def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
+        """Build the kernels."""
+        for kernel in artifact.kernels:
+            self._kernel(kernel, kernel.entry_point, len(gather_of(kernel).images))
+
+    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
+        found = list(images.values())
+        for kernel in artifact.kernels:
+            height, width, _ = found[0].shape
+            shape = (height, width, output_channels(kernel.program))
+            buffers = {WRITTEN: np.zeros(shape, np.float32)}
+            if not self.name.endswith(INLINE):
+                buffers[READ] = np.pad(
+                    kernel.weights, (0, -kernel.weights.size % 4 or 4 * (not kernel.weights.size))
+                )
+            buffers |= {FIRST_IMAGE + i: image for i, image in enumerate(found)}
+            launch = Launch((width, height), buffers, (WRITTEN,), (width, height))
+            prepared = self._kernel(kernel, kernel.entry_point, len(found))
+            found = [self._launch(prepared, launch)[0].reshape(shape)]
+        return found[0]
+
+    def build_path(self, kernel: PathArtifact) -> None:
+        """Build the kernel."""
+        self._kernel(kernel, kernel.entry_point, 0)
+
+    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
+        shape = (len(kernel.planes), part.rows, part.width)
+        sizes = (part.width, part.height, part.first_row, part.rows)
+        sizes += (part.first_sample, part.samples, part.seed)
+        buffers = {WRITTEN: np.zeros(shape, np.float32)}
+        launch = Launch(sizes, buffers, (WRITTEN,), (part.width, part.rows))
+        return self._launch(self._kernel(kernel, kernel.entry_point, 0), launch)[0].reshape(shape)
+
+    def encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+        """Return the encoded images (H, W, C) of sums (planes, H, W), by name."""
+        _, height, width = sums.shape
+        images = {i.name: np.zeros((height, width, i.channels), np.float32) for i in kernel.images}
+        buffers = {READ: np.ascontiguousarray(sums)}
+        buffers |= {FIRST_IMAGE + i: image for i, image in enumerate(images.values())}
+        places = [place for place in buffers if place >= FIRST_IMAGE]
+        launch = Launch((width, height, samples), buffers, places, (width, height))
+        found = self._launch(self._kernel(kernel, kernel.entry_point, len(images)), launch)
+        return {
+            name: flat.reshape(image.shape) for (name, image), flat in zip(images.items(), found, strict=True)
+        }
+
+    def _passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
+        rule = "it runs exported kernels one by one"
+        raise InputError("executor of pipelines", self.name, rule, "use executor opencl, opengl or numpy")

@@ -1,0 +1,97 @@
+"""Exported compute shaders on WebGPU's native implementation: WGSL, and SPIR-V from GLSL and HLSL.
+
+The package `wgpu` brings naga, which reads WGSL and SPIR-V, and drives Vulkan: Mesa's software driver
+will do. SPIR-V reaches naga with decorations that it does not know (NoContraction) and says so.
+"""
+
+from __future__ import annotations
+
+import logging
+import struct
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.glsl_buffers import GROUP
+from ...compiler.weight_homes import UNIFORM
+from ...refimpl.errors import CompileError, ExecutorUnavailable
+from . import tools
+from .buffer_runner import READ, BufferRunner, Launch
+
+WAY_OUT = "pip install 'wamnet[targets]', and a Vulkan driver: apt-get install mesa-vulkan-drivers"
+"""How to get a device."""
+
+UNIFORM_BYTES = 16
+"""A uniform buffer's size is a multiple of this."""
+
+
+class WgpuRunner(BufferRunner):
+    """A device of WebGPU; `translate` makes of a kernel's source what the device is given."""
+
+    def __init__(
+        self, name: str = "wgsl", translate: Callable[[str], str | bytes] = lambda source: source
+    ) -> None:
+        try:
+            import wgpu
+        except ImportError:
+            raise ExecutorUnavailable(f"wgpu is not installed: {WAY_OUT}") from None
+        self._wgpu: Any = wgpu
+        # naga tells of every decoration that it leaves out: hundreds in one kernel.
+        logging.getLogger("wgpu").setLevel(logging.ERROR)
+        try:
+            adapter = wgpu.gpu.request_adapter_sync()
+            self._device: Any = adapter.request_device_sync()
+        except Exception as error:  # noqa: BLE001 (drivers raise what they like)
+            raise ExecutorUnavailable(f"wgpu finds no device ({error}): {WAY_OUT}") from None
+        self.name = name
+        self.device = f"{adapter.info['device']}, {adapter.info['backend_type']}"
+        self._translate = translate
+
+    def _prepare(self, source: str, entry: str, count: int) -> Any:
+        code = self._translate(source)
+        try:
+            module = self._device.create_shader_module(code=code)
+            return self._device.create_compute_pipeline(
+                layout="auto", compute={"module": module, "entry_point": entry}
+            )
+        except Exception as error:  # noqa: BLE001 (the package has its own kinds)
+            raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+
+    def _launch(self, prepared: Any, launch: Launch) -> list[NDArray[np.float32]]:
+        usage, device = self._wgpu.BufferUsage, self._device
+        sizes = struct.pack(f"<{len(launch.sizes)}I", *(n % 2**32 for n in launch.sizes))
+        sizes += bytes(-len(sizes) % UNIFORM_BYTES)
+        held = {0: device.create_buffer_with_data(data=sizes, usage=usage.UNIFORM)}
+        for place, data in launch.buffers.items():
+            written = usage.COPY_SRC if place in launch.back else 0
+            kind = usage.UNIFORM if place == READ and self.name.endswith(UNIFORM) else usage.STORAGE
+            held[place] = device.create_buffer_with_data(
+                data=np.ascontiguousarray(data).tobytes(), usage=kind | written
+            )
+        entries = [
+            {"binding": place, "resource": {"buffer": buffer, "offset": 0, "size": buffer.size}}
+            for place, buffer in held.items()
+        ]
+        group = device.create_bind_group(layout=prepared.get_bind_group_layout(0), entries=entries)
+        encoder = device.create_command_encoder()
+        compute = encoder.begin_compute_pass()
+        compute.set_pipeline(prepared)
+        compute.set_bind_group(0, group)
+        compute.dispatch_workgroups(*(-(-n // g) for n, g in zip(launch.threads, GROUP, strict=True)), 1)
+        compute.end()
+        device.queue.submit([encoder.finish()])
+        return [
+            np.frombuffer(device.queue.read_buffer(held[place]), np.float32).copy() for place in launch.back
+        ]
+
+
+def vulkan_runner(name: str = "glsl-vulkan") -> WgpuRunner:
+    """Return a runner of GLSL for Vulkan, by way of SPIR-V."""
+    return WgpuRunner(name, tools.spirv)
+
+
+def hlsl_runner(style: str = "dxc", name: str = "glsl-vulkan") -> WgpuRunner:
+    """Return a runner of the HLSL that GLSL for Vulkan is translated to, by way of SPIR-V."""
+    return WgpuRunner(name, lambda source: tools.spirv(tools.hlsl(tools.spirv(source), style), "hlsl"))

@@ -1,0 +1,37 @@
+"""The web site, built once for all tests of a session."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+LONGEST_WAIT_S = 600
+"""After so many seconds another process that builds the site counts as gone."""
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Give the folder of the built site; of several processes one builds it, the others wait for it."""
+    from build import build_site
+
+    own = tmp_path_factory.getbasetemp()
+    shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+    folder, failed = shared / "site", shared / "site.failed"
+    try:
+        (shared / "site.lock").mkdir()
+    except FileExistsError:
+        for _ in range(LONGEST_WAIT_S):
+            if folder.exists() or failed.exists():
+                break
+            time.sleep(1)
+        assert folder.exists(), "another process could not build the site; its message says why"
+        return folder
+    try:
+        build_site(folder)
+    except BaseException:
+        failed.touch()
+        raise
+    return folder

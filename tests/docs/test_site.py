@@ -1,0 +1,187 @@
+"""The web site: it is whole, needs no other host, and says what the spec says; wrong pages are refused."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import cells
+import chapters
+import formulas
+import links
+import pytest
+import sources
+from build import main
+from mkdocs.exceptions import PluginError
+
+from wamnet.kernels.conformance.kinds import KINDS
+
+ROOT = Path(__file__).resolve().parents[2]
+
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+"""A browser, if there is one."""
+
+
+def chapter_files() -> list[Path]:
+    return sorted(path for path in (ROOT / "spec").glob("*.md") if path.name != "README.md")
+
+
+# ---- the site that is built ------------------------------------------------------------------------------
+
+
+def test_every_link_leads_somewhere_and_none_elsewhere(site):
+    assert links.broken(site) == []
+
+
+@pytest.mark.parametrize("chapter", chapter_files(), ids=lambda path: path.stem)
+def test_every_clause_has_an_anchor(site, chapter):
+    page = links.Page((site / "spec" / f"{chapter.stem}.html").read_text())
+    assert {number.lower() for number in chapters.clauses(chapter.read_text())} <= page.anchors
+
+
+def test_every_kind_of_vectors_has_its_format(site):
+    text = (site / "spec/vectors/index.html").read_text()
+    headings = re.findall(r'<h2 id="[^"]*">([\w.]+)<', text)
+    assert sorted(headings) == sorted(KINDS)
+
+
+def test_code_that_the_spec_names_is_linked_to_its_line(site):
+    page = links.Page((site / "spec/rng.html").read_text())
+    assert "../source/refimpl/rng.html#pcg4d" in page.addresses
+    source = (site / "source/refimpl/rng.html").read_text()
+    line = (
+        (ROOT / "refimpl/rng.py")
+        .read_text()
+        .splitlines()
+        .index("def pcg4d(v0: Any, v1: Any, v2: Any, v3: Any) -> Block:")
+    )
+    assert f'<span id="pcg4d"></span><span id="L{line + 1}"' in source
+
+
+def test_formulas_are_set_and_none_is_left(site):
+    texts = [path.read_text() for path in site.rglob("*.html")]
+    assert sum(text.count("<math") for text in texts) > 0
+    assert not any('class="arithmatex"' in text for text in texts)
+
+
+def test_no_page_is_wider_than_a_telephone_and_search_works_from_a_folder(site):
+    """Without a server, in a browser that is 400 pixels wide."""
+    if BROWSER is None:
+        pytest.skip("no browser: install chromium")
+    from playwright.sync_api import sync_playwright
+
+    asked: list[str] = []
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 400, "height": 800})
+        page.on("request", lambda request: asked.append(request.url))
+        page.on("pageerror", lambda error: asked.append(f"error: {error}"))
+        for path in sorted(site.rglob("*.html")):
+            name = path.relative_to(site).as_posix()
+            if name.startswith("source/") or name == "404.html":
+                continue
+            page.goto(path.as_uri())
+            assert page.evaluate("document.documentElement.scrollWidth") <= 400, name
+        page.goto((site / "index.html").as_uri())
+        page.set_viewport_size({"width": 1300, "height": 800})
+        page.locator("[data-md-component=search-query]").fill("spherical cauchy")
+        found = page.locator(".md-search-result__link").first
+        found.wait_for()
+        assert "sampling.html" in (found.get_attribute("href") or "")
+        browser.close()
+    assert [address for address in asked if not address.startswith(("file:", "data:", "about:"))] == []
+
+
+# ---- what is refused -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("html", "reason"),
+    [
+        ('<a href="none.html">', "no such file"),
+        ('<a href="other.html#none">', "no such place"),
+        ('<a href="#none">', "no such place"),
+        ('<script src="https://example.org/x.js">', "not of this site"),
+        ('<link href="//example.org/x.css">', "not of this site"),
+        ('<img src="other.html">', "no alternative text"),
+        ('<a href="other.html#here">', None),
+        ('<img src="data:image/png;base64,AA" alt="a plot">', None),
+    ],
+)
+def test_links_are_checked(tmp_path, html, reason):
+    (tmp_path / "index.html").write_text(html)
+    (tmp_path / "other.html").write_text('<p id="here">')
+    wrong = links.broken(tmp_path)
+    assert len(wrong) == (reason is not None)
+    assert reason is None or reason in wrong[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "hosts"),
+    [
+        ("a.js", 'fetch("https://example.org/x")', 1),
+        ("a.css", "@import url(//fonts.example.org/x);", 1),
+        ("a.js", 'x.createElementNS("http://www.w3.org/2000/svg", "a") // see example.org', 0),
+    ],
+)
+def test_scripts_and_styles_name_no_host(tmp_path, name, text, hosts):
+    (tmp_path / name).write_text(text)
+    assert len(links.broken(tmp_path)) == hosts
+
+
+def test_a_cell_shows_what_it_gives():
+    text = "```python cell\nx = 2\nprint(x < 3)\n```\n\n```python cell\nshow([[0.0, x / 2]], 'two')\n```\n"
+    found = cells.executed(text, "page.md")
+    assert "<pre>True\n</pre>" in found
+    assert 'alt="two" src="data:image/png;base64,' in found
+
+
+def test_a_cell_that_raises_stops_the_build():
+    text = "# Title\n\n```python cell\nx = 1\ny = x / 0\n```\n"
+    with pytest.raises(PluginError, match=r"page\.md:4: line 2 of the cell raises ZeroDivisionError"):
+        cells.executed(text, "page.md")
+
+
+def test_a_picture_without_words_is_refused():
+    with pytest.raises(PluginError, match="ValueError: show: a picture needs an alternative text"):
+        cells.executed("```python cell\nshow([[0.0]], '')\n```\n", "page.md")
+
+
+@pytest.mark.parametrize(
+    ("tex", "message"), [(r"\nosuch{x}", "unknown command"), (r"a^b^c", "cannot be set")]
+)
+def test_a_formula_that_cannot_be_set_is_refused(tex, message):
+    with pytest.raises(PluginError, match=message):
+        formulas.rendered(f'<span class="arithmatex">\\({tex}\\)</span>', "page.md")
+
+
+def test_a_formula_becomes_mathml():
+    html = formulas.rendered('<div class="arithmatex">\\[\na &lt; \\frac{1}{2}\n\\]</div>', "page.md")
+    assert "<mfrac>" in html
+    assert 'display="block"' in html
+    assert "&lt;" in html or "&#x0003C;" in html
+
+
+def test_links_are_made_outside_of_links_headings_and_listings():
+    html = "<h2>RNG-1</h2><p>RNG-1, rng.md and <a>RNG-1</a> <code>a/b.py: f, g</code></p><pre>RNG-1</pre>"
+    places = {"RNG-1": "spec/rng.html#rng-1", "rng": "spec/rng.html"}
+    found = chapters.linked(html, places, {"a/b.py": {"f"}}, lambda address: f"/{address}")
+    assert found == (
+        '<h2>RNG-1</h2><p><a href="/spec/rng.html#rng-1">RNG-1</a>, <a href="/spec/rng.html">rng.md</a> and '
+        '<a>RNG-1</a> <code><a href="/source/a/b.html">a/b.py</a>: '
+        '<a href="/source/a/b.html#f">f</a>, g</code></p><pre>RNG-1</pre>'
+    )
+
+
+def test_definitions_are_those_of_the_file():
+    text = "A = 1\n\n@d\ndef f():\n    pass\n\nclass C:\n    b: int = 2\n    def g(self):\n        pass\n"
+    assert sources.definitions(text) == {"A": 1, "f": 3, "C": 7, "C.b": 8, "C.g": 9}
+
+
+def test_a_folder_that_holds_something_else_is_left_alone(tmp_path, monkeypatch, capsys):
+    (tmp_path / "letter.txt").write_text("mine")
+    monkeypatch.setattr("sys.argv", ["build.py", str(tmp_path)])
+    assert main() == 2
+    assert "holds something that is no site; name another folder" in capsys.readouterr().err
+    assert (tmp_path / "letter.txt").read_text() == "mine"

@@ -1,0 +1,101 @@
+"""Frames of experiments: rendered once, verified, and never mixed up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lab import frames
+from lab.frames import Shot
+
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.render import Job, render
+from wamnet.refimpl.scenes import canonical
+
+SHOT = Shot("minicubes", time=1.0, size=8, spp=2, seed=3)
+
+
+def test_a_frame_is_the_reference_s(tmp_path):
+    (found,) = frames.frames(tmp_path, [SHOT], "numpy")
+    expected = render(canonical("minicubes", time=1.0), Job(8, 8, 2, 3)).frame
+    assert found.info["time"] == "1.0"
+    for name, values in expected.layers.items():
+        assert np.array_equal(found[name], values)
+
+
+def test_a_frame_is_rendered_once(tmp_path, monkeypatch):
+    first = frames.render_all(tmp_path, [SHOT, SHOT], "numpy")
+    assert first[0] == first[1]
+    monkeypatch.setattr(frames, "render_frame", None)  # a second rendering would fail
+    assert frames.render_all(tmp_path, [SHOT], "numpy") == first[:1]
+
+
+def test_a_damaged_frame_is_rendered_again(tmp_path):
+    (path,) = frames.render_all(tmp_path, [SHOT], "numpy")
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-1])
+    assert frames.find(tmp_path, SHOT, "numpy") is None
+    (again,) = frames.render_all(tmp_path, [SHOT], "numpy")
+    assert again.read_bytes() == whole
+
+
+def test_an_interrupted_run_keeps_what_was_done(tmp_path, monkeypatch):
+    other, real = replace(SHOT, seed=4), frames.render_frame
+
+    def interrupted(executor, scene, job, **options):
+        if job.seed == other.seed:
+            raise KeyboardInterrupt
+        return real(executor, scene, job, **options)
+
+    monkeypatch.setattr(frames, "render_frame", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        frames.render_all(tmp_path, [SHOT, other], "numpy")
+    assert frames.find(tmp_path, SHOT, "numpy") is not None
+    assert frames.find(tmp_path, other, "numpy") is None
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"time": 1.5},
+        {"size": 9},
+        {"spp": 3},
+        {"seed": 4},
+        {"scene": "cornell"},
+        {"parameters": {"orbit_deg": 10.0}},
+        {"parameters": {"warm": (1.0, 0.5, 0.25)}},
+    ],
+    ids=str,
+)
+def test_another_shot_has_another_file(tmp_path, change):
+    assert frames.path_of(tmp_path, replace(SHOT, **change), "numpy") != frames.path_of(
+        tmp_path, SHOT, "numpy"
+    )
+
+
+def test_a_new_layer_makes_new_files(tmp_path, monkeypatch):
+    before = frames.path_of(tmp_path, SHOT, "numpy")
+    monkeypatch.setattr(frames, "LAYERS", {**frames.LAYERS, "another": None})
+    assert frames.path_of(tmp_path, SHOT, "numpy") != before
+
+
+def test_noisy_frame_and_reference_share_no_random_numbers(tmp_path):
+    shots = [replace(SHOT, seed=seed) for seed in range(4)]
+    seeds = [make.seed for shot in shots for make in (frames.noisy(shot), frames.reference(shot, 8))]
+    assert len(set(seeds)) == len(seeds)
+    ((dirty, clean),) = frames.pairs(tmp_path, [SHOT], 4, "numpy")
+    assert (dirty.info["spp"], clean.info["spp"]) == ("1", "4")
+
+
+def test_a_reference_of_one_sample_is_refused(tmp_path):
+    with pytest.raises(InputError, match="samples of a reference is 1: more than 1"):
+        frames.pairs(tmp_path, [SHOT], 1, "numpy")
+
+
+def test_test_times_lie_between_training_times():
+    train, test = frames.split_times(4, 2, 8.0, start=1.0)
+    assert train == [1.0, 3.0, 5.0, 7.0]
+    assert test == [2.0, 6.0]
+    with pytest.raises(InputError, match="number of test times is 5"):
+        frames.split_times(4, 5, 8.0)

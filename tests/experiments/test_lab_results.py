@@ -1,0 +1,116 @@
+"""Records of experiments: nothing is lost, nothing is done twice, and two experiments are never mixed."""
+
+from __future__ import annotations
+
+import json
+import math
+import statistics
+
+import numpy as np
+import pytest
+from lab import command, figures
+from lab.results import Results, fill, summary
+from lab.tables import Column, markdown, table
+
+from wamnet.refimpl.errors import InputError, TrainingError
+
+
+@pytest.fixture
+def results(tmp_path):
+    return Results.open(tmp_path / "found.json", "test", {"size": 8})
+
+
+def test_an_interrupted_run_goes_on(results):
+    done = []
+
+    def work(seed):
+        if (len(done)) == 2:
+            raise KeyboardInterrupt
+        done.append(seed)
+        return {"psnr": 30.0 + seed}
+
+    with pytest.raises(KeyboardInterrupt):
+        fill(results, {"a": work, "b": work}, (0, 1, 2))
+    assert done == [0, 1]
+    later = Results.open(results.path, "test", {"size": 8})
+    fill(later, {"a": lambda seed: {"psnr": 30.0 + seed}, "b": lambda seed: {"psnr": 20.0}}, (0, 1, 2))
+    assert later.of("a", "psnr") == [30.0, 31.0, 32.0]
+    assert len(later.records()) == 6
+    fill(later, {"a": lambda seed: pytest.fail("it is there")}, (0, 1, 2))
+
+
+def test_a_record_replaces_an_older_one(results):
+    results.put("a", 0, {"psnr": 1.0})
+    results.put("a", 0, {"psnr": 2.0})
+    assert results.get("a", 0) == {"psnr": 2.0}
+    assert results.get("a", 1) is None
+
+
+def test_a_mean_has_a_spread(results):
+    for seed, value in enumerate((1.0, 2.0, 6.0)):
+        results.put("a", seed, {"psnr": value})
+    found = results.summary("a", "psnr")
+    assert (found.mean, found.deviation, found.count) == (3.0, statistics.stdev((1.0, 2.0, 6.0)), 3)
+    assert results.text("a", "psnr") == "3.00 ± 2.65"
+    assert results.text("a", "ssim") == ""
+    assert math.isnan(summary([1.0]).deviation)
+    assert summary([1.0]).text(1) == "1.0"
+
+
+def test_another_experiment_s_file_is_refused(results):
+    with pytest.raises(InputError, match="it belongs to test with settings"):
+        Results.open(results.path, "test", {"size": 16})
+    with pytest.raises(InputError, match="it belongs to test"):
+        Results.open(results.path, "other", {"size": 8})
+    results.path.write_text("{")
+    with pytest.raises(InputError, match="it is no file of results"):
+        Results.open(results.path, "test", {"size": 8})
+
+
+def test_settings_may_hold_tuples(tmp_path):
+    for _ in range(2):
+        Results.open(tmp_path / "found.json", "test", {"sizes": (1, 2)})
+    assert json.loads((tmp_path / "found.json").read_text())["settings"] == {"sizes": [1, 2]}
+
+
+def test_tables_have_empty_cells_for_what_was_not_measured(results):
+    results.put("a", 0, {"psnr": 30.0, "ms": 0.5})
+    results.put("b", 0, {"psnr": 20.0})
+    columns = [Column("psnr", "PSNR, dB", 1), Column("ms", "us", 0, scale=1000.0)]
+    assert table(results, columns, {"b": "B", "a": "A"}, "method") == markdown(
+        ["method", "PSNR, dB", "us"], [["B", "20.0", ""], ["A", "30.0", "500"]]
+    )
+
+
+def test_figures_are_pictures(tmp_path):
+    image = np.linspace(0.0, 1.0, 8 * 8 * 3).reshape(8, 8, 3)
+    figures.sheet(tmp_path / "sheet.png", [("row", [("a", image), ("map", image[..., 0])])])
+    figures.curves(tmp_path / "curves.png", {"a": [(1, [2.0, 3.0])], "b": [(1, [1.0])]}, ("x", "y"))
+    for name in ("sheet.png", "curves.png"):
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(InputError, match=r"pictures in each row is \[1, 2\]"):
+        figures.sheet(tmp_path / "x.png", [("", [("", image)]), ("", [("", image), ("", image)])])
+
+
+def test_errors_end_with_one_line_and_a_status(capsys):
+    def refused(arguments):
+        raise TrainingError("the loss is not finite")
+
+    with pytest.raises(SystemExit) as left:
+        command.begin(refused, [])
+    assert (left.value.code, capsys.readouterr().err) == (2, "wamnet: the loss is not finite\n")
+
+    def interrupted(arguments):
+        raise KeyboardInterrupt
+
+    with pytest.raises(SystemExit) as left:
+        command.begin(interrupted, [])
+    assert left.value.code == 130
+
+
+def test_the_scale_for_tests_is_not_offered(capsys):
+    with pytest.raises(SystemExit):
+        command.parser("text", "name").parse_args(["--help"])
+    shown = capsys.readouterr().out
+    assert "{small,paper}" in shown
+    assert "toy" not in shown

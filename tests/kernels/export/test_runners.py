@@ -1,0 +1,102 @@
+"""Exported languages: each one's denoiser, paths and encoding, run and held to bound, reference and ranges.
+
+A runner whose tools are missing skips its tests and says so; `make test` names those that must be there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wamnet import kernels
+from wamnet.compiler.compile import EXPORTED, compile_program
+from wamnet.compiler.encode_kernel import compile_encode, error_at
+from wamnet.compiler.lower_encode import layers_of
+from wamnet.compiler.lower_scene import lower_scene
+from wamnet.compiler.path_kernel import compile_path
+from wamnet.kernels.executor import Part
+from wamnet.kernels.export import runners
+from wamnet.refimpl.dataset import Normalization, encode_sums
+from wamnet.refimpl.errors import ExecutorUnavailable
+from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.transport import Settings
+
+FEATURES = ("color", "normal")
+"""What paths add up here."""
+
+
+@pytest.fixture(scope="module", params=runners.RUNNERS)
+def runner(request):
+    try:
+        opened = runners.RUNNERS[request.param]()
+    except ExecutorUnavailable as error:
+        pytest.skip(str(error))
+    with opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def case(kit):
+    program = kit.denoiser(kit.network([100, 7, 5, 3], (3.0, 5.0)), {"a": 3, "b": 1}, 5, "zero")
+    random = np.random.default_rng(1)
+    images = {name: random.uniform(-2, 2, (6, 9, n)).astype(np.float32) for name, n in (("a", 3), ("b", 1))}
+    return program, images
+
+
+@pytest.fixture(scope="module")
+def traced():
+    """Programs of a scene, a part of its picture, and the interpreter's sums."""
+    programs, part = (
+        lower_scene(canonical("minicubes", time=1.0), Settings(max_depth=2)),
+        Part(12, 9, 1, 8, 0, 1, 7),
+    )
+    with kernels.open_executor("numpy") as executor:
+        sums = executor.trace(compile_path(programs, "numpy", groups=layers_of(FEATURES)), part)
+    return programs, part, sums
+
+
+def test_denoiser_keeps_its_bound(runner, kit, case):
+    assert kit.excess(runner, *case, compile_program(case[0], runner.name)) <= 1
+
+
+def test_a_first_layer_in_two_passes(runner, kit, case):
+    """The bound of both passes is against the program that was cut."""
+    from wamnet.compiler.compile import analysed
+    from wamnet.compiler.interpret import interpret
+
+    program, images = case
+    artifact = compile_program(program, runner.name, rank=3)
+    (value,) = interpret(analysed(program), {"window": kit.windows(program, images)}, np.float64).values()
+    error = np.abs(runner.run(artifact, images) - value)
+    assert (error <= artifact.manifest["bound"]["output"]).all()
+
+
+def test_paths_are_the_interpreter_s(runner, traced):
+    """All decisions fall alike here: a number of a path of three surfaces is then off by rounding alone.
+
+    Some 8,000 operations of float32, each wrong by 2^-24 of values near 1: 8000 * 2^-24 = 5e-4.
+    """
+    programs, part, sums = traced
+    found = runner.trace(compile_path(programs, runner.name, groups=layers_of(FEATURES)), part)
+    assert found.shape == sums.shape
+    assert np.abs(found - sums).max() <= 8000 * 2.0**-24
+
+
+def test_encoding_keeps_its_bound(runner, traced):
+    if not hasattr(runner, "encode"):
+        pytest.skip("this runner's encodings run in pipelines")
+    kernel, sums = compile_encode(FEATURES, Normalization(), runner.name), traced[2]
+    planes = dict(zip(kernel.planes, sums, strict=True))
+    bound, found = error_at(kernel, planes, 1), runner.encode(kernel, sums, 1)
+    layers = {
+        name: np.moveaxis(sums[3 * i : 3 * i + 3], 0, -1).astype(np.float64)
+        for i, name in enumerate(FEATURES)
+    }
+    held = encode_sums(layers, 1.0, FEATURES, Normalization())
+    for name in FEATURES:
+        assert (np.abs(found[name] - held[name]) <= bound[name]).all()
+
+
+def test_every_exported_language_has_a_runner():
+    held = {name.partition("/")[0] for name in runners.RUNNERS}
+    assert set(EXPORTED) <= held

@@ -127,10 +127,11 @@ def conformance(
     before = None if track is None else report.read_track(track)
     verdicts = _asked(command, cases, profile, timeout)
     name = program or f"executor {executor}"
+    again = _again(program, executor, profile, vectors, timeout)
     if as_json is not None:
-        write_text(as_json, report.to_json(name, profile, verdicts))
+        write_text(as_json, report.to_json(name, profile, verdicts, again))
     if junit is not None:
-        write_text(junit, report.to_junit(name, verdicts))
+        write_text(junit, report.to_junit(name, verdicts, again))
     _print_counts(name, profile, verdicts)
     failed = [verdict for verdict in verdicts if verdict.failed]
     if track is not None and before is not None:
@@ -139,7 +140,7 @@ def conformance(
         for change in changed:
             say(str(change))
         say(f"{len(changed)} verdicts changed since {track} was written, {len(failed)} for the worse")
-    _print_failures(failed, cases, _again(program, executor, profile, vectors, timeout))
+    _print_failures(failed, cases, again)
     if track is not None and (before is None or not failed):
         write_text(track, report.track_text(before, verdicts))
     if failed:

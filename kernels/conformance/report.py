@@ -111,21 +111,28 @@ def about(verdict: Verdict, case: Case, again: str) -> list[str]:
     return [*lines, f"  again: {again}"]
 
 
-def to_json(program: str, profile: str, verdicts: Sequence[Verdict]) -> str:
-    """Return a report as JSON."""
+def to_json(program: str, profile: str, verdicts: Sequence[Verdict], again: str) -> str:
+    """Return a report as JSON; `again` is the command that asks a case alone, but for its id."""
+    first = first_blamed(verdicts)
     data = {
         "format": "wamnet-conformance-report",
         "version": VERSION,
         "program": program,
         "profile": profile,
         "kinds": {k.kind: {"cases": k.cases, **k.found} for k in counts(verdicts)},
-        "verdicts": [verdict.to_json() for verdict in verdicts],
+        "look_first_at": first.id if first is not None else None,
+        "verdicts": [
+            {**verdict.to_json(), **({"again": f"{again} {verdict.id}"} if verdict.failed else {})}
+            for verdict in verdicts
+        ],
     }
     return json.dumps(data, indent=1) + "\n"
 
 
-def to_junit(program: str, verdicts: Sequence[Verdict]) -> str:
-    """Return a report in the form of JUnit: a suite a kind, `skipped` for what is not supported."""
+def to_junit(program: str, verdicts: Sequence[Verdict], again: str) -> str:
+    """Return a report in the form of JUnit: a suite a kind, `skipped` for what is not supported.
+
+    The text of a failure is the command that repeats it."""
     root = ElementTree.Element("testsuites", name=_xml(program))
     for known in counts(verdicts):
         some = [v for v in verdicts if v.kind == known.kind]
@@ -139,7 +146,8 @@ def to_junit(program: str, verdicts: Sequence[Verdict]) -> str:
             if v.verdict != PASS:
                 word = {FAIL: "failure", UNSUPPORTED: "skipped"}.get(v.verdict, "error")
                 text = f"{v.clause}: {v.stage} {v.text} expected {v.expected} got {v.got}"
-                ElementTree.SubElement(element, word, type=v.verdict, message=_xml(text))
+                told = ElementTree.SubElement(element, word, type=v.verdict, message=_xml(text))
+                told.text = _xml(f"{again} {v.id}") if v.failed else None
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 

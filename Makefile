@@ -8,7 +8,7 @@
 VENV ?= .venv
 PYTHON ?= python3
 comma := ,
-WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba$(if $(shell $(CC) -E -include math.h -x c /dev/null >/dev/null 2>&1 && echo yes),$(comma)c)
+WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba,chromium$(if $(shell $(CC) -E -include math.h -x c /dev/null >/dev/null 2>&1 && echo yes),$(comma)c)
 PYTEST_OPTIONS ?= -n 2
 export VENV PYTHON WAMNET_REQUIRE
 

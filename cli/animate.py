@@ -22,6 +22,7 @@ import typer
 
 from ..refimpl.errors import InputError
 from . import machine, movie, options
+from .inputs import load_model, model_path
 from .options import ExecutorName, Renderer
 from .outputs import TEMPORARY, check_output, check_parent
 from .terminal import hint_on_interrupt, progress, say
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 EXAMPLES = """Examples:
 
 wamnet animate model.safetensors -o turning.mp4
+
+wamnet animate minicubes --seconds 2 --fps 5 -o turning.gif
 
 wamnet animate model.safetensors --seconds 2 --fps 5 --reference-spp 64 -o turning.gif
 
@@ -56,7 +59,9 @@ class Shot:
 
 def animate(
     model: options.ModelFile,
-    scene: Annotated[str, typer.Option(help="Canonical scene.")] = "minicubes",
+    scene: Annotated[
+        str | None, typer.Option(help="Canonical scene.", show_default="the one that the model has learned")
+    ] = None,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="PATH", help="Film (.mp4, .gif), or folder of pictures.")
     ] = Path("animation"),
@@ -68,6 +73,15 @@ def animate(
         int, typer.Option(help="Paths per pixel of a reference beside them; 0 shows none.")
     ] = 0,
     seed: options.Seed = 0,
+    feature_spp: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            help="Camera rays per pixel of the features; with more than the colour's, pictures are rendered "
+            "and denoised one after the other.",
+            show_default="as in training",
+        ),
+    ] = None,
     parameters: options.Parameters = None,
     executor: options.Executor = ExecutorName.numpy,
     renderer: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
@@ -77,9 +91,9 @@ def animate(
 
     After any interruption the same command goes on where it was.
     """
-    from ..compiler.model_file import load_model
     from ..kernels import open_executor
     from ..kernels.frame_plan import animation_times
+    from ..refimpl.render import feature_job
 
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
@@ -89,6 +103,7 @@ def animate(
     elif output.suffix:
         rule = f"a film's name must end in {' or '.join(movie.WRITERS)}, a folder's in none"
         raise InputError("output", str(output), rule, "rename it")
+    model = model_path(model)
     network = load_model(model)
     chosen = options.parse_parameters(parameters or [])
     if "time" in chosen:
@@ -97,7 +112,10 @@ def animate(
     times = animation_times(start, seconds, fps)
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
     facts += cut_facts(network, rank)
-    shots = plan_shots(folder, (scene, chosen), times, (size, reference_spp, seed), facts)
+    rays = rays_of(network) if feature_spp is None else feature_spp
+    shots = plan_shots(
+        folder, (scene or scene_of(network), chosen), times, (size, reference_spp, seed, rays), facts
+    )
     left = missing(folder, shots)
     folder.mkdir(exist_ok=True)
     with (
@@ -105,13 +123,31 @@ def animate(
         open_executor(executor.value) as runner,
         progress("drawing", len(left)) as advance,
     ):
-        draw = draw_frames if renderer.value == executor.value != "numpy" else draw_apart
+        # A pipeline's features come from the colour's camera rays.
+        one_device = renderer.value == executor.value != "numpy" and feature_job(shots[0].noisy) is None
+        draw = draw_frames if one_device else draw_apart
         for _ in draw(left, network, runner, renderer.value, rank):
             advance(1)
     if is_film:
         movie.write_movie(output, [shot.path for shot in shots], fps)
         shutil.rmtree(folder)
     say(f"{output}: {len(shots)} pictures, {len(left)} of them made now")
+
+
+def rays_of(model: Model) -> int:
+    """Return the camera rays of the features that a model has learned from; 0: the colour's, or not known."""
+    from ..refimpl.render import FEATURE_SPP
+
+    found = model.info.get(f"trained_on_{FEATURE_SPP}", "")
+    return int(found) if found.isdecimal() else 0
+
+
+def scene_of(model: Model) -> str:
+    """Return the canonical scene that a model has learned, or minicubes if that is not known."""
+    from ..refimpl.scenes import CANONICAL
+
+    found = model.info.get("trained_on_scene", "")
+    return found if found in CANONICAL else "minicubes"
 
 
 def cut_facts(network: Model, rank: int) -> list[str]:
@@ -128,22 +164,23 @@ def plan_shots(
     folder: Path,
     named: tuple[str, dict[str, Any]],
     times: Sequence[float],
-    numbers: tuple[int, int, int],
+    numbers: tuple[int, int, int, int],
     facts: Sequence[str],
 ) -> list[Shot]:
     """Return the pictures of an animation at some times.
 
-    `named` are the scene's name and parameters; numbers are size, samples of the reference (or 0) and seed.
+    `named` are the scene's name and parameters; numbers are size, samples of the reference (or 0), seed and
+    camera rays of the features (or 0).
     """
     from ..refimpl.render import Job
     from ..refimpl.scene import scene_digest
     from ..refimpl.scenes import canonical
 
-    (name, chosen), (size, spp, seed) = named, numbers
+    (name, chosen), (size, spp, seed, rays) = named, numbers
     shots = []
     for index, time in enumerate(times):
         scene = canonical(name, **{**chosen, "time": time})
-        noisy = Job(size, size, 1, seed + 2 * index)
+        noisy = Job(size, size, 1, seed + 2 * index, feature_spp=rays)
         reference = Job(size, size, spp, seed + 2 * index + 1) if spp else None
         made_from = [scene_digest(scene), asdict(noisy), reference and asdict(reference), *facts]
         text = json.dumps([*made_from, machine.versions()["wamnet"]])

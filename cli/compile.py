@@ -1,6 +1,7 @@
 """`wamnet compile`: from a model or a scene to the source of a kernel and its manifest.
 
-A name of a canonical scene, or a file that ends in .json, is a scene; anything else is a model.
+A name of a canonical scene, or a file that ends in .json, is a scene; anything else is a model: a file, or
+one that comes along, as in model:minicubes.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import typer
 from ..refimpl.errors import InputError
 from . import options
 from .choose import Request, check_request, choose
-from .inputs import load_model
+from .inputs import MODEL_PREFIX, load_model
 from .options import Sampler, Target
 from .outputs import check_parent, unwritable
 from .render import load_scene
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 EXAMPLES = """Examples:
 
 wamnet compile model.safetensors --target glsl -o kernel-glsl
+
+wamnet compile model:minicubes --target opencl -o kernel-minicubes
 
 wamnet compile model.safetensors --target opencl --profile native -o kernel-opencl
 
@@ -57,7 +60,8 @@ def compile_model(
         str,
         typer.Argument(
             metavar="MODEL",
-            help="Trained model (.safetensors), canonical scene or scene file (.json).",
+            help="Trained model (.safetensors, or model:NAME for one that comes along), canonical scene or "
+            "scene file (.json).",
             show_default=False,
         ),
     ],
@@ -179,9 +183,11 @@ def is_scene(name: str) -> bool:
 def _check_name(name: str, of_scenes: Mapping[str, Any]) -> None:
     """Refuse options of scenes, and what looks like a scene's name and is none: a model's file is there."""
     _only_for("a scene", of_scenes, f"{name} is no scene: neither a canonical one nor a .json file")
-    if not Path(name).suffix and not Path(name).exists():
+    comes_along = name.startswith(MODEL_PREFIX)
+    if not comes_along and not Path(name).suffix and not Path(name).exists():
         rule = "neither a canonical scene nor a file"
-        raise InputError("model or scene", name, rule, f"scenes are {options.SCENES}")
+        way_out = f"scenes are {options.SCENES}; models that come along: {MODEL_PREFIX}NAME, {options.MODELS}"
+        raise InputError("model or scene", name, rule, way_out)
 
 
 def _compiled_scene(

@@ -28,6 +28,8 @@ EXAMPLES = """Examples:
 
 wamnet dataset minicubes -o cubes
 
+wamnet dataset minicubes --frames 64 --size 256 --feature-spp 16 --executor opencl -o cubes
+
 wamnet dataset minicubes --frames 1000 --test 100 --size 1024 --spp 1024 -o large
 
 wamnet dataset minicubes --frames 1000 --scheduler tcp://10.0.0.1:8786 -o large
@@ -57,6 +59,10 @@ def dataset(
     test: Annotated[int, typer.Option(help="Times between them, to be judged on.")] = 2,
     size: Annotated[int, typer.Option(help="Width and height in pixels.")] = 64,
     spp: Annotated[int, typer.Option(help="Paths per pixel of a target; a noisy picture has 1.")] = 64,
+    test_spp: Annotated[
+        int, typer.Option(help="Paths per pixel of a test target.", show_default="as --spp")
+    ] = 0,
+    feature_spp: options.FeatureSpp = 0,
     start: Annotated[float, typer.Option(help="Begin of the animation, in seconds.")] = 0.0,
     seconds: Annotated[float, typer.Option(help="Length of the animation; minicubes turn in 8 s.")] = 8.0,
     seed: options.Seed = 0,
@@ -94,7 +100,7 @@ def dataset(
         )
     chosen = options.parse_parameters(parameters or [])
     numbers = (start, seconds, frames, test, size, spp, seed, max_depth)
-    request = Request(scene, chosen, *numbers, executor.value, sampler.value)
+    request = Request(scene, chosen, *numbers, executor.value, sampler.value, feature_spp, test_spp)
     if scheduler is not None and workers is not None:
         rule = "a running scheduler has its own workers"
         raise InputError("--workers", workers, rule, "leave out --workers or --scheduler")

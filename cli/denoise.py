@@ -9,7 +9,7 @@ import typer
 
 from ..refimpl.errors import ExecutorUnavailable
 from . import options
-from .inputs import load_model, need_layers
+from .inputs import load_model, need_layers, unlike_training
 from .options import ExecutorName
 from .outputs import check_output
 from .terminal import say, table
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 DENOISE_EXAMPLES = """Examples:
 
 wamnet denoise model.safetensors noisy.exr -o denoised.png
+
+wamnet denoise minicubes noisy.exr -o denoised.png
 
 wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr
 
@@ -70,6 +72,8 @@ def denoise(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )
     _say_what_is_no_number(frame, noisy, network)
+    for what in unlike_training(network, noisy):
+        say(f"{frame}: {what}")
     with open_executor(executor.value) as runner:
         result = denoise_on(runner, network, noisy, profile, schedule, rank, variant or FULL)
         first = first_time(runner, result.kernel, result.seconds_compile)

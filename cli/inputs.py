@@ -12,6 +12,12 @@ if TYPE_CHECKING:
     from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
 
+MODELS = Path(__file__).with_name("models")
+"""Folder of the models that come with the package, each with its recipe and its scores."""
+
+MODEL_PREFIX = "model:"
+"""May stand before the name of a model that comes along, and must where scenes have names too."""
+
 CHECKPOINT_MARK = ".checkpoint"
 """Before the suffix of a model's name in the name of its checkpoint."""
 
@@ -24,10 +30,27 @@ def check_input(path: Path) -> None:
         raise InputError("input file", str(path), "it does not exist", "check the name")
 
 
+def shipped_models() -> list[str]:
+    """Return the names of the models that come with the package."""
+    return sorted(path.stem for path in MODELS.glob("*.safetensors"))
+
+
+def model_path(path: Path) -> Path:
+    """Return the file of a model: the file that is named, else the one that comes along under this name."""
+    if path.suffix or path.exists():
+        return path
+    known, name = shipped_models(), str(path).removeprefix(MODEL_PREFIX)
+    if name not in known:
+        rule = "there is no such file, and no model of this name comes along"
+        raise InputError("model", str(path), rule, f"give a .safetensors file, or one of {', '.join(known)}")
+    return MODELS / f"{name}.safetensors"
+
+
 def load_model(path: Path) -> Model:
     """Read a model; a checkpoint is refused with the name of the model that belongs to it."""
     from ..compiler import model_file
 
+    path = model_path(path)
     try:
         return model_file.load_model(path)
     except InputError as error:
@@ -36,6 +59,22 @@ def load_model(path: Path) -> Model:
     name = path.name.replace(CHECKPOINT_MARK + path.suffix, path.suffix)
     way_out = f"give the model beside it: {path.with_name(name)}" if name != path.name else "give the model"
     raise InputError("model file", str(path), "it is a checkpoint of training, not a model", way_out)
+
+
+def unlike_training(model: Model, frame: Frame) -> list[str]:
+    """Return what about a frame a model has not learned from, as sentences; what nobody knows is nothing."""
+    from ..refimpl.render import FEATURE_SPP
+
+    told = []
+    scenes, scene = model.info.get("trained_on_scene", ""), frame.info.get("scene", "")
+    if scenes and scene and scene not in scenes.split(", "):
+        told.append(f"it shows {scene}, and the model has learned {scenes} alone: expect a poor picture")
+    if scenes and "spp" in frame.info:
+        rays, wanted = frame.info.get(FEATURE_SPP, "1"), model.info.get(f"trained_on_{FEATURE_SPP}", "1")
+        if rays != wanted:
+            rule = f"its features are of --feature-spp {rays}, those that the model learned from of {wanted}"
+            told.append(f"{rule}: expect worse edges")
+    return told
 
 
 def need_layers(path: Path, frame: Frame, features: Sequence[str], because: str, way_out: str) -> None:

@@ -28,10 +28,13 @@ from . import (
     dataset,
     demo,
     denoise,
+    export,
+    listing,
     render,
     train,
     triage,
     tune,
+    view,
 )
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
@@ -66,11 +69,14 @@ _register(render.scene, render.SCENE_EXAMPLES)
 _register(dataset.dataset, dataset.EXAMPLES)
 _register(train.train, train.EXAMPLES)
 _register(compile_model, COMPILE_EXAMPLES, "compile")
+_register(listing.listing, listing.EXAMPLES)
+_register(export.export, export.EXAMPLES)
 _register(certify.certify, certify.EXAMPLES)
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)
 _register(triage.triage, triage.EXAMPLES)
 _register(animate.animate, animate.EXAMPLES)
+_register(view.view, view.EXAMPLES)
 _register(tune.tune, tune.EXAMPLES)
 _register(bench.bench, bench.EXAMPLES)
 _register(denoise.executors, denoise.EXECUTORS_EXAMPLES)

@@ -18,6 +18,9 @@ from ..refimpl.errors import InputError
 SCENES = "minicubes, glossy, daylight, cornell, furnace, lone_light, empty"
 """Canonical scenes by name, for help texts; equal to the registry in refimpl, which they do not import."""
 
+MODELS = "minicubes, cornell, glossy"
+"""Models that come along by name, for help texts; equal to the files in cli/models."""
+
 LARGEST_EXPOSURE_STOPS = 64.0
 """Brightest and darkest exposure: a factor of 2**64; far past it float32 ends."""
 
@@ -86,6 +89,7 @@ class Sampler(str, Enum):
 class Preset(str, Enum):
     """Training protocols by name; equal to the registry in refimpl."""
 
+    best = "best"
     paper = "paper"
     short = "short"
 
@@ -103,7 +107,12 @@ Exposure = Annotated[
     ),
 ]
 ModelFile = Annotated[
-    Path, typer.Argument(metavar="MODEL", help="Trained model (.safetensors).", show_default=False)
+    Path,
+    typer.Argument(
+        metavar="MODEL",
+        help=f"Trained model (.safetensors), or the name of one that comes along ({MODELS}).",
+        show_default=False,
+    ),
 ]
 Profile = Annotated[
     str,
@@ -221,6 +230,16 @@ SamplerName = Annotated[
     Sampler,
     typer.Option(
         "--sampler", help="Random numbers: independent, or evenly spread (less noise at many samples)."
+    ),
+]
+FeatureSpp = Annotated[
+    int,
+    typer.Option(
+        "--feature-spp",
+        metavar="N",
+        help="Camera rays per pixel whose first hits the features are means over: 16 show edges without "
+        "jags, and cost a fraction of a path each.",
+        show_default="the colour's",
     ),
 ]
 SceneName = Annotated[

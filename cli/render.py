@@ -22,6 +22,8 @@ RENDER_EXAMPLES = """Examples:
 
 wamnet render minicubes
 
+wamnet render minicubes --feature-spp 16 -o noisy.exr
+
 wamnet render minicubes --time 2.5 --spp 64 --width 512 --height 512 -o reference.exr
 
 wamnet render minicubes --spp 1024 --executor opencl -o reference.exr
@@ -54,6 +56,7 @@ def render(
     width: Annotated[int, typer.Option(help="Width in pixels.")] = 256,
     height: Annotated[int, typer.Option(help="Height in pixels.")] = 256,
     spp: Annotated[int, typer.Option(help="Paths per pixel: 1 is noisy, 1024 is smooth.")] = 1,
+    feature_spp: options.FeatureSpp = 0,
     seed: options.Seed = 0,
     time: options.Time = None,
     parameters: options.Parameters = None,
@@ -78,12 +81,13 @@ def render(
     loaded = load_scene(scene, time, parameters or [])
     path = output or Path(f"{Path(scene).stem}.exr")
     check_output(path, (".exr", ".png"), [Path(scene)])
-    job = Job(width, height, spp, seed, Settings(max_depth=max_depth, sampler=sampler.value), dtype.value)
+    settings = Settings(max_depth=max_depth, sampler=sampler.value)
+    job = Job(width, height, spp, seed, settings, dtype.value, feature_spp=feature_spp)
     if workers is not None and renderer(executor.value).shares_work:
         rule = f"{executor.value} shares the work by itself"
         raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
     started = clock.perf_counter()
-    with progress(f"rendering {scene}", width * height * spp) as advance:
+    with progress(f"rendering {scene}", job.samples) as advance:
         frame = render_frame(executor.value, loaded, job, workers=workers, on_progress=advance).frame
     seconds = clock.perf_counter() - started
     write_picture(path, frame, exposure)

@@ -94,7 +94,8 @@ def train(
     preset: Annotated[
         Preset | None,
         typer.Option(
-            help="Protocol: the paper's own, or one that is as good in a minute or so.", show_default="short"
+            help="Protocol: the project's best, the paper's own, or one of half the best's time.",
+            show_default="best",
         ),
     ] = None,
     features: Annotated[
@@ -157,7 +158,7 @@ def _wanted(
 
     names = None if features is None else options.parse_names(features)
     choices = {"features": names, "steps": steps, "seed": seed, "rank": rank}
-    recipe = choose_recipe((preset or Preset.short).value, state, choices)
+    recipe = choose_recipe((preset or Preset.best).value, state, choices)
     check_recipe(recipe)
     return recipe
 

@@ -22,7 +22,7 @@ import typer
 
 from ..refimpl.errors import ExecutorUnavailable, InputError
 from . import machine, options
-from .inputs import load_model, need_layers
+from .inputs import load_model, model_path, need_layers
 from .outputs import check_new_folder, making_folder
 from .terminal import progress, say, table
 
@@ -108,6 +108,7 @@ def triage(
 
     check_new_folder(output)
     profile_named(profile)
+    model = model_path(model)
     network, noisy = load_model(model), exr.read_frame(frame, finite=False)
     need_layers(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
@@ -217,7 +218,7 @@ def _print(title: str, verdicts: Sequence[Verdict]) -> None:
 # ---- the reproducer -----------------------------------------------------------------------------------
 
 
-def keep(folder: Path, task: Task, verdicts: Sequence[Verdict], found: Reduced, model_path: Path) -> None:
+def keep(folder: Path, task: Task, verdicts: Sequence[Verdict], found: Reduced, model_file: Path) -> None:
     """Write model, part of the frame, the odd kernels and the report: all of it or nothing."""
     from ..compiler import artifact
     from ..kernels.triage import odd_ones
@@ -225,7 +226,7 @@ def keep(folder: Path, task: Task, verdicts: Sequence[Verdict], found: Reduced, 
 
     odd = [verdict.kernel for verdict in odd_ones(found.verdicts)]
     with making_folder(folder) as new:
-        (new / MODEL).write_bytes(model_path.read_bytes())
+        (new / MODEL).write_bytes(model_file.read_bytes())
         exr.write_frame(new / FRAME, part_of(task, found.box))
         for kernel in odd:
             assert kernel.artifact is not None

@@ -26,13 +26,15 @@ from .cuda import CUDA
 from .dialect import Dialect
 from .emit import kernel_gather, output_channels
 from .emit_inlined import Inlined
+from .emit_packed import Packed
 from .enclosure import round_up as round_up
 from .factor import HORIZONTAL, Cut, factor, left, over_images
 from .glsl import GLSL
 from .glsl_buffers import ComputeDenoise, VulkanDenoise
 from .glsl_compute import GLSL_COMPUTE
-from .glsl_es import GLSLES, GLSLESInlined
+from .glsl_es import GLSLES, GLSLESInlined, GLSLESPacked
 from .glsl_inlined import GLSL_LADDER
+from .hosts import GodotDenoise, ShadertoyDenoise
 from .ir import LEAST, OUTPUT_ENCODING, Gather, Program
 from .metal import Metal
 from .opencl import OpenCL
@@ -43,6 +45,7 @@ from .passes import pipeline
 from .profiles import Profile, SineContract
 from .schedules import PLAIN, Pick, Plain, Printed, Schedule, pick
 from .sums import is_split
+from .weight_homes import HOMES
 from .wgsl import WGSL
 
 
@@ -103,14 +106,16 @@ DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C())}
 EXPORTED: Mapping[str, Target] = {
     target.name: target
     for target in (
-        _dialect_target(GLSLES(), Inlined(GLSLESInlined())),
+        _dialect_target(GLSLES(), Inlined(GLSLESInlined()), Packed(GLSLESPacked())),
         _dialect_target(ComputeDenoise(), *GLSL_COMPUTE),
         _dialect_target(VulkanDenoise()),
         _dialect_target(WGSL()),
         _dialect_target(CUDA()),
         _dialect_target(Metal()),
+        replace(_dialect_target(ShadertoyDenoise()), schedules=(Inlined(ShadertoyDenoise()),)),
+        _dialect_target(GodotDenoise()),
     )
-}
+} | {name: _dialect_target(dialect) for name, dialect in HOMES.items()}
 """Targets that are written for other programs to run: kernels/export has what runs them in tests."""
 
 

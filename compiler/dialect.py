@@ -26,6 +26,9 @@ from numpy.typing import NDArray
 from .ir import LEAST, Node
 from .profiles import SineContract
 
+LONG_TABLE, TABLE_ROW = 200, 8
+"""Numbers of a constant table from which on it stands in rows, and the numbers of a row."""
+
 
 class Dialect:
     """One language; a subclass sets every attribute that has no value here."""
@@ -41,6 +44,7 @@ class Dialect:
     end = "}}"
     pixel: str
     weight: str
+    weights_table: bool = False
     store: str
     result_declaration: str = ""
     result_start: str = ""
@@ -155,7 +159,11 @@ class Dialect:
     def table_declaration(self, name: str, array: NDArray[Any]) -> str:
         """Return the declaration of a constant table."""
         dtype = str(array.dtype)
-        values = ", ".join(self.number(value, dtype) for value in array)
+        texts = [self.number(value, dtype) for value in array]
+        values = ", ".join(texts)
+        if len(texts) > LONG_TABLE:
+            rows = (", ".join(texts[i : i + TABLE_ROW]) for i in range(0, len(texts), TABLE_ROW))
+            values = "\n    " + ",\n    ".join(rows)
         return self.table.format(type=self.types[dtype], name=name, count=len(array), values=values)
 
     @staticmethod

@@ -21,7 +21,7 @@ from .ir import Gather, Image, Node, Program, users
 from .lines import Lines
 from .ops import LOOPS, OPS
 from .sums import is_split
-from .weights import layout, tables
+from .weights import layout, pack, tables
 
 BORDERS: Mapping[str, tuple[str, str]] = {
     "clamp": ("", "{pixel}"),
@@ -83,6 +83,9 @@ def emit(
     ]
     defines = [*(dialect.exact if program.exact else ()), *_window_defines(gather, dialect), *body.defines()]
     declared = [dialect.table_declaration(name, array) for name, array in tables(program).items()]
+    packed = pack(program)
+    if dialect.weights_table:
+        declared.append(dialect.table_declaration("weights", packed))
     begin = dialect.begin.format(
         defines="\n".join([*defines, *declared]),
         entry=dialect.entry,
@@ -92,6 +95,7 @@ def emit(
         results=_each_result(dialect.result_declaration, program, dialect),
         starts=_each_result(dialect.result_start, program, dialect),
         unordered=dialect.unordered[bounded or program.exact],
+        quads=-(-packed.size // 4),
     )
     comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
     return "\n".join([*dialect.first, *comment, begin, *body.text(), dialect.end.format()]) + "\n"

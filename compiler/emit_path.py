@@ -109,6 +109,11 @@ class _Kernel(Lines):
                 f"the kernel adds up {len(self.planes)} planes: {self.dialect.language} writes at most "
                 f"{self.dialect.max_planes}; ask for fewer groups"
             )
+        if self.programs.inputs and not self.dialect.scene_number:
+            raise CompileError(
+                f"{self.dialect.language}: its path kernels take no numbers of the scene; only those of web "
+                "pages do: compile the scene at one time"
+            )
         comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
         self._sums()
         self._samples()
@@ -143,6 +148,7 @@ class _Kernel(Lines):
             ),
             max_depth=self.programs.settings.max_depth,
             unordered=self.dialect.unordered[False],
+            scene=self._scene_declaration(),
             counter=self.dialect.types["uint32"],
             **uniforms,
         )
@@ -236,6 +242,18 @@ class _Kernel(Lines):
             store = self.dialect.sum_store
             self._line(store.format(plane=number, output=output, component=component, value=f"sum_{plane}"))
 
+    def _scene_declaration(self) -> str:
+        """Return the declaration of the scene's numbers that are inputs, if there are any."""
+        vectors = -(-len(self.programs.inputs) // 4)
+        return self.dialect.scene_numbers.format(vectors=vectors) if vectors else ""
+
+    def _scene_numbers(self) -> dict[str, str]:
+        """Return the text of each of the scene's numbers that are inputs."""
+        return {
+            name: self.dialect.scene_number.format(vector=number // 4, component="xyzw"[number % 4])
+            for number, name in enumerate(self.programs.inputs)
+        }
+
     # ---- one program -------------------------------------------------------------------------------------
 
     def block(
@@ -252,10 +270,11 @@ class _Kernel(Lines):
         assigned where a path is alive.
         """
         program = self.programs.parts()[part]
+        renamed = {**self._scene_numbers(), **(renamed or {})}
         self.lines.append("")
         self._line(f"/* {part}: {comment} */")
         self._open("{")
-        texts = self._statements(part, program, renamed or {})
+        texts = self._statements(part, program, renamed)
         for line in self._added(program, texts) if summed else self._assignments(program, texts, masked):
             self._line(line)
         self._close()

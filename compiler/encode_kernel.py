@@ -161,19 +161,7 @@ def _emit(
 
     `bounded`: the language must keep the order of operations, on which bounds rest.
     """
-    lines = []
-    for name in planes_of([image.name for image in images]):
-        number = planes.index(name)
-        buffer, component = divmod(number, dialect.planes_per_input)
-        lines.append(dialect.load.format(plane=number, name=name, buffer=buffer, component=component))
-    texts = _statements(program, dialect, lines)
-    outputs = dict(program.outputs)
-    for image in images:
-        for channel in range(image.channels):
-            value = texts[outputs[channel_name(image.name, channel)]]
-            store = dialect.image_store
-            place = {"image": image.name, "channels": image.channels, "channel": channel}
-            lines.append(store.format(value=value, **place))
+    lines = _body(program, dialect, planes, images)
     declared = [
         dialect.output_declaration.format(image=image.name, location=location, binding=location + FIRST_IMAGE)
         for location, image in enumerate(images)
@@ -188,6 +176,36 @@ def _emit(
     comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
     body = [f"    {line}" for line in lines]
     return "\n".join([*dialect.first, *comment, begin, *body, dialect.encode_end.format()]) + "\n"
+
+
+def _body(
+    program: Program, dialect: EncodeDialect, planes: Sequence[str], images: Sequence[Image]
+) -> list[str]:
+    """Return the statements: loads of planes, operations, stores of channels."""
+    lines = []
+    for name in planes_of([image.name for image in images]):
+        number = planes.index(name)
+        buffer, component = divmod(number, dialect.planes_per_input)
+        lines.append(dialect.load.format(plane=number, name=name, buffer=buffer, component=component))
+    texts = _statements(program, dialect, lines)
+    outputs = dict(program.outputs)
+    for image in images:
+        for channel in range(image.channels):
+            value = texts[outputs[channel_name(image.name, channel)]]
+            store = dialect.image_store
+            place = {"image": image.name, "channels": image.channels, "channel": channel}
+            lines.append(store.format(value=value, **place))
+    return lines
+
+
+def encode_source(
+    features: Sequence[str], normalization: Normalization, dialect: EncodeDialect, profile: str = "ieee"
+) -> str:
+    """Return the statements alone, for a kernel that has the sums of these features in variables."""
+    program = pipeline.run(lower_encode(features, normalization), profiles.profile_named(profile).passes)
+    known = [FEATURES[name] for name in features]
+    images = [Image(f.name, f.channels, f.low, f.high, f.encoding(normalization)) for f in known]
+    return "\n".join(f"    {line}" for line in _body(program, dialect, planes_of(features), images))
 
 
 def _statements(program: Program, dialect: EncodeDialect, lines: list[str]) -> list[str]:

@@ -2,7 +2,7 @@
 
 One invocation computes one pixel, in straight copies of the kernels for OpenCL: rows from the top, channels
 interleaved. Sizes stand in a uniform block. Translators make SPIR-V, HLSL and Metal from the first one
-(kernels/export/translate.py), so that its text uses numbers and arrays alone.
+(kernels/export/tools.py), so that its text uses numbers and arrays alone.
 """
 
 from __future__ import annotations

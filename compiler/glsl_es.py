@@ -8,7 +8,7 @@ compiler that keeps the order of operations [`ASSUMES`].
 from __future__ import annotations
 
 from .encode_dialect import GLSLEncode
-from .glsl import GLSL, PREAMBLE
+from .glsl import GLSL, PREAMBLE, WEIGHT_TEXTURE_WIDTH
 from .glsl_inlined import GLSLInlined
 from .glsl_path import GLSLPath
 from .profiles import SineContract
@@ -39,6 +39,19 @@ TEXTURES = "float textures to draw into need EXT_color_buffer_float in OpenGL ES
 """What callers of all these shaders must know."""
 
 
+WEIGHTS = f"""\
+{{images}}
+uniform sampler2D weight_texture;
+
+vec4 weights(int texel)
+{{{{
+    ivec2 place = ivec2(texel % {WEIGHT_TEXTURE_WIDTH}, texel / {WEIGHT_TEXTURE_WIDTH});
+    return texelFetch(weight_texture, place, 0);
+}}}}
+"""
+"""What a packed kernel declares besides the images."""
+
+
 class _ES:
     """What the shaders have in common."""
 
@@ -67,12 +80,22 @@ class GLSLESInlined(_ES, GLSLInlined):
     arguments = f"{GLSLInlined.arguments}.\n{TEXTURES}"
 
 
+class GLSLESPacked(_ES, GLSLInlined):
+    """The dialect's table for weights in a texture of four floats a texel."""
+
+    begin = GLSLInlined.begin.replace(PREAMBLE, ES_PREAMBLE).replace("{images}", WEIGHTS)
+    max_output_channels = 4 * MOST_BUFFERS
+    arguments = GLSL.arguments.replace("R32F", "RGBA32F") + f".\n{TEXTURES}"
+
+
 class GLSLESPath(_ES, GLSLPath):
     """The dialect's table for paths."""
 
     path_begin = GLSLPath.path_begin.replace(PREAMBLE, ES_PREAMBLE)
     path_arguments = f"{GLSLPath.path_arguments}.\n{TEXTURES}"
     max_planes = 4 * MOST_BUFFERS
+    scene_numbers = "uniform vec4 scene_numbers[{vectors}];\n"
+    scene_number = "scene_numbers[{vector}].{component}"
 
 
 class GLSLESEncode(_ES, GLSLEncode):

@@ -23,7 +23,7 @@ uniform int first_row;
 uniform uint first_sample;
 uniform int samples;
 uniform uint seed_number;
-
+{{scene}}
 void main()
 {{{{
     {{counter}} x = {{column}} + {{lane_numbers}};

@@ -9,7 +9,7 @@ A path is four pure functions of the reference, each a program; a kernel's skele
 
 Values between them have names [`PATH`, `SURFACE`, `COUNTERS`]: a vector is three numbers, `origin_x` and so
 on. The scene is constants by then: what it lacks (a kind of primitive, a second light, a rotation) is in no
-program.
+program. Numbers of it that shall move are inputs of all four [scene_inputs.py].
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 
 from ..refimpl import render, transport, vectors
-from ..refimpl.camera import camera_basis
 from ..refimpl.intersection import Hit, Surface
 from ..refimpl.scene import Scene, scene_digest
-from ..refimpl.transport import Counters, Path, Settings
+from ..refimpl.transport import Counters, Path, Settings, World
 from .ir import Program, Type
 from .passes import pipeline
+from .scene_inputs import SceneInputs, lay_out
 from .trace import Traced, trace
 from .verify import verify
 
@@ -84,7 +84,10 @@ PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "elimina
 
 @dataclass(frozen=True)
 class PathPrograms:
-    """The programs of one path in one scene; `alive`, `scatter`'s truth value, says whether it goes on."""
+    """The programs of one path in one scene; `alive`, `scatter`'s truth value, says whether it goes on.
+
+    `inputs` are the names of the scene's numbers that all four are given [scene_inputs.py].
+    """
 
     scene: str
     scene_digest: str
@@ -93,6 +96,7 @@ class PathPrograms:
     arrive: Program
     look: Program
     scatter: Program
+    inputs: tuple[str, ...] = ()
 
     def parts(self) -> Mapping[str, Program]:
         """Return the programs by name."""
@@ -104,15 +108,17 @@ def lower_scene(
     settings: Settings,
     most_unrolled: int | None = MOST_UNROLLED,
     keep_places: bool = False,
+    moving: SceneInputs | None = None,
 ) -> PathPrograms:
     """Return the programs of a path through a scene, in float32.
 
     The primitives of a scene that has more than `most_unrolled` of them are tables and loops, else statements
     for each; None unrolls any scene. What stands alone in its table is no loop. `keep_places`: nodes know
-    the lines of the reference that they came from, for listings.
+    the lines of the reference that they came from, for listings. The numbers that are `moving` are inputs,
+    not constants.
     """
-    world = transport.build(scene, settings, np.float32)
-    basis = camera_basis(scene.camera, np.float32)
+    laid = lay_out(scene, settings)
+    world_of = partial(_world, laid, moving)
 
     def start(given: Mapping[str, Any]) -> dict[str, Any]:
         # A pixel's counter, as in refimpl/render.py: pixel_counter.
@@ -120,16 +126,17 @@ def lower_scene(
         counters = Counters(given["seed"], pixel, given["sample_number"])
         x, y = given["x"].astype(np.float32), given["y"].astype(np.float32)
         size = given["width"], given["height"]
+        basis = (moving.opened(laid, given) if moving else laid)["camera"]
         path = render.start(basis, x, y, *size, counters, np.float32, settings.sampler)
         return {**_taken(PATH, path), "pixel": pixel}
 
     def arrive(given: Mapping[str, Any]) -> dict[str, Any]:
-        path, surface, hit = transport.arrive(world, _path(given))
+        path, surface, hit = transport.arrive(world_of(given), _path(given))
         return {**_taken({"radiance": PATH["radiance"]}, path), **_taken(SURFACE, surface, hit)}
 
     def look(given: Mapping[str, Any]) -> dict[str, Any]:
         surface, hit = _surface(given)
-        layers = render.first_hit_layers(world, surface, hit, _vector(given, "direction", XYZ))
+        layers = render.first_hit_layers(world_of(given), surface, hit, _vector(given, "direction", XYZ))
         return {
             name: value for layer, (ends, _) in LAYERS.items() for name, value in _split(layer, ends, layers)
         }
@@ -137,22 +144,30 @@ def lower_scene(
     def scatter(given: Mapping[str, Any]) -> dict[str, Any]:
         surface, hit = _surface(given)
         counters = Counters(*(given[name] for name in COUNTERS))
-        path, alive = transport.scatter(world, _path(given), surface, hit, given["depth"], counters)
+        path, alive = transport.scatter(world_of(given), _path(given), surface, hit, given["depth"], counters)
         return {**_taken(PATH, path), "alive": alive}
 
     numbers = {**dict.fromkeys(("x", "y", "seed", "sample_number"), (NUMBER, COUNTER))}
-    size = dict.fromkeys(("width", "height"), (NUMBER, FLOAT))
+    size, depth = dict.fromkeys(("width", "height"), (NUMBER, FLOAT)), {"depth": (NUMBER, COUNTER)}
+    scene_numbers = dict.fromkeys(moving.names if moving else (), (NUMBER, FLOAT))
     few = most_unrolled is None or primitives(scene) <= most_unrolled
     lowered = partial(_lowered, most_unrolled=None if few else 1, keep_places=keep_places)
     return PathPrograms(
         scene.name,
         scene_digest(scene),
         settings,
-        lowered("start", start, {**numbers, **size}),
-        lowered("arrive", arrive, PATH),
-        lowered("look", look, {**SURFACE, "direction": PATH["direction"]}),
-        lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, "depth": (NUMBER, COUNTER)}),
+        lowered("start", start, {**numbers, **size, **scene_numbers}),
+        lowered("arrive", arrive, {**PATH, **scene_numbers}),
+        lowered("look", look, {**SURFACE, "direction": PATH["direction"], **scene_numbers}),
+        lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, **depth, **scene_numbers}),
+        moving.names if moving else (),
     )
+
+
+def _world(laid: dict[str, Any], moving: SceneInputs | None, given: Mapping[str, Any]) -> World:
+    """Return the world, with those of its numbers that are inputs as they are given."""
+    world: World = (moving.opened(laid, given) if moving else laid)["world"]
+    return world
 
 
 def primitives(scene: Scene) -> int:

@@ -85,8 +85,8 @@ class Metal(_Metal):
     image_declaration = "    device const float *image_{image} [[buffer({binding})]]"
     image_separator = ",\n"
     begin = f"""\
-{{defines}}
 {TOP}
+{{defines}}
 {_size("int width", "int height")}
 kernel void {{entry}}(
     constant Size &size [[buffer(0)]],

@@ -7,7 +7,8 @@
    selection; np.take from a constant table (made one by `np.asarray(table, like=index)`) a look-up;
    `x[..., i]` a component; `x[..., None]` nothing, since a number goes with every component anyway.
 4. A fold over the rows of constant tables (refimpl/vectors.py: fold_rows) is unrolled up to a number of rows,
-   and a loop (loops.py) above it [`Tracer`].
+   and a loop (loops.py) above it [`Tracer`]. A table with traced numbers in it is always unrolled, and a
+   look-up in it selects them one by one.
 5. A Python number takes the kind of the values beside it; other kinds are never mixed.
 6. Anything else raises: the closed list of operations is what makes one definition serve every executor.
 """
@@ -224,11 +225,18 @@ def _operand(builder: Builder, value: Any, beside: str | None = None) -> int:
         return value.index
     if isinstance(value, Planes):
         _refuse("np.stack with axis=0 outside of np.moveaxis(np.stack(...), 0, -1)")
+    if _is_mixed(value):
+        return _operand(builder, emit(builder, "stack", *value) if value.ndim else value.item(), beside)
     if isinstance(value, np.ndarray) and value.ndim:
         return _add(builder, "parameter", (), name=builder.parameter(_exact_float32(value)))
     if not isinstance(value, int | float | np.number | np.bool_ | np.ndarray):
         _refuse(f"a {type(value).__name__} as an operand")
     return _constant(builder, value, _kind(value, beside))
+
+
+def _is_mixed(value: Any) -> bool:
+    """Tell whether an array holds objects: traced numbers among constants [scene_inputs.py]."""
+    return isinstance(value, np.ndarray) and value.dtype == object
 
 
 def _kind(value: Any, beside: str | None) -> str:
@@ -340,13 +348,21 @@ def _take(builder: Builder, table: Any, index: Any) -> Traced:
     """np.take from a table at a traced index."""
     if not isinstance(table, Table):
         _refuse("np.take from anything but np.asarray(table, like=index)")
-    return emit(builder, "take", index, table=builder.table(_known(table.array)))
+    if not _is_mixed(table.array):
+        return emit(builder, "take", index, table=builder.table(_known(table.array)))
+    # The constants are a table as ever; each traced entry is a selection.
+    traced = {i: entry for i, entry in enumerate(table.array) if isinstance(entry, Traced)}
+    constants = np.array([0.0 if i in traced else entry for i, entry in enumerate(table.array)], np.float32)
+    value = emit(builder, "take", index, table=builder.table(constants))
+    for i, entry in traced.items():
+        value = emit(builder, "select", emit(builder, "equal", index, i), entry, value)
+    return value
 
 
 def _fold_rows(builder: Builder, step: Any, tables: Any, start: Any) -> Any:
     """A fold over more rows than are unrolled is a loop whose body is one step."""
     trips = len(tables[0])
-    if not isinstance(builder, Tracer) or builder.unrolls(trips):
+    if not isinstance(builder, Tracer) or builder.unrolls(trips) or any(map(_is_mixed, tables)):
         return NotImplemented
     number, builder.loops = builder.loops, builder.loops + 1
     carried = [

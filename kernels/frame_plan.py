@@ -45,7 +45,9 @@ KINDS = ("noisy", "target")
 class Request:
     """All that determines a data set, besides the version: scene, animation, numbers, sizes, seed, ways.
 
-    The animation runs from `start_s` for `seconds`; `parameters` are those of the canonical scene.
+    The animation runs from `start_s` for `seconds`; `parameters` are those of the canonical scene. The
+    features of noisy pictures are means over `feature_spp` camera rays; 0: over the colour's one. Targets
+    have `spp` samples, those of test frames `test_spp`; 0: as many.
     """
 
     scene: str
@@ -60,10 +62,15 @@ class Request:
     max_depth: int = 5
     executor: str = "numpy"
     sampler: str = "pcg4d"
+    feature_spp: int = 0
+    test_spp: int = 0
 
     def as_data(self) -> dict[str, Any]:
-        """Return the request as JSON's types."""
+        """Return the request as JSON's types, without the last two where they are 0."""
         data = asdict(self)
+        for name in ("feature_spp", "test_spp"):
+            if not data[name]:
+                del data[name]
         lists = {k: list(v) if isinstance(v, tuple) else v for k, v in sorted(self.parameters.items())}
         return {**data, "parameters": lists}
 
@@ -103,7 +110,8 @@ class Task:
     @property
     def samples(self) -> int:
         """Return the number of paths to be traced."""
-        return self.picture.job.width * (self.rows[1] - self.rows[0]) * self.picture.job.spp
+        job = self.picture.job
+        return job.samples // job.height * (self.rows[1] - self.rows[0])
 
 
 def version() -> str:
@@ -157,8 +165,11 @@ def plan(request: Request) -> list[FramePlan]:
     numbers = {"train": 0, "test": 0}
     for index, (split, time) in enumerate(frame_times(request)):
         pictures = {}
-        for offset, (kind, spp) in enumerate(zip(KINDS, (NOISY_SPP, request.spp), strict=True)):
+        target_spp = request.test_spp or request.spp if split == "test" else request.spp
+        for offset, (kind, spp) in enumerate(zip(KINDS, (NOISY_SPP, target_spp), strict=True)):
             job = Job(size, size, spp, request.seed + 2 * index + offset, settings)
+            if kind == KINDS[0]:
+                job = replace(job, feature_spp=request.feature_spp)
             pictures[kind] = Picture(f"{split}/{numbers[split]:05d}-{kind}.exr", request, time, job)
         frames.append(FramePlan(split, time, pictures))
         numbers[split] += 1
@@ -199,6 +210,8 @@ def describe(frame: FramePlan) -> dict[str, Any]:
         job = picture.job
         facts[kind] = {"file": picture.name, "width": job.width, "height": job.height}
         facts[kind] |= {"spp": job.spp, "seed": job.seed}
+        if job.feature_spp:
+            facts[kind]["feature_spp"] = job.feature_spp
     return facts
 
 
@@ -208,7 +221,7 @@ def tasks_of(picture: Picture) -> list[Task]:
     A band has about TASK_SAMPLES samples, but a tile of pixels at least: smaller ones would be slow.
     """
     job = picture.job
-    rows = max(TASK_SAMPLES // (job.width * job.spp), TILE_PIXELS // job.width, 1)
+    rows = max(TASK_SAMPLES // (job.samples // job.height), TILE_PIXELS // job.width, 1)
     bands = [(first, min(first + rows, job.height)) for first in range(0, job.height, rows)]
     here = version()
     return [Task(picture, band, here) for band in bands]

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
+from ..compiler.emit_packed import WEIGHTS_A_TEXEL
 from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.factor import HORIZONTAL
 from ..compiler.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
@@ -190,14 +191,15 @@ class OpenGLExecutor(Executor):
 
     def _weights(self, artifact: Artifact) -> Any:
         """Return the weights as a texture of whole rows."""
-        rows = max(1, -(-artifact.weights.size // WEIGHT_TEXTURE_WIDTH))
+        texel = artifact.manifest["schedule"].get(WEIGHTS_A_TEXEL, 1)
+        rows = max(1, -(-artifact.weights.size // (WEIGHT_TEXTURE_WIDTH * texel)))
         largest = self._context.info["GL_MAX_TEXTURE_SIZE"]
         if rows > largest:
             raise CompileError(
                 f"{artifact.weights.size} weights fill {rows} rows of a texture: this OpenGL takes at most "
                 f"{largest}; use narrower layers, or executor opencl or numpy"
             )
-        padded = np.zeros((rows, WEIGHT_TEXTURE_WIDTH, 1), np.float32)
+        padded = np.zeros((rows, WEIGHT_TEXTURE_WIDTH, texel), np.float32)
         padded.reshape(-1)[: artifact.weights.size] = artifact.weights
         return self._texture("weights", padded)
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from ..compiler.lower_scene import lower_scene
 from ..compiler.path_kernel import PathArtifact, compile_path, most_unrolled
 from ..refimpl.errors import InputError
 from ..refimpl.frame import LAYERS, Frame
-from ..refimpl.render import Job, Render, checked_rows, render_info
+from ..refimpl.render import Job, Render, checked_rows, feature_job, render_info, with_own_features
 from ..refimpl.scene import Scene
 from ..refimpl.transport import Settings
 from .executor import Executor, Part
@@ -69,6 +69,9 @@ def render_on(
     """
     if job.dtype != "float32":
         raise InputError("dtype", job.dtype, "kernels compute in float32", "render with --executor numpy")
+    if feature_job(job) is not None:
+        part = partial(render_on, executor, scene, rows=rows, on_progress=on_progress, profile=profile)
+        return with_own_features(scene, job, part)
     first, last = checked_rows(job, rows)
     kernel = compile_scene(executor, scene, job, profile)
     executor.build_path(kernel)

@@ -55,7 +55,7 @@ def render_parallel(
         raise InputError("workers", count, "at least one process must work", "use 1 or more")
     parts = bands(job, count)
     keep_freed_memory()
-    if count == 1 or len(parts) == 1 or job.width * job.height * job.spp < LEAST_SAMPLES:
+    if count == 1 or len(parts) == 1 or job.samples < LEAST_SAMPLES:
         return render(scene, job, on_progress=on_progress)
     context = multiprocessing.get_context("spawn")
     counter = context.Value("Q", 0)

@@ -3,7 +3,7 @@
 1. Hypothesis draws the same examples on every run, without a deadline: a test's result is a function of the
    code. HYPOTHESIS_PROFILE=long draws twenty times as many.
 2. `executor` runs one test body on every executor of whole pipelines [`PIPELINES`], `denoiser` on those that
-   denoise alone too [`EXECUTORS`], `mitsuba` gives a peer [`PEERS`]. One that
+   denoise alone too [`EXECUTORS`], `mitsuba` and `chromium` give peers [`PEERS`]. One that
    is missing fails its tests when WAMNET_REQUIRE names it, as `make test` does; else they are skipped. Either
    way the summary says what was missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
 3. The user's cache folder is never touched: tests have one of their own, which their commands inherit.
@@ -27,8 +27,8 @@ PIPELINES = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
 EXECUTORS = (*PIPELINES, "c")
 """Every way to run a denoiser that the tests know."""
 
-PEERS = ("mitsuba",)
-"""Other renderers that tests compare with, under the policy of executors."""
+PEERS = ("mitsuba", "chromium")
+"""Other programs that tests compare with or run pages in, under the policy of executors."""
 
 hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, database=None, print_blob=True)
 hypothesis.settings.register_profile("long", hypothesis.settings.get_profile("ci"), max_examples=2000)
@@ -110,19 +110,43 @@ def mitsuba(executor_named: Callable[[str], Any]) -> Any:
     return executor_named("mitsuba")
 
 
+@pytest.fixture(scope="session")
+def chromium(executor_named: Callable[[str], Any]) -> Any:
+    """Give a headless browser."""
+    return executor_named("chromium")
+
+
+def _open_mitsuba() -> tuple[Any, str]:
+    """Return the module and what it is."""
+    import mitsuba_scene
+
+    peer = mitsuba_scene.open_mitsuba("scalar_rgb")
+    return peer, f"version {peer.__version__}, {peer.variant()}"
+
+
+def _open_chromium() -> tuple[Any, str]:
+    """Return the browser and what it is."""
+    from browser import Chromium
+
+    peer = Chromium()
+    return peer, peer.device
+
+
+OPENED = {"mitsuba": _open_mitsuba, "chromium": _open_chromium}
+"""How peers are opened."""
+
+
 def _open(name: str) -> tuple[Any, str]:
     """Return the executor or peer and "ok (device)", or None and "MISSING: reason"."""
     from wamnet import kernels
     from wamnet.refimpl.errors import ExecutorUnavailable
 
     if name in PEERS:
-        import mitsuba_scene
-
         try:
-            peer = mitsuba_scene.open_mitsuba("scalar_rgb")
+            peer, text = OPENED[name]()
         except ExecutorUnavailable as error:
             return None, f"MISSING: {error}"
-        return peer, f"ok (version {peer.__version__}, {peer.variant()})"
+        return peer, f"ok ({text})"
     kind, _, context = name.partition("-")
     try:
         executor = kernels.open_executor(kind, **({"context": context} if context else {}))

@@ -25,7 +25,7 @@ from wamnet.kernels.frame_plan import version
 from wamnet.kernels.render_frame import render_frame
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import LAYERS, Frame
-from wamnet.refimpl.render import Job
+from wamnet.refimpl.render import Job, feature_job, render_info
 from wamnet.refimpl.scene import Scene, scene_digest
 from wamnet.refimpl.scenes import canonical
 
@@ -41,7 +41,10 @@ Pair = tuple[Frame, Frame]
 
 @dataclass(frozen=True)
 class Shot:
-    """A picture to be rendered; `parameters` are those of the canonical scene, without its time."""
+    """A picture to be rendered; `parameters` are those of the canonical scene, without its time.
+
+    Its features are means over `feature_spp` camera rays; 0: over the colour's.
+    """
 
     scene: str = "minicubes"
     time: float = 0.0
@@ -49,11 +52,12 @@ class Shot:
     spp: int = NOISY_SPP
     seed: int = 0
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    feature_spp: int = 0
 
     @property
     def job(self) -> Job:
         """Return size, samples and seed as the renderer wants them."""
-        return Job(self.size, self.size, self.spp, self.seed)
+        return Job(self.size, self.size, self.spp, self.seed, feature_spp=self.feature_spp)
 
     def build(self) -> Scene:
         """Return the scene at its time."""
@@ -62,7 +66,10 @@ class Shot:
 
 def path_of(folder: Path, shot: Shot, executor: str) -> Path:
     """Return the name of a shot's file without checksum and suffix."""
-    made_from = [scene_digest(shot.build()), asdict(shot.job), executor, sorted(LAYERS), version()]
+    job = asdict(shot.job)
+    if not shot.feature_spp:
+        del job["feature_spp"]  # these files are older than it is
+    made_from = [scene_digest(shot.build()), job, executor, sorted(LAYERS), version()]
     digest = hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:DIGITS]
     return folder / f"{shot.scene}-{shot.time:.4g}s-{shot.size}px-{shot.spp}spp-{digest}"
 
@@ -83,7 +90,7 @@ def render_all(folder: Path, shots: Iterable[Shot], executor: str = "opencl") ->
     wanted = list(shots)
     there = {id(shot): find(folder, shot, executor) for shot in wanted}
     left = [shot for shot in wanted if there[id(shot)] is None]
-    samples = sum(shot.size**2 * shot.spp for shot in left)
+    samples = sum(shot.job.samples for shot in left)
     with (
         hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"),
         progress(f"rendering {len(left)} frames", samples) as advance,
@@ -96,8 +103,17 @@ def render_all(folder: Path, shots: Iterable[Shot], executor: str = "opencl") ->
 
 
 def _render(folder: Path, shot: Shot, executor: str, advance: Any) -> Path:
-    """Render a shot and give its file the name that ends in its checksum."""
-    frame = render_frame(executor, shot.build(), shot.job, workers=None, on_progress=advance).frame
+    """Render a shot and give its file the name that ends in its checksum.
+
+    Where the same colour is there with features of its own rays, only the others' first hits are traced.
+    """
+    scene, plain = shot.build(), find(folder, replace(shot, feature_spp=0), executor)
+    if (of_features := feature_job(shot.job)) is not None and plain is not None:
+        hits = render_frame(executor, scene, of_features, workers=None, on_progress=advance).frame
+        layers = {**hits.layers, "color": exr.read_frame(plain)["color"]}
+        frame = Frame(layers, render_info(scene, shot.job))
+    else:
+        frame = render_frame(executor, scene, shot.job, workers=None, on_progress=advance).frame
     name = path_of(folder, shot, executor)
     new = folder / f".{name.name}.exr"
     exr.write_frame(new, frame)
@@ -114,7 +130,7 @@ def reference(shot: Shot, spp: int) -> Shot:
 
     Seeds of references are odd and those of noisy shots even, so that none share their random numbers.
     """
-    return replace(shot, spp=spp, seed=2 * shot.seed + 1)
+    return replace(shot, spp=spp, seed=2 * shot.seed + 1, feature_spp=0)
 
 
 def noisy(shot: Shot) -> Shot:

@@ -11,7 +11,8 @@
    falls with their number, and what display-encoding adds is measured [`Ladder.spp_of`].
 
 *WAMnet for Image Denoising* prints MSE on 0 .. 255 and, as PSNR, ten times the natural logarithm of
-255^2 / MSE; so does [`paper_figure`].
+255^2 / MSE; so does [`paper_figure`]. No picture of 1 spp has its MSE of 82.93, which is 28.9 dB: squares of
+8-bit numbers that wrap around give such values [`wrapped_mse`].
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ from numpy.typing import NDArray
 
 from wamnet.cli.packages import need
 from wamnet.refimpl import metrics
-from wamnet.refimpl.encoding import LEVELS, from_display, to_display
+from wamnet.refimpl.encoding import LEVELS, from_display, to_8bit, to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Floats
 
-LOWER_IS_BETTER = ("mse", "mse255", "flip", "relmse", "smape")
+LOWER_IS_BETTER = ("mse", "mse255", "wrapped", "flip", "relmse", "smape")
 """The scores that fall as a picture gets better."""
 
 
@@ -48,6 +49,7 @@ def score(
     return {
         "mse": error,
         "mse255": error * LEVELS**2,
+        "wrapped": wrapped_mse(picture, target),
         "psnr": metrics.psnr(picture, target),
         "paper": paper_figure(error * LEVELS**2),
         "ssim": metrics.ssim(picture, target),
@@ -65,6 +67,12 @@ def mean_scores(found: Sequence[Mapping[str, float]]) -> dict[str, float]:
 def paper_figure(mse255: float) -> float:
     """Return what the paper's Table 1 calls PSNR: 10 ln(255^2 / MSE), MSE on 0 .. 255; without error, inf."""
     return 10.0 * math.log(LEVELS**2 / mse255) if mse255 > 0.0 else math.inf
+
+
+def wrapped_mse(picture: Floats, target: Floats) -> float:
+    """Return the MSE of two display-encoded pictures in arithmetic of 8 bits: each square modulo 256."""
+    difference = to_8bit(picture).astype(np.int64) - to_8bit(target)
+    return float(np.mean(difference**2 % (LEVELS + 1)))
 
 
 def flip(picture: Floats, target: Floats) -> float:

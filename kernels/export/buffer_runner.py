@@ -18,6 +18,7 @@ from ...compiler.emit import output_channels
 from ...compiler.encode_kernel import EncodeArtifact
 from ...compiler.glsl_buffers import FIRST_IMAGE
 from ...compiler.path_kernel import PathArtifact
+from ...compiler.weight_homes import INLINE
 from ...refimpl.errors import InputError
 from ..executor import Executor, Images, Part, gather_of
 from ..passes import Passes
@@ -65,8 +66,11 @@ class BufferRunner(Executor):
         for kernel in artifact.kernels:
             height, width, _ = found[0].shape
             shape = (height, width, output_channels(kernel.program))
-            weights = kernel.weights if kernel.weights.size else np.zeros(4, np.float32)
-            buffers = {READ: weights, WRITTEN: np.zeros(shape, np.float32)}
+            buffers = {WRITTEN: np.zeros(shape, np.float32)}
+            if not self.name.endswith(INLINE):
+                buffers[READ] = np.pad(
+                    kernel.weights, (0, -kernel.weights.size % 4 or 4 * (not kernel.weights.size))
+                )
             buffers |= {FIRST_IMAGE + i: image for i, image in enumerate(found)}
             launch = Launch((width, height), buffers, (WRITTEN,), (width, height))
             prepared = self._kernel(kernel, kernel.entry_point, len(found))

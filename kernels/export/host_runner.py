@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.weight_homes import INLINE
 from . import tools
 from .buffer_runner import READ, WRITTEN, BufferRunner, Launch
 
@@ -75,7 +76,8 @@ class HostRunner(BufferRunner):
     suffix = ".cpp"
     options: tuple[str, ...] = ("-std=c++17",)
 
-    def __init__(self) -> None:
+    def __init__(self, name: str = "") -> None:
+        self.name = name or self.name
         self._folder = tempfile.TemporaryDirectory(prefix="wamnet-host-")
         self._count = 0
         told = tools.run(self.program, "--version", folder=Path(self._folder.name))
@@ -84,6 +86,10 @@ class HostRunner(BufferRunner):
     def _glue(self, source: str, entry: str, count: int, folder: Path) -> str:
         """Return the text that is compiled, with a function `wamnet_call`."""
         raise NotImplementedError
+
+    def _weights(self, buffer: str) -> list[str]:
+        """Return the argument that holds weights, if they are one."""
+        return [] if self.name.endswith(INLINE) else [buffer]
 
     def _prepare(self, source: str, entry: str, count: int) -> Any:
         self._count += 1
@@ -132,7 +138,7 @@ class CRunner(HostRunner):
         images, reads, writes = _images(count), f"buffers[{READ}]", f"buffers[{WRITTEN}]"
         part = ", ".join(["(uint32_t)sizes[4]" if i == 4 else f"sizes[{i}]" for i in range(6)])
         arguments = {
-            "wamnet_pixel": [*images, reads, writes, *_sizes(2)],
+            "wamnet_pixel": [*images, *self._weights(reads), writes, *_sizes(2)],
             "wamnet_trace_pixel": ["&part", writes],
             "wamnet_encode": [reads, *images, *_sizes(3)],
         }
@@ -157,7 +163,7 @@ class CUDARunner(HostRunner):
         images = _images(count)
         reads, writes = f"buffers[{READ}]", f"buffers[{WRITTEN}]"
         arguments = {
-            "wamnet_denoise": [*images, reads, writes, *_sizes(2)],
+            "wamnet_denoise": [*images, *self._weights(reads), writes, *_sizes(2)],
             "wamnet_trace": [writes, *_sizes(7)],
             "wamnet_encode": [reads, *images, *_sizes(3)],
         }

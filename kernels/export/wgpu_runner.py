@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.glsl_buffers import GROUP
+from ...compiler.weight_homes import UNIFORM
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from . import tools
-from .buffer_runner import BufferRunner, Launch
+from .buffer_runner import READ, BufferRunner, Launch
 
 WAY_OUT = "pip install 'wamnet[targets]', and a Vulkan driver: apt-get install mesa-vulkan-drivers"
 """How to get a device."""
@@ -65,8 +66,9 @@ class WgpuRunner(BufferRunner):
         held = {0: device.create_buffer_with_data(data=sizes, usage=usage.UNIFORM)}
         for place, data in launch.buffers.items():
             written = usage.COPY_SRC if place in launch.back else 0
+            kind = usage.UNIFORM if place == READ and self.name.endswith(UNIFORM) else usage.STORAGE
             held[place] = device.create_buffer_with_data(
-                data=np.ascontiguousarray(data).tobytes(), usage=usage.STORAGE | written
+                data=np.ascontiguousarray(data).tobytes(), usage=kind | written
             )
         entries = [
             {"binding": place, "resource": {"buffer": buffer, "offset": 0, "size": buffer.size}}
@@ -85,13 +87,11 @@ class WgpuRunner(BufferRunner):
         ]
 
 
-def vulkan_runner() -> WgpuRunner:
+def vulkan_runner(name: str = "glsl-vulkan") -> WgpuRunner:
     """Return a runner of GLSL for Vulkan, by way of SPIR-V."""
-    return WgpuRunner("glsl-vulkan", tools.spirv)
+    return WgpuRunner(name, tools.spirv)
 
 
-def hlsl_runner(style: str = "dxc") -> WgpuRunner:
+def hlsl_runner(style: str = "dxc", name: str = "glsl-vulkan") -> WgpuRunner:
     """Return a runner of the HLSL that GLSL for Vulkan is translated to, by way of SPIR-V."""
-    return WgpuRunner(
-        "glsl-vulkan", lambda source: tools.spirv(tools.hlsl(tools.spirv(source), style), "hlsl")
-    )
+    return WgpuRunner(name, lambda source: tools.spirv(tools.hlsl(tools.spirv(source), style), "hlsl"))

@@ -67,6 +67,15 @@ def test_three_numbers(wamnet, tmp_path) -> None:
     assert exr.read_frame(tmp_path / "a.exr").info["scene_digest"] == want
 
 
+def test_features_of_more_rays(wamnet, tmp_path) -> None:
+    """The file has them, and says of how many rays they are means."""
+    size = ("--width", 4, "--height", 3)
+    assert wamnet("render", "cornell", *size, "--feature-spp", 6, "-o", "a.exr").status == 0
+    found, want = exr.read_frame(tmp_path / "a.exr"), render(canonical("cornell"), Job(4, 3, feature_spp=6))
+    assert all((found[name] == values).all() for name, values in want.frame.layers.items())
+    assert found.info["feature_spp"] == "6"
+
+
 def test_a_picture(wamnet, tmp_path) -> None:
     """PNG holds the display-encoded colour, one stop brighter here."""
     arguments = ["--set", "background=0.25", "--width", 3, "--height", 2]
@@ -113,6 +122,7 @@ def test_a_scene_file_renders_the_same(wamnet, tmp_path) -> None:
         (["minicubes", "--width", "0"], "width is 0: it must be an integer from 1 to"),
         (["minicubes", "--spp", "-1"], "spp is -1: it must be an integer from 1 to"),
         (["minicubes", "--seed", "-1"], "seed is -1: it must be an integer from 0 to"),
+        (["minicubes", "--feature-spp", "-1"], "feature_spp is -1: it must be an integer from 0 to"),
         (["minicubes", "--max-depth", "-1"], "max_depth is -1: it counts scatterings"),
         (["minicubes", "--workers", "0"], "workers is 0: at least one process must work; use 1 or more"),
         (["minicubes", "-o", "a.jpg"], "output file is a.jpg: its name must end in .exr or .png"),

@@ -31,7 +31,7 @@ def test_the_model_is_the_references(wamnet, pair, tmp_path) -> None:
     model = load_model(tmp_path / "m.safetensors")
     assert model.features == ("color", "normal")
     assert model.info["trained_on_time"] == "1.0"
-    recipe = train.choose_recipe("short", None, {"features": ("color", "normal"), "steps": 2, "seed": 3})
+    recipe = train.choose_recipe("best", None, {"features": ("color", "normal"), "steps": 2, "seed": 3})
     frames = exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr")
     want = reference.train(recipe, [frames]).siren
     assert all((a == b).all() for a, b in zip(model.siren.weights, want.weights, strict=True))
@@ -67,7 +67,7 @@ def test_checkpoints_by_time(wamnet, pair, tmp_path, monkeypatch) -> None:
         "wamnet.compiler.model_file.save_checkpoint", lambda _path, state: kept.append(state.step)
     )
     frames = [(exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr"))]
-    recipe = train.choose_recipe("short", None, {"features": ("color",), "steps": 4})
+    recipe = train.choose_recipe("best", None, {"features": ("color",), "steps": 4})
     train.fit(train.replace(recipe, log_every=2), frames, tmp_path / "m.safetensors")
     assert kept == [2, 4, 4]
 
@@ -191,7 +191,7 @@ def test_a_model_is_cut_and_trained_on(wamnet, refused, pair, tmp_path) -> None:
     more = ("--from", "full.safetensors", "--rank", 4, "--steps", 3, "-o", "cut.safetensors")
     assert wamnet("train", *pair, *more).status == 0
     choices = {"features": ("color", "normal"), "steps": 3, "rank": 4}
-    recipe = train.choose_recipe("short", None, choices)
+    recipe = train.choose_recipe("best", None, choices)
     frames = exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr")
     network = load_model(tmp_path / "full.safetensors").siren
     want = reference.train(recipe, [frames], network=network)
@@ -208,7 +208,7 @@ def test_training_on_a_device(wamnet, refused, pair, tmp_path, executor_named) -
     device = executor_named("opencl")
     options = ("--steps", 4, "--executor", "opencl")
     assert wamnet("train", *pair, *options, "-o", "m.safetensors").status == 0
-    recipe = train.choose_recipe("short", None, {"features": ("color", "normal"), "steps": 4})
+    recipe = train.choose_recipe("best", None, {"features": ("color", "normal"), "steps": 4})
     frames = exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr")
     want = train_on(device, recipe, [frames]).siren
     found = load_model(tmp_path / "m.safetensors").siren
@@ -226,7 +226,7 @@ def test_factors_are_trained_on_a_device(wamnet, pair, tmp_path, executor_named)
     assert wamnet("train", *pair, "--steps", 2, "-o", "full.safetensors").status == 0
     more = ("--from", "full.safetensors", "--rank", 4, "--steps", 3, "-o", "cut.safetensors")
     assert wamnet("train", *pair, *more, "--executor", "opencl").status == 0
-    recipe = train.choose_recipe("short", None, {"features": ("color", "normal"), "steps": 3, "rank": 4})
+    recipe = train.choose_recipe("best", None, {"features": ("color", "normal"), "steps": 3, "rank": 4})
     frames = exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr")
     want = train_on(device, recipe, [frames], network=load_model(tmp_path / "full.safetensors").siren)
     got = load_checkpoint(tmp_path / "cut.checkpoint.safetensors")

@@ -47,6 +47,15 @@ def test_the_paper_s_figure_is_what_its_table_prints(mse, printed):
     assert abs(scores.paper_figure(mse) - printed) <= 0.07
 
 
+def test_squares_of_eight_bits_wrap_around():
+    target = np.zeros((12, 12, 3))
+    for levels, square in ((3, 9), (16, 0), (20, 400 - 256), (255, 65025 % 256)):
+        assert scores.wrapped_mse(target + levels / 255.0, target) == square
+    a, b = (np.random.default_rng(7).integers(0, 256, (8, 8, 3)).astype(np.uint8) for _ in range(2))
+    b = b[::-1]
+    assert scores.wrapped_mse(a / 255.0, b / 255.0) == np.mean((a - b) ** 2)  # NumPy's own 8 bits
+
+
 def test_means_are_over_pictures():
     assert scores.mean_scores([{"mse": 1.0}, {"mse": 3.0}]) == {"mse": 2.0}
 

@@ -65,6 +65,23 @@ def test_pictures_have_names_and_seeds_of_their_own() -> None:
     assert (facts["split"], facts["time_s"], facts["noisy"]["spp"]) == ("train", 0.0, 1)
 
 
+def test_rays_of_features_and_samples_of_tests() -> None:
+    """Noisy pictures alone have rays for features; test targets have samples of their own number."""
+    request = replace(TINY, feature_spp=16, test_spp=5)
+    jobs = [{kind: p.job for kind, p in frame.pictures.items()} for frame in plan(request)]
+    assert [job["noisy"].feature_spp for job in jobs] == [16, 16, 16]
+    assert [job["target"].feature_spp for job in jobs] == [0, 0, 0]
+    assert [job["target"].spp for job in jobs] == [2, 2, 5]
+    noisy = frame_plan.describe(plan(request)[0])["noisy"]
+    assert (noisy["spp"], noisy["feature_spp"]) == (1, 16)
+    assert "feature_spp" not in frame_plan.describe(plan(TINY)[0])["noisy"]
+    assert {"feature_spp": 16, "test_spp": 5}.items() <= request.as_data().items()
+    assert not {"feature_spp", "test_spp"} & TINY.as_data().keys()  # as texts of the time before had it
+    task = tasks_of(plan(request)[0].pictures["noisy"])[0]
+    assert task.samples == 6 * 6 * (1 + 16)
+    assert carry_out(task).info["feature_spp"] == "16"
+
+
 def test_small_pictures_are_one_task_and_large_ones_many() -> None:
     """Bands have at least a tile of pixels; together they are all rows."""
     small, large = plan(TINY)[0].pictures["target"], plan(replace(TINY, size_px=1024, spp=1024))[0].pictures

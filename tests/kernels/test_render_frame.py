@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ REQUIRED = {"numpy": "numpy", "opencl": "opencl", "opengl": "opengl-egl"}
 def test_bands_are_the_frame(executor_named, name) -> None:
     """Rows rendered apart and joined are all rows, to the bit."""
     executor_named(REQUIRED[name])
-    job = Job(7, 5, 2, 3)
+    job = Job(7, 5, 2, 3, feature_spp=4)
     whole = render_frame(name, SCENE, job)
     assert whole.frame.height == 5
     parts = join_rows([render_frame(name, SCENE, job, rows=rows) for rows in ((0, 2), (2, 5))])
@@ -38,6 +39,23 @@ def test_a_kernel_renders_the_scene(executor_named, name) -> None:
     want, got = (render_frame(renderer, SCENE, job).frame for renderer in ("numpy", name))
     near = np.abs(got["position"] - want["position"]) <= 1e-5 * (1 + np.abs(want["position"]))
     assert near.all(axis=-1).mean() >= 0.97  # one path of 35 may pass an edge by less than rounding
+
+
+@pytest.mark.parametrize("name", ["opencl", "opengl"])
+def test_kernels_take_more_rays_for_features(executor_named, name) -> None:
+    """The colour's bits are those of a job without; the features are those of as many samples."""
+    executor_named(REQUIRED[name])
+    job, counted = Job(7, 5, 1, 3), []
+    found = render_frame(name, SCENE, replace(job, feature_spp=6), on_progress=counted.append).frame
+    plain = render_frame(name, SCENE, job).frame
+    assert (found["color"] == plain["color"]).all()
+    assert sum(counted) == 7 * 5 * (1 + 6)
+    want = render_frame("numpy", SCENE, replace(job, feature_spp=6)).frame
+    for layer in ("albedo", "normal", "position"):
+        # As above: at most one ray of 210 may pass an edge by less than rounding, and moves one pixel.
+        near = np.abs(found[layer] - want[layer]) <= 1e-5 * (1 + np.abs(want[layer]))
+        assert near.all(axis=-1).mean() >= 0.97
+    assert not np.array_equal(found["position"], plain["position"])
 
 
 @pytest.mark.parametrize("name", RENDERERS)
@@ -59,12 +77,12 @@ def test_threads_have_devices_of_their_own(executor_named) -> None:
 
 def test_numpy_is_the_reference() -> None:
     """Also with workers, and the samples are counted."""
-    job, counted = Job(6, 4, 2), []
+    job, counted = Job(6, 4, 2, feature_spp=3), []
     want = render(SCENE, job).frame["color"]
     for workers in (1, 2, None):
         got = render_frame("numpy", SCENE, job, workers=workers, on_progress=counted.append)
         assert (got.frame["color"] == want).all()
-    assert sum(counted) == 3 * 6 * 4 * 2
+    assert sum(counted) == 3 * 6 * 4 * (2 + 3)
 
 
 def test_an_unknown_executor_is_refused() -> None:

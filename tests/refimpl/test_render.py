@@ -118,6 +118,32 @@ def test_layers_of_a_known_scene():
     )  # a product and a sum of numbers < 8
 
 
+def test_features_of_more_rays_are_their_means():
+    """RND-2b: the colour stays to the bit; features are means over single rays, the colour's among them."""
+    job = R.Job(9, 7, 2, seed=5, dtype="float64")
+    counted: list[int] = []
+    found = R.render(CORNELL, replace(job, feature_spp=5), on_progress=counted.append)
+    plain = R.render(CORNELL, job)
+    assert np.array_equal(found.frame["color"], plain.frame["color"])
+    assert np.array_equal(found.color_variance, plain.color_variance)
+    assert sum(counted) == replace(job, feature_spp=5).samples == 9 * 7 * (2 + 5)
+    rays = [R.render(CORNELL, replace(job, spp=1, first_sample=n)).frame for n in range(5)]
+    for name in ("albedo", "normal", "depth", "position", "direction"):
+        mean = np.mean([ray[name] for ray in rays], axis=0)
+        # Five sums and a quotient of float64 in another order: 6 roundings of numbers below 8.
+        assert np.max(np.abs(found.frame[name] - mean)) <= 6 * 8 * 2.0**-53
+    assert found.frame.info == {**plain.frame.info, "feature_spp": "5"}
+
+
+@pytest.mark.parametrize("feature_spp", [0, 1, 2])
+def test_features_of_no_more_rays_are_the_colour_s(feature_spp):
+    job = R.Job(5, 4, 2, seed=5)
+    found = R.render(CORNELL, replace(job, feature_spp=feature_spp))
+    assert equal(found, R.render(CORNELL, job))
+    assert "feature_spp" not in found.frame.info
+    assert replace(job, feature_spp=feature_spp).samples == 5 * 4 * 2
+
+
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 @pytest.mark.parametrize("name", ["cornell", "lone_light", "empty"])
 def test_layers_are_zero_where_nothing_is_hit(name, dtype):
@@ -164,6 +190,7 @@ def test_info_names_what_made_the_frame():
         ({"seed": True}, "seed is True"),
         ({"first_sample": 2**32}, "first_sample is 4294967296"),
         ({"dtype": "float16"}, "dtype is float16: it must be float32 or float64"),
+        ({"feature_spp": -1}, "feature_spp is -1: it must be an integer from 0 to 4294967296"),
     ],
 )
 def test_refuses_jobs(arguments, message):

@@ -10,6 +10,7 @@ numbers are not shown.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -18,6 +19,12 @@ from typing import Any
 import numpy as np
 
 from wamnet.compiler import sine
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.encode_kernel import compile_encode
+from wamnet.compiler.lower import lower
+from wamnet.compiler.lower_scene import lower_scene
+from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.step_kernel import compile_step
 from wamnet.kernels.conformance.numbers import number_text
 from wamnet.refimpl import (
     adam,
@@ -38,6 +45,7 @@ from wamnet.refimpl import (
     train,
     transport,
 )
+from wamnet.refimpl.denoise import Model
 
 SEED, SAMPLE, X, Y, SIZE_PX = 7, 5, 6, 10, 16
 """The path that several chapters follow: sample 5 of pixel (6, 10) of a picture of 16 x 16, seed 7."""
@@ -234,7 +242,7 @@ def display_values() -> list[str]:
 def window_at_border() -> list[str]:
     """The window of 4 x 4 of the top left pixel under both border rules."""
     image = (10.0 * np.arange(3)[:, None] + np.arange(5))[..., None]
-    lines = ["```text", "image              clamp              zero"]
+    lines = ["```text", f"{'image':<22} {'clamp':<18} zero"]
     clamp, zero = (
         dataset.windows_at(image, [0], [0], dataset.Window(4, border)).reshape(4, 4)
         for border in ("clamp", "zero")
@@ -371,6 +379,88 @@ def sine_steps() -> list[str]:
         columns.append([*reduced, *found])
     names = ("x", "k", "x - k P1", "r", "sign", "p(r), degree 11", "result", "sin(x), exact")
     return table(("", "first", "second", "third"), [[n, *c] for n, *c in zip(names, *columns, strict=True)])
+
+
+def _small_model() -> Model:
+    """Return a model of colour and normal, of 2 x 2 pixels and four neurons."""
+    features, window = ("color", "normal"), dataset.Window(2, "clamp")
+    network = siren.init((dataset.n_inputs(features, window), 4, 3), 1.0, 1.0, SEED)
+    return Model(network, features, window, dataset.Normalization())
+
+
+def signature(source: str, language: str) -> list[str]:
+    """Return what a caller binds, as the source declares it, in a fence."""
+    if language == "glsl":
+        declared = re.findall(r"(?m)^(?:uniform|layout).*;$", source)
+    else:
+        declared = re.findall(r"(?ms)^(?:__kernel|static inline) void wamnet_\w+\(.*?\)", source)
+        declared = [re.sub(r"\n +", "\n    ", text) for text in dict.fromkeys(declared)]
+    return [f"```{language}", *declared, "```"]
+
+
+@worked
+def denoise_bindings() -> list[str]:
+    """What each target's plain kernel, and the compute shader, ask for."""
+    program = lower(_small_model())
+    kinds = (
+        ("opencl", "plain", "c"),
+        ("opengl", "plain", "glsl"),
+        ("opengl", "compute", "glsl"),
+        ("c", "plain", "c"),
+    )
+    lines: list[str] = []
+    for target, schedule, language in kinds:
+        made = compile_program(program, target, "ieee", schedule)
+        lines += ["", f"{made.manifest['language']}, `{schedule}`:", "", *signature(made.source, language)]
+    return lines[1:]
+
+
+@worked
+def path_bindings() -> list[str]:
+    """What a path kernel asks for."""
+    programs = lower_scene(scenes.canonical("furnace"), transport.Settings(max_depth=3))
+    lines: list[str] = []
+    for target, language in (("opencl", "c"), ("opengl", "glsl")):
+        made = compile_path(programs, target, "ieee", 1)
+        lines += ["", f"{made.manifest['language']}:", "", *signature(made.source, language)]
+    planes = ", ".join(f"`{plane}`" for plane in made.planes)
+    return [*lines[1:], "", f"Planes of a frame, in order: {planes}."]
+
+
+@worked
+def encode_bindings() -> list[str]:
+    """What the encoding of colour and depth asks for."""
+    lines: list[str] = []
+    for target, language in (("opencl", "c"), ("opengl", "glsl")):
+        made = compile_encode(("color", "depth"), dataset.Normalization(), target)
+        lines += ["", f"{made.manifest['language']}:", "", *signature(made.source, language)]
+    return lines[1:]
+
+
+@worked
+def train_bindings() -> list[str]:
+    """What the kernels of a step ask for."""
+    source = compile_step((12, 20, 3), (1.0, 1.0), 32, 2).source
+    found = [
+        re.sub(r"\n +", "\n    ", match)
+        for match in re.findall(r"(?ms)^(?:__kernel [^\n]*\n)?(?:__kernel )?void wamnet_\w+\(.*?\)", source)
+    ]
+    return ["```c", *found, "```"]
+
+
+@worked
+def denoise_manifest() -> list[str]:
+    """A manifest, with hashes left out."""
+    made = compile_program(lower(_small_model()), "opencl", "ieee", "plain")
+    text = json.dumps(made.manifest, indent=1, sort_keys=True)
+    text = re.sub(r"[0-9a-f]{64}", "64 hexadecimal digits", text)
+    for _ in range(2):  # Lists and objects of numbers and texts on one line.
+        text = re.sub(
+            r"([\[{])\n *([^\[\]{}]{0,90}?)\n *([\]}])",
+            lambda m: m[1] + re.sub(r"\n *", " ", m[2]) + m[3],
+            text,
+        )
+    return ["```json", *text.splitlines(), "```"]
 
 
 # ---- the appendix ---------------------------------------------------------------------------------------

@@ -1,0 +1,501 @@
+// The page: controls, keys and pointer, what is said to people, and the loop.
+
+const SIZES = [64, 96, 128, 192, 256, 384, 512, 768, 1024];
+const AUTO_START = 128; // every device gets this far in a moment
+const AUTO_LARGEST = 512;
+const AUTO_QUICK_MS = 20; // a larger picture is tried below this
+const AUTO_SLOW_MS = 400; // a smaller one above this
+const AUTO_FRAMES = 4; // frames before either is believed
+const GRAB_PX = 18; // how near to the line a pointer takes hold of it
+const DEGREES_PER_PX = 0.4;
+const LABELS = { color: "1 sample per pixel", normal: "Normals", albedo: "Albedo", picture: "Denoised" };
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+const REST = { yaw: 0, pitch: 0, distance: 1 };
+
+const find = (id) => document.getElementById(id);
+
+class Page {
+  constructor(data) {
+    this.data = data;
+    data.numbers.rows = decodeFloats(data.numbers.rows);
+    this.state = {
+      playing: data.times.length > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches,
+      clock: 0,
+      turn: { ...REST },
+      colors: data.lights.map((light) => light.color),
+      size: "auto",
+      variant: data.variants[0].name,
+      left: "color",
+      right: "picture",
+      wipe: 0.5,
+      seed: 0,
+    };
+    this.auto = { size: AUTO_START, frames: 0, limit: AUTO_LARGEST };
+    this.dirty = true;
+    this.held = false; // a test draws; the loop leaves pictures alone
+    this.times = [];
+    this.checks = new Map();
+  }
+
+  // ---- starting ---------------------------------------------------------------------------------------
+
+  async start() {
+    this.fill();
+    this.listen();
+    const canvas = find("picture");
+    try {
+      this.device = new Device(canvas, this.leastBuffers());
+      this.renderer = new Renderer(this.device, this.data);
+    } catch (error) {
+      this.trouble(error);
+      throw error;
+    }
+    canvas.addEventListener("webglcontextlost", (event) => this.lost(event));
+    canvas.addEventListener("webglcontextrestored", () => this.restored());
+    find("device").textContent = this.device.name;
+    if (SOFTWARE.test(this.device.name) && this.data.variants.length > 1) {
+      this.state.variant = this.data.variants[1].name; // the whole network takes a processor seconds
+    }
+    find("variant").value = this.state.variant;
+    requestAnimationFrame((now) => this.loop(now));
+    await this.choose(this.state.variant);
+  }
+
+  /** Textures that some pass draws into at once. */
+  leastBuffers() {
+    const { path, encoders, variants } = this.data;
+    const counts = [Math.ceil(path.planes.length / 4), ...encoders.map((e) => e.images.length)];
+    return Math.max(...counts, ...variants.flatMap((v) => v.passes.map((pass) => pass.buffers)));
+  }
+
+  /** Compile what a variant needs, and check it; the picture before stays until it is ready. */
+  async choose(name) {
+    this.preparing = name;
+    try {
+      await this.prepare(name);
+      this.state.variant = name;
+      this.auto.frames = 0;
+      this.dirty = true;
+      if (!this.checks.has(name)) {
+        this.checks.set(name, await this.renderer.check(name));
+      }
+      this.preparing = null;
+      this.tellVariant();
+      this.say(this.state.playing ? "Ready. The animation is playing." : "Ready. The animation is paused.");
+    } catch (error) {
+      if (!(error instanceof Lost)) {
+        this.trouble(error);
+        throw error;
+      }
+    }
+  }
+
+  async prepare(name) {
+    if (this.renderer.variant(name).ready) {
+      return;
+    }
+    this.say("Compiling shaders. The page stays usable meanwhile.");
+    await this.renderer.prepare(name, (done, all) => this.progress(done, all));
+    this.progress(1, 1);
+  }
+
+  /** The context is lost: a driver was reset, or gave up on a shader. */
+  lost(event) {
+    event.preventDefault();
+    this.renderer.strips.drop();
+    this.renderer.ready = false;
+    this.progress(1, 1);
+    const { variants } = this.data;
+    const facts = variants.find((one) => one.name === this.preparing);
+    if (facts && facts.schedule === "inlined") {
+      // A shader with all weights in its text may be too much to compile: take a short one.
+      this.state.variant = variants.find((one) => one.schedule !== "inlined" && one.rank === facts.rank).name;
+      find("variant").value = this.state.variant;
+    }
+    this.say("The graphics device was lost. If it does not come back in a moment, load the page again.");
+  }
+
+  restored() {
+    this.device.setUp(this.leastBuffers());
+    this.renderer.build();
+    this.checks.clear();
+    return this.choose(this.state.variant);
+  }
+
+  /** Show in plain words what keeps the page from working. */
+  trouble(error) {
+    find("trouble-what").textContent =
+      error instanceof Missing ? error.message : `A shader was refused by this device: ${error.message}`;
+    find("trouble").hidden = false;
+    find("stage").hidden = true;
+    find("controls").hidden = true;
+    this.say("The page cannot run here.");
+    this.progress(1, 1);
+  }
+
+  // ---- the loop ---------------------------------------------------------------------------------------
+
+  loop(now) {
+    requestAnimationFrame((next) => this.loop(next));
+    const passed = Math.min(now - (this.before || now), 250) / 1000; // a hidden page does not leap ahead
+    this.before = now;
+    const { state, renderer } = this;
+    if (!renderer.ready || this.device.gl.isContextLost()) {
+      return;
+    }
+    if (state.playing && !this.held) {
+      const { times } = this.data;
+      state.clock = (state.clock + passed) % this.duration();
+      this.tellTime();
+      this.dirty = this.dirty || times.length > 1;
+    }
+    renderer.strips.tick(now);
+    if (this.dirty && !this.held && !renderer.strips.busy && renderer.variant(state.variant).ready) {
+      this.dirty = false;
+      this.drawNext();
+      renderer.strips.tick(now);
+    }
+  }
+
+  async drawNext() {
+    const { state } = this;
+    state.seed = state.playing ? (state.seed + 1) >>> 0 : state.seed;
+    const size = state.size === "auto" ? this.auto.size : state.size;
+    try {
+      const ms = await this.renderer.draw(this.request(size));
+      this.measured(size, ms);
+      this.show();
+    } catch (error) {
+      if (!(error instanceof Lost)) {
+        this.trouble(error);
+        throw error;
+      }
+    }
+  }
+
+  request(size) {
+    const { state, data } = this;
+    const camera = orbit(data.camera, state.turn);
+    const { colors, seed, variant } = state;
+    return { size, frame: this.frame(), seed, camera, colors, variant };
+  }
+
+  duration() {
+    const { times } = this.data;
+    return times.length > 1 ? (times[1] - times[0]) * times.length : 1;
+  }
+
+  frame() {
+    const { times } = this.data;
+    return Math.floor((this.state.clock / this.duration()) * times.length) % times.length;
+  }
+
+  /** Keep frames/s, and fit the size to the device. */
+  measured(size, ms) {
+    const now = performance.now();
+    this.times = [...this.times.filter((one) => now - one.at < 1000), { at: now, ms }];
+    if (now - (this.toldAt || 0) > 400 || this.times.length === 1) {
+      this.toldAt = now;
+      const mean = this.times.reduce((sum, one) => sum + one.ms, 0) / this.times.length;
+      const span = now - this.times[0].at;
+      const rate = this.times.length > 1 ? (1000 * (this.times.length - 1)) / span : 1000 / Math.max(ms, 1);
+      find("rate").textContent = this.state.playing ? rate.toFixed(rate < 10 ? 1 : 0) : "paused";
+      find("milliseconds").textContent = `${mean.toFixed(0)} ms`;
+      find("pixels").textContent = `${size} × ${size}`;
+    }
+    const { auto } = this;
+    if (this.state.size !== "auto" || ++auto.frames < AUTO_FRAMES) {
+      return;
+    }
+    const place = SIZES.indexOf(size);
+    if (ms > AUTO_SLOW_MS && place > 0) {
+      auto.limit = auto.size = SIZES[place - 1];
+      auto.frames = 0;
+    } else if (ms < AUTO_QUICK_MS && size < auto.limit) {
+      auto.size = SIZES[place + 1];
+      auto.frames = 0;
+    }
+  }
+
+  show() {
+    const { left, right, wipe } = this.state;
+    this.renderer.show(left, right, wipe);
+  }
+
+  // ---- what is said -----------------------------------------------------------------------------------
+
+  say(text) {
+    find("status").textContent = text;
+  }
+
+  progress(done, all) {
+    find("progress").hidden = done >= all;
+    find("progress").max = all;
+    find("progress").value = done;
+    find("progress-text").textContent = done < all ? `shader ${done + 1} of ${all}` : "";
+  }
+
+  tellTime() {
+    const time = this.data.times[this.frame()];
+    const slider = find("time");
+    slider.value = this.frame();
+    slider.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds`);
+    find("time-value").textContent = `${time.toFixed(2)} s`;
+  }
+
+  tellTurn() {
+    const { yaw, pitch, distance } = this.state.turn;
+    const told = { yaw: `${yaw.toFixed(0)}°`, pitch: `${pitch.toFixed(0)}°`, distance: `× ${distance.toFixed(2)}` };
+    const spoken = { yaw: `${yaw.toFixed(0)} degrees`, pitch: `${pitch.toFixed(0)} degrees` };
+    for (const name of Object.keys(told)) {
+      find(name).value = this.state.turn[name];
+      find(`${name}-value`).textContent = told[name];
+      find(name).setAttribute("aria-valuetext", spoken[name] || `${distance.toFixed(2)} times`);
+    }
+  }
+
+  tellWipe() {
+    const percent = Math.round(100 * this.state.wipe);
+    find("line").style.left = `${100 * this.state.wipe}%`;
+    find("wipe").value = percent;
+    const [left, right] = [LABELS[this.state.left], LABELS[this.state.right]];
+    find("wipe").setAttribute("aria-valuetext", `${percent} percent ${left}, the rest ${right}`);
+    find("left-label").textContent = left;
+    find("right-label").textContent = right;
+    find("left-label").style.opacity = this.state.wipe > 0.04 ? 1 : 0;
+    find("right-label").style.opacity = this.state.wipe < 0.96 ? 1 : 0;
+  }
+
+  tellVariant() {
+    const facts = this.data.variants.find((one) => one.name === this.state.variant);
+    const check = this.checks.get(facts.name);
+    const number = (x) => (x === 0 ? "0" : x.toExponential(1).replace("e-", "\u00a0·\u00a010⁻").replace(/⁻(\d+)$/, raised));
+    find("products").textContent = facts.products.toLocaleString("en");
+    find("bound").textContent = facts.bound === null ? "none" : number(facts.bound);
+    find("first-difference").textContent =
+      facts.name === this.data.variants[0].name ? "it is the full one" : `${(100 * facts.rms_to_first).toFixed(1)} %`;
+    if (check) {
+      const held = check.share <= 1;
+      find("error").textContent = `${number(check.error)}, ${held ? "within" : "NOT within"} ${number(check.bound)}`;
+      find("error").classList.toggle("bad", !held);
+    }
+  }
+
+  tellPlaying() {
+    find("play").textContent = this.state.playing ? "Pause" : "Play";
+  }
+
+  // ---- controls ---------------------------------------------------------------------------------------
+
+  /** Fill in what depends on the data. */
+  fill() {
+    const { data } = this;
+    const option = (value, text) => new Option(text, value);
+    const images = ["color", "normal", "picture"];
+    for (const side of ["left", "right"]) {
+      find(side).append(...images.map((name) => option(name, LABELS[name])));
+      find(side).value = this.state[side];
+    }
+    find("size").append(
+      option("auto", "as the device can"),
+      ...SIZES.map((size) => option(size, `${size} × ${size}`)),
+    );
+    find("variant").append(...data.variants.map((one) => option(one.name, variantText(one))));
+    find("time").max = data.times.length - 1;
+    find("animation").hidden = data.times.length < 2;
+    find("lights").hidden = data.lights.length === 0;
+    data.lights.forEach((light, i) => find("light-list").append(this.lightRow(light, i)));
+    this.tellTime();
+    this.tellTurn();
+    this.tellWipe();
+    this.tellPlaying();
+  }
+
+  lightRow(light, i) {
+    const row = document.createElement("p");
+    row.className = "row";
+    const label = document.createElement("label");
+    label.htmlFor = `light-${i}`;
+    label.textContent = `Light ${i + 1}`;
+    const input = document.createElement("input");
+    Object.assign(input, { type: "color", id: `light-${i}`, value: hexFromLinear(light.color) });
+    input.addEventListener("input", () => {
+      // Black lights alone could not be picked by their power: a trace of light stays.
+      const color = linearFromHex(input.value).map((c) => Math.max(c, 1e-3));
+      this.change({ colors: this.state.colors.map((old, k) => (k === i ? color : old)) });
+    });
+    row.append(label, input);
+    return row;
+  }
+
+  /** Take new values, and draw what they change. */
+  change(values) {
+    Object.assign(this.state, values);
+    this.dirty = true;
+  }
+
+  turn(values) {
+    const turn = { ...this.state.turn, ...values };
+    turn.yaw = ((((turn.yaw + 180) % 360) + 360) % 360) - 180;
+    turn.pitch = clamp(turn.pitch, -75, 75);
+    turn.distance = clamp(turn.distance, 0.4, 2);
+    this.change({ turn });
+    this.tellTurn();
+  }
+
+  play(playing) {
+    this.change({ playing });
+    this.tellPlaying();
+    this.say(playing ? "The animation is playing." : "The animation is paused.");
+    this.times = [];
+  }
+
+  step(frames) {
+    const { times } = this.data;
+    const frame = (this.frame() + frames + times.length) % times.length;
+    this.seek(frame);
+  }
+
+  seek(frame) {
+    if (this.state.playing) {
+      this.play(false);
+    }
+    this.change({ clock: ((frame + 0.5) * this.duration()) / this.data.times.length });
+    this.tellTime();
+  }
+
+  wipeTo(share) {
+    this.state.wipe = clamp(share, 0, 1);
+    this.tellWipe();
+    if (this.renderer && this.renderer.ready && !this.device.gl.isContextLost()) {
+      this.show();
+    }
+  }
+
+  listen() {
+    const on = (id, event, action) => find(id).addEventListener(event, (e) => action(e.target.value, e));
+    on("play", "click", () => this.play(!this.state.playing));
+    on("time", "input", (value) => this.seek(Number(value)));
+    on("wipe", "input", (value) => this.wipeTo(value / 100));
+    for (const name of ["yaw", "pitch", "distance"]) {
+      on(name, "input", (value) => this.turn({ [name]: Number(value) }));
+    }
+    on("camera-reset", "click", () => this.turn(REST));
+    on("lights-reset", "click", () => {
+      this.data.lights.forEach((light, i) => (find(`light-${i}`).value = hexFromLinear(light.color)));
+      this.change({ colors: this.data.lights.map((light) => light.color) });
+    });
+    on("size", "change", (value) => {
+      this.times = [];
+      this.change({ size: value === "auto" ? value : Number(value) });
+    });
+    on("variant", "change", (value) => this.choose(value));
+    for (const side of ["left", "right"]) {
+      on(side, "change", (value) => {
+        this.state[side] = value;
+        this.wipeTo(this.state.wipe);
+      });
+    }
+    this.listenToPicture(find("picture"));
+  }
+
+  /** Drag to turn, drag the line to wipe; keys do both. */
+  listenToPicture(canvas) {
+    let held = null;
+    const share = (event) => {
+      const box = canvas.getBoundingClientRect();
+      return (event.clientX - box.left) / box.width;
+    };
+    canvas.addEventListener("pointerdown", (event) => {
+      const width = canvas.getBoundingClientRect().width;
+      const near = Math.abs(share(event) - this.state.wipe) * width <= GRAB_PX;
+      held = { near, x: event.clientX, y: event.clientY, turn: this.state.turn };
+      canvas.setPointerCapture(event.pointerId);
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (held && held.near) {
+        this.wipeTo(share(event));
+      } else if (held) {
+        const yaw = held.turn.yaw - DEGREES_PER_PX * (event.clientX - held.x);
+        const pitch = held.turn.pitch + DEGREES_PER_PX * (event.clientY - held.y);
+        this.turn({ yaw, pitch });
+      }
+    });
+    for (const name of ["pointerup", "pointercancel"]) {
+      canvas.addEventListener(name, () => (held = null));
+    }
+    canvas.addEventListener("keydown", (event) => {
+      const { yaw, pitch, distance } = this.state.turn;
+      const keys = {
+        ArrowLeft: () => this.turn({ yaw: yaw - 5 }),
+        ArrowRight: () => this.turn({ yaw: yaw + 5 }),
+        ArrowUp: () => this.turn({ pitch: pitch + 5 }),
+        ArrowDown: () => this.turn({ pitch: pitch - 5 }),
+        "+": () => this.turn({ distance: distance / 1.1 }),
+        "-": () => this.turn({ distance: distance * 1.1 }),
+        0: () => this.turn(REST),
+        " ": () => this.data.times.length > 1 && this.play(!this.state.playing),
+        ",": () => this.step(-1),
+        ".": () => this.step(1),
+        a: () => this.wipeTo(this.state.wipe - 0.05),
+        d: () => this.wipeTo(this.state.wipe + 0.05),
+      };
+      if (keys[event.key] && !event.ctrlKey && !event.metaKey && !event.altKey) {
+        event.preventDefault();
+        keys[event.key]();
+      }
+    });
+  }
+}
+
+function raised(_, digits) {
+  return `⁻${digits.replace(/\d/g, (digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit])}`;
+}
+
+function variantText(variant) {
+  const place = variant.schedule === "packed" ? ", weights in a texture" : "";
+  return variant.rank ? `fast, rank ${variant.rank}${place}` : "full";
+}
+
+/** For tests and for the curious: draw a given moment and read its floats. */
+function hook(page, started) {
+  return {
+    ready: started,
+    page,
+    parts: { Strips, REST, decodeFloats },
+    /** Stop the loop's own pictures, and draw one: {size, frame, seed, turn, colors, variant}. */
+    async draw(options) {
+      page.held = true;
+      while (page.renderer.strips.busy) {
+        await nextFrame();
+      }
+      const { state } = page;
+      if (options.variant && options.variant !== state.variant) {
+        await page.choose(options.variant);
+      }
+      const camera = orbit(page.data.camera, { ...REST, ...options.turn });
+      const colors = options.colors || page.data.lights.map((light) => light.color);
+      const { size = 64, frame = 0, seed = 0 } = options;
+      await page.renderer.draw({ size, frame, seed, camera, colors, variant: state.variant });
+      page.show();
+      return { camera, colors, time: page.data.times[frame] };
+    },
+    /** Floats (RGBA, rows from the top) of an image as base64. */
+    read(name) {
+      const bytes = new Uint8Array(page.renderer.read(name).buffer);
+      let text = "";
+      for (let i = 0; i < bytes.length; i += 4096) {
+        text += String.fromCharCode(...bytes.subarray(i, i + 4096));
+      }
+      return btoa(text);
+    },
+    go() {
+      page.held = false;
+    },
+  };
+}
+
+const page = new Page(JSON.parse(find("data").textContent));
+const started = page.start();
+started.catch(() => {}); // it has been told; the hook's promise tells tests
+window.wamnet = hook(page, started);

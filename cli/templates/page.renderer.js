@@ -1,0 +1,356 @@
+// Pictures: paths, encoding, denoiser, one pass after another, in strips that never hold the page up.
+
+const WEIGHT_COLUMNS = 1024; // texels in a row of the weight texture, as the kernels read it
+const BATCH_MS = 40; // work that is handed to the device at once
+const POLL_MS = 3; // between two looks at a fence
+const QUICK_MS = 12; // what comes back sooner may have been done at once
+
+/** Jobs in strips: each is a list of passes; one fence at a time. */
+class Strips {
+  constructor(device) {
+    this.device = device;
+    this.jobs = [];
+    this.pixelMs = new Map(); // by shader: what a pixel is believed to cost
+    this.sync = null;
+  }
+
+  /** Do passes {shader, target, textures, set}; resolve with the milliseconds from the first strip on. */
+  run(passes) {
+    return new Promise((done, failed) => this.jobs.push({ passes, at: 0, row: 0, done, failed, start: 0 }));
+  }
+
+  get busy() {
+    return this.jobs.length > 0;
+  }
+
+  /** Forget everything: the context is gone. */
+  drop() {
+    this.jobs.forEach((job) => job.failed(new Lost("while a picture was drawn")));
+    this.jobs = [];
+    this.sync = null;
+    this.pixelMs.clear();
+  }
+
+  /** Once a frame of the screen: see whether the last batch is done, and hand out the next one. */
+  tick(now) {
+    if (this.sync) {
+      if (!this.device.isPassed(this.sync)) {
+        return;
+      }
+      this.sync = null;
+      this.learn(now - this.handedAt);
+    }
+    const job = this.jobs[0];
+    if (!job) {
+      return;
+    }
+    if (job.at === job.passes.length) {
+      this.jobs.shift();
+      job.done(now - job.start);
+      this.tick(now);
+      return;
+    }
+    job.start = job.start || now;
+    this.hand(job, now);
+  }
+
+  /** Hand out strips worth BATCH_MS. */
+  hand(job, now) {
+    this.batch = new Set();
+    this.guess = 0;
+    while (job.at < job.passes.length && this.guess < BATCH_MS) {
+      const pass = job.passes[job.at];
+      const size = pass.target.size;
+      const known = this.pixelMs.has(pass.shader);
+      if (!known && this.batch.size) {
+        break; // drivers compile when they draw first: this row is measured alone
+      }
+      const cost = (known ? this.pixelMs.get(pass.shader) : 1) * size;
+      const fit = known ? Math.max(1, Math.floor((BATCH_MS - this.guess) / cost)) : 1;
+      const rows = Math.min(fit, size - job.row);
+      this.device.draw(pass.shader, pass.target, pass.textures, pass.set, [job.row, rows]);
+      this.batch.add(pass.shader);
+      job.row += rows;
+      if (job.row === size) {
+        job.at += 1;
+        job.row = 0;
+      }
+      if (!known) {
+        this.pixelMs.set(pass.shader, BATCH_MS / (16 * size)); // from here on 16 rows, then as measured
+        this.guess = BATCH_MS;
+        this.batch.clear();
+      }
+      this.guess += cost * rows;
+    }
+    this.sync = this.device.fence();
+    this.handedAt = now;
+    this.poll();
+  }
+
+  /** Look at the fence between the frames of the screen too: a slow device must not wait for them. */
+  poll() {
+    const sync = this.sync;
+    setTimeout(() => {
+      if (sync && this.sync === sync) {
+        this.tick(performance.now());
+        if (this.sync === sync) {
+          this.poll();
+        }
+      }
+    }, POLL_MS);
+  }
+
+  /** Correct what pixels are believed to cost. */
+  learn(ms) {
+    const factor = ms <= QUICK_MS ? 0.5 : clamp(ms / Math.max(this.guess, 1), 0.5, 4);
+    for (const shader of this.batch) {
+      this.pixelMs.set(shader, this.pixelMs.get(shader) * factor);
+    }
+  }
+}
+
+/** The shaders and textures of one scene and its networks. */
+class Renderer {
+  constructor(device, data) {
+    this.device = device;
+    this.data = data;
+    this.strips = new Strips(device);
+    this.build();
+  }
+
+  /** Start all that does not depend on a size; once more after the context was lost. */
+  build() {
+    const { device, data } = this;
+    this.size = 0;
+    this.shown = null;
+    this.sums = null;
+    this.between = [];
+    this.pictures = [];
+    this.path = device.compile(data.path.source);
+    this.encoders = data.encoders.map((encoder) => device.compile(encoder.source));
+    this.screen = device.compile(SCREEN);
+    this.variants = new Map();
+  }
+
+  /** Everything that a variant needs, being compiled from the first call on. */
+  variant(name) {
+    if (!this.variants.has(name)) {
+      const facts = this.data.variants.find((variant) => variant.name === name);
+      const passes = facts.passes.map((pass) => ({
+        ...pass,
+        shader: this.device.compile(pass.source),
+        weights: this.weights(pass),
+      }));
+      this.variants.set(name, { name, facts, passes, ready: false });
+    }
+    return this.variants.get(name);
+  }
+
+  /** A pass's weights as whole rows of texels of one float or four. */
+  weights(pass) {
+    const values = decodeFloats(pass.weights);
+    const row = WEIGHT_COLUMNS * pass.texel;
+    const rows = Math.max(1, Math.ceil(values.length / row));
+    const padded = new Float32Array(rows * row);
+    padded.set(values);
+    return this.device.texture(WEIGHT_COLUMNS, rows, padded, pass.texel === 1);
+  }
+
+  /** Wait for shaders without holding anything up; `report` is told how many are done. */
+  async compiled(shaders, report) {
+    for (let done = 0; done < shaders.length; ++done) {
+      report(done, shaders.length);
+      await nextFrame();
+      while (!this.device.isCompiled(shaders[done]) && !this.device.gl.isContextLost()) {
+        await nextFrame();
+      }
+      this.device.finish(shaders[done]);
+    }
+  }
+
+  async prepare(name, report) {
+    const variant = this.variant(name);
+    const common = [this.screen, this.path, ...this.encoders];
+    const waiting = variant.passes.map((pass) => pass.shader);
+    await this.compiled(this.ready ? waiting : [...common, ...waiting], report);
+    this.ready = variant.ready = true;
+  }
+
+  /** Make the targets for a size: what is drawn next must not destroy what is shown. */
+  resize(size) {
+    if (size === this.size) {
+      return;
+    }
+    const { device, data } = this;
+    [this.sums, this.between, ...this.pictures.flatMap((one) => [...one.features, one.result])]
+      .flat()
+      .forEach((target) => target && device.release(target));
+    this.sums = device.target(size, Math.ceil(data.path.planes.length / 4));
+    this.between = [];
+    this.pictures = [0, 1].map(() => ({
+      features: data.encoders.map((encoder) => device.target(size, encoder.images.length)),
+      result: device.target(size, 1),
+    }));
+    this.shown = null;
+    this.size = size;
+  }
+
+  /** Targets between the passes of a denoiser. */
+  scratch(size, count) {
+    const found = this.between.find((one) => one.size === size && one.textures.length === count);
+    if (found) {
+      return found;
+    }
+    this.between.push(this.device.target(size, count));
+    return this.between[this.between.length - 1];
+  }
+
+  /** The passes of a denoiser on feature textures. */
+  denoising(variant, images, result) {
+    let given = images;
+    return variant.passes.map((pass, number) => {
+      const last = number === variant.passes.length - 1;
+      const target = last ? result : this.scratch(result.size, pass.buffers);
+      const reads = given;
+      const textures = { weight_texture: pass.weights };
+      pass.reads.forEach((name) => (textures[`image_${name}`] = reads[name]));
+      given = Object.fromEntries(target.textures.map((texture, i) => [`horizontal_${i}`, texture]));
+      return { shader: pass.shader, target, textures, set: () => {} };
+    });
+  }
+
+  /** Draw a frame; resolve with the milliseconds that it took. */
+  async draw({ size, frame, seed, camera, colors, variant }) {
+    const { gl } = this.device;
+    this.resize(size);
+    const picture = this.pictures[this.shown === this.pictures[0] ? 1 : 0];
+    const numbers = sceneNumbers(this.data, frame, camera, colors);
+    const images = this.images(picture);
+    const tracing = {
+      shader: this.path,
+      target: this.sums,
+      textures: {},
+      set: (place) => {
+        for (const [name, value] of Object.entries({ width: size, height: size, first_row: 0, samples: 1 })) {
+          gl.uniform1i(place(name), value);
+        }
+        gl.uniform1ui(place("first_sample"), 0);
+        gl.uniform1ui(place("seed_number"), seed);
+        gl.uniform4fv(place("scene_numbers"), numbers);
+      },
+    };
+    const sums = Object.fromEntries(this.sums.textures.map((texture, i) => [`sums_${i}`, texture]));
+    const encoding = this.encoders.map((shader, i) => ({
+      shader,
+      target: picture.features[i],
+      textures: sums,
+      set: (place) => gl.uniform1i(place("sample_count"), 1),
+    }));
+    const denoising = this.denoising(this.variant(variant), images, picture.result);
+    const ms = await this.strips.run([tracing, ...encoding, ...denoising]);
+    this.shown = picture;
+    return ms;
+  }
+
+  /** Feature textures by name. */
+  images(picture) {
+    const pairs = this.data.encoders.flatMap((encoder, i) =>
+      encoder.images.map((image, k) => [image.name, picture.features[i].textures[k]]),
+    );
+    return Object.fromEntries(pairs);
+  }
+
+  /** Denoise the picture that the page carries, and return the largest error and error / bound. */
+  async check(name) {
+    const variant = this.variant(name);
+    const { size, images } = this.data.check;
+    const { device } = this;
+    const textures = Object.fromEntries(
+      Object.entries(images).map(([image, { channels, values }]) => {
+        const floats = decodeFloats(values);
+        const rgba = new Float32Array(4 * size * size);
+        for (let pixel = 0; pixel < size * size; ++pixel) {
+          rgba.set(floats.subarray(pixel * channels, (pixel + 1) * channels), 4 * pixel);
+        }
+        return [image, device.texture(size, size, rgba)];
+      }),
+    );
+    const result = device.target(size, 1);
+    await this.strips.run(this.denoising(variant, textures, result));
+    const found = device.read(result, 0);
+    Object.values(textures).forEach((texture) => device.gl.deleteTexture(texture));
+    device.release(result);
+    const expected = decodeFloats(variant.facts.check.expected, Float64Array);
+    const bound = decodeFloats(variant.facts.check.bound);
+    let error = 0;
+    let share = 0;
+    expected.forEach((value, i) => {
+      const off = Math.abs(found[4 * Math.floor(i / 3) + (i % 3)] - value);
+      error = off <= error ? error : off; // a NaN stays
+      share = off / bound[i] <= share ? share : off / bound[i];
+    });
+    return { error, share, bound: bound.reduce((a, b) => Math.max(a, b)) };
+  }
+
+  /** Show two images of the last picture, left and right of a line at `wipe` (0 to 1). */
+  show(left, right, wipe) {
+    if (!this.shown) {
+      return;
+    }
+    const { gl } = this.device;
+    if (gl.canvas.width !== this.size) {
+      gl.canvas.width = gl.canvas.height = this.size;
+    }
+    const images = { ...this.images(this.shown), picture: this.shown.result.textures[0] };
+    this.device.draw(this.screen, null, { left: images[left], right: images[right] }, (place) => {
+      gl.uniform1f(place("wipe"), wipe);
+      gl.uniform2f(place("is_signed"), left === "normal" ? 1 : 0, right === "normal" ? 1 : 0);
+    });
+  }
+
+  /** Floats of an image of the last picture, or of the path kernel's sums ("sums_0"), for tests. */
+  read(name) {
+    if (name === "picture") {
+      return this.device.read(this.shown.result, 0);
+    }
+    if (name.startsWith("sums_")) {
+      return this.device.read(this.sums, Number(name.slice(5)));
+    }
+    for (const [i, encoder] of this.data.encoders.entries()) {
+      const number = encoder.images.findIndex((image) => image.name === name);
+      if (number >= 0) {
+        return this.device.read(this.shown.features[i], number);
+      }
+    }
+    throw new Error(`there is no image ${name}`);
+  }
+}
+
+const SCREEN = `#version 300 es
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+uniform sampler2D left;
+uniform sampler2D right;
+uniform float wipe;
+uniform vec2 is_signed;
+out vec4 color;
+void main()
+{
+    ivec2 size = textureSize(left, 0);
+    ivec2 at = ivec2(int(gl_FragCoord.x), size.y - 1 - int(gl_FragCoord.y));
+    vec3 l = texelFetch(left, at, 0).rgb;
+    vec3 r = texelFetch(right, at, 0).rgb;
+    l = mix(l, 0.5 + 0.5 * l, is_signed.x);
+    r = mix(r, 0.5 + 0.5 * r, is_signed.y);
+    color = vec4(gl_FragCoord.x < wipe * float(size.x) ? l : r, 1.0);
+}
+`;
+
+function clamp(x, low, high) {
+  return Math.max(low, Math.min(high, x));
+}
+
+function nextFrame() {
+  return new Promise((done) => requestAnimationFrame(done));
+}

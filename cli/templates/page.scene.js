@@ -1,0 +1,107 @@
+// The scene's numbers: which of them are uniforms of the path kernel, and what they are now.
+//
+// A kernel has every number of the scene as a constant but those that may move. Of these, what follows time
+// stands in a table, one row for each moment; camera and lights are computed here as the reference does
+// (refimpl/camera.py, refimpl/transport.py): in 64 bits, rounded to 32 once.
+
+const radians = (degrees) => (degrees * Math.PI) / 180;
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [
+  a[1] * b[2] - a[2] * b[1],
+  a[2] * b[0] - a[0] * b[2],
+  a[0] * b[1] - a[1] * b[0],
+];
+
+function normalize(a) {
+  const length = Math.sqrt(dot(a, a));
+  return a.map((x) => x / length);
+}
+
+/** Return bytes from base64. */
+function decodeBase64(text) {
+  return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+}
+
+/** Return floats from base64; the numbers are little-endian, as all machines with browsers are. */
+function decodeFloats(text, Kind = Float32Array) {
+  return new Kind(decodeBase64(text).buffer);
+}
+
+/** The camera's axes, as refimpl/camera.py: camera_basis. */
+function cameraBasis(camera) {
+  const forward = normalize(camera.look_at.map((x, i) => x - camera.position[i]));
+  const right = normalize(cross(forward, camera.up));
+  return { position: camera.position, right, up: cross(right, forward), forward };
+}
+
+/** The scene's camera turned around what it looks at; at rest it is the scene's own, to the bit. */
+function orbit(camera, turn) {
+  if (turn.yaw === 0 && turn.pitch === 0 && turn.distance === 1) {
+    return camera;
+  }
+  const away = camera.position.map((x, i) => x - camera.look_at[i]);
+  const radius = Math.sqrt(dot(away, away)) * turn.distance;
+  const yaw = Math.atan2(away[0], away[2]) + radians(turn.yaw);
+  const start = Math.atan2(away[1], Math.hypot(away[0], away[2]));
+  const steepest = radians(85); // straight from above, `up` would be no direction
+  const pitch = Math.max(-steepest, Math.min(steepest, start + radians(turn.pitch)));
+  const offset = [
+    Math.sin(yaw) * Math.cos(pitch),
+    Math.sin(pitch),
+    Math.cos(yaw) * Math.cos(pitch),
+  ];
+  return { ...camera, position: camera.look_at.map((x, i) => x + radius * offset[i]) };
+}
+
+/** Radiance of the lights, and the tables by which one is picked, as refimpl/transport.py: _build_lights. */
+function lightTables(lights, colors, share) {
+  const radiance = lights.flatMap((light, i) =>
+    colors[i].map((c) => (light.power * c) / (Math.PI * light.area)),
+  );
+  const weights = lights.map((light, i) => light.power * (colors[i][0] + colors[i][1] + colors[i][2]));
+  const total = weights.reduce((sum, weight) => sum + weight, 0);
+  let sum = 0;
+  const cumulative = weights.map((weight) => Math.fround((sum += weight) / total));
+  cumulative[cumulative.length - 1] = 1;
+  const probability = cumulative.map((end, i) => {
+    return Math.fround(share * Math.fround(end - (i ? cumulative[i - 1] : 0)));
+  });
+  return { radiance, cumulative, probability };
+}
+
+/** Return the uniforms of the path kernel: a row of the table, then camera and lights in their places. */
+function sceneNumbers(data, frame, camera, colors) {
+  const { names, still, moving, rows } = data.numbers;
+  const values = Float32Array.from(still);
+  moving.forEach((place, i) => (values[place] = rows[frame * moving.length + i]));
+  const tables = { camera: cameraBasis(camera) };
+  if (data.lights.length) {
+    tables["world.lights"] = lightTables(data.lights, colors, data.share);
+  }
+  names.forEach(([path, index], place) => {
+    const dotted = path.lastIndexOf(".");
+    const table = tables[path.slice(0, dotted)];
+    if (table) {
+      values[place] = table[path.slice(dotted + 1)][index];
+    }
+  });
+  const padded = new Float32Array(4 * Math.max(1, Math.ceil(values.length / 4)));
+  padded.set(values);
+  return padded;
+}
+
+/** sRGB's curve (IEC 61966-2-1), for colours that are chosen as one sees them. */
+function linearFromHex(hex) {
+  return [1, 3, 5].map((start) => {
+    const s = parseInt(hex.slice(start, start + 2), 16) / 255;
+    return s <= 0.04045 ? s / 12.92 : ((s + 0.055) / 1.055) ** 2.4;
+  });
+}
+
+function hexFromLinear(color) {
+  const digits = color.map((c) => {
+    const s = c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055;
+    return Math.round(255 * Math.max(0, Math.min(1, s))).toString(16).padStart(2, "0");
+  });
+  return `#${digits.join("")}`;
+}

@@ -1,0 +1,124 @@
+"""`wamnet view`: a model at work in the browser, on a scene that is path-traced there.
+
+1. Make the page [`webpage.page_of`]; with -o it is written to a file, and that is all.
+2. Serve it on the loopback interface, to this machine alone, and open the browser [`serve`]; Ctrl-C ends.
+"""
+
+from __future__ import annotations
+
+import webbrowser
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..refimpl.errors import InputError
+from . import options
+from .outputs import check_output, write_text
+from .terminal import say
+from .webpage import page_of
+
+EXAMPLES = """Examples:
+
+wamnet view model.safetensors
+
+wamnet view model.safetensors --fast model-16.safetensors --scene minicubes --port 8080
+
+wamnet view model.safetensors -o page.html"""
+"""Shown below the help of `wamnet view`."""
+
+HOST = "127.0.0.1"
+"""Where the page is served: to this machine alone."""
+
+LARGEST_PORT = 65535
+"""Ports have 16 bits."""
+
+
+def view(
+    model: options.ModelFile,
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENE",
+            help=f"Canonical scene ({options.SCENES}) or scene file (.json).",
+            show_default="the one that the model was trained on",
+        ),
+    ] = None,
+    fast: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MODEL",
+            help="Model whose first layer is cut to rank 16 for the fast variant: one trained on so.",
+            show_default="the same",
+        ),
+    ] = None,
+    parameters: options.Parameters = None,
+    port: Annotated[int, typer.Option(help="Port to serve the page at; 0 takes one that is free.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Open the browser.")] = True,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Write the page (.html) and serve nothing.",
+            show_default="the page is served",
+        ),
+    ] = None,
+) -> None:
+    """Show a model at work in the browser: a scene, path-traced live, its normals, and the denoised picture.
+
+    The page is one file that runs anywhere where WebGL 2 does, without a server: -o writes it.
+    """
+    if not 0 <= port <= LARGEST_PORT:
+        raise InputError("--port", port, f"it must be from 0 to {LARGEST_PORT}", "for example --port 8080")
+    if output is not None:
+        check_output(output, (".html", ".htm"), [path for path in (model, fast) if path])
+    page = page_of(model, scene, parameters or [], fast)
+    if output is not None:
+        write_text(output, page)
+        say(str(output))
+        return
+    serve(page.encode(), port, browser)
+
+
+def serve(page: bytes, port: int, browser: bool) -> None:
+    """Serve one page until Ctrl-C."""
+    try:
+        server = ThreadingHTTPServer((HOST, port), handler_of(page))
+    except OSError as error:
+        reason = error.strerror or "it is taken"
+        raise InputError("--port", port, f"it cannot be had ({reason})", "choose another, or 0") from None
+    with server:
+        address = f"http://{HOST}:{server.server_address[1]}/"
+        say(f"{address} (Ctrl-C ends)")
+        if browser:
+            webbrowser.open(address)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            say("ended")
+
+
+def handler_of(page: bytes) -> type[BaseHTTPRequestHandler]:
+    """Return a handler that knows one page."""
+
+    class Handler(BaseHTTPRequestHandler):
+        """Answers `/`, and nothing else."""
+
+        def do_GET(self) -> None:
+            if self.path != "/":
+                self.send_error(404)
+                return
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html; charset=utf-8")
+            self.send_header("Content-Length", str(len(page)))
+            self.send_header("Cache-Control", "no-store")
+            self.end_headers()
+            self.wfile.write(page)
+
+        def log_message(self, format: str, *args: object) -> None:  # noqa: A002 (the base class's name)
+            """Say nothing: the address is all that people need."""
+
+    return Handler

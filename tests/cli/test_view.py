@@ -1,0 +1,138 @@
+"""`wamnet view`: a page that is written or served, and what is refused before anything is computed."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import socket
+import threading
+import urllib.error
+import urllib.request
+
+import pytest
+
+from wamnet.cli import view, webpage
+from wamnet.refimpl import scenes
+
+
+@pytest.fixture
+def here(samples, tmp_path):
+    """Put model.safetensors into the working folder."""
+    shutil.copy(samples / "model.safetensors", tmp_path / "model.safetensors")
+    return tmp_path
+
+
+def data_of(text):
+    """Return the data that a page holds."""
+    (found,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+    return json.loads(found)
+
+
+def test_a_page_is_written(wamnet, here):
+    outcome = wamnet("view", "model.safetensors", "--scene", "cornell", "-o", "page.html")
+    assert outcome.status == 0, outcome.err
+    assert outcome.out == "page.html\n"
+    text = (here / "page.html").read_text(encoding="utf-8")
+    data = data_of(text)
+    assert (data["scene"], data["times"]) == ("cornell", [0.5 / webpage.FPS])
+    assert [one["name"] for one in data["variants"]] == ["full", "fast", "fast-texture"]
+    assert not re.search(r"(src|href)=\"(?!data:)", text), "nothing is fetched"
+    assert wamnet("view", "model.safetensors", "--scene", "cornell", "-o", "again.html").status == 0
+    assert (here / "again.html").read_text(encoding="utf-8") == text, "a page is a function of its inputs"
+
+
+def test_the_model_s_own_scene_is_shown_at_all_its_times(wamnet, here):
+    """The model of the samples was trained on none: the page shows the mini cubes."""
+    assert wamnet("view", "model.safetensors", "--fast", "model.safetensors", "-o", "page.html").status == 0
+    data = data_of((here / "page.html").read_text(encoding="utf-8"))
+    assert data["scene"] == "minicubes"
+    assert len(data["times"]) == webpage.FRAMES
+
+
+@pytest.mark.parametrize("name", ["minicubes", "glossy", "daylight"])
+def test_scenes_move_without_changing_their_form(name):
+    """All moments of each animation are one kernel."""
+    from wamnet.kernels.page import moving_numbers
+    from wamnet.refimpl.transport import Settings
+
+    animation = webpage.animation_of(name)
+    inputs, numbers = moving_numbers(animation, Settings())
+    assert 0 < len(numbers["moving"]) < len(inputs.places)
+
+
+def test_a_scene_file_is_still(wamnet, here):
+    assert wamnet("scene", "glossy", "--time", "1", "-o", "mine.json").status == 0
+    animation = webpage.animation_of(str(here / "mine.json"))
+    assert animation.times == (0.0,)
+    assert animation.scenes[0].name == "glossy"
+
+
+def test_parameters_of_a_scene_hold_at_all_times():
+    found = webpage.animation_of("minicubes", ["warm=1,0,0"])
+    assert {scene.lights[0].color for scene in found.scenes} == {(1.0, 0.0, 0.0)}
+    assert found.scenes[0].lights[1].color == scenes.COOL
+
+
+def test_the_page_is_served_to_this_machine(wamnet, here, monkeypatch):
+    """The browser that is opened gets the page, another address nothing; Ctrl-C ends it well."""
+    found = {}
+
+    def browse(address):
+        def fetch():
+            found["page"] = urllib.request.urlopen(address).read().decode()
+            with pytest.raises(urllib.error.HTTPError, match="404"):
+                urllib.request.urlopen(f"{address}other")
+
+        found["address"], found["thread"] = address, threading.Thread(target=fetch)
+        found["thread"].start()
+
+    def serve_two(server):
+        server.handle_request()
+        server.handle_request()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(view.webbrowser, "open", browse)
+    monkeypatch.setattr(view.ThreadingHTTPServer, "serve_forever", serve_two)
+    monkeypatch.setattr(view, "page_of", lambda *_: "<!DOCTYPE html>")
+    outcome = wamnet("view", "model.safetensors")
+    found["thread"].join()
+    assert outcome.status == 0
+    assert outcome.out == f"{found['address']} (Ctrl-C ends)\nended\n"
+    assert found["address"].startswith("http://127.0.0.1:")
+    assert found["page"] == "<!DOCTYPE html>"
+
+
+def test_no_browser_where_none_is_wanted(wamnet, here, monkeypatch):
+    def stop(server):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(view.webbrowser, "open", lambda address: pytest.fail("a browser was opened"))
+    monkeypatch.setattr(view.ThreadingHTTPServer, "serve_forever", stop)
+    monkeypatch.setattr(view, "page_of", lambda *_: "")
+    assert wamnet("view", "model.safetensors", "--no-browser").status == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--port", "70000"], "--port is 70000: it must be from 0 to 65535"),
+        (["-o", "page.txt"], "its name must end in .html or .htm"),
+        (["-o", "missing/page.html"], "it does not exist"),
+        (["--scene", "nowhere", "-o", "page.html"], "no canonical scene has this name"),
+        (["--set", "time=2", "-o", "page.html"], "a page shows all times of a canonical scene"),
+        (["--set", "warm=2", "-o", "page.html"], "minicubes wants three numbers with commas"),
+        (["--fast", "nothing.safetensors", "-o", "page.html"], "nothing.safetensors"),
+    ],
+)
+def test_refusals(refused, here, arguments, said):
+    assert said in refused("view", "model.safetensors", *arguments)
+
+
+def test_a_port_that_is_taken_is_refused(refused, here, monkeypatch):
+    monkeypatch.setattr(view, "page_of", lambda *_: "")
+    with socket.socket() as taken:
+        taken.bind((view.HOST, 0))
+        taken.listen()
+        line = refused("view", "model.safetensors", "--port", taken.getsockname()[1])
+    assert "it cannot be had (Address already in use); choose another, or 0" in line

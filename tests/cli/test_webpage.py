@@ -1,0 +1,340 @@
+"""The web page in a headless Chromium: its pixels against the reference, its controls, what it says and asks.
+
+A small network and few bounces: SwiftShader traces and denoises 40 x 40 pixels in a moment.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wamnet.cli import webpage
+from wamnet.compiler.encode_kernel import compile_encode, error_at
+from wamnet.compiler.lower_scene import lower_scene
+from wamnet.compiler.path_kernel import compile_path
+from wamnet.kernels import page as P
+from wamnet.kernels.executor import Part
+from wamnet.kernels.numpy_executor import NumpyExecutor
+from wamnet.refimpl import dataset, scenes
+from wamnet.refimpl.denoise import Model
+from wamnet.refimpl.transport import Settings
+
+SIZE, FRAME, SEED = 40, 3, 5
+SETTINGS = Settings(max_depth=2)
+FEATURES = ("color", "normal", "position")
+SCALES = dataset.Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
+TIMES = tuple((number + 0.5) / 4 for number in range(8))
+COLORS = [[0.9, 0.2, 0.1], [0.3, 0.4, 0.8]]
+TURN = {"yaw": 25.0, "pitch": 8.0, "distance": 0.9}
+
+NO_MOTION = {"reduced_motion": "reduce"}
+WITHOUT_WEBGL = """
+const known = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+  return kind === "webgl2" ? null : known.call(this, kind, ...rest);
+};
+"""
+WITHOUT_FLOATS = """
+const known = WebGL2RenderingContext.prototype.getExtension;
+WebGL2RenderingContext.prototype.getExtension = function (name) {
+  return name === "EXT_color_buffer_float" ? null : known.call(this, name);
+};
+"""
+
+
+@pytest.fixture(scope="module")
+def model(kit):
+    """A network whose pictures lie within 0.5 +- 0.45, of an odd width."""
+    window = dataset.Window(5, "zero")
+    network = kit.network([dataset.n_inputs(FEATURES, window), 10, 7, 3], (3.0, 3.0))
+    return Model(network, FEATURES, window, SCALES)
+
+
+@pytest.fixture(scope="module")
+def data(model):
+    animation = P.Animation(TIMES, tuple(scenes.canonical("minicubes", time=time) for time in TIMES))
+    return P.page_data(animation, P.networks_of(model, rank=4), SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def path(data, tmp_path_factory):
+    """The page in a file."""
+    file = tmp_path_factory.mktemp("page") / "page.html"
+    file.write_text(webpage.render_page(data), encoding="utf-8")
+    return file
+
+
+@pytest.fixture(scope="module")
+def still(chromium, path):
+    """A tab whose animation stands still, ready."""
+    with chromium.tab(path, **NO_MOTION) as tab:
+        tab.page.evaluate("wamnet.ready")
+        yield tab
+
+
+def read(tab, name):
+    """Return the floats (H, W, 4) of an image."""
+    text = tab.page.evaluate("name => wamnet.read(name)", name)
+    return np.frombuffer(base64.b64decode(text), "<f4").reshape(SIZE, SIZE, 4)
+
+
+def draw(tab, **options):
+    """Draw a moment; return what the page says of camera, colours and time."""
+    return tab.page.evaluate("options => wamnet.draw(options)", {"size": SIZE, **options})
+
+
+# ---- pixels ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"frame": FRAME, "seed": SEED, "turn": TURN, "colors": COLORS}], ids=["rest", "moved"]
+)
+def test_the_paths_are_the_reference_s(still, options):
+    """As the kernels of test_paths.py: 99 pixels in 100 have every number to 1e-5 of its layer's size."""
+    told = draw(still, **options)
+    scene = scenes.canonical("minicubes", time=told["time"])
+    camera = replace(scene.camera, position=tuple(told["camera"]["position"]))
+    pairs = zip(scene.lights, told["colors"], strict=True)
+    lights = tuple(replace(light, color=tuple(color)) for light, color in pairs)
+    assert (camera == scene.camera) == ("turn" not in options)
+    kernel = compile_path(
+        lower_scene(replace(scene, camera=camera, lights=lights), SETTINGS), "numpy", groups=FEATURES
+    )
+    expected = NumpyExecutor().trace(kernel, Part(SIZE, SIZE, 0, SIZE, 0, 1, options.get("seed", 0)))
+    found = np.concatenate([read(still, f"sums_{number}") for number in range(3)], axis=-1)
+    for first, layer in zip((0, 3, 6), FEATURES, strict=True):
+        held = np.moveaxis(expected[first : first + 3], 0, -1)
+        size = np.abs(held).max(axis=-1, keepdims=True) + np.abs(held).mean()
+        near = np.abs(found[..., first : first + 3] - held) <= 1e-5 * size
+        assert near.all(axis=-1).mean() >= 0.99, layer
+
+
+def test_the_features_keep_the_bound_of_the_encoding(still, model):
+    """At the sums that the page has read, against their encoding in float64."""
+    draw(still, frame=FRAME, seed=SEED)
+    sums = np.concatenate([read(still, f"sums_{number}") for number in range(3)], axis=-1)
+    names = [
+        f"{layer}_{end}"
+        for layer, ends in (("color", "rgb"), ("normal", "xyz"), ("position", "xyz"))
+        for end in ends
+    ]
+    planes = {name: sums[..., i] for i, name in enumerate(names)}
+    errors = error_at(compile_encode(FEATURES, SCALES, P.TARGET), planes, 1)
+    for first, name in zip((0, 3, 6), FEATURES, strict=True):
+        values = sums[..., first : first + 3].astype(np.float64)
+        expected = dataset.FEATURES[name].encode(values, SCALES)
+        assert np.all(np.abs(read(still, name)[..., :3] - expected) <= errors[name]), name
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_the_pictures_keep_their_bound(still, model, data, number):
+    """Every number of the picture, at the features that the page has read, for each variant."""
+    network = P.networks_of(model, rank=4)[number]
+    draw(still, frame=FRAME, seed=SEED, variant=network.name)
+    images = {name: read(still, name)[..., :3].copy() for name in FEATURES}
+    program = P.lower(model)
+    artifact = P.compile_program(program, P.TARGET, "ieee", network.schedule, network.rank)
+    value, bound = P._expected(program, artifact, network.rank, images)
+    found = read(still, "picture")[..., :3].astype(np.float64)
+    assert 0 < bound.max() < 2**-8, "a step of 8 bits would hold for many wrong kernels"
+    assert np.all(np.abs(found - value) <= bound)
+    assert np.ptp(value) > bound.max()
+
+
+def test_the_page_measures_its_own_error(still, data):
+    check = still.page.evaluate("wamnet.page.renderer.check('full')")
+    assert 0 < check["share"] <= 1
+    assert 0 < check["error"] <= check["bound"]
+    assert "within" in still.text("error")
+    # A number of the reference that is moved by 1e-3, as by a sine without its range reduction, is told.
+    moved = """async () => {
+      const check = wamnet.page.data.variants[0].check;
+      const kept = check.expected;
+      const values = wamnet.parts.decodeFloats(kept, Float64Array);
+      values[7] += 1e-3;
+      const letters = Array.from(new Uint8Array(values.buffer), (byte) => String.fromCharCode(byte));
+      check.expected = btoa(letters.join(""));
+      const found = await wamnet.page.renderer.check("full");
+      check.expected = kept;
+      return found.share;
+    }"""
+    assert still.page.evaluate(moved) > 1
+
+
+# ---- behaviour -------------------------------------------------------------------------------------------
+
+
+def test_nothing_is_asked_for_and_nothing_complained_of(still):
+    assert still.asked == [still.address]
+    assert still.said == []
+    policy = still.page.locator("meta[http-equiv]").get_attribute("content")
+    assert "default-src 'none'" in policy
+
+
+def test_controls_work(still):
+    page = still.page
+    page.evaluate("wamnet.go()")
+    before = still.state("turn")
+    page.locator("#picture").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("+")
+    after = still.state("turn")
+    assert after["yaw"] == before["yaw"] + 5
+    assert after["pitch"] == before["pitch"] + 5
+    assert after["distance"] < before["distance"]
+    page.keyboard.press("0")
+    assert still.state("turn") == {"yaw": 0, "pitch": 0, "distance": 1}
+    page.keyboard.press(".")
+    assert still.page.evaluate("wamnet.page.frame()") == 1
+    assert page.locator("#time").get_attribute("aria-valuetext") == "0.38 seconds"
+    page.locator("#yaw").fill("40")
+    assert still.state("turn")["yaw"] == 40
+    page.locator("#camera-reset").click()
+    page.locator("#light-0").fill("#ff0000")
+    assert still.state("colors")[0] == [1, 1e-3, 1e-3]
+    page.locator("#lights-reset").click()
+    assert still.state("colors")[0] == list(scenes.WARM)
+    page.locator("#size").select_option("96")
+    still.until("wamnet.page.renderer.size === 96 && !wamnet.page.renderer.strips.busy")
+    page.locator("#left").select_option("normal")
+    page.locator("#wipe").fill("30")
+    assert still.state("wipe") == 0.3
+    assert still.text("left-label") == "Normals"
+    assert page.locator("#wipe").get_attribute("aria-valuetext") == "30 percent Normals, the rest Denoised"
+    page.locator("#variant").select_option("fast-texture")
+    still.until("wamnet.page.state.variant === 'fast-texture' && !wamnet.page.preparing")
+    assert "within" in still.text("error")
+
+
+def test_the_pointer_turns_the_camera_and_moves_the_line(still):
+    page = still.page
+    page.evaluate("wamnet.go(); wamnet.page.turn(wamnet.parts.REST); wamnet.page.wipeTo(0.5)")
+    box = page.locator("#picture").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + box["width"] / 4, y)
+    page.mouse.up()
+    assert still.state("wipe") == pytest.approx(0.75, abs=0.01)  # a pixel is a fifth of that
+    assert still.state("turn")["yaw"] == 0
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 50, y - 20)
+    page.mouse.up()
+    assert still.state("turn") == {"yaw": -20, "pitch": -8, "distance": 1}
+    page.evaluate("wamnet.page.turn(wamnet.parts.REST)")
+
+
+def test_it_plays_where_motion_is_welcome(chromium, path):
+    with chromium.tab(path) as tab:
+        tab.page.evaluate("wamnet.ready")
+        assert tab.text("status") == "Ready. The animation is playing."
+        tab.until("wamnet.page.state.seed > 2 && wamnet.page.frame() > 0")
+        tab.page.locator("#play").click()
+        assert tab.text("play") == "Play"
+        assert tab.text("status") == "The animation is paused."
+        assert tab.said == []
+
+
+def test_it_stands_still_where_motion_is_not(still):
+    assert still.state("playing") is False
+    assert still.text("status").startswith("Ready. The animation is paused.")
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"color_scheme": "dark", "viewport": {"width": 400, "height": 800}}],
+    ids=["light", "dark"],
+)
+def test_people_who_do_not_see_it_can_use_it(chromium, path, options):
+    """axe-core finds nothing; no more scrolling to the side than none on a telephone."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    with chromium.tab(path, **NO_MOTION, **options) as tab:
+        tab.page.evaluate("wamnet.ready")
+        found = axe.Axe().run(tab.page).response["violations"]
+        assert [(one["id"], one["impact"]) for one in found] == []
+        assert tab.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [(WITHOUT_WEBGL, "does not offer WebGL 2"), (WITHOUT_FLOATS, "EXT_color_buffer_float is missing")],
+)
+def test_what_is_missing_is_said(chromium, path, script, said):
+    with chromium.tab(path, script, **NO_MOTION) as tab:
+        assert said in tab.page.evaluate("wamnet.ready.catch(error => error.message)")
+        assert said in tab.text("trouble-what")
+        assert tab.page.locator("#trouble").is_visible()
+        assert not tab.page.locator("#controls").is_visible()
+        assert tab.text("status") == "The page cannot run here."
+        assert tab.said == []
+
+
+def test_a_shader_that_is_refused_is_told(chromium, data, tmp_path):
+    broken = json.loads(json.dumps(data))
+    broken["encoders"][0]["source"] = "#version 300 es\nvoid main() { nonsense }\n"
+    (tmp_path / "broken.html").write_text(webpage.render_page(broken), encoding="utf-8")
+    with chromium.tab(tmp_path / "broken.html", **NO_MOTION) as tab:
+        tab.page.evaluate("wamnet.ready.catch(() => 0)")
+        assert tab.text("trouble-what").startswith("A shader was refused by this device: ERROR: 0:2")
+
+
+def test_a_lost_device_comes_back(chromium, path):
+    with chromium.tab(path, **NO_MOTION) as tab:
+        page = tab.page
+        page.evaluate("wamnet.ready")
+        page.evaluate("window.loss = wamnet.page.device.gl.getExtension('WEBGL_lose_context')")
+        page.evaluate("loss.loseContext()")
+        tab.until("document.getElementById('status').textContent.includes('was lost')")
+        page.evaluate("setTimeout(() => loss.restoreContext(), 50)")
+        tab.until("document.getElementById('status').textContent.startsWith('Ready')")
+        draw(tab)
+        assert np.ptp(read(tab, "picture")[..., :3]) > 0.01
+        assert not any(text.startswith("error") for text in tab.said)
+
+
+def test_slow_devices_get_small_pieces(still):
+    """However dear a pixel is, what is handed out at once is worth no more than a batch."""
+    rows = still.page.evaluate(
+        """() => {
+          const handed = [];
+          const device = {
+            draw: (shader, target, textures, set, [first, count]) => handed.push([first, count]),
+            fence: () => 1, isPassed: () => true };
+          const strips = new wamnet.parts.Strips(device);
+          const shader = {};
+          strips.run([{ shader, target: { size: 64 }, textures: {}, set: () => {} }]);
+          strips.poll = () => {};
+          for (let now = 0; strips.busy; now += 400) { strips.tick(now); }
+          return handed;
+        }"""
+    )
+    assert rows[0] == [0, 1]
+    assert [first for first, _ in rows] == [0, *np.cumsum([count for _, count in rows])[:-1].tolist()]
+    assert sum(count for _, count in rows) == 64
+    assert rows[-1][1] <= 2 < rows[1][1]
+
+
+@pytest.mark.parametrize("name", webpage.SCRIPTS)
+def test_scripts_are_javascript(name, tmp_path):
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is not installed; Chromium runs the scripts in the other tests")
+    script = tmp_path / "script.mjs"
+    script.write_text((resources.files("wamnet.cli") / webpage.FOLDER / name).read_text(encoding="utf-8"))
+    found = subprocess.run([node, "--check", str(script)], capture_output=True, text=True, check=False)
+    assert found.returncode == 0, found.stderr
+
+
+def test_a_picture_of_it_is_in_the_documents():
+    picture = Path(__file__).parents[2] / "docs" / "images" / "web-page.png"
+    assert picture.stat().st_size <= 200_000

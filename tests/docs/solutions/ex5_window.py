@@ -1,0 +1,21 @@
+"""A right answer to exercise 5, for the tests of its grader."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def window(image, x, y, size, border):
+    if not 1 <= size <= 64:
+        raise ValueError(f"size {size}")
+    if border not in ("clamp", "zero"):
+        raise ValueError(f"border {border}")
+    height, width, _ = image.shape
+    taps = []
+    for dy in range(size):
+        for dx in range(size):
+            row, column = y + dy - size // 2, x + dx - size // 2
+            inside = 0 <= row < height and 0 <= column < width
+            pixel = image[min(max(row, 0), height - 1), min(max(column, 0), width - 1)]
+            taps.append(pixel if inside or border == "clamp" else 0 * pixel)
+    return np.concatenate(taps)

@@ -1,0 +1,18 @@
+"""A right answer to exercise 9, for the tests of its grader."""
+
+from __future__ import annotations
+
+from wamnet.compiler.ir import Node
+from wamnet.compiler.passes.rewrite import rewrite
+
+
+def subtract(program):
+    def rule(builder, node, args):
+        if node.op != "add":
+            return None
+        for kept, other in (args, args[::-1]):
+            if builder.nodes[other].op == "negative":
+                return builder.add(Node("subtract", (kept, builder.nodes[other].args[0]), node.type))
+        return None
+
+    return rewrite(program, rule)

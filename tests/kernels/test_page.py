@@ -1,0 +1,125 @@
+"""The data of a web page: what it holds, and what is refused."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wamnet.kernels import page as P
+from wamnet.refimpl import dataset, scenes
+from wamnet.refimpl.denoise import Model
+from wamnet.refimpl.errors import CompileError, InputError
+from wamnet.refimpl.scene import Sphere
+from wamnet.refimpl.transport import Settings
+
+SETTINGS = Settings(max_depth=1)
+SCALES = dataset.Normalization(0.0, 12.0, (0.0, 0.0, 0.0), 6.0)
+
+
+def animation(name, *times):
+    return P.Animation(times, tuple(scenes.canonical(name, time=time) for time in times))
+
+
+@pytest.fixture(scope="module")
+def model_of(kit):
+    """Give a function that returns a small model of some features."""
+
+    def make(*features):
+        window = dataset.Window(3, "clamp")
+        network = kit.network([dataset.n_inputs(features, window), 6, 3], (3.0, 3.0))
+        return Model(network, features, window, SCALES)
+
+    return make
+
+
+def floats(text, kind="<f4"):
+    return np.frombuffer(base64.b64decode(text), kind)
+
+
+def test_rows_are_the_moments_and_numbers_keep_their_places():
+    moments = animation("minicubes", 0.1, 0.9, 2.3)
+    inputs, numbers = P.moving_numbers(moments, SETTINGS)
+    rows = floats(numbers["rows"]).reshape(3, -1)
+    for scene, row in zip(moments.scenes, rows, strict=True):
+        assert np.array_equal(inputs.values(scene)[numbers["moving"]], row)
+        still = np.delete(inputs.values(scene), numbers["moving"])
+        assert np.array_equal(still, np.delete(np.float32(numbers["still"]), numbers["moving"]))
+    paths = [path for path, _ in numbers["names"]]
+    assert {paths[place] for place in numbers["moving"]} == {"world.geometry.groups.0.rotation"}
+    assert "world.geometry.emission" not in paths, "a page computes the lights' tables"
+    assert sum(path.startswith("camera.") for path in paths) >= 9
+
+
+def test_a_still_scene_has_one_row_without_numbers():
+    _, numbers = P.moving_numbers(animation("cornell", 0.0), SETTINGS)
+    assert numbers["moving"] == []
+    assert floats(numbers["rows"]).size == 0
+
+
+def test_every_feature_that_fits_is_encoded_in_passes_of_four(model_of):
+    """Six features have 16 channels: as many as four buffers hold."""
+    features = [name for name in dataset.FEATURES if name != "unshadowed"]
+    model = model_of(*features)
+    data = P.page_data(animation("cornell", 0.0), P.networks_of(model, rank=2), SETTINGS)
+    names = [[image["name"] for image in encoder["images"]] for encoder in data["encoders"]]
+    assert [len(part) for part in names] == [4, 2]
+    assert sorted(names[0] + names[1]) == sorted(features)
+    assert len(data["path"]["planes"]) == 16
+    assert data["lights"] == [{"color": [1.0, 0.78, 0.5], "power": 14.0, "area": 0.25}]
+
+
+def test_what_a_page_shows_is_encoded_though_no_network_reads_it(model_of):
+    data = P.page_data(animation("empty", 0.0), P.networks_of(model_of("depth")), SETTINGS)
+    assert [image["name"] for image in data["encoders"][0]["images"]] == ["depth", "color", "normal"]
+    assert data["variants"][0]["passes"][0]["reads"] == ["depth"]
+    assert set(data["check"]["images"]) == {"depth", "color", "normal"}
+
+
+def test_variants_say_what_they_cost_and_how_far_they_are(model_of):
+    networks = P.networks_of(model_of("color"), rank=1)
+    images = {"color": np.random.default_rng(0).uniform(0, 1, (8, 8, 3)).astype(np.float32)}
+    full, fast, texture = (P.variant(network, images, "ieee") for network in networks)
+    assert full["products"] == 27 * 6 + 6 * 3
+    assert fast["products"] == texture["products"] == 9 + 3 * 6 + 6 * 3
+    assert (fast["weights"], texture["schedule"], fast["schedule"]) == (0, "packed", "inlined")
+    assert np.array_equal(fast["picture"], texture["picture"])
+    assert np.ptp(full["picture"] - fast["picture"]) > 0, "a cut to rank 1 leaves something out"
+    for one in (full, fast, texture):
+        assert np.array_equal(floats(one["check"]["expected"], "<f8"), one["picture"].ravel())
+        assert 0 < floats(one["check"]["bound"]).max() <= one["bound"]
+
+
+def test_the_bound_is_rounded_up():
+    exact = np.array([1e-7, 0.1, 1 / 3])
+    assert np.all(P._raised(exact).astype(np.float64) >= exact)
+
+
+def test_models_that_need_two_encodings_are_refused(model_of):
+    model = model_of("color")
+    other = replace(model, normalization=replace(SCALES, depth_scale=2.0))
+    with pytest.raises(InputError, match="one page encodes once"):
+        P.page_data(animation("empty", 0.0), P.networks_of(model, other), SETTINGS)
+
+
+def test_more_numbers_a_pixel_than_buffers_hold_are_refused(model_of):
+    with pytest.raises(InputError, match="WebGL 2 draws 16 numbers a pixel"):
+        P.page_data(animation("empty", 0.0), P.networks_of(model_of(*dataset.FEATURES)), SETTINGS)
+
+
+def test_too_many_moving_numbers_are_refused():
+    base = scenes.canonical("cornell")
+    balls = [
+        tuple(Sphere((0.1 * i + move, 0.2 * i, 0.3 * i - move), 0.05, (0.5,) * 3) for i in range(450))
+        for move in (0.0, 0.01)
+    ]
+    moments = P.Animation((0.0, 1.0), tuple(replace(base, spheres=spheres) for spheres in balls))
+    with pytest.raises(InputError, match=r"of its numbers move; a shader has uniforms for 800"):
+        P.moving_numbers(moments, SETTINGS)
+
+
+def test_a_scene_that_changes_its_form_is_refused():
+    with pytest.raises(CompileError, match="laid out in another way"):
+        P.moving_numbers(animation("glossy", 0.0, 0.1), SETTINGS)

@@ -45,7 +45,8 @@ uniform sampler2D weight_texture;
 
 vec4 weights(int texel)
 {{{{
-    return texelFetch(weight_texture, ivec2(texel % {WEIGHT_TEXTURE_WIDTH}, texel / {WEIGHT_TEXTURE_WIDTH}), 0);
+    ivec2 place = ivec2(texel % {WEIGHT_TEXTURE_WIDTH}, texel / {WEIGHT_TEXTURE_WIDTH});
+    return texelFetch(weight_texture, place, 0);
 }}}}
 """
 """What a packed kernel declares besides the images."""

@@ -2,8 +2,8 @@
 
 A home is the dialect of a target with one declaration of its denoiser replaced [`HOMES`].
 `inline` is a constant table that loops read, `uniform` a block of `vec4`, or constant memory. Fragment
-shaders of GLSL have constants as straight code instead [emit_inlined.py]; compute shaders have no table: Mesa had not
-compiled one of 770 numbers after a minute, and a buffer is there wherever they are.
+shaders of GLSL have constants as straight code instead [emit_inlined.py]; compute shaders have no table:
+Mesa had not compiled one of 770 numbers after a minute, and a buffer is there wherever they are.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a web page needs to path-trace a scene and denoise it in WebGL 2: kernels, weights, and numbers to move.
+"""What a web page needs to path-trace a scene and denoise it in WebGL 2: kernels, weights, moving numbers.
 
 1. The paths are one kernel for all moments: what differs between the scenes of the animation is read from a
    table of uniforms, a row for each moment; camera and light colours are uniforms too [`moving_numbers`].
@@ -59,7 +59,7 @@ RANK = 16
 hold. Trained in this form it loses nothing (spec/factored.md)."""
 
 MANY, FEW = "packed", "inlined"
-"""Schedules: four weights a texel, however many weights there are; constants of the source where they are few."""
+"""Schedules: four weights a texel, however many there are; constants of the source where they are few."""
 
 CHECK_PX = 32
 """Side of the picture that a page checks itself with: the window fits in, all four borders are seen."""

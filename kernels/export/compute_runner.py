@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.glsl_buffers import GROUP
 from ...compiler.glsl_compute import SHADER_VERSION
+from ...compiler.weight_homes import UNIFORM
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..executor import Images
 from ..opengl_executor import OpenGLExecutor
-from .buffer_runner import BufferRunner, Launch
+from .buffer_runner import READ, BufferRunner, Launch
 
 
 class ComputeRunner(BufferRunner):
@@ -61,7 +62,10 @@ class ComputeRunner(BufferRunner):
             for place, data in launch.buffers.items():
                 held[place] = self._context.buffer(np.ascontiguousarray(data).tobytes())
                 made.callback(held[place].release)
-                held[place].bind_to_storage_buffer(place)
+                if place == READ and self.name.endswith(UNIFORM):
+                    held[place].bind_to_uniform_block(place)
+                else:
+                    held[place].bind_to_storage_buffer(place)
             prepared.run(*(-(-n // g) for n, g in zip(launch.threads, GROUP, strict=True)), 1)
             self._context.memory_barrier()
             return [np.frombuffer(held[place].read(), np.float32).copy() for place in launch.back]

@@ -56,6 +56,7 @@ def traced():
 
 
 def test_denoiser_keeps_its_bound(runner, kit, case):
+    """EXP-3, and by way of SPIR-V and HLSL EXP-4."""
     assert kit.excess(runner, *case, compile_program(case[0], runner.name)) <= 1
 
 

@@ -57,7 +57,7 @@ def exported(request):
 
 
 def test_an_export_keeps_its_bound_where_it_is_run(exported):
-    """The pair's picture, and with it the paths: 98 % of the sums are the reference's but for rounding."""
+    """EXP-4, EXP-6, EXP-10, EXP-11: the pair's picture within its bound; the paths' sums but for 2 %."""
     verdict = check.check(exported)
     assert verdict.holds, verdict.wrong
     if "missing" in verdict.executed:
@@ -68,6 +68,7 @@ def test_an_export_keeps_its_bound_where_it_is_run(exported):
 
 
 def test_the_manifest_is_of_the_schema_and_names_every_file(exported):
+    """EXP-8: all that the clause lists."""
     schema = json.loads((ROOT / "spec/export.schema.json").read_text())
     contents = exported.contents()
     manifest = json.loads(contents["manifest.json"])
@@ -96,6 +97,7 @@ def test_entry_points_and_names_stand_in_the_source(exported):
 
 
 def test_the_pair_s_files_are_as_they_say(exported):
+    """EXP-9: shapes, and bounds that are not zero."""
     told = json.loads(exported.files["check/check.json"])
     pixels = told["width"] * told["height"]
     for name, image in told["images"].items():
@@ -152,6 +154,7 @@ def test_what_a_tool_refuses_is_a_verdict():
     [(row.name, place) for row in targets.TARGETS.values() for place in [*row.places][1:]],
 )
 def test_other_places_of_weights_keep_the_bound(target, place):
+    """EXP-7: each place that a target has is compiled and, where something runs it, held to the bound."""
     try:
         whole = export(Request(model(), target, weights=place))
     except ExecutorUnavailable as error:

@@ -1,4 +1,4 @@
-"""Exported languages: each one's denoiser, paths and encoding, run and held to bound, reference and ranges.
+"""Exported languages (EXP-3, EXP-5): each one's denoiser, paths and encoding, run and held to its bound.
 
 A runner whose tools are missing skips its tests and says so; `make test` names those that must be there.
 """

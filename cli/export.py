@@ -41,8 +41,21 @@ TARGETS = (
 HTML, PAGE_NAME = "html", "index.html"
 """The target that is a web page, and its file."""
 
+DEPTH = 5
+"""Bounces of a path, if nobody asks for another number."""
+
 STATUS_WRONG = 1
 """Exit status when an export was written, and what runs it here finds it off, or refuses it."""
+
+
+Place = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PLACE",
+        help="Where the weights are: inline, uniform, texture or buffer, as far as the target has it.",
+        show_default="the target's usual place",
+    ),
+]
 
 
 def export(
@@ -66,18 +79,11 @@ def export(
     ] = None,
     time: options.Time = None,
     parameters: options.Parameters = None,
-    max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
+    max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = DEPTH,
     sampler: options.SamplerName = Sampler.pcg4d,
     profile: options.Profile = "ieee",
     variant: options.Variant = None,
-    weights: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PLACE",
-            help="Where the weights are: inline, uniform, texture or buffer, as far as the target has it.",
-            show_default="the target's usual place",
-        ),
-    ] = None,
+    weights: Place = None,
     check: Annotated[
         bool,
         typer.Option("--check", help="Compile and run it here, and compare with the reference's picture."),
@@ -92,32 +98,28 @@ def export(
     folder = output or Path(target)
     if target == HTML:
         of_kernels = {"--weights": weights, "--variant": variant, "--check": check or None, "--time": time}
-        for option, value in of_kernels.items():
-            if value is not None:
-                raise InputError(option, value, "a web page has its own", "leave it out")
+        _refuse(of_kernels, "a web page has its own", "leave it out")
         _write(folder, {PAGE_NAME: webpage.page_of(model, scene, parameters or [], None).encode()})
         return
     check_new_folder(folder)
     if scene is None:
-        given = {"--time": time, "--set": parameters, "--sampler": sampler.value, "--max-depth": max_depth}
-        _refuse_without_scene(given)
+        turned = None if sampler is Sampler.pcg4d else sampler.value
+        depth = None if max_depth == DEPTH else max_depth
+        given = {"--time": time, "--set": parameters, "--sampler": turned, "--max-depth": depth}
+        _refuse(given, "there is no scene", "name one with --scene, or leave it out")
     moment, paths = (time, parameters or []), (max_depth, sampler)
     made = _export(model, target, scene, moment, paths, profile, variant, weights)
     _write(folder, made.contents())
-    for limit in made.manifest["limits"]:
-        say(f"{limit['name']}: {limit['needs']} of {limit['most']}")
-    if made.manifest["assumes"]:
-        say(f"the bound assumes: {made.manifest['assumes']}")
+    _tell(made)
     if check:
         _checked(made)
 
 
-def _refuse_without_scene(given: dict[str, Any]) -> None:
-    """Refuse options of a scene where there is none."""
-    usual = {"--sampler": Sampler.pcg4d.value, "--max-depth": 5}
+def _refuse(given: dict[str, Any], rule: str, way_out: str) -> None:
+    """Refuse options that are given though they mean nothing."""
     for option, value in given.items():
-        if value != usual.get(option):
-            raise InputError(option, value, "there is no scene", "name one with --scene, or leave it out")
+        if value is not None:
+            raise InputError(option, value, rule, way_out)
 
 
 def _export(
@@ -140,6 +142,14 @@ def _export(
     loaded = load_scene(scene, *moment) if scene else None
     request = Request(load_model(model), target, loaded, profile, weights or "", variant or FULL, settings)
     return exported(request)
+
+
+def _tell(made: Export) -> None:
+    """Say which limits an export keeps, and what its bound rests on."""
+    for limit in made.manifest["limits"]:
+        say(f"{limit['name']}: {limit['needs']} of {limit['most']}")
+    if made.manifest["assumes"]:
+        say(f"the bound assumes: {made.manifest['assumes']}")
 
 
 def _write(folder: Path, contents: Any) -> None:

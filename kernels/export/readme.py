@@ -94,8 +94,8 @@ def _rays(facts: Mapping[str, Any]) -> list[str]:
         return []
     return [
         f"* The model has learned from features that are means over {rays} camera rays. Run the path kernel "
-        f"again with samples = {rays}, divide all planes but the colour's by {rays}, and give the encoding those, "
-        "with sample_count = 1; with features of one ray edges are worse."
+        f"again with samples = {rays}, divide all planes but the colour's by {rays}, and give the encoding "
+        "those, with sample_count = 1; with features of one ray edges are worse."
     ]
 
 
@@ -109,7 +109,7 @@ def _check(check: Mapping[str, Any]) -> list[str]:
     ]
     if check["sums"]:
         found += [
-            f"`sums.f32` are the paths' sums of the same picture, for seed {check['sums']['seed']}; a path",
+            f"`sums.f32` are the paths' sums of this picture, seed {check['sums']['seed']}; a path",
             "that passes an edge within rounding may differ.",
         ]
     return found

@@ -162,147 +162,144 @@ ARGUMENTS_CODE = """\
 """Integration with functions."""
 
 
-def _rows() -> tuple[Row, ...]:
-    """Return all rows but ONNX, which is no kernel's text."""
-    buffers, arguments = "numbered", "arguments"
-    return (
-        Row(
-            "opencl",
-            "OpenCL C 1.2",
-            _storage("opencl", 64 * KILOBYTE, "CL_DEVICE_MAX_CONSTANT_BUFFER_SIZE") | _tabled("opencl"),
-            _as(".cl"),
-            arguments,
-            'cl_kernel kernel = clCreateKernel(program, "wamnet_denoise", &error);\n'
-            "/* Arguments in this order: {arguments}. */\n"
-            "set_arguments(kernel, {arguments});\n"
-            "size_t global[2] = {{round_up(width, 16), round_up(height, 4)}}, local[2] = {{16, 4}};\n"
-            "clEnqueueNDRangeKernel(queue, kernel, 2, NULL, global, local, 0, NULL, NULL);",
+ROWS: tuple[Row, ...] = (
+    Row(
+        "opencl",
+        "OpenCL C 1.2",
+        _storage("opencl", 64 * KILOBYTE, "CL_DEVICE_MAX_CONSTANT_BUFFER_SIZE") | _tabled("opencl"),
+        _as(".cl"),
+        "arguments",
+        'cl_kernel kernel = clCreateKernel(program, "wamnet_denoise", &error);\n'
+        "/* Arguments in this order: {arguments}. */\n"
+        "set_arguments(kernel, {arguments});\n"
+        "size_t global[2] = {{round_up(width, 16), round_up(height, 4)}}, local[2] = {{16, 4}};\n"
+        "clEnqueueNDRangeKernel(queue, kernel, 2, NULL, global, local, 0, NULL, NULL);",
+    ),
+    Row("glsl", "GLSL 3.30, fragment shader", _fragment("opengl", 1024), _as(".frag"), "names", GL_CODE),
+    Row(
+        "glsl-compute",
+        "GLSL 4.30, compute shader",
+        _storage("glsl-compute", 16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE"),
+        _as(".comp"),
+        "numbered",
+        BUFFERS_CODE.replace("{api}", "GLuint").replace("{dispatch}", f"gl{DISPATCH}"),
+    ),
+    Row(
+        "glsl-es",
+        "GLSL ES 3.00, fragment shader",
+        _fragment("glsl-es", 2048),
+        _as(".frag"),
+        "names",
+        GL_CODE,
+    ),
+    Row(
+        "glsl-vulkan",
+        "GLSL 4.50 for Vulkan, compute shader",
+        VULKAN_PLACES,
+        _as(".comp"),
+        "numbered",
+        BUFFERS_CODE.replace("{api}", "VkPipeline").replace("{dispatch}", DISPATCH),
+    ),
+    Row(
+        "wgsl",
+        "WGSL",
+        _storage("wgsl", 64 * KILOBYTE, "maxUniformBufferBindingSize"),
+        _as(".wgsl"),
+        "numbered",
+        BUFFERS_CODE.replace("{api}", "const").replace("{dispatch}", DISPATCH),
+        most_images=Limit("maxStorageBuffersPerShaderStage, less 2", 6, "use fewer features"),
+    ),
+    Row(
+        "hlsl",
+        "HLSL, compute shader for fxc (shader model 5.0) and dxc (6.0)",
+        VULKAN_PLACES,
+        _hlsl,
+        "registers",
+        BUFFERS_CODE.replace("{api}", "auto").replace("{dispatch}", DISPATCH),
+    ),
+    Row(
+        "metal",
+        "Metal Shading Language",
+        _storage("metal", 64 * KILOBYTE, "constant memory of a kernel") | _tabled("metal"),
+        _as(".metal"),
+        "numbered",
+        BUFFERS_CODE.replace("{api}", "id<MTLComputePipelineState>").replace(
+            "{dispatch}", "dispatchThreads(width, height)"
         ),
-        Row("glsl", "GLSL 3.30, fragment shader", _fragment("opengl", 1024), _as(".frag"), "names", GL_CODE),
-        Row(
-            "glsl-compute",
-            "GLSL 4.30, compute shader",
-            _storage("glsl-compute", 16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE"),
-            _as(".comp"),
-            buffers,
-            BUFFERS_CODE.replace("{api}", "GLuint").replace("{dispatch}", f"gl{DISPATCH}"),
+    ),
+    Row(
+        "spirv",
+        "SPIR-V 1.0, compute shader",
+        VULKAN_PLACES,
+        _spirv,
+        "numbered",
+        BUFFERS_CODE.replace("{api}", "VkPipeline").replace("{dispatch}", DISPATCH),
+    ),
+    Row(
+        "c",
+        "C99, one header",
+        {BUFFER: Place("c"), **_tabled("c")},
+        _as(".h"),
+        "arguments",
+        '#include "denoise.h"\n'
+        + ARGUMENTS_CODE.replace("{call}", "wamnet_image({arguments});")
+        + "\n/* Compile with -ffp-contract=off; wamnet_pixel does one pixel, for loops of your own. */",
+    ),
+    Row(
+        "cuda",
+        "CUDA C",
+        {BUFFER: Place("cuda"), **_tabled("cuda")},
+        _as(".cu"),
+        "arguments",
+        ARGUMENTS_CODE.replace(
+            "{call}",
+            "dim3 block(16, 8), grid((width + 15) / 16, (height + 7) / 8);\n"
+            "wamnet_denoise<<<grid, block>>>({arguments});\n"
+            "cudaDeviceSynchronize();",
         ),
-        Row(
-            "glsl-es",
-            "GLSL ES 3.00, fragment shader",
-            _fragment("glsl-es", 2048),
-            _as(".frag"),
-            "names",
-            GL_CODE,
+    ),
+    Row(
+        "shadertoy",
+        "Shadertoy's tabs",
+        {INLINE: Place("shadertoy", "inlined", limit=INLINED, each=1.0)},
+        _as(".glsl"),
+        "channels",
+        "1. Make buffers A, B, ... and paste features/feature.<name>.glsl into one each, in this order.\n"
+        "2. Paste denoise.glsl into the tab Image.\n"
+        "3. In Image, set iChannel0, iChannel1, ... to the buffers in that order:\n"
+        "{images}\n"
+        "4. Set each channel's filter to nearest and its wrap to clamp.",
+        entry="mainImage",
+        single=True,
+        most_images=Limit("buffers of a Shadertoy, A to D", 4, "use fewer features"),
+        source=Limit(
+            "characters of a tab, a bound of ours: the site states none",
+            1_000_000,
+            "use a smaller --variant",
         ),
-        Row(
-            "glsl-vulkan",
-            "GLSL 4.50 for Vulkan, compute shader",
-            VULKAN_PLACES,
-            _as(".comp"),
-            buffers,
-            BUFFERS_CODE.replace("{api}", "VkPipeline").replace("{dispatch}", DISPATCH),
-        ),
-        Row(
-            "wgsl",
-            "WGSL",
-            _storage("wgsl", 64 * KILOBYTE, "maxUniformBufferBindingSize"),
-            _as(".wgsl"),
-            buffers,
-            BUFFERS_CODE.replace("{api}", "const").replace("{dispatch}", DISPATCH),
-            most_images=Limit("maxStorageBuffersPerShaderStage, less 2", 6, "use fewer features"),
-        ),
-        Row(
-            "hlsl",
-            "HLSL, compute shader for fxc (shader model 5.0) and dxc (6.0)",
-            VULKAN_PLACES,
-            _hlsl,
-            "registers",
-            BUFFERS_CODE.replace("{api}", "auto").replace("{dispatch}", DISPATCH),
-        ),
-        Row(
-            "metal",
-            "Metal Shading Language",
-            _storage("metal", 64 * KILOBYTE, "constant memory of a kernel") | _tabled("metal"),
-            _as(".metal"),
-            buffers,
-            BUFFERS_CODE.replace("{api}", "id<MTLComputePipelineState>").replace(
-                "{dispatch}", "dispatchThreads(width, height)"
-            ),
-        ),
-        Row(
-            "spirv",
-            "SPIR-V 1.0, compute shader",
-            VULKAN_PLACES,
-            _spirv,
-            buffers,
-            BUFFERS_CODE.replace("{api}", "VkPipeline").replace("{dispatch}", DISPATCH),
-        ),
-        Row(
-            "c",
-            "C99, one header",
-            {BUFFER: Place("c"), **_tabled("c")},
-            _as(".h"),
-            arguments,
-            '#include "denoise.h"\n'
-            + ARGUMENTS_CODE.replace("{call}", "wamnet_image({arguments});")
-            + "\n/* Compile with -ffp-contract=off; wamnet_pixel does one pixel, for loops of your own. */",
-        ),
-        Row(
-            "cuda",
-            "CUDA C",
-            {BUFFER: Place("cuda"), **_tabled("cuda")},
-            _as(".cu"),
-            arguments,
-            ARGUMENTS_CODE.replace(
-                "{call}",
-                "dim3 block(16, 8), grid((width + 15) / 16, (height + 7) / 8);\n"
-                "wamnet_denoise<<<grid, block>>>({arguments});\n"
-                "cudaDeviceSynchronize();",
-            ),
-        ),
-        Row(
-            "shadertoy",
-            "Shadertoy's tabs",
-            {INLINE: Place("shadertoy", "inlined", limit=INLINED, each=1.0)},
-            _as(".glsl"),
-            "channels",
-            "1. Make buffers A, B, ... and paste features/feature.<name>.glsl into one each, in this order.\n"
-            "2. Paste denoise.glsl into the tab Image.\n"
-            "3. In Image, set iChannel0, iChannel1, ... to the buffers in that order:\n"
-            "{images}\n"
-            "4. Set each channel's filter to nearest and its wrap to clamp.",
-            entry="mainImage",
-            single=True,
-            most_images=Limit("buffers of a Shadertoy, A to D", 4, "use fewer features"),
-            source=Limit(
-                "characters of a tab, a bound of ours: the site states none",
-                1_000_000,
-                "use a smaller --variant",
-            ),
-        ),
-        Row(
-            "godot",
-            "Godot 4 shading language, canvas item",
-            {
-                TEXTURE: Place("godot", limit=_texture(16384), each=1 / WEIGHT_TEXTURE_WIDTH),
-                **_tabled("godot"),
-            },
-            _as(".gdshader"),
-            "names",
-            "var material = ShaderMaterial.new()\n"
-            'material.shader = load("res://denoise.gdshader")\n'
-            "# Images: FORMAT_RGBF, row 0 the top row; weights: FORMAT_RF, 1024 wide, padded with zeros.\n"
-            "{images}\n"
-            'material.set_shader_parameter("weight_texture", ImageTexture.create_from_image(weights))\n'
-            "$Picture.material = material   # a TextureRect of the picture's size\n"
-            "get_viewport().use_hdr_2d = true   # else colours keep 8 bits",
-            single=True,
-        ),
-    )
+    ),
+    Row(
+        "godot",
+        "Godot 4 shading language, canvas item",
+        {
+            TEXTURE: Place("godot", limit=_texture(16384), each=1 / WEIGHT_TEXTURE_WIDTH),
+            **_tabled("godot"),
+        },
+        _as(".gdshader"),
+        "names",
+        "var material = ShaderMaterial.new()\n"
+        'material.shader = load("res://denoise.gdshader")\n'
+        "# Images: FORMAT_RGBF, row 0 the top row; weights: FORMAT_RF, 1024 wide, padded with zeros.\n"
+        "{images}\n"
+        'material.set_shader_parameter("weight_texture", ImageTexture.create_from_image(weights))\n'
+        "$Picture.material = material   # a TextureRect of the picture's size\n"
+        "get_viewport().use_hdr_2d = true   # else colours keep 8 bits",
+        single=True,
+    ),
+)
+"""All rows but that of ONNX, which is no kernel's text."""
 
-
-TARGETS: Mapping[str, Row] = {row.name: row for row in _rows()}
+TARGETS: Mapping[str, Row] = {row.name: row for row in ROWS}
 """All targets whose kernels are text or SPIR-V, by name."""
 
 ONNX = "onnx"

@@ -49,7 +49,7 @@ def view(
         Path | None,
         typer.Option(
             metavar="MODEL",
-            help="Model whose first layer is cut to rank 16 for the fast variant: one that was trained on so.",
+            help="Model whose first layer is cut to rank 16 for the fast variant: one trained on so.",
             show_default="the same",
         ),
     ] = None,

@@ -2,8 +2,8 @@
 
 1. The scene at the times of its animation [`animation_of`]; one that time does not change is still.
 2. Kernels, weights and numbers come from kernels/page.py, as JSON in the page.
-3. The page is a template with one style sheet and some scripts beside it [`SCRIPTS`], which are put into it as
-   they are: nothing is built, nothing is fetched; the page forbids itself to (its Content-Security-Policy).
+3. The page is a template with one style sheet and some scripts beside it [`SCRIPTS`], which are put into it
+   as they are: nothing is built, nothing is fetched; its Content-Security-Policy forbids it to.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ FRAMES = 240
 """Moments of an animation that a page can show: eight seconds, 30 a second."""
 
 FPS = 30.0
-"""Moments a second. They lie half a step beside whole numbers, since some scenes are laid out in another way
+"""Moments a second. They lie half a step beside whole numbers, since some scenes are laid out otherwise
 at time 0, where their boxes are parallel to the axes."""
 
 LEAD = (
-    "One random path per pixel gives the noisy picture; a small network, compiled to a fragment shader with a "
-    "bound on its error, makes the calm one of it. All of it runs on your device: nothing is loaded or sent."
+    "One random path per pixel gives the noisy picture; a small network, compiled to a fragment shader with "
+    "a bound on its error, makes the calm one of it. All runs on your device: nothing is loaded or sent."
 )
 """The sentence below the title."""
 
@@ -80,7 +80,6 @@ def animation_of(name: str, assignments: Sequence[str] = ()) -> Animation:
 def render_page(data: dict[str, Any]) -> str:
     """Return the page that shows such data."""
     import jinja2
-    from markupsafe import Markup
 
     def part(name: str) -> str:
         return (resources.files(__package__) / FOLDER / name).read_text(encoding="utf-8")
@@ -91,7 +90,7 @@ def render_page(data: dict[str, Any]) -> str:
     return environment.from_string(part("page.html.jinja")).render(
         title=f"{data['scene'].replace('_', ' ').capitalize()}, path-traced and denoised live",
         lead=LEAD,
-        style=Markup(part("page.css")),
-        script=Markup("\n".join(part(name) for name in SCRIPTS)),
-        data=Markup(text),
+        style=part("page.css"),
+        script="\n".join(part(name) for name in SCRIPTS),
+        data=text,
     )

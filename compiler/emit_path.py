@@ -148,7 +148,7 @@ class _Kernel(Lines):
             ),
             max_depth=self.programs.settings.max_depth,
             unordered=self.dialect.unordered[False],
-            scene=self.dialect.scene_numbers.format(vectors=-(-len(self.programs.inputs) // 4)),
+            scene=self._scene_declaration(),
             counter=self.dialect.types["uint32"],
             **uniforms,
         )
@@ -241,6 +241,11 @@ class _Kernel(Lines):
             output, component = divmod(number, self.dialect.planes_per_output)
             store = self.dialect.sum_store
             self._line(store.format(plane=number, output=output, component=component, value=f"sum_{plane}"))
+
+    def _scene_declaration(self) -> str:
+        """Return the declaration of the scene's numbers that are inputs, if there are any."""
+        vectors = -(-len(self.programs.inputs) // 4)
+        return self.dialect.scene_numbers.format(vectors=vectors) if vectors else ""
 
     def _scene_numbers(self) -> dict[str, str]:
         """Return the text of each of the scene's numbers that are inputs."""

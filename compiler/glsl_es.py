@@ -7,6 +7,7 @@ compiler that keeps the order of operations [`ASSUMES`].
 
 from __future__ import annotations
 
+from .dialect import Dialect
 from .encode_dialect import GLSLEncode
 from .glsl import GLSL, PREAMBLE, WEIGHT_TEXTURE_WIDTH
 from .glsl_inlined import GLSLInlined
@@ -45,13 +46,14 @@ uniform sampler2D weight_texture;
 
 vec4 weights(int texel)
 {{{{
-    return texelFetch(weight_texture, ivec2(texel % {WEIGHT_TEXTURE_WIDTH}, texel / {WEIGHT_TEXTURE_WIDTH}), 0);
+    ivec2 place = ivec2(texel % {WEIGHT_TEXTURE_WIDTH}, texel / {WEIGHT_TEXTURE_WIDTH});
+    return texelFetch(weight_texture, place, 0);
 }}}}
 """
 """What a packed kernel declares besides the images."""
 
 
-class _ES:
+class _ES(Dialect):
     """What the shaders have in common."""
 
     target = "glsl-es"
@@ -59,7 +61,7 @@ class _ES:
     native_sine = NATIVE_SINE
     assumes = ASSUMES
     unordered = ("", "")
-    first = (VERSION,)
+    first: tuple[str, ...] = (VERSION,)
     indexes_results = False
 
 

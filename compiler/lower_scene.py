@@ -107,8 +107,9 @@ def lower_scene(
     scene: Scene,
     settings: Settings,
     most_unrolled: int | None = MOST_UNROLLED,
-    keep_places: bool = False,
     moving: SceneInputs | None = None,
+    *,
+    keep_places: bool = False,
 ) -> PathPrograms:
     """Return the programs of a path through a scene, in float32.
 
@@ -118,10 +119,7 @@ def lower_scene(
     not constants.
     """
     laid = lay_out(scene, settings)
-
-    def world_of(given: Mapping[str, Any]) -> World:
-        world: World = (moving.opened(laid, given) if moving else laid)["world"]
-        return world
+    world_of = partial(_world, laid, moving)
 
     def start(given: Mapping[str, Any]) -> dict[str, Any]:
         # A pixel's counter, as in refimpl/render.py: pixel_counter.
@@ -151,7 +149,7 @@ def lower_scene(
         return {**_taken(PATH, path), "alive": alive}
 
     numbers = {**dict.fromkeys(("x", "y", "seed", "sample_number"), (NUMBER, COUNTER))}
-    size = dict.fromkeys(("width", "height"), (NUMBER, FLOAT))
+    size, depth = dict.fromkeys(("width", "height"), (NUMBER, FLOAT)), {"depth": (NUMBER, COUNTER)}
     scene_numbers = dict.fromkeys(moving.names if moving else (), (NUMBER, FLOAT))
     few = most_unrolled is None or primitives(scene) <= most_unrolled
     lowered = partial(_lowered, most_unrolled=None if few else 1, keep_places=keep_places)
@@ -162,13 +160,15 @@ def lower_scene(
         lowered("start", start, {**numbers, **size, **scene_numbers}),
         lowered("arrive", arrive, {**PATH, **scene_numbers}),
         lowered("look", look, {**SURFACE, "direction": PATH["direction"], **scene_numbers}),
-        lowered(
-            "scatter",
-            scatter,
-            {**PATH, **SURFACE, **COUNTERS, "depth": (NUMBER, COUNTER), **scene_numbers},
-        ),
+        lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, **depth, **scene_numbers}),
         moving.names if moving else (),
     )
+
+
+def _world(laid: dict[str, Any], moving: SceneInputs | None, given: Mapping[str, Any]) -> World:
+    """Return the world, with those of its numbers that are inputs as they are given."""
+    world: World = (moving.opened(laid, given) if moving else laid)["world"]
+    return world
 
 
 def primitives(scene: Scene) -> int:

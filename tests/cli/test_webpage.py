@@ -102,7 +102,8 @@ def test_the_paths_are_the_reference_s(still, options):
     told = draw(still, **options)
     scene = scenes.canonical("minicubes", time=told["time"])
     camera = replace(scene.camera, position=tuple(told["camera"]["position"]))
-    lights = tuple(replace(l, color=tuple(c)) for l, c in zip(scene.lights, told["colors"], strict=True))
+    pairs = zip(scene.lights, told["colors"], strict=True)
+    lights = tuple(replace(light, color=tuple(color)) for light, color in pairs)
     assert (camera == scene.camera) == ("turn" not in options)
     kernel = compile_path(
         lower_scene(replace(scene, camera=camera, lights=lights), SETTINGS), "numpy", groups=FEATURES
@@ -143,9 +144,9 @@ def test_the_pictures_keep_their_bound(still, model, data, number):
     artifact = P.compile_program(program, P.TARGET, "ieee", network.schedule, network.rank)
     value, bound = P._expected(program, artifact, network.rank, images)
     found = read(still, "picture")[..., :3].astype(np.float64)
-    assert 0 < bound.max() < 1e-3
+    assert 0 < bound.max() < 2**-8, "a step of 8 bits would hold for many wrong kernels"
     assert np.all(np.abs(found - value) <= bound)
-    assert np.ptp(value) > 0.01
+    assert np.ptp(value) > bound.max()
 
 
 def test_the_page_measures_its_own_error(still, data):
@@ -317,7 +318,7 @@ def test_slow_devices_get_small_pieces(still):
           return handed;
         }"""
     )
-    assert rows[0] == [0, 1]
+    assert rows[0] == [0, 2], "the first strip is small, in whole squares of 2 x 2 pixels"
     assert [first for first, _ in rows] == [0, *np.cumsum([count for _, count in rows])[:-1].tolist()]
     assert sum(count for _, count in rows) == 64
     assert rows[-1][1] <= 2 < rows[1][1]

@@ -170,10 +170,11 @@ def _command(program: str | None, executor: str | None) -> list[str]:
         if not command:
             raise InputError("--program", repr(program), "it is no command", "name a program")
         return command
+    from ..kernels.export.runners import RUNNERS
     from ..kernels.registry import EXECUTORS
 
-    if executor not in (REFERENCE, *EXECUTORS):
-        known = ", ".join((REFERENCE, *EXECUTORS))
+    if executor not in (REFERENCE, *EXECUTORS, *RUNNERS):
+        known = ", ".join(dict.fromkeys((REFERENCE, *EXECUTORS, *RUNNERS)))
         raise InputError("--executor", executor, "it is unknown", f"known are {known}")
     return [sys.executable, "-m", "wamnet.kernels.conformance.program", "--executor", str(executor)]
 

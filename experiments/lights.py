@@ -5,7 +5,7 @@
 2. Networks are trained on A alone, on several sets, or on one of the tests' sets alone, which is as good as
    it can get. Frames are as many in all cases [`trained_on`].
 3. Four inputs are compared [`INPUTS`]: the paper's colour and normal; the preset `short`; the lamps' light
-   without shadows in place of its albedo (spec/transport.md, LTR-11), which tells the light colours; and both.
+   without shadows in place of its albedo (spec/transport.md, LTR-11), which tells their colours; and both.
 4. Pictures of unseen sets at unseen times are scored, and their error of colour is told [`lab/colors.py`].
 
     python experiments/lights.py

@@ -101,7 +101,7 @@ def varying(scenes: Sequence[Scene], settings: Settings) -> SceneInputs:
 
 def bind(programs: PathPrograms, values: Mapping[str, float]) -> PathPrograms:
     """Return the programs with constants in the place of the inputs that have values."""
-    parts = {name: _bound(program, values) for name, program in programs.parts().items()}
+    parts: dict[str, Any] = {name: _bound(part, values) for name, part in programs.parts().items()}
     return replace(programs, inputs=(), **parts)
 
 

@@ -48,7 +48,7 @@ class Home:
         for old, new in self.moves.items():
             assert old in begin, f"{base.target} no longer has {old!r}"
             begin = begin.replace(old, new)
-        words = {"target": f"{base.target}:{how}", "begin": begin, "weight": self.weight}
+        words: dict[str, object] = {"target": f"{base.target}:{how}", "begin": begin, "weight": self.weight}
         words |= {"weights_table": self.table, "arguments": _arguments(base.arguments, how)}
         found: Dialect = type(f"{base.__name__}_{how}", (base,), words)()
         return found

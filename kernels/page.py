@@ -125,7 +125,7 @@ def page_data(
     shown = _features([network.model for network in networks])
     scene, first = animation.scenes[0], networks[0].model
     inputs, numbers = moving_numbers(animation, settings)
-    programs = lower_scene(scene, settings, None, inputs)
+    programs = lower_scene(scene, settings, None, moving=inputs)
     path = compile_path(programs, TARGET, profile, 1, layers_of(shown))
     images = check(animation, first, shown, settings)
     variants = [variant(network, images, profile) for network in networks]
@@ -283,7 +283,8 @@ def check(
 ) -> dict[str, NDArray[np.float32]]:
     """Return the encoded features (H, W, C) of a small noisy picture, by name."""
     job = Job(CHECK_PX, CHECK_PX, 1, CHECK_SEED, settings)
-    return images_of(replace(model, features=tuple(features)), render(animation.scenes[0], job).frame)
+    frame = render(animation.scenes[0], job).frame
+    return dict(images_of(replace(model, features=tuple(features)), frame))
 
 
 def _raised(bound: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -66,8 +66,9 @@ class Strips {
         break; // drivers compile when they draw first: this row is measured alone
       }
       const cost = (known ? this.pixelMs.get(pass.shader) : 1) * size;
-      const fit = known ? Math.max(1, Math.floor((BATCH_MS - this.guess) / cost)) : 1;
-      const rows = Math.min(fit, size - job.row);
+      // Devices shade squares of 2 x 2 pixels: a single row would cost as much as two.
+      const fit = known ? Math.max(1, Math.floor((BATCH_MS - this.guess) / (2 * cost))) : 1;
+      const rows = Math.min(2 * fit, size - job.row);
       this.device.draw(pass.shader, pass.target, pass.textures, pass.set, [job.row, rows]);
       this.batch.add(pass.shader);
       job.row += rows;

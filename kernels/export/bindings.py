@@ -131,7 +131,7 @@ def _integers(role: str, target: str) -> list[str]:
 
 
 def _numbered(role: str, target: str, bound: Sequence[Binding]) -> list[Binding]:
-    """Return bindings with numbers: sizes 0, what is read besides images 1, what is written 2, images 3 on."""
+    """Return bindings with numbers: 0 sizes, 1 what is read but images, 2 what is written, 3 images."""
     fixed = {"weights": 1, "result": 2}
     fixed |= {"sums": 2 if role == "path" else 1}
     rest = iter(range(FIRST_IMAGE, FIRST_IMAGE + len(bound)))

@@ -99,13 +99,13 @@ def check(export: Export) -> Verdict:
     except CompileError as error:
         return Verdict(*known, compiled, "refused", wrong=str(error))
     pair = export.pair
-    error = np.abs(found.astype(np.float64) - pair.output)
-    share = float(np.max(error / pair.bound))
-    wrong = "" if share <= 1 else f"off by {error.max():.3g}, {share:.3g} times the bound"
+    off = np.abs(found.astype(np.float64) - pair.output)
+    share = float(np.max(off / pair.bound))
+    wrong = "" if share <= 1 else f"off by {off.max():.3g}, {share:.3g} times the bound"
     if paths is not None and not paths >= PATHS_ALIKE:
         wrong = wrong or f"{paths:.1%} of the paths' sums agree, of at least {PATHS_ALIKE:.0%}"
-    numbers = (float(error.max()), float(pair.bound.max()), pair.promised, share, paths)
-    return Verdict(*known, compiled, device, *numbers, wrong=wrong)
+    numbers = (float(off.max()), float(pair.bound.max()))
+    return Verdict(*known, compiled, device, *numbers, pair.promised, share, paths, wrong)
 
 
 def _compiled(export: Export) -> tuple[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -45,14 +46,14 @@ class ComputeRunner(BufferRunner):
             return self._textures._run(artifact, images)
         return super()._run(artifact, images)
 
-    def _prepare(self, source: str, entry: str, count: int) -> moderngl.ComputeShader:
+    def _prepare(self, source: str, entry: str, count: int) -> Any:
         with self._context:
             try:
                 return self._context.compute_shader(source)
             except moderngl.Error as error:
                 raise CompileError(f"{self.device} does not build the kernel: {error}") from None
 
-    def _launch(self, prepared: moderngl.ComputeShader, launch: Launch) -> list[NDArray[np.float32]]:
+    def _launch(self, prepared: Any, launch: Launch) -> list[NDArray[np.float32]]:
         with self._context, ExitStack() as made:
             sizes = np.array([n % 2**32 for n in launch.sizes], np.uint32)
             block = self._context.buffer(np.pad(sizes, (0, -len(sizes) % 4)).tobytes())

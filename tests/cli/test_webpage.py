@@ -318,7 +318,7 @@ def test_slow_devices_get_small_pieces(still):
           return handed;
         }"""
     )
-    assert rows[0] == [0, 1]
+    assert rows[0] == [0, 2], "the first strip is small, in whole squares of 2 x 2 pixels"
     assert [first for first, _ in rows] == [0, *np.cumsum([count for _, count in rows])[:-1].tolist()]
     assert sum(count for _, count in rows) == 64
     assert rows[-1][1] <= 2 < rows[1][1]

@@ -68,6 +68,8 @@ def test_every_feature_that_fits_is_encoded_in_passes_of_four(model_of):
     assert [len(part) for part in names] == [4, 2]
     assert sorted(names[0] + names[1]) == sorted(features)
     assert len(data["path"]["planes"]) == 16
+    vectors = -(-len(data["numbers"]["names"]) // 4)
+    assert f"uniform vec4 scene_numbers[{vectors}];" in data["path"]["source"]
     assert data["lights"] == [{"color": [1.0, 0.78, 0.5], "power": 14.0, "area": 0.25}]
 
 

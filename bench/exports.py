@@ -3,9 +3,9 @@
     python bench/exports.py
     python bench/exports.py --model model.safetensors --scene minicubes --targets wgsl c --places
 
-Each target is exported, compiled by its own tools, run by what is nearest to it on this machine; its
-picture compared with the reference's. `--places` does so for every place of the weights, without paths. A tool
-that is missing is a cell of the table; status 1 says that something that was tried is wrong.
+Each target is exported, compiled by its own tools, run by what is nearest to it on this machine, and its
+picture compared with the reference's. `--places` does so for every place of the weights, without paths. A
+tool that is missing is a cell of the table; status 1 says that something that was tried is wrong.
 """
 
 from __future__ import annotations
@@ -13,17 +13,13 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from wamnet.cli.inputs import load_model
 from wamnet.kernels.export.check import HEAD, Verdict, check
 from wamnet.kernels.export.package import Request, export
+from wamnet.kernels.export.shelf import random_model
 from wamnet.kernels.export.targets import NAMES, ONNX, TARGETS
-from wamnet.refimpl import siren
-from wamnet.refimpl.dataset import Normalization, Window
 from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.scene import Scene
@@ -67,13 +63,6 @@ def judged(model: Model, target: str, place: str, scene: Scene | None) -> Verdic
         return Verdict(target, place, 0, f"missing: {error}", "-")
     except InputError as error:
         return Verdict(target, place, 0, f"beyond a limit: {error.what} is {error.value}", "-")
-
-
-def random_model() -> Model:
-    """Return a network of 4x4 windows, untrained, whose outputs lie around the middle."""
-    network = siren.init((96, 8, 3), 2.0, 2.0, 5, np.float32)
-    network = replace(network, biases=(*network.biases[:-1], np.full(3, 0.5, np.float32)))
-    return Model(network, ("color", "normal"), Window(4, "clamp"), Normalization(), {})
 
 
 if __name__ == "__main__":

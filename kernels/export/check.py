@@ -108,6 +108,10 @@ def check(export: Export) -> Verdict:
     return Verdict(*known, compiled, device, *numbers, pair.promised, share, paths, wrong)
 
 
+UNTOLD: Mapping[str, str] = {"metal": "none of Apple's here", "onnx": "onnx.checker"}
+"""What the table says of targets without tools here, and whose files a package has checked."""
+
+
 def _compiled(export: Export) -> tuple[str, str]:
     """Return which tools took the files, and what one of them refused."""
     told = []
@@ -123,7 +127,7 @@ def _compiled(export: Export) -> tuple[str, str]:
                 told.append(f"missing: {error}")
             except CompileError as error:
                 return "", str(error)
-    return " + ".join(dict.fromkeys(told)) or "the device's compiler", ""
+    return " + ".join(dict.fromkeys(told)) or UNTOLD.get(export.target, "the device's compiler"), ""
 
 
 def _sources(export: Export, suffix: str) -> list[str]:

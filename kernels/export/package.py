@@ -206,6 +206,7 @@ def _model(request: Request) -> dict[str, Any]:
         "features": list(varied.features),
         "widths": [varied.siren.weights[0].shape[1], *(len(b) for b in varied.siren.biases)],
         "variant": request.variant,
+        "feature_spp": int(request.model.info.get("trained_on_feature_spp", "1") or 1),
     }
 
 

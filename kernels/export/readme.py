@@ -82,7 +82,20 @@ def _facts(facts: Mapping[str, Any]) -> list[str]:
         f"* Weights: {weights['count'] or 'all'} numbers, {weights['where']}.",
         f"* Output: {facts['output']['encoding'] or 'linear'}.",
         *images,
+        *_rays(facts),
         *(f"* Limit: {x['name']}: needs {x['needs']} of {x['most']}." for x in facts["limits"]),
+    ]
+
+
+def _rays(facts: Mapping[str, Any]) -> list[str]:
+    """Return the line about features of more camera rays than the colour's."""
+    rays = facts["model"]["feature_spp"]
+    if rays < 2 or facts["scene"] is None:
+        return []
+    return [
+        f"* The model has learned from features that are means over {rays} camera rays. Run the path kernel "
+        f"again with samples = {rays}, divide all planes but the colour's by {rays}, and give the encoding those, "
+        "with sample_count = 1; with features of one ray edges are worse."
     ]
 
 

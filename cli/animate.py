@@ -113,7 +113,9 @@ def animate(
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
     facts += cut_facts(network, rank)
     rays = rays_of(network) if feature_spp is None else feature_spp
-    shots = plan_shots(folder, (scene or scene_of(network), chosen), times, (size, reference_spp, seed, rays), facts)
+    shots = plan_shots(
+        folder, (scene or scene_of(network), chosen), times, (size, reference_spp, seed, rays), facts
+    )
     left = missing(folder, shots)
     folder.mkdir(exist_ok=True)
     with (

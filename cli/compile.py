@@ -1,7 +1,7 @@
 """`wamnet compile`: from a model or a scene to the source of a kernel and its manifest.
 
-A name of a canonical scene, or a file that ends in .json, is a scene; anything else is a model: a file, or one
-that comes along, as in model:minicubes.
+A name of a canonical scene, or a file that ends in .json, is a scene; anything else is a model: a file, or
+one that comes along, as in model:minicubes.
 """
 
 from __future__ import annotations

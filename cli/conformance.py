@@ -127,10 +127,11 @@ def conformance(
     before = None if track is None else report.read_track(track)
     verdicts = _asked(command, cases, profile, timeout)
     name = program or f"executor {executor}"
+    again = _again(program, executor, profile, vectors, timeout)
     if as_json is not None:
-        write_text(as_json, report.to_json(name, profile, verdicts))
+        write_text(as_json, report.to_json(name, profile, verdicts, again))
     if junit is not None:
-        write_text(junit, report.to_junit(name, verdicts))
+        write_text(junit, report.to_junit(name, verdicts, again))
     _print_counts(name, profile, verdicts)
     failed = [verdict for verdict in verdicts if verdict.failed]
     if track is not None and before is not None:
@@ -139,7 +140,7 @@ def conformance(
         for change in changed:
             say(str(change))
         say(f"{len(changed)} verdicts changed since {track} was written, {len(failed)} for the worse")
-    _print_failures(failed, cases, _again(program, executor, profile, vectors, timeout))
+    _print_failures(failed, cases, again)
     if track is not None and (before is None or not failed):
         write_text(track, report.track_text(before, verdicts))
     if failed:
@@ -169,10 +170,11 @@ def _command(program: str | None, executor: str | None) -> list[str]:
         if not command:
             raise InputError("--program", repr(program), "it is no command", "name a program")
         return command
+    from ..kernels.export.runners import RUNNERS
     from ..kernels.registry import EXECUTORS
 
-    if executor not in (REFERENCE, *EXECUTORS):
-        known = ", ".join((REFERENCE, *EXECUTORS))
+    if executor not in (REFERENCE, *EXECUTORS, *RUNNERS):
+        known = ", ".join(dict.fromkeys((REFERENCE, *EXECUTORS, *RUNNERS)))
         raise InputError("--executor", executor, "it is unknown", f"known are {known}")
     return [sys.executable, "-m", "wamnet.kernels.conformance.program", "--executor", str(executor)]
 
@@ -236,8 +238,11 @@ def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:
 
 def _print_failures(failed: Sequence[Verdict], cases: Mapping[str, Sequence[Case]], again: str) -> None:
     """Print the first failures in full."""
-    from ..kernels.conformance.report import about
+    from ..kernels.conformance.report import about, first_blamed
 
+    first = first_blamed(failed)
+    if first is not None and len(failed) > 1:
+        say(f"look first at {first.clause}: {first.id} fails, and what others are made of comes before them")
     by_id = {case.id: case for some in cases.values() for case in some}
     for verdict in failed[:SHOWN_FAILURES]:
         for line in about(verdict, by_id[verdict.id], f"{again} {verdict.id}"):

@@ -80,26 +80,32 @@ class Plan:
     """All sizes of a demonstration; the defaults take two to four minutes on two cores.
 
     The frames are those of `wamnet dataset`: test times lie between training times, and the network never
-    sees them. `steps` None means the preset's.
+    sees them. Many targets of `train_spp` samples teach more than few clean ones; what is judged has
+    references of `reference_spp`. `steps` None means the preset's.
     """
 
     scene: str = "minicubes"
     size_px: int = 256
-    train_frames: int = 12
+    train_frames: int = 48
     test_frames: int = 2
+    train_spp: int = 64
     reference_spp: int = 1024
-    preset: str = "short"
+    feature_spp: int = 16
+    preset: str = "best"
     steps: int | None = None
     seed: int = 1
     renderer: str = "opencl"
     trainer: str = "opencl"
 
 
-QUICK = Plan(size_px=24, train_frames=2, test_frames=2, reference_spp=8, steps=60)
+QUICK = Plan(size_px=24, train_frames=2, test_frames=2, train_spp=8, reference_spp=8, steps=60)
 """Small enough to test the whole way; its pictures are not meant to be looked at."""
 
 REFERENCE_SPP_OF_NUMPY = 32
 """Samples of a reference where no kernel runs: NumPy's would take an hour, and are thirty times slower."""
+
+TRAIN_FRAMES_OF_NUMPY = 12
+"""Training frames there, for the same reason."""
 
 
 @dataclass(frozen=True)
@@ -189,9 +195,11 @@ def for_this_machine(plan: Plan) -> Plan:
             say(f"not rendered with {name}: {error}")
         else:
             return replace(plan, renderer=name, trainer=name if trains else "numpy")
-    spp = min(plan.reference_spp, REFERENCE_SPP_OF_NUMPY)
-    say(f"rendered with NumPy, which is slow: references have {spp} paths per pixel")
-    return replace(plan, renderer="numpy", trainer="numpy", reference_spp=spp)
+    most, frames = REFERENCE_SPP_OF_NUMPY, min(plan.train_frames, TRAIN_FRAMES_OF_NUMPY)
+    train_spp, spp = min(plan.train_spp, most), min(plan.reference_spp, most)
+    say(f"rendered with NumPy, which is slow: {frames} training times, references have {spp} paths per pixel")
+    few = replace(plan, train_frames=frames, train_spp=train_spp, reference_spp=spp)
+    return replace(few, renderer="numpy", trainer="numpy")
 
 
 def begin(plan: Plan, folder: Path) -> None:
@@ -254,7 +262,9 @@ def render_frames(plan: Plan, output: Path) -> None:
         frames=plan.train_frames,
         test_frames=plan.test_frames,
         size_px=plan.size_px,
-        spp=plan.reference_spp,
+        spp=plan.train_spp,
+        test_spp=plan.reference_spp,
+        feature_spp=plan.feature_spp,
         seed=plan.seed,
         executor=plan.renderer,
     )

@@ -28,6 +28,8 @@ from . import (
     dataset,
     demo,
     denoise,
+    export,
+    listing,
     render,
     train,
     triage,
@@ -67,6 +69,8 @@ _register(render.scene, render.SCENE_EXAMPLES)
 _register(dataset.dataset, dataset.EXAMPLES)
 _register(train.train, train.EXAMPLES)
 _register(compile_model, COMPILE_EXAMPLES, "compile")
+_register(listing.listing, listing.EXAMPLES)
+_register(export.export, export.EXAMPLES)
 _register(certify.certify, certify.EXAMPLES)
 _register(denoise.denoise, denoise.DENOISE_EXAMPLES)
 _register(compare.compare, compare.EXAMPLES)

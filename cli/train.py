@@ -94,7 +94,7 @@ def train(
     preset: Annotated[
         Preset | None,
         typer.Option(
-            help="Protocol: the project's best, the paper's own, or one that takes a third of the best's time.",
+            help="Protocol: the project's best, the paper's own, or one of half the best's time.",
             show_default="best",
         ),
     ] = None,

@@ -243,7 +243,7 @@ class _Kernel(Lines):
             self._line(store.format(plane=number, output=output, component=component, value=f"sum_{plane}"))
 
     def _scene_declaration(self) -> str:
-        """Return the declaration of the scene's numbers that are inputs, if there are some."""
+        """Return the declaration of the scene's numbers that are inputs, if there are any."""
         vectors = -(-len(self.programs.inputs) // 4)
         return self.dialect.scene_numbers.format(vectors=vectors) if vectors else ""
 

@@ -67,7 +67,7 @@ class _Vulkan(Dialect):
     target = "glsl-vulkan"
     language = "GLSL 4.50 for Vulkan, compute shader"
     suffix = ".comp"
-    first = ("#version 450", "#define PRECISE precise")
+    first: tuple[str, ...] = ("#version 450", "#define PRECISE precise")
     native_sine = SineContract(
         "sin() of Vulkan, which promises 2^-11 on [-pi, pi] alone, and that absolutely", None
     )
@@ -177,12 +177,12 @@ class VulkanEncode(_Vulkan, EncodeDialect):
     )
 
 
-class _Compute:
+class _Compute(_Vulkan):
     """The same for OpenGL 4.3."""
 
     target = "glsl-compute"
     language = "GLSL 4.30, compute shader"
-    first = ("#version 430 core", "#define PRECISE precise")
+    first: tuple[str, ...] = ("#version 430 core", "#define PRECISE precise")
     native_sine = SineContract("sin() of GLSL 4.30, which promises nothing", None)
 
 

@@ -7,6 +7,7 @@ compiler that keeps the order of operations [`ASSUMES`].
 
 from __future__ import annotations
 
+from .dialect import Dialect
 from .encode_dialect import GLSLEncode
 from .glsl import GLSL, PREAMBLE, WEIGHT_TEXTURE_WIDTH
 from .glsl_inlined import GLSLInlined
@@ -52,7 +53,7 @@ vec4 weights(int texel)
 """What a packed kernel declares besides the images."""
 
 
-class _ES:
+class _ES(Dialect):
     """What the shaders have in common."""
 
     target = "glsl-es"
@@ -60,7 +61,7 @@ class _ES:
     native_sine = NATIVE_SINE
     assumes = ASSUMES
     unordered = ("", "")
-    first = (VERSION,)
+    first: tuple[str, ...] = (VERSION,)
     indexes_results = False
 
 

@@ -24,7 +24,7 @@ class _ShadertoyPath(GLSLESPath):
     target = "shadertoy"
     language = "Shadertoy (GLSL ES 3.00), one buffer a feature"
     suffix = ".glsl"
-    first = ()
+    first: tuple[str, ...] = ()
     max_planes = 4
     path_begin = """\
 #define PRECISE /* GLSL ES 3.00 has no `precise` */

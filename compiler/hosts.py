@@ -29,7 +29,7 @@ class ShadertoyDenoise(GLSLESInlined):
     language = "Shadertoy (GLSL ES 3.00), tab Image"
     suffix = ".glsl"
     entry = "mainImage"
-    first = ()
+    first: tuple[str, ...] = ()
     native_sine = SineContract("sin() of GLSL ES 3.00, which promises nothing", None)
     max_output_channels = 4
     image_declaration = "#define image_{image} iChannel{binding} /* Buffer */"

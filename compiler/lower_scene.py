@@ -107,8 +107,9 @@ def lower_scene(
     scene: Scene,
     settings: Settings,
     most_unrolled: int | None = MOST_UNROLLED,
-    keep_places: bool = False,
     moving: SceneInputs | None = None,
+    *,
+    keep_places: bool = False,
 ) -> PathPrograms:
     """Return the programs of a path through a scene, in float32.
 

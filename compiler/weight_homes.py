@@ -2,8 +2,8 @@
 
 A home is the dialect of a target with one declaration of its denoiser replaced [`HOMES`].
 `inline` is a constant table that loops read, `uniform` a block of `vec4`, or constant memory. Fragment
-shaders of GLSL have constants as straight code instead [emit_inlined.py]; compute shaders have no table: Mesa had not
-compiled one of 770 numbers after a minute, and a buffer is there wherever they are.
+shaders of GLSL have constants as straight code instead [emit_inlined.py]; compute shaders have no table:
+Mesa had not compiled one of 770 numbers after a minute, and a buffer is there wherever they are.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Home:
         for old, new in self.moves.items():
             assert old in begin, f"{base.target} no longer has {old!r}"
             begin = begin.replace(old, new)
-        words = {"target": f"{base.target}:{how}", "begin": begin, "weight": self.weight}
+        words: dict[str, object] = {"target": f"{base.target}:{how}", "begin": begin, "weight": self.weight}
         words |= {"weights_table": self.table, "arguments": _arguments(base.arguments, how)}
         found: Dialect = type(f"{base.__name__}_{how}", (base,), words)()
         return found

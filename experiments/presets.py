@@ -20,15 +20,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+import lab.frames
+from lab.frames import Pair, Shot
 from numpy.typing import NDArray
 
 from wamnet.kernels import open_executor, train_on
 from wamnet.refimpl import dataset, metrics
 from wamnet.refimpl.denoise import denoise
-from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.render import Job, render
-from wamnet.refimpl.scenes import CANONICAL, TURN_SECONDS
+from wamnet.refimpl.scenes import TURN_SECONDS
 from wamnet.refimpl.train import PAPER, SHORT, Recipe, model_of, train
 
 UNSEEN_TIMES = (2.5, 5.5)
@@ -52,7 +51,6 @@ FEATURE_SETS = {
 }
 """Feature sets by the initials of their members."""
 
-Pair = tuple[Frame, Frame]
 Picture = tuple[NDArray[Any], NDArray[Any]]
 
 
@@ -73,20 +71,13 @@ def candidate(name: str) -> Recipe:
 
 def frames(folder: Path, size: int, times: Sequence[float], reference_spp: int) -> list[Pair]:
     """Return (1 spp, reference) pairs at the times, from the folder where they lie there already."""
-    pairs = []
-    folder.mkdir(parents=True, exist_ok=True)
+    shots = []
     for moment in times:
-        path = folder / f"minicubes-{size}px-{reference_spp}spp-{moment}s.npz"
-        if not path.exists():
-            scene, seed = CANONICAL["minicubes"](time=moment), round(moment * 1000)
-            noisy = render(scene, Job(size, size, 1, seed=seed)).frame
-            reference = render(scene, Job(size, size, reference_spp, seed=seed + 1)).frame
-            arrays: dict[str, Any] = {"reference": reference["color"], **noisy.layers}
-            np.savez(path, **arrays)
-        with np.load(path) as found:
-            layers = {name: found[name] for name in found.files if name != "reference"}
-            pairs.append((Frame(layers), Frame({"color": found["reference"]})))
-    return pairs
+        seed = round(moment * 1000)
+        shots.append(Shot("minicubes", moment, size, 1, seed))
+        shots.append(Shot("minicubes", moment, size, reference_spp, seed + 1))
+    found = lab.frames.frames(folder, shots, "numpy")
+    return list(zip(found[::2], found[1::2], strict=True))
 
 
 def score(

@@ -3,8 +3,8 @@
     python experiments/quality.py
     python experiments/quality.py --scenes minicubes --only input best-16 oidn-clean16 --seeds 0
 
-1. Training and test frames of each scene are rendered and kept [`Bench.training`, `Bench.tests`]. Test times lie
-   between training times; `cornell` does not move, so that only the noise of its test frames is new.
+1. Training and test frames of each scene are rendered and kept [`Bench.training`, `Bench.tests`]. Test times
+   lie between training times; `cornell` does not move, so that only the noise of its test frames is new.
 2. Each row denoises the test frames of each seed, which is that of the noise and of the training [`judged`].
    Features are those of the colour's one camera ray, or means over 16 rays: then for both denoisers.
 3. Beside a score stands the number of samples per pixel whose render has the same error [`climbed`].
@@ -257,12 +257,15 @@ def report(kept: Results, clock: Results, scenes: Sequence[str], rows: Sequence[
             for name, s in times["seconds"].items()
         ]
         heads = ["a frame, in turns", "ms, median", "ms, range"]
-        parts += [f"## Time ({times['device']}, schedule {times['schedule']})\n", tables.markdown(heads, cells)]
+        parts += [
+            f"## Time ({times['device']}, schedule {times['schedule']})\n",
+            tables.markdown(heads, cells),
+        ]
     return "\n".join(part for part in parts if part)
 
 
 def _ahead(kept: Results, scene: str, rows: Sequence[str]) -> str:
-    """Return by how much the best preset is ahead of the best Open Image Denoise that has the same features."""
+    """Return by how much the best preset is ahead of the best Open Image Denoise with the same features."""
     lines = []
     for ours, rays in (("best-1", (0, 1)), ("best-16", (0, 1, RAYS))):
         peers = [row for row in rows if ROWS[row].quality and ROWS[row].rays in rays]

@@ -7,7 +7,8 @@
    between them that nothing was trained on [`baselines/rows.py`].
 2. Each row is trained, tuned or opened for each seed, which is that of the noise too, and judged on the test
    frames [`judged`]. A row without its packages is left out, and said so.
-3. Times of a frame are taken in turns, when everything else is done [`timed`].
+3. Times of a frame and of a step of training are taken in turns, when everything else is done [`timed`].
+   "training" is the steps times that.
 4. The folder gets `table1.json`, `times.json`, `table1.md`, the pictures of the first test frame, and
    `crops.png`: a crop around a corner of pix2pix's patches [`drawn`].
 
@@ -52,7 +53,7 @@ SCALES: Mapping[str, Scale] = {
         paper={"steps": 2, "batch": 64, "n_windows": 128},
         short={"steps": 2, "batch": 32},
         dncnn={"steps": 1, "batch": 1, "crop": 16, "width": 4},
-        shrunk={"steps": 1, "batch": 1, "crop": 16, "width": 4, "shrink": 4},
+        shrunk={"steps": 1, "batch": 1, "crop": 8, "width": 4, "shrink": 4},
         pix2pix={"steps": 1, "batch": 1, "crop": 64, "width": 4},
     ),
     "small": Scale(
@@ -64,9 +65,9 @@ SCALES: Mapping[str, Scale] = {
         ladder=(1, 2, 4, 8, 16, 32, 64, 128, 256),
         short_frames=24,
         paper={"steps": 4000},
-        dncnn={"steps": 250, "batch": 8, "crop": 40, "half": True},
-        shrunk={"steps": 100, "batch": 8, "crop": 40, "half": True, "shrink": 4},
-        pix2pix={"steps": 500, "batch": 1, "crop": 128, "width": 32},
+        dncnn={"steps": 1600, "batch": 2, "crop": 40, "half": True},
+        shrunk={"steps": 400, "batch": 2, "crop": 40, "half": True, "shrink": 4},
+        pix2pix={"steps": 1500, "batch": 1, "crop": 128, "width": 32},
     ),
     "paper": Scale(
         size=1024,
@@ -86,7 +87,7 @@ SCALES: Mapping[str, Scale] = {
 CROP_PX = 96
 """Side of the crop that is shown."""
 
-SHOWN = ("input", "dncnn", "wamnet", "wamnet-short", "pix2pix", "oidn-noisy", "render30")
+SHOWN = ("input", "dncnn", "wamnet", "wamnet-best", "pix2pix", "oidn-noisy", "render30")
 """Rows of which a crop is shown."""
 
 ROUNDS = 5
@@ -98,7 +99,7 @@ def judged(row: str, bench: Bench, ladder: scores.Ladder, pictures: Path, seed: 
     ready = ROWS[row].make(bench, seed)
     own = ready.facts.get("case")
     found, pairs = [], []
-    for case in bench.cases(seed) if own is None else [own]:
+    for case in bench.cases(seed, ready.rays) if own is None else [own]:
         picture, linear = ready.picture(case)
         found.append(scores.score(picture, case.reference["color"], linear))
         pairs.append((picture, to_display(case.reference["color"])))
@@ -136,10 +137,17 @@ def timed(rows: Sequence[str], bench: Bench, kept: Results, rounds: int) -> None
     left = [row for row in rows if kept.get(row, 0) is None and row not in ("input", "wamnet-own")]
     if not left:
         return
-    case = next(iter(bench.cases(0)))
-    ways = {row: _way(row, ROWS[row].make(bench, 0), bench, case) for row in left}
-    for row, found in in_turns(ways, rounds).items():
-        kept.put(row, 0, {"ms": 1e3 * found.median, "spread": found.spread, "device": bench.device.device})
+    made = {row: ROWS[row].make(bench, 0) for row in left}
+    cases = {rays: next(iter(bench.cases(0, rays))) for rays in {ready.rays for ready in made.values()}}
+    ways = {row: _way(row, ready, bench, cases[ready.rays]) for row, ready in made.items()}
+    times = in_turns(ways, rounds)
+    steps = in_turns({row: ready.step for row, ready in made.items() if ready.step is not None}, rounds)
+    for row, found in times.items():
+        values = {"ms": 1e3 * found.median, "spread": found.spread, "device": bench.device.device}
+        if row in steps:
+            values["step_ms"] = 1e3 * steps[row].median
+            values["training_s"] = steps[row].median * made[row].facts["steps"]
+        kept.put(row, 0, values)
 
 
 def _way(row: str, ready: Ready, bench: Bench, case: Case) -> Callable[[], float | None]:
@@ -182,9 +190,14 @@ COLUMNS = (
     ),
     tables.Column("blocks", "blocks", 2),
     tables.Column("parameters", "parameters", write=count),
-    tables.Column("training_s", "training, s", write=count),
 )
-"""The columns of the table; MSE is that of 0 .. 255."""
+"""The columns of the table that have one number for each seed; MSE is that of 0 .. 255."""
+
+TIMES = (
+    tables.Column("ms", "ms a frame", write=lambda s: f"{s.mean:.1f}" if s.mean < 100 else count(s)),
+    tables.Column("training_s", "training, s", write=lambda s: f"{s.mean:.1f}" if s.mean < 10 else count(s)),
+)
+"""The columns of times."""
 
 
 def written(kept: Results, times: Results) -> str:
@@ -192,10 +205,11 @@ def written(kept: Results, times: Results) -> str:
     rows = [row for row in ROWS if kept.summary(row, "mse") is not None]
     cells = []
     for row in rows:
-        ms = times.summary(row, "ms")
-        shown = "" if ms is None else (f"{ms.mean:.1f}" if ms.mean < 100 else f"{ms.mean:,.0f}")
-        cells.append([ROWS[row].text, *(c.cell(kept.summary(row, c.value)) for c in COLUMNS), shown])
-    return tables.markdown(["", *(column.heading for column in COLUMNS), "ms a frame"], cells)
+        shown = [column.cell(kept.summary(row, column.value)) for column in COLUMNS]
+        cells.append(
+            [ROWS[row].text, *shown, *(column.cell(times.summary(row, column.value)) for column in TIMES)]
+        )
+    return tables.markdown(["", *(column.heading for column in (*COLUMNS, *TIMES))], cells)
 
 
 def drawn(folder: Path, pictures: Path, size: int, patch: int) -> None:

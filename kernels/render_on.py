@@ -70,8 +70,8 @@ def render_on(
     if job.dtype != "float32":
         raise InputError("dtype", job.dtype, "kernels compute in float32", "render with --executor numpy")
     if feature_job(job) is not None:
-        part = partial(render_on, executor, scene, rows=rows, on_progress=on_progress, profile=profile)
-        return with_own_features(scene, job, part)
+        apart = partial(render_on, executor, scene, rows=rows, on_progress=on_progress, profile=profile)
+        return with_own_features(scene, job, apart)
     first, last = checked_rows(job, rows)
     kernel = compile_scene(executor, scene, job, profile)
     executor.build_path(kernel)

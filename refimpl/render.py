@@ -71,7 +71,6 @@ class Job:
         if self.dtype not in ("float32", "float64"):
             raise InputError("dtype", self.dtype, "it must be float32 or float64", "choose one of them")
 
-
     @property
     def samples(self) -> int:
         """Return the number of samples of all pixels together, the features' own camera rays among them."""
@@ -135,7 +134,7 @@ def feature_job(job: Job) -> Job | None:
 
 
 def with_own_features(scene: Scene, job: Job, render_part: Callable[[Job], Render]) -> Render:
-    """Render colour and features apart, each by `render_part`; return the colour's render with the features."""
+    """Render colour and features apart, each by `render_part`, and return them as one render."""
     of_features = feature_job(job)
     assert of_features is not None
     color, features = render_part(replace(job, feature_spp=0)), render_part(of_features)

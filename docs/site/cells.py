@@ -44,7 +44,8 @@ class Output:
             raise ValueError("show: a picture needs an alternative text; say what is seen")
         data = _png(what)
         address = "data:image/png;base64," + base64.b64encode(data).decode()
-        self.pieces.append(f'<img class="shown" alt="{escape(alternative)}" src="{address}">')
+        kind = "shown" if hasattr(what, "savefig") else "shown pixels"
+        self.pieces.append(f'<img class="{kind}" alt="{escape(alternative)}" src="{address}">')
 
 
 def executed(text: str, where: str, on_cell: Callable[[int], None] | None = None) -> str:

@@ -41,8 +41,8 @@ SPEC = ROOT / "spec"
 SECTION = re.compile(r"^## (.+)$|^\* \[.*?\]\((\w+\.md)\)", re.MULTILINE)
 """A heading of the spec's index, or a line of its list."""
 
-LEAVING = re.compile(r"\]\(((?:\.\./)+spec/[\w./-]+)")
-"""A link from a page of docs/ to the spec, as it works in the repository."""
+LEAVING = re.compile(r"\]\(((?:\.\./)+(?:spec|docs)/[\w./-]+)")
+"""A link from docs/ to spec/, or back, as it works in the repository."""
 
 FOREIGN = re.compile(r"https://(?:unpkg\.com|api\.github\.com)/[\w./@-]*")
 """Addresses in the theme's scripts, for diagrams and counts of stars that this site does not have."""
@@ -105,20 +105,25 @@ def _places() -> dict[str, str]:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Give clauses their anchors, and execute cells."""
-    if page.file.src_uri.startswith("spec/"):
-        return chapters.anchored(markdown)
-    if page.file.src_uri.startswith("tutorial/"):
-        markdown = cells.executed(markdown, f"docs/{page.file.src_uri}")
-    return _into_site(markdown, page.file.src_uri)
+    """Give clauses their anchors, execute cells, and turn links to other folders."""
+    uri = page.file.src_uri
+    if uri.startswith("spec/"):
+        return into_site(chapters.anchored(markdown), uri)
+    if uri.startswith("tutorial/"):
+        markdown = cells.executed(markdown, f"docs/{uri}")
+    return into_site(markdown, f"docs/{uri}")
 
 
-def _into_site(markdown: str, uri: str) -> str:
-    """Return a page's Markdown with its links to the spec as they are on the site, whose root is docs/."""
+def into_site(markdown: str, path: str) -> str:
+    """Return the Markdown of a file of the repository with links between docs/ and spec/ as on the site.
+
+    The site's root is docs/, and spec/ lies in it.
+    """
 
     def link(match: re.Match[str]) -> str:
-        path = posixpath.normpath(posixpath.join("docs", posixpath.dirname(uri), match[1]))
-        return f"]({posixpath.relpath(path, posixpath.dirname(uri) or '.')}"
+        target = posixpath.normpath(posixpath.join(posixpath.dirname(path), match[1]))
+        own, there = (name.removeprefix("docs/") for name in (path, target))
+        return f"]({posixpath.relpath(there, posixpath.dirname(own) or '.')}"
 
     return LEAVING.sub(link, markdown)
 

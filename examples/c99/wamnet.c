@@ -1615,6 +1615,20 @@ static v3 emission_towards(const world *w, const hit *h, v3 d) {
     return dot(w->planes[h->id - w->first_quad].normal, d) < 0 ? s->emission : BLACK;
 }
 
+/* LTR-11 */
+static v3 unshadowed(parts lights, v3 point, v3 normal, v3 reflectance) {
+    v3 found = BLACK;
+    for (size_t i = 0; i < lights.count; i++) {
+        const part *l = &lights.items[i];
+        v3 middle = add(l->corner, scale(add(l->edge_u, l->edge_v), 0.5)), offset = sub(middle, point);
+        double square = dot(offset, offset), distance = sqrt(square);
+        double here = fmax(0, dot(normal, offset) / distance);
+        double there = fmax(0, -dot(unit(cross(l->edge_u, l->edge_v)), offset) / distance);
+        found = add(found, scale(light_radiance(l), area(l) * here * there / (square + area(l) / PI)));
+    }
+    return scale(mul(reflectance, found), 1 / PI);
+}
+
 /* LTR-2 */
 static hit arrive(const world *w, path *p) {
     hit h = closest(w, p->origin, p->direction);
@@ -1686,9 +1700,10 @@ static double srgb_encode(double x) { return x <= 0.0031308 ? 12.92 * x : 1.055 
 /* ENC-4, ENC-5 */
 static double to_display(double linear, double stops) { return srgb_encode(clamp(linear * exp2(stops), 0, 1)); }
 
-static const char *const FEATURES[] = {"color", "albedo", "normal", "depth", "position", "direction"};
+static const char *const FEATURES[] = {"color",    "albedo",    "normal",    "depth",
+                                       "position", "direction", "unshadowed"};
 
-typedef enum { COLOR, ALBEDO, NORMAL, DEPTH, POSITION, DIRECTION, FEATURE_COUNT } feature;
+typedef enum { COLOR, ALBEDO, NORMAL, DEPTH, POSITION, DIRECTION, UNSHADOWED, FEATURE_COUNT } feature;
 
 typedef struct {
     feature items[FEATURE_COUNT];
@@ -1737,7 +1752,7 @@ static scales read_scales(const json *in) {
 /* DAT-1, DAT-10 */
 static double encoded(feature f, double x, size_t channel, const scales *s) {
     if (isnan(x)) x = 0;
-    if (f == COLOR) return to_display(x, s->stops);
+    if (f == COLOR || f == UNSHADOWED) return to_display(x, s->stops);
     if (f == ALBEDO) return clamp(x, 0, 1);
     if (f == DEPTH) return clamp(x / s->depth_scale, 0, 1);
     if (f == POSITION) x = (x - s->position_center.c[channel]) / s->position_scale;
@@ -2182,6 +2197,14 @@ static void do_random_block(const json *in) {
     answer_array("floats", (array){.axes = 1, .shape = {4}, .count = 4, .values = floats});
 }
 
+static void do_sobol(const json *in) {
+    uint32_t seed = counter(in, "seed"), pixel = counter(in, "pixel"), sample = counter(in, "sample");
+    words found = sobol_block(seed, pixel, sample, counter(in, "block"));
+    double floats[4];
+    for (int i = 0; i < 4; i++) floats[i] = uniform(found.w[i]);
+    answer_array("floats", (array){.axes = 1, .shape = {4}, .count = 4, .values = floats});
+}
+
 static void do_disk(const json *in) {
     double x, y;
     concentric_disk(number(in, "u0"), number(in, "u1"), &x, &y);
@@ -2330,6 +2353,19 @@ static void do_mis(const json *in) {
     double pdf = number(in, "pdf"), other = number(in, "other");
     answer_number("balance", mis_weight(pdf, other, 1));
     answer_number("power", mis_weight(pdf, other, 2));
+}
+
+/* The lamps of scenes/terrace.json. */
+static const part TERRACE_LAMPS[2] = {{.corner = {{0.25, 1.75, 0.25}}, .edge_u = {{0.5, 0, 0}},
+                                       .edge_v = {{0, 0, 0.5}}, .color = {{1, 0.75, 0.5}}, .power = 12},
+                                      {.corner = {{-1.25, 1, 0.25}}, .edge_u = {{0, 0.5, 0}},
+                                       .edge_v = {{0.5, 0, 0.125}}, .color = {{0.25, 0.5, 1}}, .power = 4}};
+
+static void do_unshadowed(const json *in) {
+    parts lamps = {get(2, sizeof(part)), 2};
+    memcpy(lamps.items, TERRACE_LAMPS, sizeof TERRACE_LAMPS);
+    v3 point = vec_in(in, "point"), normal = vec_in(in, "normal");
+    answer_vec("unshadowed", unshadowed(lamps, point, normal, vec_in(in, "reflectance")));
 }
 
 static const sky TEST_SKY = {true, {{0.16, 0.3, 0.62}}, {{0.62, 0.7, 0.8}}, {{0.18, 0.16, 0.14}}, {{0.6, 0.8, 0}},
@@ -2689,6 +2725,7 @@ static const struct {
     void (*answer)(const json *in);
 } KINDS[] = {
     {"random.block", do_random_block},
+    {"random.sobol", do_sobol},
     {"sampling.concentric_disk", do_disk},
     {"sampling.cosine_hemisphere", do_hemisphere},
     {"sampling.spherical_cauchy", do_cauchy},
@@ -2708,6 +2745,7 @@ static const struct {
     {"material.conductor_value", do_conductor_value},
     {"material.dielectric", do_dielectric},
     {"transport.mis_weight", do_mis},
+    {"transport.unshadowed", do_unshadowed},
     {"sky.radiance", do_sky_radiance},
     {"sky.sample", do_sky_sample},
     {"path.start", do_start},

@@ -104,36 +104,42 @@ def planes(frame: Frame, features: Sequence[str]) -> Tensor:
 def examples(recipe: Recipe, files: Sequence[tuple[Path, Path]], folder: Path) -> Examples:
     """Return the pictures of the files of noisy frames and references, shrunk as the recipe says.
 
-    They are kept in the folder as arrays. The names of the files end in their checksums.
+    They are kept in the folder as arrays, under the names of the files, which end in their checksums. The
+    digest is that of the arrays: layers that are not looked at do not count.
     """
     names = [[path.name for path in pair] for pair in files]
     text = json.dumps([names, recipe.features, recipe.shrink])
     digest = hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
     folder.mkdir(parents=True, exist_ok=True)
-    kept = []
+    kept, sums = [], []
     for kind, features in enumerate((recipe.features, ("color",))):
         path = folder / f"examples-{digest}-{('noisy', 'clean')[kind]}.npy"
-        if not path.exists():
+        known = path.with_suffix(".sha256")
+        if not (path.exists() and known.exists()):
             with replacing(path) as new:
-                _stack(new, [pair[kind] for pair in files], features, recipe.shrink)
+                found = _stack(new, [pair[kind] for pair in files], features, recipe.shrink)
+            write_text(known, found)
         kept.append(np.load(path, mmap_mode="r"))
+        sums.append(known.read_text(encoding="utf-8"))
     noisy, clean = kept
     if min(noisy.shape[2:]) < recipe.crop:
         size = f"{noisy.shape[3]}x{noisy.shape[2]}"
         rule = f"crops of {recipe.crop} pixels must fit into them"
         raise InputError("size of the training pictures", size, rule, "render larger ones")
-    return Examples(noisy, clean, digest)
+    return Examples(noisy, clean, hashlib.sha256("".join(sums).encode()).hexdigest())
 
 
-def _stack(path: Path, files: Sequence[Path], features: Sequence[str], shrink: int) -> None:
-    """Write the feature images of all files as one array (F, C, H, W), one after another."""
-    array = None
+def _stack(path: Path, files: Sequence[Path], features: Sequence[str], shrink: int) -> str:
+    """Write the feature images of all files one after another, as (F, C, H, W); return their SHA-256."""
+    array, digest = None, hashlib.sha256()
     for index, file in enumerate(files):
         image = shrunk(planes(read_frame(file), features), shrink).numpy()
         if array is None:
             shape = (len(files), *image.shape[1:])
             array = np.lib.format.open_memmap(path, mode="w+", dtype=np.float32, shape=shape)
         array[index] = image[0]
+        digest.update(image.tobytes())
+    return digest.hexdigest()
 
 
 def shrunk(images: Tensor, factor: int) -> Tensor:
@@ -216,6 +222,13 @@ def fit(
         write_text(path.with_suffix(".json"), json.dumps(facts) + "\n")
         checkpoint.unlink(missing_ok=True)
     return facts
+
+
+def seconds_a_step(method: Method, recipe: Recipe, data: Examples) -> float:
+    """Do a step of a method that nothing else uses; return its seconds."""
+    begun = time.perf_counter()
+    _one(method, recipe, data, 0)
+    return time.perf_counter() - begun
 
 
 @contextmanager

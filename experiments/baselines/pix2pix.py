@@ -28,6 +28,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Floats, Frame
 
 from .fitting import Recipe, follow, generator_of, planes
@@ -122,6 +123,9 @@ class Pix2pix:
 
     def __init__(self, recipe: Recipe) -> None:
         """Make the networks with the random weights of the recipe's seed: normal, of deviation 0.02."""
+        if recipe.crop % 2**LEVELS:
+            rule = f"{LEVELS} levels halve it: a multiple of {2**LEVELS}"
+            raise InputError("side of pix2pix's patches", recipe.crop, rule, "the paper's is 128")
         self.recipe = recipe
         channels = 3 * len(recipe.features)
         with torch.random.fork_rng():

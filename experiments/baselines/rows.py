@@ -11,6 +11,7 @@ use them; without them these rows say so.
 from __future__ import annotations
 
 import itertools
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -32,7 +33,7 @@ from wamnet.refimpl.denoise import Model, denoise
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats, Frame
 from wamnet.refimpl.scenes import TURN_SECONDS
-from wamnet.refimpl.train import PAPER, SHORT, Recipe
+from wamnet.refimpl.train import BEST, PAPER, SHORT, Recipe
 
 from . import atrous
 
@@ -81,12 +82,15 @@ class Case:
 class Ready:
     """A way that is made ready: `picture` of a case, and facts: parameters, seconds of training, choices.
 
-    `seconds`: how long a picture takes, if calling `picture` says something else.
+    `seconds`: how long a picture takes, if calling `picture` says something else; `step`: how long a step of
+    its training takes; `rays`: the camera rays that the features of its cases are means over, if not one.
     """
 
     picture: Callable[[Case], Picture]
     facts: Mapping[str, Any] = field(default_factory=dict)
     seconds: Callable[[Case], float] | None = None
+    step: Callable[[], float] | None = None
+    rays: int = 0
 
 
 @dataclass(frozen=True)
@@ -107,22 +111,22 @@ class Bench:
         """Return the times of training and of test frames."""
         return frames.split_times(self.scale.train, self.scale.test, TURN_SECONDS)
 
-    def train_files(self, seed: int, every: int = 1) -> list[tuple[Path, Path]]:
+    def train_files(self, seed: int, every: int = 1, rays: int = 0) -> list[tuple[Path, Path]]:
         """Return noisy frame and reference of every so many of the training times; noise is the seed's."""
         shots = self._shots(self.times()[0], 0)[::every]
-        noisy = [replace(frames.noisy(s), seed=2 * (s.seed + SEEDS_APART * seed)) for s in shots]
+        noisy = [self._noisy(shot, seed, rays) for shot in shots]
         clean = [frames.reference(s, self.scale.train_spp) for s in shots]
         return list(zip(self._files(noisy), self._files(clean), strict=True))
 
-    def train_pairs(self, seed: int, count: int) -> list[frames.Pair]:
+    def train_pairs(self, seed: int, count: int, rays: int = 0) -> list[frames.Pair]:
         """Return about so many training pairs, evenly over the animation: the first one first."""
         every = -(-self.scale.train // count)
-        return [(exr.read_frame(n), exr.read_frame(c)) for n, c in self.train_files(seed, every)]
+        return [(exr.read_frame(n), exr.read_frame(c)) for n, c in self.train_files(seed, every, rays)]
 
-    def cases(self, seed: int) -> Iterator[Case]:
+    def cases(self, seed: int, rays: int = 0) -> Iterator[Case]:
         """Yield the test frames with the seed's noise, one after another: all may be too many to keep."""
         shots = self._shots(self.times()[1], TEST_SEED)
-        noisy = [replace(frames.noisy(s), seed=2 * (s.seed + SEEDS_APART * seed)) for s in shots]
+        noisy = [self._noisy(shot, seed, rays) for shot in shots]
         clean = [frames.reference(s, self.scale.test_spp) for s in shots]
         found = zip(self._files(noisy), self._files(clean), strict=True)
         for index, (dirty, reference) in enumerate(found):
@@ -132,6 +136,10 @@ class Bench:
         """Return the files of renders of the test frames with so many samples."""
         shots = self._shots(self.times()[1], RENDER_SEED + SEEDS_APART * seed)
         return self._files([replace(shot, spp=spp, seed=2 * shot.seed) for shot in shots])
+
+    def _noisy(self, shot: Shot, seed: int, rays: int) -> Shot:
+        """Return a shot's noisy one, with the seed's noise and features of so many camera rays."""
+        return replace(frames.noisy(shot), seed=2 * (shot.seed + SEEDS_APART * seed), feature_spp=rays)
 
     def _shots(self, times: Sequence[float], first: int) -> list[Shot]:
         """Return a shot of each time, with seeds from `first` on."""
@@ -164,15 +172,17 @@ def more_samples(spp: int, bench: Bench, seed: int) -> Ready:
 # ---- WAMnet ----------------------------------------------------------------------------------------------
 
 
-def wamnet(base: Recipe, kind: str, bench: Bench, seed: int, **changes: Any) -> Ready:
-    """Train WAMnet: the paper's recipe on one pair, the project's on more."""
+def wamnet(base: Recipe, kind: str, bench: Bench, seed: int, rays: int = 0) -> Ready:
+    """Train WAMnet: the paper's recipe on one pair, the project's on more; features of so many rays."""
     count = 1 if kind == "paper" else bench.scale.short_frames
-    pairs = bench.train_pairs(seed, count)[:count]
-    recipe = replace(base, seed=seed, **getattr(bench.scale, kind), **changes)
-    model, seconds = training.trained(recipe, pairs, bench.cache / "networks", bench.executor)
-    facts = {"parameters": parameters(model), "training_s": seconds, "steps": recipe.steps}
+    pairs = bench.train_pairs(seed, count, rays)[:count]
+    recipe = replace(base, seed=seed, **getattr(bench.scale, kind))
+    model, spent = training.trained(recipe, pairs, bench.cache / "networks", bench.executor)
+    facts = {"parameters": parameters(model), "training_s": spent, "steps": recipe.steps}
     facts |= {"training_frames": len(pairs)}
-    return Ready(partial(_by_network, bench, model), facts, partial(_network_seconds, bench, model))
+    step = partial(training.seconds_a_step, recipe, pairs, bench.device)
+    seconds = partial(_network_seconds, bench, model)
+    return Ready(partial(_by_network, bench, model), facts, seconds, step, rays)
 
 
 def _by_network(bench: Bench, model: Model, case: Case) -> Picture:
@@ -184,8 +194,6 @@ def _by_network(bench: Bench, model: Model, case: Case) -> Picture:
 
 def _network_seconds(bench: Bench, model: Model, case: Case) -> float:
     """Return the seconds of a frame: features encoded, images to the device, kernel, result back."""
-    import time
-
     begun = time.perf_counter()
     images_of(model, case.noisy)
     encoded = time.perf_counter() - begun
@@ -212,21 +220,22 @@ def dncnn(kind: str, bench: Bench, seed: int) -> Ready:
     """Train DnCNN on all training frames."""
     need("torch", "for DnCNN", "baselines")
     from . import dncnn as module
-    from .fitting import Recipe, examples, fit
+    from .fitting import Recipe, examples, fit, seconds_a_step
 
     recipe = Recipe("dncnn", learning_rate=1e-3, seed=seed, **getattr(bench.scale, kind))
     data = examples(recipe, bench.train_files(seed), bench.cache / "networks")
     made = module.DnCNN(recipe)
     run = fit(made, recipe, data, bench.cache / "networks")
     facts = {"parameters": run["parameters"]["dncnn"], "training_s": run["seconds"], "steps": recipe.steps}
-    return Ready(lambda case: (made.picture(case.noisy), None), facts)
+    step = partial(seconds_a_step, module.DnCNN(recipe), recipe, data)
+    return Ready(lambda case: (made.picture(case.noisy), None), facts, step=step)
 
 
 def pix2pix(bench: Bench, seed: int) -> Ready:
     """Train pix2pix on patches of all training frames; its parameters are those of the generator."""
     need("torch", "for pix2pix", "baselines")
     from . import pix2pix as module
-    from .fitting import Recipe, examples, fit
+    from .fitting import Recipe, examples, fit, seconds_a_step
 
     chosen = {"features": ("color", "normal"), "tiles": True, **bench.scale.pix2pix}
     recipe = Recipe("pix2pix", learning_rate=2e-4, seed=seed, **chosen)
@@ -235,7 +244,8 @@ def pix2pix(bench: Bench, seed: int) -> Ready:
     run = fit(made, recipe, data, bench.cache / "networks")
     facts = {"parameters": run["parameters"]["generator"], "training_s": run["seconds"]}
     facts |= {"parameters_of_discriminator": run["parameters"]["discriminator"], "steps": recipe.steps}
-    return Ready(lambda case: (made.picture(case.noisy), None), facts)
+    step = partial(seconds_a_step, module.Pix2pix(recipe), recipe, data)
+    return Ready(lambda case: (made.picture(case.noisy), None), facts, step=step)
 
 
 # ---- what today's users would ask for ---------------------------------------------------------------------
@@ -260,7 +270,7 @@ def svgf(bench: Bench, seed: int) -> Ready:
     target = to_display(clean["color"])
     choices = [
         atrous.Settings(sigma_luminance=luminance, sigma_normal=normal)
-        for luminance, normal in itertools.product((4.0, 8.0, 16.0, 32.0), (32.0, 128.0))
+        for luminance, normal in itertools.product((1.0, 2.0, 4.0, 8.0), (8.0, 32.0, 128.0))
     ]
     best = min(choices, key=lambda s: metrics.mse(to_display(atrous.denoise(noisy, s)), target))
 
@@ -317,6 +327,9 @@ ROWS: Mapping[str, Row] = {
     "wamnet": Row("WAMnet, preset `paper`", partial(wamnet, PAPER, "paper")),
     "wamnet-own": Row("the same, on the frame it was trained on", on_its_own_frame),
     "wamnet-short": Row("WAMnet, preset `short`", partial(wamnet, SHORT, "short")),
+    "wamnet-best": Row(
+        "WAMnet, preset `best`, features of 16 camera rays", partial(wamnet, BEST, "short", rays=16)
+    ),
     "pix2pix": Row("pix2pix", pix2pix, ("torch",)),
     "oidn": Row("Open Image Denoise", partial(open_image_denoise, "none"), ("pyoidn",)),
     "oidn-noisy": Row("the same, with albedo and normal", partial(open_image_denoise, "noisy"), ("pyoidn",)),

@@ -25,7 +25,7 @@ from wamnet.kernels.frame_plan import version
 from wamnet.kernels.render_frame import render_frame
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import LAYERS, Frame
-from wamnet.refimpl.render import Job
+from wamnet.refimpl.render import Job, feature_job, render_info
 from wamnet.refimpl.scene import Scene, scene_digest
 from wamnet.refimpl.scenes import canonical
 
@@ -103,8 +103,17 @@ def render_all(folder: Path, shots: Iterable[Shot], executor: str = "opencl") ->
 
 
 def _render(folder: Path, shot: Shot, executor: str, advance: Any) -> Path:
-    """Render a shot and give its file the name that ends in its checksum."""
-    frame = render_frame(executor, shot.build(), shot.job, workers=None, on_progress=advance).frame
+    """Render a shot and give its file the name that ends in its checksum.
+
+    Where the same colour is there with features of its own rays, only the others' first hits are traced.
+    """
+    scene, plain = shot.build(), find(folder, replace(shot, feature_spp=0), executor)
+    if (of_features := feature_job(shot.job)) is not None and plain is not None:
+        hits = render_frame(executor, scene, of_features, workers=None, on_progress=advance).frame
+        layers = {**hits.layers, "color": exr.read_frame(plain)["color"]}
+        frame = Frame(layers, render_info(scene, shot.job))
+    else:
+        frame = render_frame(executor, scene, shot.job, workers=None, on_progress=advance).frame
     name = path_of(folder, shot, executor)
     new = folder / f".{name.name}.exr"
     exr.write_frame(new, frame)

@@ -11,17 +11,21 @@ from __future__ import annotations
 
 import hashlib
 import json
+import time
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from wamnet.cli.outputs import write_text
 from wamnet.cli.train import checkpoint_path, fit
 from wamnet.compiler.model_file import load_checkpoint, load_model
-from wamnet.kernels import denoise_on, open_executor
+from wamnet.kernels import denoise_on, open_executor, train_on
+from wamnet.kernels.executor import Executor
 from wamnet.refimpl import dataset
 from wamnet.refimpl.denoise import Model, denoise
 from wamnet.refimpl.frame import Floats, Frame
-from wamnet.refimpl.train import Recipe, recipe_to_json
+from wamnet.refimpl.train import Recipe, recipe_to_json, train
 
 from .frames import DIGITS, Pair
 
@@ -53,6 +57,26 @@ def trained(
     write_text(clock, json.dumps({"seconds": total, "recipe": json.loads(recipe_to_json(recipe))}) + "\n")
     checkpoint.unlink(missing_ok=True)
     return load_model(path), total
+
+
+TIMED_STEPS = 100
+"""Steps whose time is taken, after as many whose is not."""
+
+
+def seconds_a_step(
+    recipe: Recipe, pairs: Sequence[Pair], device: Executor, steps: int = TIMED_STEPS
+) -> float:
+    """Return the seconds of a step on a device: of the steps in the middle, without what comes before."""
+    count = max(1, min(steps, recipe.steps // 2))
+    seen: list[float] = []
+    fit_on = train if device.name == "numpy" else partial(train_on, device)
+    fit_on(
+        replace(recipe, log_every=count),
+        pairs,
+        until=2 * count,
+        on_progress=lambda *_: seen.append(time.perf_counter()),
+    )
+    return (seen[1] - seen[0]) / count
 
 
 def denoised(model: Model, frames: Sequence[Frame], executor: str = "opencl") -> list[Floats]:

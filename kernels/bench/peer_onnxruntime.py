@@ -5,6 +5,7 @@ Images come as rows with interleaved channels; the graph itself joins and turns 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...refimpl.dataset import FEATURES
 from ...refimpl.denoise import Model
+from ...refimpl.errors import ExecutorUnavailable
 from .contender import Contender, Opened, Tools, told_as_missing
 from .cost import layered
 from .workload import Given
@@ -73,6 +75,16 @@ def graph(model: Model) -> bytes:
     checker.check_model(made)
     found: bytes = made.SerializeToString()
     return found
+
+
+def run_graph(data: bytes, images: Mapping[str, NDArray[np.float32]]) -> tuple[str, NDArray[np.float32]]:
+    """Return the runtime's name, and what a graph makes of images (H, W, C)."""
+    try:
+        import onnxruntime
+    except ImportError:
+        raise ExecutorUnavailable("onnxruntime is not installed: pip install 'wamnet[targets]'") from None
+    session = onnxruntime.InferenceSession(data, providers=["CPUExecutionProvider"])
+    return f"ONNX Runtime {onnxruntime.__version__}", session.run(None, dict(images))[0]
 
 
 def _open(tools: Tools, model: Model, size: int) -> Opened:

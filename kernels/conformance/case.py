@@ -22,7 +22,7 @@ import numpy as np
 from ...refimpl.errors import InputError
 from .numbers import from_file, from_json, rounded_up, to_json
 
-VERSION = "1.0.0"
+VERSION = "1.1.0"
 """Version of format, behaviour and cases."""
 
 FORMAT = "wamnet-vectors"
@@ -36,6 +36,7 @@ class Output:
     `bound` 0 asks for equality; `accepted` holds other values that are right too, where rounding decides,
     each a mapping with its own `value` and `bound`.
     `welch`: the value is an estimate, and so is the answer (kinds/pictures.py).
+    `clause`: what a deviation is blamed on, where it is not the clause of the case.
     """
 
     value: Any
@@ -43,6 +44,7 @@ class Output:
     source: str = "exact"
     accepted: tuple[Mapping[str, Any], ...] = ()
     welch: Mapping[str, Any] | None = None
+    clause: str = ""
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,12 @@ class Case:
     expected: Mapping[str, Output] | None
     flags: tuple[str, ...] = ()
     note: str = ""
+
+    @property
+    def clauses(self) -> tuple[str, ...]:
+        """Return the clauses that a deviation may be blamed on: that of the case, and those of outputs."""
+        own = (output.clause for output in (self.expected or {}).values() if output.clause)
+        return (self.clause, *own)
 
     def to_json(self) -> dict[str, Any]:
         """Return the case in the form of JSON."""
@@ -70,6 +78,8 @@ class Case:
 def _output_json(output: Output) -> dict[str, Any]:
     """Return an expected output in the form of JSON."""
     data = {"value": to_json(output.value), "bound": _bound_json(output.bound), "source": output.source}
+    if output.clause:
+        data["clause"] = output.clause
     if output.accepted:
         data["accepted"] = [
             {"value": to_json(other["value"]), "bound": _bound_json(other["bound"])}
@@ -137,13 +147,18 @@ def _case(data: Mapping[str, Any], folder: Path) -> Case:
     """Return a case from JSON; numbers stay texts until they are compared."""
     expected = None
     if data["valid"]:
-        expected = {
-            name: Output(o["value"], o["bound"], o["source"], tuple(o.get("accepted", ())), o.get("welch"))
-            for name, o in data["expected"].items()
-        }
+        expected = {name: _output(o) for name, o in data["expected"].items()}
     flags, note = tuple(data["flags"]), data.get("note", "")
     inputs = {name: _placed(value, folder) for name, value in data["input"].items()}
     return Case(str(data["id"]), str(data["clause"]), inputs, expected, flags, note)
+
+
+def _output(data: Mapping[str, Any]) -> Output:
+    """Return an expected output from JSON."""
+    accepted = tuple(data.get("accepted", ()))
+    return Output(
+        data["value"], data["bound"], data["source"], accepted, data.get("welch"), str(data.get("clause", ""))
+    )
 
 
 def _placed(value: Any, folder: Path) -> Any:

@@ -36,19 +36,23 @@ SEED = 20_240_817
 
 
 class Field(NamedTuple):
-    """An input or output: what it is, its components (0: a number), and the least and largest value given."""
+    """An input or output: what it is, its components (0: a number), and the least and largest value given.
+
+    `clause` governs an output where it is not the function's."""
 
     text: str
     size: int = 0
     low: float = 0.0
     high: float = 1.0
+    clause: str = ""
 
 
 @dataclass(frozen=True)
 class Function:
     """A function of the reference as a kind of case: `call` has the inputs and the float type of constants.
 
-    `given`: inputs of cases with a note; `draws` more are drawn by `draw` from uniform numbers in [0, 1).
+    `given`: inputs of cases with a note, and a clause where it is another one; `draws` more are drawn by
+    `draw` from uniform numbers in [0, 1).
     """
 
     name: str
@@ -57,7 +61,7 @@ class Function:
     inputs: Mapping[str, Field]
     outputs: Mapping[str, Field]
     call: Callable[[Numbers, Any], Numbers]
-    given: Sequence[tuple[str, Numbers]] = ()
+    given: Sequence[tuple[str, Numbers] | tuple[str, Numbers, str]] = ()
     draw: Callable[[NDArray[np.float64]], Numbers] | None = None
     draws: int = 8
 
@@ -71,15 +75,15 @@ class Function:
 
     def cases(self) -> list[Case]:
         """Return the cases with their answers and bounds."""
-        rows = [(note, values) for note, values in self.given]
+        rows = [(note, values, *(own or [self.clause])) for note, values, *own in self.given]
         if self.draw is not None:
-            rows += [("", self.draw(drawn(self.name, index))) for index in range(self.draws)]
+            rows += [("", self.draw(drawn(self.name, index)), self.clause) for index in range(self.draws)]
         found = []
-        for index, (note, values) in enumerate(rows):
+        for index, (note, values, clause) in enumerate(rows):
             inputs = {name: np.asarray(values[name], np.float32).astype(np.float64) for name in self.inputs}
             expected, undecided = self.bounded(inputs)
             flags = ("undecided",) if undecided else ()
-            found.append(Case(f"{self.name}/{index}", self.clause, inputs, expected, flags, note))
+            found.append(Case(f"{self.name}/{index}", clause, inputs, expected, flags, note))
         return found
 
     def answer(self, inputs: Numbers) -> Numbers:
@@ -96,7 +100,8 @@ class Function:
         for name, field in self.outputs.items() if sure else ():
             value = np.asarray(wanted[name], np.float64)
             low, high = (_ends(found, name, field, end).reshape(value.shape) for end in ENDS)
-            outputs[name] = Output(value, np.maximum(high - value, value - low), SOURCE)
+            bound = np.maximum(high - value, value - low)
+            outputs[name] = Output(value, bound, SOURCE, clause=field.clause)
             # Single precision may be sure of its way, and double precision go the other one.
             outside = np.maximum(low - value, value - high)
             sure &= bool(np.max(outside) <= APART * (1.0 + float(np.max(np.abs(value)))))
@@ -127,7 +132,7 @@ class Function:
             assert np.isfinite(bound), f"{self.name}: no bound at {inputs}"
             bounds = [np.maximum(bound, ULP * np.abs(other)) for other in (value, *others)]
             accepted = tuple({"value": v, "bound": b} for v, b in zip(others, bounds[1:], strict=True))
-            outputs[name] = Output(value, bounds[0], EITHER, accepted)
+            outputs[name] = Output(value, bounds[0], EITHER, accepted, clause=field.clause)
         return outputs
 
     @cached_property

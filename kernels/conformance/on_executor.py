@@ -18,13 +18,14 @@ from typing import Any
 import numpy as np
 
 from ...compiler.artifact import Artifact
-from ...compiler.compile import TARGETS, compile_program
+from ...compiler.compile import DENOISERS, TARGETS, compile_program
 from ...compiler.emit_path import END
 from ...compiler.ir import Gather, Image, Program, Type
 from ...compiler.lower_scene import PATH, SURFACE, lower_scene
 from ...compiler.passes import pipeline
 from ...compiler.path_kernel import PathArtifact, compile_path, most_unrolled
 from ...compiler.profiles import profile_named
+from ...compiler.schedules import PLAIN
 from ...compiler.trace import trace
 from ...refimpl import scene as scene_module
 from ...refimpl.dataset import Window
@@ -34,6 +35,7 @@ from ...refimpl.render import Job
 from ...refimpl.transport import Settings
 from ..denoise_on import denoise_on
 from ..executor import Executor, Part
+from ..export.buffer_runner import BufferRunner
 from ..render_on import render_on
 from .case import given
 from .functions import Function, components, names
@@ -53,7 +55,7 @@ class OnExecutor:
     def __init__(self, executor: Executor) -> None:
         self.executor = executor
         own: dict[str, Own] = {"picture.denoised": self._denoised}
-        if executor.name in TARGETS:
+        if executor.name in TARGETS or isinstance(executor, BufferRunner):
             own |= {"path.whole": self._vertices, "picture.rendered": self._rendered}
         self._own: Mapping[str, Own] = own
         self.kinds = [*FUNCTIONS, *self._own]
@@ -105,7 +107,8 @@ class OnExecutor:
         """Return a denoised picture."""
         frame = frame_of({name: inputs[name] for name in LAYERS if name in inputs})
         model = model_from(base64.b64decode(inputs["model"]))
-        return {"picture": denoise_on(self.executor, model, frame, profile).image}
+        schedule = None if self.executor.name in DENOISERS else PLAIN
+        return {"picture": denoise_on(self.executor, model, frame, profile, schedule).image}
 
     def _rendered(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
         """Return mean and variance of each pixel."""

@@ -1,7 +1,7 @@
 """The project's own answers through the same door: `python -m wamnet.kernels.conformance.program`.
 
 --executor reference   the reference in float64
---executor NAME        kernels on an executor (on_executor.py)
+--executor NAME        kernels on an executor (on_executor.py), or exported ones on what runs them here
 """
 
 from __future__ import annotations
@@ -63,10 +63,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         serve(sys.stdin, sys.stdout, "wamnet, reference", list(KINDS), of_reference)
         return
     from .. import open_executor
+    from ..export.runners import RUNNERS
     from .on_executor import OnExecutor
 
     try:
-        with open_executor(options.executor) as executor:
+        opened = RUNNERS[options.executor]() if options.executor in RUNNERS else None
+        with opened or open_executor(options.executor) as executor:
             answers = OnExecutor(executor)
             name = f"wamnet, {options.executor} ({executor.device})"
             serve(sys.stdin, sys.stdout, name, answers.kinds, answers.answer)

@@ -1,6 +1,7 @@
 """What is told of verdicts: counts, one text a failure, JSON, JUnit, and what changed since the last time.
 
-1. [`counts`] counts verdicts by kind; [`about`] tells all of one failure.
+1. [`counts`] counts verdicts by kind; [`about`] tells all of one failure, [`first_blamed`] finds the
+   one to mend first.
 2. [`to_json`] and [`to_junit`] are for other programs.
 3. A track is a file of the last verdicts: [`changes`] are the cases that differ from it, and those that are
    [`worse`] are failures; known ones are not. It is written anew unless something is worse.
@@ -56,6 +57,44 @@ def counts(verdicts: Sequence[Verdict]) -> list[Kinds]:
     ]
 
 
+ELEMENTARY = (
+    "random.",
+    "sampling.",
+    "camera.",
+    "intersection.sphere",
+    "intersection.quad",
+    "intersection.box",
+    "intersection.",
+    "material.",
+    "transport.",
+    "sky.",
+    "path.start",
+    "path.arrive",
+    "path.scatter",
+    "path.whole",
+    "encoding.",
+    "sine",
+    "network.",
+    "adam.",
+    "image.",
+    "metric.",
+    "file.",
+    "picture.",
+)
+"""How kinds begin, those that others are made of first: what fails there makes the others fail."""
+
+
+def first_blamed(verdicts: Sequence[Verdict]) -> Verdict | None:
+    """Return the failure to look at first: of the most elementary kind that fails, the first case."""
+
+    def rank(verdict: Verdict) -> int:
+        known = [i for i, start in enumerate(ELEMENTARY) if verdict.kind.startswith(start)]
+        return min(known, default=len(ELEMENTARY))
+
+    failed = [verdict for verdict in verdicts if verdict.failed]
+    return min(failed, key=rank, default=None)
+
+
 def about(verdict: Verdict, case: Case, again: str) -> list[str]:
     """Return the lines that tell a failure: what, where, input, expected and found, and how to repeat it."""
     note = f": {case.note}" if case.note else ""
@@ -72,21 +111,28 @@ def about(verdict: Verdict, case: Case, again: str) -> list[str]:
     return [*lines, f"  again: {again}"]
 
 
-def to_json(program: str, profile: str, verdicts: Sequence[Verdict]) -> str:
-    """Return a report as JSON."""
+def to_json(program: str, profile: str, verdicts: Sequence[Verdict], again: str) -> str:
+    """Return a report as JSON; `again` is the command that asks a case alone, but for its id."""
+    first = first_blamed(verdicts)
     data = {
         "format": "wamnet-conformance-report",
         "version": VERSION,
         "program": program,
         "profile": profile,
         "kinds": {k.kind: {"cases": k.cases, **k.found} for k in counts(verdicts)},
-        "verdicts": [verdict.to_json() for verdict in verdicts],
+        "look_first_at": first.id if first is not None else None,
+        "verdicts": [
+            {**verdict.to_json(), **({"again": f"{again} {verdict.id}"} if verdict.failed else {})}
+            for verdict in verdicts
+        ],
     }
     return json.dumps(data, indent=1) + "\n"
 
 
-def to_junit(program: str, verdicts: Sequence[Verdict]) -> str:
-    """Return a report in the form of JUnit: a suite a kind, `skipped` for what is not supported."""
+def to_junit(program: str, verdicts: Sequence[Verdict], again: str) -> str:
+    """Return a report in the form of JUnit: a suite a kind, `skipped` for what is not supported.
+
+    The text of a failure is the command that repeats it."""
     root = ElementTree.Element("testsuites", name=_xml(program))
     for known in counts(verdicts):
         some = [v for v in verdicts if v.kind == known.kind]
@@ -100,7 +146,8 @@ def to_junit(program: str, verdicts: Sequence[Verdict]) -> str:
             if v.verdict != PASS:
                 word = {FAIL: "failure", UNSUPPORTED: "skipped"}.get(v.verdict, "error")
                 text = f"{v.clause}: {v.stage} {v.text} expected {v.expected} got {v.got}"
-                ElementTree.SubElement(element, word, type=v.verdict, message=_xml(text))
+                told = ElementTree.SubElement(element, word, type=v.verdict, message=_xml(text))
+                told.text = _xml(f"{again} {v.id}") if v.failed else None
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 

@@ -84,7 +84,7 @@ def chosen(cases: Mapping[str, Sequence[Case]], words: Sequence[str]) -> dict[st
     """
 
     def wanted(case: Case) -> bool:
-        known = (case.id, case.clause, *case.flags)
+        known = (case.id, *case.clauses, *case.flags)
         return not words or any(word in known or ("/" not in word and word in case.id) for word in words)
 
     found = {kind: [case for case in some if wanted(case)] for kind, some in cases.items()}
@@ -148,15 +148,28 @@ def judge(kind: str, case: Case, answer: Mapping[str, Any]) -> Verdict:
     outputs = answer.get("output")
     if not isinstance(outputs, dict):
         return Verdict(case.id, kind, case.clause, GARBAGE, "the answer has no output")
-    largest = 0.0
+    largest, found = 0.0, list[Verdict]()
     for name, expected in case.expected.items():
+        blamed = expected.clause or case.clause
         if name not in outputs:
-            return Verdict(case.id, kind, case.clause, FAIL, "the output is missing", name)
-        wrong, ratio = _compared(name, expected, outputs[name], outputs)
+            return Verdict(case.id, kind, blamed, FAIL, "the output is missing", name)
+        wrong, ratio = _compared(name, expected, outputs[name], outputs, kind in IN_STEPS)
         if wrong:
-            return Verdict(case.id, kind, case.clause, FAIL, *wrong, ratio)
+            found.append(Verdict(case.id, kind, blamed, FAIL, *wrong, ratio))
+        if found and kind not in IN_STEPS:
+            break
         largest = max(largest, ratio)
-    return Verdict(case.id, kind, case.clause, PASS, ratio=largest)
+    return min(found, key=_step, default=Verdict(case.id, kind, case.clause, PASS, ratio=largest))
+
+
+IN_STEPS = ("path.whole",)
+"""Kinds whose outputs have steps on their first axis: the earliest step that deviates is told."""
+
+
+def _step(verdict: Verdict) -> int:
+    """Return the step of a deviation: `point[2][0]` is of step 2; another shape is before all."""
+    index = verdict.stage.partition("[")[2].partition("]")[0]
+    return int(index) if index else -1
 
 
 Wrong = tuple[str, str, str, str]
@@ -164,9 +177,11 @@ Wrong = tuple[str, str, str, str]
 
 
 def _compared(
-    name: str, expected: Output, got: Any, outputs: Mapping[str, Any]
+    name: str, expected: Output, got: Any, outputs: Mapping[str, Any], in_steps: bool = False
 ) -> tuple[Wrong | None, float]:
-    """Return what is wrong with an output, if anything, and the largest error / bound."""
+    """Return what is wrong with an output, if anything, and the largest error / bound.
+
+    Where its first axis has steps, the worst number of the earliest step that is wrong is told."""
     if isinstance(expected.value, str) and not is_number(expected.value):
         return (None if got == expected.value else ("another text", name, expected.value, str(got)[:80])), 0.0
     try:
@@ -176,7 +191,7 @@ def _compared(
     except InputError as error:
         return (str(error), name, "", ""), np.inf
     ways = ({"value": expected.value, "bound": expected.bound}, *expected.accepted)
-    verdicts = [_nearness(name, way, found) for way in ways]
+    verdicts = [_nearness(name, way, found, in_steps) for way in ways]
     return min(verdicts, key=lambda verdict: (verdict[0] is not None, verdict[1]))
 
 
@@ -186,7 +201,9 @@ def _read(name: str, got: Any) -> Numbers:
     return found.astype(np.float64)
 
 
-def _nearness(name: str, expected: Mapping[str, Any], found: Numbers) -> tuple[Wrong | None, float]:
+def _nearness(
+    name: str, expected: Mapping[str, Any], found: Numbers, in_steps: bool
+) -> tuple[Wrong | None, float]:
     """Return what is wrong with numbers that should be within the bound of a value, and error / bound."""
     wanted = from_json(expected["value"], name).astype(np.float64)
     if found.shape != wanted.shape:
@@ -201,7 +218,11 @@ def _nearness(name: str, expected: Mapping[str, Any], found: Numbers) -> tuple[W
         ratio = np.where(~right & (bound > 0), error / bound, ratio)
     if np.all(right):
         return None, float(ratio.max(initial=0.0))
-    worst = np.unravel_index(int(np.argmax(np.where(right, -1.0, ratio))), ratio.shape)
+    asked = np.where(right, -1.0, ratio)
+    if in_steps:
+        first = int(np.argmin(right.reshape(len(right), -1).all(axis=1)))
+        asked = np.where(np.arange(len(asked)).reshape(-1, *(1,) * (asked.ndim - 1)) == first, asked, -1.0)
+    worst = np.unravel_index(int(np.argmax(asked)), ratio.shape)
     place = name + "".join(f"[{index}]" for index in worst)
     text = f"error {error[worst]:.3g}, bound {bound[worst]:.3g}"
     return (text, place, number_text(wanted[worst]), number_text(found[worst])), float(ratio[worst])

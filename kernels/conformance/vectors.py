@@ -28,6 +28,10 @@ NUMBER = {
 """A number: decimal, hexadecimal, or one of three words."""
 
 
+CLAUSE = {"type": "string", "pattern": "^[A-Z]+-[0-9]+[a-z]?$"}
+"""The number of a clause."""
+
+
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a file of vectors."""
     numbers = {"anyOf": [{"$ref": "#/$defs/number"}, {"type": "array", "items": {"$ref": "#/$defs/numbers"}}]}
@@ -39,6 +43,7 @@ def schema() -> dict[str, Any]:
             "value": {"anyOf": [{"$ref": "#/$defs/numbers"}, {"type": "boolean"}, TEXT]},
             "bound": {"$ref": "#/$defs/numbers"},
             "source": {"type": "string", "minLength": 1},
+            "clause": {"$ref": "#/$defs/clause"},
             "accepted": {"type": "array", "minItems": 1, "items": {"$ref": "#/$defs/accepted"}},
             "welch": {
                 "type": "object",
@@ -58,7 +63,7 @@ def schema() -> dict[str, Any]:
         "additionalProperties": False,
         "properties": {
             "id": {"type": "string", "pattern": "^[a-z0-9_.]+/[0-9]+$"},
-            "clause": {"type": "string", "pattern": "^[A-Z]+-[0-9]+[a-z]?$"},
+            "clause": {"$ref": "#/$defs/clause"},
             "flags": {"type": "array", "items": {"enum": ["undecided", "statistical"]}, "uniqueItems": True},
             "note": {"type": "string", "minLength": 1},
             "valid": {"type": "boolean"},
@@ -86,7 +91,14 @@ def schema() -> dict[str, Any]:
             "title": {"type": "string"},
             "cases": {"type": "array", "minItems": 1, "items": {"$ref": "#/$defs/case"}},
         },
-        "$defs": {"number": NUMBER, "numbers": numbers, "output": output, "accepted": accepted, "case": case},
+        "$defs": {
+            "number": NUMBER,
+            "numbers": numbers,
+            "clause": CLAUSE,
+            "output": output,
+            "accepted": accepted,
+            "case": case,
+        },
     }
 
 
@@ -115,7 +127,7 @@ def _about(kind: Kind) -> list[str]:
     """Return the page's lines about one kind."""
     cases = kind.make()
     bad = sum(case.expected is None for case in cases)
-    clauses = ", ".join(dict.fromkeys(case.clause for case in cases))
+    clauses = ", ".join(dict.fromkeys(clause for case in cases for clause in case.clauses))
     counted = f"{len(cases)} cases" + (f", {bad} of them to be refused" if bad else "")
     fields = [
         f"| {side} | `{name}` | {_cell(text)} |"

@@ -83,10 +83,10 @@ class BufferRunner(Executor):
 
     def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
         shape = (len(kernel.planes), part.rows, part.width)
-        sizes = (part.width, part.height, part.first_row, part.rows)
-        sizes += (part.first_sample, part.samples, part.seed)
+        sizes = (part.width, part.height, part.first_row, part.rows, part.first_sample)
+        numbers = (*sizes, part.samples, part.seed)
         buffers = {WRITTEN: np.zeros(shape, np.float32)}
-        launch = Launch(sizes, buffers, (WRITTEN,), (part.width, part.rows))
+        launch = Launch(numbers, buffers, (WRITTEN,), (part.width, part.rows))
         return self._launch(self._kernel(kernel, kernel.entry_point, 0), launch)[0].reshape(shape)
 
     def encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -11,10 +12,11 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.glsl_buffers import GROUP
 from ...compiler.glsl_compute import SHADER_VERSION
+from ...compiler.weight_homes import UNIFORM
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..executor import Images
 from ..opengl_executor import OpenGLExecutor
-from .buffer_runner import BufferRunner, Launch
+from .buffer_runner import READ, BufferRunner, Launch
 
 
 class ComputeRunner(BufferRunner):
@@ -44,14 +46,14 @@ class ComputeRunner(BufferRunner):
             return self._textures._run(artifact, images)
         return super()._run(artifact, images)
 
-    def _prepare(self, source: str, entry: str, count: int) -> moderngl.ComputeShader:
+    def _prepare(self, source: str, entry: str, count: int) -> Any:
         with self._context:
             try:
                 return self._context.compute_shader(source)
             except moderngl.Error as error:
                 raise CompileError(f"{self.device} does not build the kernel: {error}") from None
 
-    def _launch(self, prepared: moderngl.ComputeShader, launch: Launch) -> list[NDArray[np.float32]]:
+    def _launch(self, prepared: Any, launch: Launch) -> list[NDArray[np.float32]]:
         with self._context, ExitStack() as made:
             sizes = np.array([n % 2**32 for n in launch.sizes], np.uint32)
             block = self._context.buffer(np.pad(sizes, (0, -len(sizes) % 4)).tobytes())
@@ -61,7 +63,10 @@ class ComputeRunner(BufferRunner):
             for place, data in launch.buffers.items():
                 held[place] = self._context.buffer(np.ascontiguousarray(data).tobytes())
                 made.callback(held[place].release)
-                held[place].bind_to_storage_buffer(place)
+                if place == READ and self.name.endswith(UNIFORM):
+                    held[place].bind_to_uniform_block(place)
+                else:
+                    held[place].bind_to_storage_buffer(place)
             prepared.run(*(-(-n // g) for n, g in zip(launch.threads, GROUP, strict=True)), 1)
             self._context.memory_barrier()
             return [np.frombuffer(held[place].read(), np.float32).copy() for place in launch.back]

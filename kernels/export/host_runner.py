@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.weight_homes import INLINE
+from ...refimpl.errors import ExecutorUnavailable
 from . import tools
 from .buffer_runner import READ, WRITTEN, BufferRunner, Launch
 
@@ -80,7 +81,11 @@ class HostRunner(BufferRunner):
         self.name = name or self.name
         self._folder = tempfile.TemporaryDirectory(prefix="wamnet-host-")
         self._count = 0
-        told = tools.run(self.program, "--version", folder=Path(self._folder.name))
+        try:
+            told = tools.run(self.program, "--version", folder=Path(self._folder.name))
+        except ExecutorUnavailable:
+            self._folder.cleanup()
+            raise
         self.device = " ".join(told.split()[:4])
 
     def _glue(self, source: str, entry: str, count: int, folder: Path) -> str:

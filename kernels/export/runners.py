@@ -15,6 +15,13 @@ def _es() -> Executor:
     return ESRunner()
 
 
+def _godot() -> Executor:
+    """Open OpenGL for shaders of Godot."""
+    from .host_pass_runner import GodotRunner
+
+    return GodotRunner()
+
+
 def _compute() -> Executor:
     """Open OpenGL for compute shaders."""
     from .compute_runner import ComputeRunner
@@ -30,7 +37,8 @@ RUNNERS: Mapping[str, Callable[[], Executor]] = {
     "glsl-vulkan/hlsl-dxc": lambda: wgpu_runner.hlsl_runner("dxc"),
     "wgsl": wgpu_runner.WgpuRunner,
     "metal": host_runner.MetalRunner,
-    "c": host_runner.CRunner,
+    "c99": host_runner.CRunner,
     "cuda": host_runner.CUDARunner,
+    "godot": _godot,
 }
-"""By compiler target, and after a stroke what it is translated to."""
+"""By compiler target, and after a stroke what it is translated to; c99 is C, whose name an executor has."""

@@ -7,6 +7,7 @@ will do. SPIR-V reaches naga with decorations that it does not know (NoContracti
 from __future__ import annotations
 
 import logging
+import re
 import struct
 from collections.abc import Callable
 from typing import Any
@@ -25,6 +26,26 @@ WAY_OUT = "pip install 'wamnet[targets]', and a Vulkan driver: apt-get install m
 
 UNIFORM_BYTES = 16
 """A uniform buffer's size is a multiple of this."""
+
+DECLARED = re.compile(
+    r"@binding\((\d+)\) var<(uniform|storage, read_write|storage, read)>"
+    r"|layout\(std\d+, binding = (\d+)\) (uniform|restrict readonly buffer|restrict buffer)"
+)
+"""A buffer in WGSL, or in GLSL for Vulkan."""
+
+KINDS = {
+    "uniform": "uniform",
+    "storage, read_write": "storage",
+    "restrict buffer": "storage",
+    "storage, read": "read-only-storage",
+    "restrict readonly buffer": "read-only-storage",
+}
+"""What WebGPU calls it."""
+
+
+def _declared(source: str) -> dict[int, str]:
+    """Return the kinds of the buffers that a kernel declares, by binding."""
+    return {int(m[1] or m[3]): KINDS[m[2] or m[4]] for m in DECLARED.finditer(source)}
 
 
 class WgpuRunner(BufferRunner):
@@ -53,14 +74,23 @@ class WgpuRunner(BufferRunner):
         code = self._translate(source)
         try:
             module = self._device.create_shader_module(code=code)
-            return self._device.create_compute_pipeline(
-                layout="auto", compute={"module": module, "entry_point": entry}
+            # A layout of its own holds also what a kernel declares and does not read.
+            entries = [
+                {"binding": place, "visibility": self._wgpu.ShaderStage.COMPUTE, "buffer": {"type": kind}}
+                for place, kind in _declared(source).items()
+            ]
+            group = self._device.create_bind_group_layout(entries=entries)
+            layout = self._device.create_pipeline_layout(bind_group_layouts=[group])
+            pipeline = self._device.create_compute_pipeline(
+                layout=layout, compute={"module": module, "entry_point": entry}
             )
         except Exception as error:  # noqa: BLE001 (the package has its own kinds)
             raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+        return pipeline, group, set(_declared(source))
 
     def _launch(self, prepared: Any, launch: Launch) -> list[NDArray[np.float32]]:
         usage, device = self._wgpu.BufferUsage, self._device
+        pipeline, layout, declared = prepared
         sizes = struct.pack(f"<{len(launch.sizes)}I", *(n % 2**32 for n in launch.sizes))
         sizes += bytes(-len(sizes) % UNIFORM_BYTES)
         held = {0: device.create_buffer_with_data(data=sizes, usage=usage.UNIFORM)}
@@ -73,11 +103,12 @@ class WgpuRunner(BufferRunner):
         entries = [
             {"binding": place, "resource": {"buffer": buffer, "offset": 0, "size": buffer.size}}
             for place, buffer in held.items()
+            if place in declared
         ]
-        group = device.create_bind_group(layout=prepared.get_bind_group_layout(0), entries=entries)
+        group = device.create_bind_group(layout=layout, entries=entries)
         encoder = device.create_command_encoder()
         compute = encoder.begin_compute_pass()
-        compute.set_pipeline(prepared)
+        compute.set_pipeline(pipeline)
         compute.set_bind_group(0, group)
         compute.dispatch_workgroups(*(-(-n // g) for n, g in zip(launch.threads, GROUP, strict=True)), 1)
         compute.end()

@@ -65,6 +65,29 @@ def test_one_device_draws_by_one_pipeline(wamnet, tmp_path, monkeypatch, executo
         assert (levels > 0).mean() <= 0.01  # values within 1e-5 of a rounding limit: 255 x 2e-5 of all
 
 
+def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:
+    """Unless others are named; a model that does not tell shows mini cubes, with the colour's rays."""
+    network = load_model(tmp_path / "m.safetensors")
+    facts = {"trained_on_scene": "cornell", "trained_on_feature_spp": "3"}
+    learned = replace(network, info=facts)
+    assert (animate.scene_of(learned), animate.rays_of(learned)) == ("cornell", 3)
+    assert (animate.scene_of(network), animate.rays_of(network)) == ("minicubes", 0)
+    odd = replace(network, info={"trained_on_scene": "cornell, empty", "trained_on_feature_spp": "1, 3"})
+    assert (animate.scene_of(odd), animate.rays_of(odd)) == ("minicubes", 0)
+    save_model(tmp_path / "l.safetensors", learned)
+    one = ("--seconds", 0.2, "--fps", 5, "--size", 13)
+    assert wamnet("animate", "l.safetensors", *one, "-o", "own").status == 0
+    noisy = render(canonical("cornell"), Job(13, 13, feature_spp=3)).frame
+    got = read_png(tmp_path / "own" / "00000.png")[LABEL_PX:-1, 13:26]
+    # Half a level of 8 bits, and float32's rounding of sums below 256.
+    assert np.abs(got - denoise(network, noisy)).max() <= 0.5 / 255 + 256 * 2.0**-23
+    named = ("--scene", "minicubes", "--feature-spp", 0)
+    assert wamnet("animate", "l.safetensors", *one, *named, "-o", "named").status == 0
+    assert wamnet("animate", "m.safetensors", *one, "-o", "plain").status == 0
+    pictures = [read_png(tmp_path / folder / "00000.png") for folder in ("named", "plain")]
+    assert np.array_equal(*pictures)
+
+
 @pytest.mark.parametrize("name", ["numpy", "opencl", "opengl"])
 def test_a_cut_first_layer(wamnet, tmp_path, refused, executor_named, name) -> None:
     """The pictures of the model whose first layer is expanded from its factors, up to one level."""

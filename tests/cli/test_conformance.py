@@ -63,6 +63,7 @@ def test_many_failures_are_counted(wamnet, program):
     assert done.status == 1
     assert done.out.count("\nFAIL ") == 10
     assert "... and 5 more; --json or --junit tell all" in done.out
+    assert "look first at RNG-3: random.block/1 fails" in done.out
 
 
 def test_reports(wamnet, program, tmp_path):
@@ -78,6 +79,10 @@ def test_reports(wamnet, program, tmp_path):
     assert suites["random.block"].get("errors") == str(found["crash"])
     assert len(suites["random.block"].findall("testcase/error")) == found["crash"]
     assert suites["sine"].get("skipped") == "1"
+    (ended, *_) = (v for v in report["verdicts"] if v["verdict"] == "crash")
+    assert ended["again"].endswith(f"-k {ended['id']}")
+    assert report["look_first_at"] == ended["id"]
+    assert suites["random.block"].find("testcase/error").text == ended["again"]
 
 
 def test_a_track_shows_what_changed(wamnet, program, tmp_path):

@@ -58,12 +58,17 @@ def test_the_frames_are_held_out(finished, report) -> None:
 
 
 def test_the_full_plan_is_what_is_promised() -> None:
-    """Frames of 256x256 or larger, references of 1024 samples, several training times, two unseen ones."""
+    """Frames of 256x256 or larger, references of 1024 samples, several training times, two unseen ones.
+
+    Training takes the default preset, on features of more rays than one.
+    """
     plan = demo.Plan()
     assert plan.size_px >= 256
     assert plan.reference_spp >= 1024
     assert plan.train_frames >= 4
     assert plan.test_frames >= 2
+    assert plan.feature_spp > 1
+    assert plan.preset == "best"
 
 
 def test_the_numbers_are_those_of_the_files(finished, report) -> None:
@@ -187,11 +192,16 @@ def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
     monkeypatch.setattr("wamnet.kernels.open_executor", nothing)
     plan = demo.for_this_machine(demo.Plan())
     assert plan == demo.replace(
-        demo.Plan(), renderer="numpy", trainer="numpy", reference_spp=demo.REFERENCE_SPP_OF_NUMPY
+        demo.Plan(),
+        renderer="numpy",
+        trainer="numpy",
+        train_frames=demo.TRAIN_FRAMES_OF_NUMPY,
+        train_spp=demo.REFERENCE_SPP_OF_NUMPY,
+        reference_spp=demo.REFERENCE_SPP_OF_NUMPY,
     )
     told = capsys.readouterr().out
     assert "not rendered with opengl: opengl: nothing there" in told
-    assert "rendered with NumPy, which is slow: references have 32 paths per pixel" in told
+    assert "rendered with NumPy, which is slow: 12 training times, references have 32 paths per pixel" in told
 
 
 def test_an_executor_that_is_missing_is_told(finished, monkeypatch) -> None:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from wamnet.cli import exr
+from wamnet.cli import exr, inputs
+from wamnet.compiler.model_file import load_model, save_model
+from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 
 
@@ -100,3 +104,62 @@ def test_the_longest_name_is_written(wamnet, here) -> None:
     name = "n" * 251 + ".png"
     assert wamnet("render", "minicubes", "--width", 2, "--height", 2, "-o", name).status == 0
     assert (here / name).is_file()
+
+
+def test_models_have_names(samples, monkeypatch, tmp_path) -> None:
+    """A file that is there comes first; then a name, with a prefix or not; else the names are listed."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(inputs, "MODELS", tmp_path / "along")
+    (tmp_path / "along").mkdir()
+    shutil.copy(samples / "model.safetensors", tmp_path / "along" / "cubes.safetensors")
+    assert inputs.shipped_models() == ["cubes"]
+    for name in ("cubes", "model:cubes"):
+        assert inputs.model_path(Path(name)) == tmp_path / "along" / "cubes.safetensors"
+        assert inputs.load_model(Path(name)).features == ("color", "normal")
+    (tmp_path / "cubes").touch()
+    assert inputs.model_path(Path("cubes")) == Path("cubes")
+    assert inputs.model_path(Path("cubes.safetensors")) == Path("cubes.safetensors")
+    text = "model is spheres: there is no such file, and no model of this name comes along; give .* of cubes"
+    with pytest.raises(InputError, match=text):
+        inputs.model_path(Path("spheres"))
+
+
+@pytest.mark.parametrize(
+    ("trained", "shown", "told"),
+    [
+        ({}, {"scene": "cornell", "spp": "1"}, []),
+        ({"scene": "cornell"}, {}, []),
+        ({"scene": "cornell"}, {"scene": "cornell", "spp": "1"}, []),
+        ({"scene": "cornell, empty"}, {"scene": "empty", "spp": "1"}, []),
+        ({"scene": "cornell"}, {"scene": "empty", "spp": "1"}, ["it shows empty, and the model has learned"]),
+        (
+            {"scene": "empty", "feature_spp": "16"},
+            {"scene": "empty", "spp": "1"},
+            ["its features are of --feature-spp 1, those that the model learned from of 16"],
+        ),
+        (
+            {"scene": "empty"},
+            {"scene": "cornell", "spp": "1", "feature_spp": "4"},
+            [
+                "it shows cornell",
+                "its features are of --feature-spp 4, those that the model learned from of 1",
+            ],
+        ),
+    ],
+)
+def test_frames_unlike_those_of_the_training(samples, trained, shown, told) -> None:
+    """What is known of both is compared."""
+    model = load_model(samples / "model.safetensors")
+    model = replace(model, info={f"trained_on_{name}": value for name, value in trained.items()})
+    found = inputs.unlike_training(model, Frame({"color": np.zeros((2, 2, 3))}, shown))
+    assert len(found) == len(told)
+    assert all(text.startswith(begin) for text, begin in zip(found, told, strict=True))
+
+
+def test_a_frame_of_another_scene_is_denoised_with_a_warning(wamnet, here) -> None:
+    model = load_model(here / "model.safetensors")
+    save_model(here / "other.safetensors", replace(model, info={"trained_on_scene": "cornell"}))
+    outcome = wamnet("denoise", "other.safetensors", "noisy.exr")
+    assert outcome.status == 0
+    assert "noisy.exr: it shows minicubes, and the model has learned cornell alone" in outcome.out
+    assert (here / "denoised.png").exists()

@@ -1,8 +1,13 @@
-"""The second implementation, examples/c99/wamnet.c: it needs nothing, passes all, and survives nonsense."""
+"""The second implementation, examples/c99/wamnet.c: it needs nothing, passes all, and survives nonsense.
+
+Of its mutants (examples/c99/mutants.txt) every third is asked here; `python examples/c99/mutants.py` asks
+all of them.
+"""
 
 from __future__ import annotations
 
 import base64
+import importlib.util
 import json
 import random
 import re
@@ -14,9 +19,13 @@ from pathlib import Path
 import pytest
 
 from wamnet.kernels.conformance import run, vectors
+from wamnet.kernels.conformance.report import ELEMENTARY
 
 SOURCE = Path(__file__).parents[2] / "examples" / "c99" / "wamnet.c"
 """The program: one file."""
+
+EVERY = 3
+"""One mutant in this many is asked."""
 
 STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
 """What the program is held to."""
@@ -41,25 +50,36 @@ SEED = 20_261_121
 
 
 @pytest.fixture
-def built(tmp_path, executor_named):
-    """Give a function that compiles the program with flags and returns its path."""
-    executor_named("c")  # A compiler that is required and missing fails here, under the policy of executors.
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler is None:
+def compiler(executor_named) -> str:
+    """Give the C compiler, under the policy of executors: one that is required and missing fails here."""
+    executor_named("c")
+    found = shutil.which("cc") or shutil.which("gcc")
+    if found is None:
         pytest.skip("the C compiler that CC names is neither cc nor gcc")
+    return found
+
+
+@pytest.fixture
+def built(tmp_path, compiler):
+    """Give a function that compiles the program with flags and returns its path."""
 
     def build(flags: list[str]) -> str:
         program = tmp_path / "wamnet-c99"
-        done = subprocess.run(
-            [compiler, *STRICT, *flags, SOURCE, "-o", program, "-lm"],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        command = [compiler, *STRICT, *flags, SOURCE, "-o", program, "-lm"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         return str(program)
 
     return build
+
+
+@pytest.fixture(scope="module")
+def mutants():
+    """Give the module of examples/c99/mutants.py."""
+    spec = importlib.util.spec_from_file_location("c99_mutants", SOURCE.with_name("mutants.py"))
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def test_it_includes_headers_of_the_standard_alone():
@@ -129,3 +149,38 @@ def test_damaged_files_and_requests_are_answered(built):
     words = Counter("refused" if "refused" in answer else "answered" for answer in answers)
     assert words["refused"] > len(lines) / 2  # most damage is noticed
     assert words["answered"] > 0  # some is a change to a name or a number
+
+
+# ---- mutants ----------------------------------------------------------------------------------------------
+
+
+def test_each_mutant_changes_one_place_and_breaks_a_clause(mutants):
+    table = mutants.read(mutants.TABLE.read_text())
+    assert len(table) >= 100
+    assert len({m.name for m in table}) == len(table)
+    known = {
+        clause for some in run.read_vectors(vectors.FOLDER).values() for c in some for clause in c.clauses
+    }
+    assert {m.clause for m in table} <= known
+    for mutant in table:
+        mutants.mutated(mutant, SOURCE.read_text())
+
+
+def test_a_mutant_whose_text_is_gone_is_an_error(mutants):
+    mutant = mutants.Mutant("RNG-1", "nothing", (), "no such text", "another")
+    with pytest.raises(ValueError, match=r"nothing: its text stands there 0 times"):
+        mutants.mutated(mutant, SOURCE.read_text())
+
+
+def test_mutants_are_caught_and_blamed_on_the_clause_that_they_break(mutants, compiler, tmp_path):
+    cases = run.read_vectors(vectors.FOLDER)
+    asked = mutants.read(mutants.TABLE.read_text())[::EVERY]
+    found = {m.name: mutants.outcome(m, cases, tmp_path, compiler) for m in asked}
+    assert {name: came for name, came in found.items() if came.failed == 0} == {}
+    wrong = {m.name: (m.clause, found[m.name]) for m in asked if found[m.name].clause != m.clause}
+    assert wrong == {}
+
+
+def test_every_kind_has_a_place_among_the_elementary_ones():
+    kinds = run.read_vectors(vectors.FOLDER)
+    assert [kind for kind in kinds if not any(kind.startswith(start) for start in ELEMENTARY)] == []

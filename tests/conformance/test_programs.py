@@ -10,6 +10,8 @@ import pytest
 from wamnet.kernels.conformance import run
 from wamnet.kernels.conformance.case import Case, Output
 from wamnet.kernels.conformance.protocol import NoAnswerError, Session
+from wamnet.kernels.conformance.report import first_blamed
+from wamnet.kernels.conformance.run import Verdict, judge
 from wamnet.refimpl.errors import InputError
 
 ANSWER = '{"id": request["id"], "output": KINDS[request["kind"]](request["input"])}'
@@ -208,3 +210,41 @@ def test_other_answers_that_are_accepted_have_bounds_of_their_own():
     other = ({"value": "0x1p+10", "bound": "0x1p+0"},)
     verdicts = [judged(x, value=0.0, bound=0.25, accepted=other).verdict for x in (0.25, 0.5, 1024.5, 1026)]
     assert verdicts == ["pass", "fail", "pass", "fail"]
+
+
+# ---- what to look at first --------------------------------------------------------------------------------
+
+
+def test_of_a_path_the_earliest_vertex_that_deviates_is_told():
+    """The worst number is a later one, of an output that is looked at before."""
+    expected = {"t": Output([1.0, 2.0, 3.0], 0.5), "point": Output([[0.0] * 3] * 3, 0.5)}
+    answer = {"output": {"t": [1.0, 2.0, 300.0], "point": [[0, 0, 0], [0, 2, 1], [9, 9, 9]]}}
+    case = Case("path.whole/0", "LTR-8", {}, expected)
+    verdict = judge("path.whole", case, answer)
+    assert (verdict.stage, verdict.expected, verdict.got) == ("point[1][1]", "0x0p+0", "0x1p+1")
+    elsewhere = judge("metric.mse", case, answer)
+    assert elsewhere.stage == "t[2]"
+
+
+def test_a_deviation_is_blamed_on_the_clause_of_its_output():
+    expected = {"a": Output(1.0, 0.5), "b": Output(1.0, 0.5, clause="RNG-4")}
+    case = Case("path.start/0", "CAM-3", {}, expected)
+    assert judge("path.start", case, {"output": {"a": 1, "b": 1}}).clause == "CAM-3"
+    assert judge("path.start", case, {"output": {"a": 1, "b": 2}}).clause == "RNG-4"
+    assert judge("path.start", case, {"output": {"a": 1}}).clause == "RNG-4"
+
+
+def test_what_others_are_made_of_comes_first():
+    found = [
+        Verdict(f"{kind}/0", kind, clause, verdict)
+        for kind, clause, verdict in (
+            ("adam.step", "ADM-1", "fail"),
+            ("path.whole", "LTR-8", "fail"),
+            ("path.start", "CAM-3", "crash"),
+            ("random.block", "RNG-3", "pass"),
+        )
+    ]
+    first = first_blamed(found)
+    assert first is not None
+    assert first.clause == "CAM-3"
+    assert first_blamed(found[3:]) is None

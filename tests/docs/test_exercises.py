@@ -47,7 +47,6 @@ WRONG = {
     "ex4_light": [
         ("reflectance * np.ones_like(z)", "reflectance * z / np.pi", "in a furnace of 2"),
         ("1 / (1 + ratio * ratio)", "pdf * pdf / (pdf * pdf + other * other)", "are alike"),
-        ("1 / (1 + ratio * ratio)", "1 / (1 + ratio)", "transport.mis_weight"),
         ("4 * half * half", "half * half", "p-value"),
     ],
     "ex5_window": [

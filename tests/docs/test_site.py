@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import re
-import shutil
 from pathlib import Path
 
 import cells
 import chapters
 import formulas
+import hooks
 import links
 import pytest
 import sources
 from build import main
+from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 
 from wamnet.kernels.conformance.kinds import KINDS
 
 ROOT = Path(__file__).resolve().parents[2]
 
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-"""A browser, if there is one."""
+TRIES = 30
+"""How often a query is typed, a second apart, until it is answered."""
 
 
 def chapter_files() -> list[Path]:
@@ -30,8 +31,26 @@ def chapter_files() -> list[Path]:
 # ---- the site that is built ------------------------------------------------------------------------------
 
 
-def test_every_link_leads_somewhere_and_none_elsewhere(site):
-    assert links.broken(site) == []
+def test_a_site_with_a_broken_link_is_refused(tmp_path):
+    """The fixture `site` is built by the same step, so no link of it is broken."""
+    (tmp_path / "index.html").write_text('<a href="spec/none.html">')
+    with pytest.raises(
+        PluginError, match=r"1 links that lead nowhere.*\n.*spec/none\.html: there is no such"
+    ):
+        refuse(tmp_path)
+
+
+def refuse(folder: Path) -> None:
+    config = MkDocsConfig()
+    config.site_dir = str(folder)
+    hooks.on_post_build(config)
+
+
+def test_a_page_s_links_to_the_spec_work_in_the_repository_and_on_the_site():
+    text = "[a](../../spec/rng.md#x), [b](../listing.md)"
+    assert hooks.into_site(text, "docs/tutorial/1.md") == "[a](../spec/rng.md#x), [b](../listing.md)"
+    assert hooks.into_site("[a](../spec/rng.md)", "docs/index.md") == "[a](spec/rng.md)"
+    assert hooks.into_site("[a](../docs/images/a.png)", "spec/x.md") == "[a](../images/a.png)"
 
 
 @pytest.mark.parametrize("chapter", chapter_files(), ids=lambda path: path.stem)
@@ -65,32 +84,51 @@ def test_formulas_are_set_and_none_is_left(site):
     assert not any('class="arithmatex"' in text for text in texts)
 
 
-def test_no_page_is_wider_than_a_telephone_and_search_works_from_a_folder(site):
-    """Without a server, in a browser that is 400 pixels wide."""
-    if BROWSER is None:
-        pytest.skip("no browser: install chromium")
-    from playwright.sync_api import sync_playwright
+def outside(asked: list[str]) -> list[str]:
+    """Return the addresses that are not of the site."""
+    return [address for address in asked if not address.startswith(("file:", "data:", "about:"))]
 
-    asked: list[str] = []
-    with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 400, "height": 800})
-        page.on("request", lambda request: asked.append(request.url))
-        page.on("pageerror", lambda error: asked.append(f"error: {error}"))
+
+def test_no_page_is_wider_than_a_telephone(site, chromium):
+    """Without a server, 400 pixels wide; and none asks for anything of another host."""
+    with chromium.tab(site / "index.html", viewport={"width": 400, "height": 800}) as tab:
         for path in sorted(site.rglob("*.html")):
-            name = path.relative_to(site).as_posix()
-            if name.startswith("source/") or name == "404.html":
-                continue
-            page.goto(path.as_uri())
-            assert page.evaluate("document.documentElement.scrollWidth") <= 400, name
-        page.goto((site / "index.html").as_uri())
-        page.set_viewport_size({"width": 1300, "height": 800})
-        page.locator("[data-md-component=search-query]").fill("spherical cauchy")
-        found = page.locator(".md-search-result__link").first
-        found.wait_for()
+            if path.relative_to(site).parts[0] not in ("source", "404.html"):
+                tab.page.goto(path.as_uri())
+                assert tab.page.evaluate("document.documentElement.scrollWidth") <= 400, path
+    assert outside(tab.asked) == []
+    assert tab.said == []
+
+
+def test_search_finds_a_page_without_a_server(site, chromium):
+    with chromium.tab(site / "index.html", viewport={"width": 1300, "height": 800}) as tab:
+        query = tab.page.locator("[data-md-component=search-query]")
+        found = tab.page.locator(".md-search-result__link").first
+        for _ in range(TRIES):
+            # What is typed before the index has been read is not looked up.
+            query.fill("")
+            query.press_sequentially("spherical cauchy")
+            tab.page.wait_for_timeout(1000)
+            if found.is_visible():
+                break
         assert "sampling.html" in (found.get_attribute("href") or "")
-        browser.close()
-    assert [address for address in asked if not address.startswith(("file:", "data:", "about:"))] == []
+    assert outside(tab.asked) == []
+
+
+def test_a_listing_marks_the_partners_of_a_line(site, chromium):
+    with chromium.tab(site / "listing.html", viewport={"width": 1300, "height": 800}) as tab:
+        left = tab.page.locator("#network-opencl-" + line_of("refimpl/siren.py", "x = np.sin("))
+        left.hover()
+        marked = tab.page.locator(".listing .marked").all_text_contents()
+    assert any("np.sin(" in text for text in marked)
+    assert any("float t4 = sin(t3);" in text for text in marked)
+    assert not any("matmul" in text or "weights[" in text for text in marked)
+
+
+def line_of(path: str, beginning: str) -> str:
+    """Return the number of the first line of a file that begins so, counted from 1."""
+    lines = (ROOT / path).read_text().splitlines()
+    return str(next(n for n, line in enumerate(lines, 1) if line.strip().startswith(beginning)))
 
 
 # ---- what is refused -------------------------------------------------------------------------------------

@@ -82,6 +82,11 @@ def test_the_generator_depends_on_its_noise():
     assert 0.0 <= float(one.detach().min()) <= float(one.detach().max()) <= 1.0
 
 
+def test_patches_must_halve_evenly():
+    with pytest.raises(InputError, match="side of pix2pix's patches is 96: 6 levels halve it"):
+        make(replace(PIX2PIX, crop=96))
+
+
 # ---- losses, by hand -------------------------------------------------------------------------------------
 
 
@@ -217,6 +222,18 @@ def test_noisy_and_clean_crops_are_of_one_place(tmp_path, files):
     assert noisy.shape == (2, 3, 8, 8)
     assert torch.equal(noisy, clean)
     assert not torch.equal(noisy, fitting.draw(DNCNN, 4, data)[0])
+
+
+def test_the_digest_is_that_of_what_is_looked_at(tmp_path, files):
+    """Copies of the files under other names are the same examples; other files are not."""
+    copies = []
+    for pair in files:
+        names = [tmp_path / f"copy-of-{path.name}" for path in pair]
+        for path, name in zip(pair, names, strict=True):
+            name.write_bytes(path.read_bytes())
+        copies.append(tuple(names))
+    digests = [fitting.examples(DNCNN, found, tmp_path).digest for found in (files, copies, files[:1], files)]
+    assert digests[0] == digests[1] == digests[3] != digests[2]
 
 
 def test_tiles_are_those_of_a_grid(tmp_path, files):

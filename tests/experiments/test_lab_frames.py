@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import hashlib
+import json
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 from lab import frames
 from lab.frames import Shot
 
+from wamnet.kernels.frame_plan import version
 from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.frame import LAYERS
 from wamnet.refimpl.render import Job, render
+from wamnet.refimpl.scene import scene_digest
 from wamnet.refimpl.scenes import canonical
 
 SHOT = Shot("minicubes", time=1.0, size=8, spp=2, seed=3)
@@ -99,3 +104,27 @@ def test_test_times_lie_between_training_times():
     assert test == [2.0, 6.0]
     with pytest.raises(InputError, match="number of test times is 5"):
         frames.split_times(4, 5, 8.0)
+
+
+def test_a_colour_that_is_there_gets_other_features(tmp_path):
+    """The frame is that of rendering both; only the features' rays are traced again."""
+    shot = Shot("cornell", size=6, seed=4)
+    (plain,) = frames.frames(tmp_path, [shot], "numpy")
+    (found,) = frames.frames(tmp_path, [replace(shot, feature_spp=5)], "numpy")
+    want = render(shot.build(), Job(6, 6, seed=4, feature_spp=5)).frame
+    assert all(np.array_equal(found[name], want[name]) for name in want.layers)
+    assert found.info == want.info
+    assert not np.array_equal(found["normal"], plain["normal"])
+    assert frames.reference(replace(shot, feature_spp=5), 8) == frames.reference(shot, 8)
+
+
+def test_names_without_features_of_their_own_are_the_older_ones(tmp_path):
+    """Folders that were filled before there were any are still good."""
+    shot = Shot("cornell", size=6, seed=4)
+    names = {frames.path_of(tmp_path, replace(shot, feature_spp=rays), "numpy") for rays in (0, 5, 16)}
+    assert len(names) == 3
+    job = {**asdict(shot.job)}
+    del job["feature_spp"]
+    made_from = [scene_digest(shot.build()), job, "numpy", sorted(LAYERS), version()]
+    digest = hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()
+    assert any(name.name.endswith(digest[:16]) for name in names)

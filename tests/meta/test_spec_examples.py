@@ -4,8 +4,9 @@
    name [`test_worked_examples`]; `--update-golden` writes it.
 2. A fenced block is run, read or drawn by its language [`test_fenced_blocks`], or a mark before it says where
    a test runs it, `<!-- run by tests/... -->`, or why it cannot be, `<!-- not run: reason -->`.
-3. Links to files of the repository and paths of experiments, benchmarks and tests exist
-   [`test_links_lead_somewhere`, `test_paths_exist`].
+3. Links lead to files of the repository [`test_links_lead_somewhere`]; named paths: tests/meta/test_paths.py.
+4. What a chapter decides about the paper is in the appendix, in words
+   [`test_decisions_about_the_paper_are_in_the_appendix`].
 """
 
 from __future__ import annotations
@@ -34,9 +35,6 @@ FENCE = re.compile(
 
 LINK = re.compile(r"\]\(([\w./:-]*)(?:#[^)\s]*)?\)")
 """The target of a link, without its anchor."""
-
-NAMED_PATH = re.compile(r"(?<![\w/])((?:experiments|bench|tests|examples|docs)/[\w/-]+\.\w+)")
-"""A path of the repository, but for code, which tests/meta/test_spec.py looks at."""
 
 
 def filled(text: str) -> str:
@@ -104,16 +102,6 @@ def test_links_lead_somewhere() -> None:
     assert not wrong, f"a link leads to a file of the repository: {wrong}"
 
 
-def test_paths_exist() -> None:
-    wrong = [
-        f"spec/{path.name}: {named}"
-        for path in CHAPTERS
-        for named in NAMED_PATH.findall(path.read_text())
-        if not (ROOT / named).exists()
-    ]
-    assert not wrong, f"a path that the text names exists: {wrong}"
-
-
 def test_decisions_about_the_paper_are_in_the_appendix() -> None:
     """What a chapter decides because the paper is silent, or against it, stands in departures.md in words."""
     by_hand = WORKED.sub("", (ROOT / "spec/departures.md").read_text())
@@ -155,8 +143,4 @@ def test_a_stale_example_and_a_failing_block_are_found(tmp_path: Path) -> None:
     ]
     with pytest.raises(pytest.fail.Exception, match="ends with status 3"):
         test_fenced_blocks(chapter, tmp_path)
-    assert NAMED_PATH.findall("see bench/render.py, and experiments/no_such.py") == [
-        "bench/render.py",
-        "experiments/no_such.py",
-    ]
     assert LINK.findall("[a](b.md#c) [d](#e)") == ["b.md", ""]

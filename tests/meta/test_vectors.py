@@ -51,7 +51,9 @@ def named_by_vectors(folder: Path) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for path in sorted(folder.glob("*.json")):
         for case in json.loads(path.read_text()).get("cases", ()):
-            found.setdefault(case["clause"], []).append(case["id"])
+            for part in (case, *case.get("expected", {}).values()):
+                if "clause" in part:
+                    found.setdefault(part["clause"], []).append(case["id"])
     return found
 
 
@@ -90,7 +92,13 @@ def said_by_clauses(folder: Path) -> set[tuple[str, str]]:
 def said_by_vectors(folder: Path) -> set[tuple[str, str]]:
     """Return (clause, kind) for the clauses that vectors name."""
     loaded = [(path.stem, json.loads(path.read_text())) for path in sorted(folder.glob("*.json"))]
-    return {(case["clause"], kind) for kind, data in loaded for case in data.get("cases", ())}
+    parts = (
+        (part, kind)
+        for kind, data in loaded
+        for case in data.get("cases", ())
+        for part in (case, *case.get("expected", {}).values())
+    )
+    return {(part["clause"], kind) for part, kind in parts if "clause" in part}
 
 
 def test_clauses_and_vectors_name_each_other(house):

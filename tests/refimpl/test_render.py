@@ -119,7 +119,7 @@ def test_layers_of_a_known_scene():
 
 
 def test_features_of_more_rays_are_their_means():
-    """The colour stays to the bit; features are the means over single rays, the colour's the first of them."""
+    """RND-2b: the colour stays to the bit; features are means over single rays, the colour's among them."""
     job = R.Job(9, 7, 2, seed=5, dtype="float64")
     counted: list[int] = []
     found = R.render(CORNELL, replace(job, feature_spp=5), on_progress=counted.append)

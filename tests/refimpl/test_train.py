@@ -254,6 +254,11 @@ def test_presets_are_sound_and_the_paper_is_the_papers() -> None:
     assert sum(array.size for array in network.weights + network.biases) == 30_947
 
 
+def test_best_is_short_for_longer() -> None:
+    """TRN-9."""
+    assert replace(PRESETS["short"], steps=30_000) == PRESETS["best"]
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -325,7 +325,7 @@ def test_unshadowed_light_is_bounded_and_dark_behind_a_lamp(dtype):
 
 
 def test_frames_have_unshadowed_light():
-    """At one sample the layers are of one hit: the formula, written once more, of what they say of it.
+    """LTR-11: at one sample the layers are of one hit: the formula, written again, of what they say of it.
 
     Points are at least 0.2 from the lamps' middles, where light changes by at most (2 / 0.2 + 2 / R) L
     a unit, R = 0.6; float32 knows points below 8 to 2^-21, and normals and products to less.

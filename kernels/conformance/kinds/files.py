@@ -121,6 +121,23 @@ def _twice() -> bytes:
     return _joined(text[:-1] + b', "layer0.bias": ' + json.dumps(header["layer1.bias"]).encode() + b"}", data)
 
 
+def _texts_twice() -> bytes:
+    """Return a file with its texts twice, and both times the same."""
+    header, data = _parts(file_of(MODEL))
+    again = b', "__metadata__": ' + json.dumps(header["__metadata__"]).encode() + b"}"
+    return _joined(json.dumps(header).encode()[:-1] + again, data)
+
+
+def _gap() -> bytes:
+    """Return a file with four bytes between two tensors that belong to none."""
+    header, data = _parts(file_of(MODEL))
+    end = header["layer0.bias"]["data_offsets"][1]
+    for name, entry in header.items():
+        if name != "__metadata__" and entry["data_offsets"][0] >= end:
+            entry["data_offsets"] = [offset + 4 for offset in entry["data_offsets"]]
+    return _joined(header, data[:end] + bytes(4) + data[end:])
+
+
 GOOD: Mapping[str, Callable[[], bytes]] = {
     "as it was written": lambda: file_of(MODEL),
     "in float64": lambda: file_of(
@@ -171,11 +188,13 @@ BAD: Mapping[str, Callable[[], bytes]] = {
     "a tensor beyond the file": lambda: _tensor("layer0.bias", data_offsets=[1 << 30, (1 << 30) + 16]),
     "a tensor that ends before it begins": lambda: _tensor("layer0.bias", data_offsets=[16, 0]),
     "tensors that overlap": lambda: _tensor("layer0.weight", data_offsets=[0, 432]),
+    "a gap between tensors": _gap,
     "a layer without biases": lambda: _renamed("layer1.bias", "layer1.offset"),
     "a layer left out": lambda: _renamed("layer1.weight", "layer2.weight"),
     "NaN among the weights": lambda: _number(float("nan")),
     "an infinity among the weights": lambda: _number(float("inf")),
     "a name twice": _twice,
+    "all texts twice": _texts_twice,
 }
 """Files that are refused, by what is wrong with them."""
 
@@ -214,12 +233,40 @@ def _changed(path: str, value: Any) -> str:
     return json.dumps(data)
 
 
+def _numbers() -> str:
+    """Return the text of a scene with numbers of all sizes, and a name of all kinds of letters."""
+    data = json.loads(_changed("camera.position", [1e-5, 123456789.125, -1e11]))
+    data["name"] = 'h\u00fctte "\\\u007f \U0001f3e0\t'
+    data["lights"][0]["power"] = 5e-324
+    data["background"] = [0.0001, 0.1 + 0.2, -0.0]
+    return json.dumps(data)
+
+
+def _least() -> str:
+    """Return the text of a scene without anything that has a default."""
+    box = {"center": [0, 0, 0], "half_extent": [1, 1, 1], "reflectance": [0.5, 0.5, 0.5]}
+    metal, glass = ({**box, "material": {"kind": kind}} for kind in ("conductor", "dielectric"))
+    camera = {"position": [0, 0, 4], "look_at": [0, 0, 0]}
+    sky = {"zenith": [1, 1, 1], "horizon": [1, 1, 1], "ground": [1, 1, 1]}
+    data = {"format": "wamnet-scene", "version": 1, "name": "", "camera": camera, "environment": sky}
+    return json.dumps({**data, "boxes": [box, metal, glass]})
+
+
+def _sky(name: str, value: Any) -> str:
+    """Return the text of a scene with a fact of its sky changed."""
+    data = json.loads(scene_text("daylight"))
+    data["environment"][name] = value
+    return json.dumps(data)
+
+
 SCENE_GOOD: Mapping[str, Callable[[], str]] = {
     "as it was written": lambda: scene_text("cornell"),
     "with materials": lambda: scene_text("glossy"),
     "with a sky": lambda: scene_text("daylight"),
     "other facts, the same digest": lambda: _changed("info.author", "somebody"),
     "whole numbers are numbers": lambda: _changed("camera.vertical_fov_deg", 37),
+    "numbers with exponents, letters that are not ASCII": _numbers,
+    "what may be left out is": _least,
 }
 """Scenes that are read."""
 
@@ -247,12 +294,18 @@ SCENE_BAD: Mapping[str, Callable[[], str]] = {
     "a room inside out": lambda: _changed("room.low.0", 1.0),
     "five walls": lambda: _changed("room.reflectances.5", ...),
     "a matrix that is no rotation": lambda: _changed("boxes.0.rotation.0.0", 0.9),
+    "a mirror image of a rotation": lambda: _changed(
+        "boxes.0.rotation", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]
+    ),
     "a light without an area": lambda: _changed("lights.0.edge_u", [0.0, 0.0, 1.0]),
     "a negative power": lambda: _changed("lights.0.power", -1.0),
     "an unknown material": lambda: _changed("boxes.0.material", {"kind": "velvet"}),
     "a material without a kind": lambda: _changed("boxes.0.material", {"roughness": 0.5}),
     "a roughness of 0": lambda: _changed("boxes.0.material", {"kind": "conductor", "roughness": 0.0}),
     "glass below 1": lambda: _changed("boxes.0.material", {"kind": "dielectric", "ior": 0.9}),
+    "glass that is no body": lambda: _changed("room.materials", [None] * 5 + [{"kind": "dielectric"}]),
+    "a sun without a direction": lambda: _sky("sun_direction", [0.0, 0.0, 0.0]),
+    "a sun that is too narrow": lambda: _sky("sun_concentration", 2e6),
     "a sky and a background": lambda: json.dumps(
         {**json.loads(scene_text("daylight")), "background": [0.1, 0.1, 0.1]}
     ),

@@ -90,21 +90,23 @@ SCALES = {
 """The scales of the cases."""
 
 FEATURE_ROWS = (
-    ("color", "DAT-10", "NaN is 0, infinities and fireflies are clipped"),
-    ("normal,depth", "DAT-10", "NaN is 0, what is out of range is clipped"),
-    ("albedo,position,direction", "DAT-1", "scales and clips"),
-    ("position,color", "DAT-3", "features in the order in which they are named"),
+    *((name, "DAT-1", "scales and clips", False) for name in dataset.FEATURES),
+    ("position,color", "DAT-3", "features in the order in which they are named", False),
+    ("color", "DAT-10", "NaN is 0, infinities and fireflies are clipped", True),
+    ("normal,depth", "DAT-10", "NaN is 0, what is out of range is clipped", True),
+    ("albedo,position,direction", "DAT-10", "NaN is 0, what is out of range is clipped", True),
 )
-"""Features of the cases, clause and note."""
+"""Features of the cases, clause, note, and whether pixels are bad."""
 
 
 def _feature_cases() -> list[Case]:
     """Return feature images of a frame with bad pixels; one without a needed layer is refused."""
     cases: list[Case] = []
     layers = bad_layers(2, 3, 50)
-    for names, clause, note in FEATURE_ROWS:
+    for names, clause, note, bad in FEATURE_ROWS:
         wanted = {dataset.FEATURES[name].layer for name in names.split(",")}
-        inputs = {**{n: v for n, v in layers.items() if n in wanted}, "features": names, **SCALES}
+        shown = {n: v if bad else v[1:] for n, v in layers.items() if n in wanted}  # bad ones are in row 0
+        inputs = {**shown, "features": names, **SCALES}
         expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}
         cases.append(Case(f"image.features/{len(cases)}", clause, inputs, expected, (), note))
     for names, note in (
@@ -129,6 +131,7 @@ def _window(inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 
 WINDOW_ROWS = (
+    (4, 4, 3, "clamp", 1, 2, "taps row by row, channels together"),
     (3, 4, 3, "clamp", 0, 0, "odd, upper left corner"),
     (3, 4, 3, "zero", 3, 2, "odd, lower right corner, zeros"),
     (5, 5, 4, "clamp", 2, 2, "even: two taps before the pixel, one after it"),
@@ -150,7 +153,9 @@ def _window_cases() -> list[Case]:
         image = 100 * row + 10 * column + channel
         inputs = {"image": image, "size": size, "border": border, "x": x, "y": y}
         expected = {"window": Output(_window(inputs)["window"])}
-        clause = "DAT-5" if "corner" in note or "an image" in note else "DAT-4"
+        clause = (
+            "DAT-5" if "corner" in note or "an image" in note else "DAT-6" if "taps row" in note else "DAT-4"
+        )
         cases.append(Case(f"image.window/{len(cases)}", clause, inputs, expected, (), note))
     image = np.zeros((2, 2, 1), np.int64)
     for size, border in ((0, "clamp"), (65, "clamp"), (3, "mirror")):

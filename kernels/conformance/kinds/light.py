@@ -27,7 +27,7 @@ def _ray(given: Numbers, dtype: Any) -> dict[str, Any]:
 
 RAY = Function(
     "camera.ray",
-    f"Rays of a camera at {CAMERA.position} that looks at {CAMERA.look_at}, "
+    f"Rays of a camera at {CAMERA.position} that looks at {CAMERA.look_at}, with {CAMERA.up} up, "
     f"{CAMERA.vertical_fov_deg:g} degrees high, image {WIDTH} x {HEIGHT}",
     "CAM-2",
     {
@@ -203,8 +203,9 @@ PLANE = Function(
     [
         ("from above, into its middle", {"origin": (0.375, 2.0, 0.375), "direction": (0.0, -1.0, 0.0)}),
         ("from below", {"origin": (0.375, -2.0, 0.375), "direction": (0.0, 1.0, 0.0)}),
-        ("in its plane", {"origin": (-4.0, 0.25, 0.375), "direction": (1.0, 0.0, 0.0)}),
-        ("parallel to it, above", {"origin": (-4.0, 0.5, 0.375), "direction": (1.0, 0.0, 0.0)}),
+        ("into its far corner", {"origin": (1.125, 2.0, 1.375), "direction": (0.0, -1.0, 0.0)}),
+        ("in its plane", {"origin": (-4.0, 0.25, 0.375), "direction": (1.0, 0.0, 0.0)}, "ISC-5"),
+        ("parallel to it, above", {"origin": (-4.0, 0.5, 0.375), "direction": (1.0, 0.0, 0.0)}, "ISC-5"),
         ("through a corner", {"origin": (-0.5, 2.0, -0.75), "direction": (0.0, -1.0, 0.0)}),
         ("behind the ray", {"origin": (0.375, 2.0, 0.375), "direction": (0.0, 1.0, 0.0)}),
     ],

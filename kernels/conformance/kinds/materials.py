@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 
 from ....refimpl import environment, transport
+from ....refimpl.intersection import Surface
 from ....refimpl.materials import Conductor, Dielectric, Lambertian, Mirror
 from ....refimpl.materials.material import Site
 from ....refimpl.scene import Sky
 from ..functions import Field, Function, Numbers
 from .light import UNIFORM, _unit
+from .terrace import TERRACE
 
 VERTEX = {
     "wo": Field("unit direction back along the path", 3, -1.0),
@@ -169,6 +171,8 @@ DIELECTRIC = Function(
         ("out, refracted", _at(0, 0, 0.9, wo=(0.28, 0.96, 0.0), ior=1.5, outside=0)),
         ("out, totally reflected", _at(0, 0, 0.999, wo=(0.96, 0.28, 0.0), ior=1.5, outside=0)),
         ("an index of 1: the body is not there", _at(0, 0, 0.5, ior=1.0, outside=1)),
+        ("below the mean of both polarisations, above one", _at(0, 0, 0.03125, ior=1.5, outside=1), "DIE-3"),
+        ("above the mean, below the other", _at(0, 0, 0.0625, ior=1.5, outside=1), "DIE-3"),
     ],
     lambda u: {**_vertex(u), "ior": 1.0 + u[12], "outside": round(u[13])},
 )
@@ -211,7 +215,10 @@ RADIANCE = Function(
     f"{SKY}".replace("Sky(", "The sky with ").rstrip(")"),
     "ENV-1",
     {"direction": Field("unit direction", 3, -1.0)},
-    {"radiance": Field("radiance from there", 3), "pdf": Field("density of the direction, 1/sr")},
+    {
+        "radiance": Field("radiance from there", 3),
+        "pdf": Field("density of the direction, 1/sr", clause="ENV-3"),
+    },
     _sky,
     [
         ("the zenith", {"direction": (0.0, 1.0, 0.0)}),
@@ -244,5 +251,50 @@ SKY_SAMPLE = Function(
 )
 """Samples of the sky."""
 
-FUNCTIONS = (LAMBERTIAN, MIRROR, CONDUCTOR, CONDUCTOR_VALUE, DIELECTRIC, MIS, RADIANCE, SKY_SAMPLE)
+
+def _unshadowed(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return the light of the terrace's lamps at points of its surfaces."""
+    world = transport.build(TERRACE, transport.Settings(), dtype)
+    surface = Surface(given["point"], given["normal"], given["reflectance"], None, None)
+    return {"unshadowed": transport.unshadowed(world, surface)}
+
+
+def _lit(point: Any, normal: Any) -> dict[str, Any]:
+    """Return the inputs of a point of a surface."""
+    return {"point": point, "normal": normal, "reflectance": GOLD}
+
+
+UNSHADOWED = Function(
+    "transport.unshadowed",
+    "Light of the lamps of scenes/terrace.json, as if nothing stood in between",
+    "LTR-11",
+    {
+        "point": Field("point of a surface", 3, -4.0, 4.0),
+        "normal": Field("unit normal", 3, -1.0),
+        "reflectance": Field("of the surface", 3),
+    },
+    {"unshadowed": Field("radiance", 3)},
+    _unshadowed,
+    [
+        ("under a lamp", _lit((0.5, 0.0, 0.5), (0.0, 1.0, 0.0))),
+        ("close to it", _lit((0.5, 1.6875, 0.5), (0.0, 1.0, 0.0))),
+        ("below all lamps, facing away", _lit((0.5, 0.0, 0.5), (0.0, -1.0, 0.0))),
+        ("behind both lamps", _lit((-0.5, 2.0, 3.0), (0.0, 0.0, -1.0))),
+    ],
+    lambda u: _lit(4.0 * u[:3] - 2.0, _unit(u[3:])),
+    draws=4,
+)
+"""Light without shadows."""
+
+FUNCTIONS = (
+    LAMBERTIAN,
+    MIRROR,
+    CONDUCTOR,
+    CONDUCTOR_VALUE,
+    DIELECTRIC,
+    MIS,
+    UNSHADOWED,
+    RADIANCE,
+    SKY_SAMPLE,
+)
 """The functions of this module."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ....compiler import sine
-from ....refimpl import adam, encoding, rng
+from ....refimpl import adam, encoding, rng, sobol
 from ..case import Case, Kind, Output
 from ..functions import Field, Function, drawn
 
@@ -55,6 +55,36 @@ BLOCK = Kind(
     _block,
 )
 """Four words and four floats of four counters."""
+
+
+def _sobol(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the floats of a block of scrambled Sobol points."""
+    floats = sobol.uniforms(*(rng.counter(int(inputs[name])) for name in COUNTERS), np.float64)
+    return {"floats": np.array([f[0] for f in floats])}
+
+
+def _sobol_blocks() -> list[Case]:
+    """Return blocks of a pixel's first samples, at the ends of the counters, and others."""
+    rows = [("", (3, 65536, sample, 1)) for sample in range(6)]
+    rows += [("all at their end", (LAST,) * 4), ("half of all samples", (0, 0, 2**31, 0))]
+    rows += [("", tuple(int(u * 2**32) for u in drawn("random.sobol", i, 4))) for i in range(4)]
+    found = []
+    for index, (note, values) in enumerate(rows):
+        inputs = dict(zip(COUNTERS, values, strict=True))
+        expected = {name: Output(value) for name, value in _sobol(inputs).items()}
+        found.append(Case(f"random.sobol/{index}", "SOB-3", inputs, expected, (), note))
+    return found
+
+
+SOBOL = Kind(
+    "random.sobol",
+    "A block of scrambled Sobol points",
+    dict.fromkeys(COUNTERS, "integer below 2^32"),
+    {"floats": "float[4] in [0, 1)"},
+    _sobol_blocks,
+    _sobol,
+)
+"""Four floats of four counters."""
 
 
 def _scalar(u: np.ndarray, low: float, high: float) -> float:
@@ -157,7 +187,7 @@ SINE = Function(
 )
 """The sine of the network; its contract is the emitted sine's."""
 
-KINDS = (BLOCK,)
+KINDS = (BLOCK, SOBOL)
 """Kinds of this module that are no functions of floats."""
 
 FUNCTIONS = (SRGB, SINE, ADAM)

@@ -22,10 +22,12 @@ from ....compiler.lower_scene import PATH, SURFACE, PathPrograms, Values, kinds,
 from ....compiler.ranges import Range
 from ....refimpl import camera, render, rng, scenes, transport
 from ....refimpl import scene as scene_module
-from ....refimpl.intersection import Hit, Surface
+from ....refimpl.intersection import Hit, Surface, materials_by_id
+from ....refimpl.materials import Dielectric
 from ....refimpl.transport import Counters, Path, Settings
 from ..case import Case, Kind, Output
 from ..functions import SOURCE
+from .terrace import TERRACE
 
 SCENES = ("cornell", "glossy", "daylight", "minicubes")
 """Canonical scenes whose paths are cases; each at a time of its own, [`TIME_S`]."""
@@ -66,12 +68,14 @@ class World(NamedTuple):
 
 def scene_text(name: str) -> str:
     """Return the JSON of a scene of these cases."""
+    if name == TERRACE.name:
+        return scene_module.to_json(TERRACE)
     return scene_module.to_json(scenes.canonical(name, time=TIME_S))
 
 
 def files() -> dict[str, bytes]:
     """Return the scene files."""
-    return {_file(name): scene_text(name).encode() for name in SCENES}
+    return {_file(name): scene_text(name).encode() for name in (*SCENES, TERRACE.name)}
 
 
 def _file(name: str) -> str:
@@ -158,7 +162,7 @@ def scatter(inputs: Mapping[str, Any]) -> State:
     )
     if not alive[0]:
         return {"alive": np.False_, "radiance": found.radiance[0]}
-    return {"alive": np.True_, **{name: getattr(found, name)[0] for name in PATH}}
+    return {"alive": np.True_, **{name: getattr(found, name)[0] for name in SCATTERED}}
 
 
 # ---- bounds ---------------------------------------------------------------------------------------------
@@ -198,22 +202,61 @@ def _ends(found: Mapping[str, Range], name: str, ends: tuple[str, ...]) -> tuple
     return low, high, bool(all(np.all(p.sure & p.known) for p in parts))
 
 
-def _expected(wanted: State, found: Mapping[str, Range]) -> dict[str, Output] | None:
+CLAUSES: Mapping[str, Mapping[str, str]] = {
+    "path.start": {"pixel": "RNG-4"},
+    "path.arrive": {
+        "point": "ISC-1",
+        "normal": "ISC-8",
+        "reflectance": "SHD-3",
+        "t": "ISC-1",
+        "surface": "ISC-1",
+    },
+    "path.scatter": {"alive": "LTR-8", "origin": "ISC-9", "radiance": "LTR-4"},
+}
+"""Clauses of outputs where they are not those of the kind."""
+
+OF_GLASS = {"direction": "DIE-1", "beta": "DIE-4", "pdf": "DIE-4"}
+"""Clauses of outputs of a scattering at glass."""
+
+SCATTERED = ("direction", "beta", "pdf", "origin", "radiance")
+"""The outputs of a scattering, in the order in which they are looked at."""
+
+WITH_ROULETTE = {"alive": "LTR-9", "beta": "LTR-9"}
+"""Clauses of outputs of a scattering with Russian roulette."""
+
+
+def _clauses(kind: str, inputs: Mapping[str, Any]) -> Mapping[str, str]:
+    """Return the clauses of a case's outputs where they are not the case's own."""
+    if kind != "path.scatter":
+        return CLAUSES[kind]
+    found = dict(CLAUSES[kind])
+    name = str(inputs["scene"]["file"]).removeprefix("scenes/").removesuffix(".json")
+    materials = materials_by_id(scene_module.from_json(scene_text(name)))
+    number = int(inputs["surface"])
+    if number < len(materials) and isinstance(materials[number][0], Dielectric):
+        found |= OF_GLASS
+    return {**found, **(WITH_ROULETTE if inputs["settings"]["roulette_depth"] is not None else {})}
+
+
+def _expected(
+    wanted: State, found: Mapping[str, Range], clauses: Mapping[str, str]
+) -> dict[str, Output] | None:
     """Return outputs with bounds, or nothing where a decision is not sure."""
     outputs = {}
     for name, value in wanted.items():
         if name == "pixel":
-            outputs[name] = Output(value)
+            outputs[name] = Output(value, clause=clauses[name])
             continue
         ends, kind = {**PATH, **SURFACE, "alive": (("",), "bool")}[name]
         low, high, sure = _ends(found, name, ends)
         if not sure:
             return None
         if kind in ("bool", "int32"):
-            outputs[name] = Output(bool(value) if kind == "bool" else int(value))
+            outputs[name] = Output(bool(value) if kind == "bool" else int(value), clause=clauses[name])
             continue
         low, high = (end.reshape(np.shape(value)) for end in (low, high))
-        outputs[name] = Output(value, np.maximum(high - value, value - low), SOURCE)
+        bound = np.maximum(high - value, value - low)
+        outputs[name] = Output(value, bound, SOURCE, clause=clauses.get(name, ""))
     return outputs
 
 
@@ -222,13 +265,16 @@ def _expected(wanted: State, found: Mapping[str, Range]) -> dict[str, Output] | 
 
 @dataclass(frozen=True)
 class View:
-    """A path: its scene and settings, its pixel, its sample."""
+    """A path: its scene and settings, its pixel, its sample.
+
+    `clause` is that of the light gathered at the first vertex, where the path is there for it."""
 
     scene: str
     settings: Settings
     x: int
     y: int
     sample: int
+    clause: str = ""
 
     def inputs(self) -> dict[str, Any]:
         """Return the inputs of the first step."""
@@ -251,6 +297,29 @@ VARIANTS = (
     Settings(strategy="bsdf"),
 )
 """Settings of the cases, in turn."""
+
+
+PLACES = (
+    (6, 13, "ENV-4"),  # the floor, half of whose light samples go to the sky
+    (2, 5, ""),  # a lamp from behind
+    (9, 8, ""),  # a ball of glass
+    (6, 3, ""),  # a ball that emits
+    (8, 11, "DIE-6"),  # the floor, behind glass as lamps see it
+    (12, 8, ""),  # a block that emits
+    (5, 9, ""),  # a block of glass
+    (11, 2, ""),  # a lamp
+    (7, 8, ""),  # rough metal
+    (3, 8, ""),  # a matt block
+    (1, 6, ""),  # a mirror
+    (9, 12, ""),  # the floor
+)
+"""Columns and rows of pixels of the terrace, and the clause that the light at what is seen there shows."""
+
+
+def _terrace() -> Iterator[View]:
+    """Yield paths over the terrace."""
+    for index, (x, y, clause) in enumerate(PLACES):
+        yield View(TERRACE.name, VARIANTS[index % len(VARIANTS)], x, y, index % 3, clause)
 
 
 def _views(count: int) -> Iterator[View]:
@@ -279,7 +348,7 @@ class Found(NamedTuple):
 def _steps() -> Found:
     """Return the cases of all steps: paths in float64 whose states are rounded to float32 at each step."""
     found = Found([], [], [])
-    for view in _views(16):
+    for view in (*_views(16), *_terrace()):
         given = view.inputs()
         programs = programs_of(view.scene, view.settings)
         wanted = start(_with_scene(given, view))
@@ -312,7 +381,7 @@ def _steps() -> Found:
             wanted = scatter(_with_scene(inputs, view))
             flat = {**_flat(inputs, PATH), **_flat(inputs, SURFACE), **_counted(inputs)}
             sent = ranges.evaluate(programs.scatter, flat)
-            _add(found.scatter, "path.scatter", "LTR-7", inputs, wanted, sent)
+            _add(found.scatter, "path.scatter", "LTR-7", inputs, wanted, sent, view.clause * (depth == 0))
             if not wanted["alive"]:
                 break
             state = wanted
@@ -333,9 +402,11 @@ def _add(
     inputs: Mapping[str, Any],
     wanted: State,
     found: Mapping[str, Range],
+    of_light: str = "",
 ) -> None:
-    """Append a case, unless a decision of it is not sure."""
-    expected = _expected(wanted, found)
+    """Append a case, unless a decision of it is not sure. Its light may have a clause of its own."""
+    clauses = {**_clauses(kind, inputs), **({"radiance": of_light} if of_light else {})}
+    expected = _expected(wanted, found, clauses)
     if expected is not None:
         note = f"{inputs['settings']['strategy']}, {inputs['settings']['sampler']}"
         cases.append(Case(f"{kind}/{len(cases)}", clause, dict(inputs), expected, (), note))
@@ -394,7 +465,7 @@ def followed(view: View) -> Iterator[dict[str, Range]]:
 def _whole_cases() -> list[Case]:
     """Return whole paths."""
     cases: list[Case] = []
-    for view in _views(32):
+    for view in (*_views(32), *_terrace()):
         reach = []
         for state in followed(view):
             low, high, _ = _ends(state, "point", PATH["origin"][0])

@@ -45,11 +45,17 @@ SIZE_PX, BLOCK_PX = 16, 4
 # ---- denoising --------------------------------------------------------------------------------------------
 
 
-def _model(features: tuple[str, ...], window: Window, widths: list[int], seed: int) -> Model:
-    """Return a small model whose values lie in the middle of [0, 1], where clipping hides nothing."""
+MIDDLE, BEYOND = (0.5, 0.5, 0.5), (-0.25, 0.5, 1.25)
+"""Colours around which pictures lie: in the middle of [0, 1], where clipping hides nothing, and beyond."""
+
+
+def _model(
+    features: tuple[str, ...], window: Window, widths: list[int], seed: int, around: tuple[float, ...]
+) -> Model:
+    """Return a small model whose pictures lie around a colour."""
     n_in = dataset.n_inputs(features, window)
     network = siren.init([n_in, *widths, 3], 3.0, 1.0, seed=seed, dtype=np.float32)
-    biases = (*network.biases[:-1], np.full(3, 0.5, np.float32))
+    biases = (*network.biases[:-1], np.array(around, np.float32))
     weights = (*network.weights[:-1], (network.weights[-1] * np.float32(0.2)).astype(np.float32))
     scales = Normalization(0.5, 0.75, (0.25, -0.5, 0.5), 0.5)
     return Model(siren.Siren(weights, biases, 3.0, 1.0), features, window, scales)
@@ -68,18 +74,19 @@ def _denoise(inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 
 DENOISED = (
-    (("color", "normal"), Window(4, "clamp"), [6, 6], (4, 5), "NaN, infinities and a firefly"),
-    (("color",), Window(5, "zero"), [8], (3, 3), "smaller than the window, zeros outside"),
-    (("depth", "albedo", "position"), Window(3, "clamp"), [5, 5], (1, 4), "one row"),
+    (("color", "normal"), Window(4, "clamp"), [6, 6], (4, 5), MIDDLE, "NaN, infinities and a firefly"),
+    (("color",), Window(5, "zero"), [8], (3, 3), MIDDLE, "smaller than the window, zeros outside"),
+    (("depth", "albedo", "position"), Window(3, "clamp"), [5, 5], (1, 4), MIDDLE, "one row"),
+    (("color",), Window(2, "clamp"), [4], (2, 2), BEYOND, "clipped to [0, 1]"),
 )
-"""Features, window, hidden widths, height and width, note."""
+"""Features, window, hidden widths, height and width, the colour around which pictures lie, note."""
 
 
 def _denoise_cases() -> list[Case]:
     """Return denoised pictures with bounds."""
     cases = []
-    for index, (features, window, widths, size, note) in enumerate(DENOISED):
-        model = _model(features, window, widths, index)
+    for index, (features, window, widths, size, around, note) in enumerate(DENOISED):
+        model = _model(features, window, widths, index, around)
         wanted = {dataset.FEATURES[name].layer for name in features}
         layers = {name: v for name, v in bad_layers(*size, 90 + 10 * index).items() if name in wanted}
         inputs = {**layers, "model": base64.b64encode(file_of(model)).decode()}
@@ -88,7 +95,11 @@ def _denoise_cases() -> list[Case]:
         text = "bounds of profile ieee at these pixels, features being one ulp off (compiler/bounds.py)"
         expected = {"picture": Output(picture, bound, text)}
         cases.append(Case(f"picture.denoised/{index}", "DEN-2", inputs, expected, (), note))
-    inputs = {"color": bad_layers(2, 2, 5)["color"], "model": inputs["model"]}
+    needy = _model(("color", "normal"), Window(2, "clamp"), [4], 0, MIDDLE)
+    inputs = {
+        "color": bad_layers(2, 2, 5)["color"],
+        "model": base64.b64encode(file_of(needy)).decode(),
+    }
     return [*cases, Case(f"picture.denoised/{len(cases)}", "DAT-9", inputs, None, (), "layers are missing")]
 
 

@@ -38,7 +38,7 @@ MIXED = Scene(
 )
 """A sphere between a box and a quad, which it touches."""
 
-FOUND = {**T, "normal": Field("unit normal against the ray; 0 where nothing is hit", 3)}
+FOUND = {**T, "normal": Field("unit normal against the ray; 0 where nothing is hit", 3, clause="ISC-8")}
 """What the answers hold."""
 
 
@@ -70,12 +70,12 @@ BOXES = Function(
     [
         ("from outside", _ray((0.25, -0.5, 4.0), (0, 0, -1))),
         ("from inside: the exit, with a normal that faces the ray", _ray(BOX.center, (0, 1, 0))),
-        ("parallel to two slabs, outside one", _ray((2.0, -0.5, 4.0), (0, 0, -1))),
+        ("parallel to two slabs, outside one", _ray((2.0, -0.5, 4.0), (0, 0, -1)), "ISC-5"),
         ("behind the ray", _ray((0.25, -0.5, 4.0), (0, 0, 1))),
         ("along a face", _ray((0.75, -0.5, 4.0), (0, 0, -1))),
         ("through an edge", _ray((2.75, 0.25, 0.125), (-1, 0, 0))),
         ("into a corner", _ray((2.75, 2.25, 3.125), (-1, -1, -1))),
-        ("a component that is the other zero", _ray((0.25, -0.5, 4.0), (-0.0, 0.0, -1))),
+        ("a component that is the other zero", _ray((0.25, -0.5, 4.0), (-0.0, 0.0, -1)), "ISC-5"),
     ],
     _aimed,
 )
@@ -86,7 +86,7 @@ TURNED_BOXES = Function(
     f"The same box turned: its axes are {HALVES}",
     "ISC-3",
     RAY_FIELDS,
-    FOUND,
+    {**FOUND, "normal": FOUND["normal"]._replace(clause="")},
     _met(Scene("turned box", EYE, boxes=(TURNED,))),
     [("from outside", _ray((0.25, -0.5, 4.0), (0, 0, -1))), ("from inside", _ray(BOX.center, (0, 1, 0)))],
     _aimed,
@@ -113,7 +113,9 @@ ROOMS = Function(
 
 NEAREST = Function(
     "intersection.nearest",
-    "A box, a sphere on it (surface 1), and a quad that touches the sphere from above",
+    f"A box around {MIXED.boxes[0].center} with the half extents {MIXED.boxes[0].half_extent}, on it a "
+    f"sphere of radius {MIXED.spheres[0].radius} around {MIXED.spheres[0].center}, and a quad that touches "
+    f"it from above: corner {MIXED.quads[0].corner}, edges {MIXED.quads[0].edge_u}, {MIXED.quads[0].edge_v}",
     "ISC-1",
     RAY_FIELDS,
     {**FOUND, "surface": Field("number: 0 the box, 1 the sphere, 2 the quad, 3 nothing")},

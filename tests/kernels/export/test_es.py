@@ -1,4 +1,4 @@
-"""GLSL ES 3.00: what the language asks for, and the shaders' results against reference, bound and paths."""
+"""GLSL ES 3.00 (EXP-1, EXP-2): what the language asks for, results against reference, bound and paths."""
 
 from __future__ import annotations
 
@@ -42,6 +42,7 @@ def case(kit):
 
 @pytest.mark.parametrize("schedule", ["plain", "inlined", "packed"])
 def test_denoiser_keeps_its_bound(runner, kit, case, schedule):
+    """EXP-1, WEB-5."""
     artifact = compile_program(case[0], "glsl-es", schedule=schedule)
     assert artifact.manifest["schedule"]["name"] == schedule
     assert kit.excess(runner, *case, artifact) <= 1

@@ -1,0 +1,165 @@
+"""`wamnet export`: a model, and a scene's path tracer with it, for other programs and engines."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..refimpl.errors import InputError
+from . import options, webpage
+from .inputs import load_model
+from .options import Sampler
+from .outputs import check_new_folder, making_folder
+from .render import load_scene
+from .terminal import say
+
+if TYPE_CHECKING:
+    from ..kernels.export.package import Export
+
+EXAMPLES = """Examples:
+
+wamnet export model.safetensors --target wgsl -o for-webgpu
+
+wamnet export model.safetensors --scene minicubes --target glsl-es -o for-webgl
+
+wamnet export model.safetensors --target c --weights inline --check -o header
+
+wamnet export model.safetensors --target hlsl --variant window8+rank16 -o for-direct3d
+
+wamnet export model.safetensors --scene minicubes --target html -o page"""
+"""Shown below the help of `wamnet export`."""
+
+TARGETS = (
+    "opencl, glsl, glsl-compute, glsl-es, glsl-vulkan, wgsl, hlsl, metal, spirv, c, cuda, shadertoy, godot, "
+    "onnx, html"
+)
+"""Targets by name, for help texts: those of the registry in kernels, and the page."""
+
+HTML, PAGE_NAME = "html", "index.html"
+"""The target that is a web page, and its file."""
+
+STATUS_WRONG = 1
+"""Exit status when an export was written, and what runs it here finds it off, or refuses it."""
+
+
+def export(
+    model: options.ModelFile,
+    target: Annotated[
+        str, typer.Option(metavar="NAME", help=f"Where it is going: {TARGETS}.", show_default=False)
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FOLDER", help="New folder for the files.", show_default="TARGET"
+        ),
+    ] = None,
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENE",
+            help="The path tracer too, of this scene: a canonical one or a file (.json).",
+            show_default="the denoiser alone",
+        ),
+    ] = None,
+    time: options.Time = None,
+    parameters: options.Parameters = None,
+    max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
+    sampler: options.SamplerName = Sampler.pcg4d,
+    profile: options.Profile = "ieee",
+    variant: options.Variant = None,
+    weights: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PLACE",
+            help="Where the weights are: inline, uniform, texture or buffer, as far as the target has it.",
+            show_default="the target's usual place",
+        ),
+    ] = None,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="Compile and run it here, and compare with the reference's picture."),
+    ] = False,
+) -> None:
+    """Write a denoiser for another program: kernels, a manifest, a README, and a pair to check with.
+
+    Each target's files were compiled by its own tools, run, and held to the bound that the manifest states.
+    With a scene the path tracer and the encoding of its features are written too; with --target html, a web
+    page that does all of it.
+    """
+    folder = output or Path(target)
+    if target == HTML:
+        of_kernels = {"--weights": weights, "--variant": variant, "--check": check or None, "--time": time}
+        for option, value in of_kernels.items():
+            if value is not None:
+                raise InputError(option, value, "a web page has its own", "leave it out")
+        _write(folder, {PAGE_NAME: webpage.page_of(model, scene, parameters or [], None).encode()})
+        return
+    check_new_folder(folder)
+    if scene is None:
+        given = {"--time": time, "--set": parameters, "--sampler": sampler.value, "--max-depth": max_depth}
+        _refuse_without_scene(given)
+    moment, paths = (time, parameters or []), (max_depth, sampler)
+    made = _export(model, target, scene, moment, paths, profile, variant, weights)
+    _write(folder, made.contents())
+    for limit in made.manifest["limits"]:
+        say(f"{limit['name']}: {limit['needs']} of {limit['most']}")
+    if made.manifest["assumes"]:
+        say(f"the bound assumes: {made.manifest['assumes']}")
+    if check:
+        _checked(made)
+
+
+def _refuse_without_scene(given: dict[str, Any]) -> None:
+    """Refuse options of a scene where there is none."""
+    usual = {"--sampler": Sampler.pcg4d.value, "--max-depth": 5}
+    for option, value in given.items():
+        if value != usual.get(option):
+            raise InputError(option, value, "there is no scene", "name one with --scene, or leave it out")
+
+
+def _export(
+    model: Path,
+    target: str,
+    scene: str | None,
+    moment: tuple[float | None, list[str]],
+    paths: tuple[int, Sampler],
+    profile: str,
+    variant: str | None,
+    weights: str | None,
+) -> Export:
+    """Return the export that the options ask for."""
+    from ..compiler.variants import FULL
+    from ..kernels.export.package import Request
+    from ..kernels.export.package import export as exported
+    from ..refimpl.transport import Settings
+
+    settings = replace(Settings(max_depth=paths[0]), sampler=paths[1].value)
+    loaded = load_scene(scene, *moment) if scene else None
+    request = Request(load_model(model), target, loaded, profile, weights or "", variant or FULL, settings)
+    return exported(request)
+
+
+def _write(folder: Path, contents: Any) -> None:
+    """Write all files into a new folder, which appears as a whole."""
+    with making_folder(folder) as new:
+        for name, data in contents.items():
+            (new / name).parent.mkdir(parents=True, exist_ok=True)
+            (new / name).write_bytes(data)
+    for name in sorted(contents):
+        say(str(folder / name))
+
+
+def _checked(made: Export) -> None:
+    """Say what compiles and runs an export here, and how far off it is; end with status 1 if wrong."""
+    from ..kernels.export.check import HEAD
+    from ..kernels.export.check import check as checked
+
+    verdict = checked(made)
+    for name, value in zip(HEAD, verdict.cells(), strict=True):
+        say(f"{name}: {value}")
+    if not verdict.holds:
+        say(f"wrong: {verdict.wrong}")
+        raise typer.Exit(STATUS_WRONG)

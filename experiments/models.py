@@ -1,0 +1,95 @@
+"""Make the models that come with the package: one for each scene of `experiments/quality.py`.
+
+    python experiments/models.py
+    python experiments/models.py --scenes minicubes -o out/models --write cli/models
+
+1. Each is the network of that experiment's row `best-16`, seed 0; it is trained where the cache lacks it.
+2. Its scores on the test frames, with features of 16 rays and of one, and those of Open Image Denoise there
+   go into its facts, beside the recipe [`scored`].
+3. The folder gets a file for each scene, and `SHA256SUMS` [`written`].
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from lab import command, scores
+from quality import PLANS, RAYS, ROWS, SCENES, Bench, denoised
+
+from wamnet.cli.dataset_files import sum_of
+from wamnet.cli.outputs import write_text
+from wamnet.compiler.model_file import save_model
+from wamnet.refimpl.denoise import Model
+
+MADE_BY = "experiments/models.py"
+"""Fact of these models: what makes them."""
+
+SUMS = "SHA256SUMS"
+"""File with the digest of each model, in the form of `sha256sum`."""
+
+SCORED = {
+    f"{RAYS} rays": ("best-16", RAYS),
+    "1 ray": ("best-16", 1),
+    f"Open Image Denoise, {RAYS} rays": ("oidn-clean16", RAYS),
+    "Open Image Denoise, 1 ray": ("oidn-1", 1),
+    "input": ("input", 1),
+}
+"""What is scored, by the words of the facts: a row, and the camera rays of the features that it is given."""
+
+DIGITS = 4
+"""Digits of a score after the point."""
+
+
+def scored(bench: Bench) -> dict[str, dict[str, float]]:
+    """Return PSNR, SSIM and FLIP on the test frames, means, of each way in the table above."""
+    found = {}
+    for text, (name, rays) in SCORED.items():
+        pairs = bench.tests(0, rays)
+        row = ROWS[name] if ROWS[name].preset else replace(ROWS[name], rays=rays)
+        pictures, _ = denoised(bench, row, [frame for frame, _ in pairs], 0)
+        each = [
+            scores.score(picture, clean["color"], linear)
+            for (picture, linear), (_, clean) in zip(pictures, pairs, strict=True)
+        ]
+        mean = scores.mean_scores(each)
+        found[text] = {metric: round(mean[metric], DIGITS) for metric in ("psnr", "ssim", "flip")}
+    return found
+
+
+def shipped(bench: Bench) -> Model:
+    """Return a scene's model with its scores among its facts."""
+    model, _ = bench.model(ROWS["best-16"], 0)
+    plan = bench.plan
+    frames = f"{plan.test} unseen times, {plan.size}x{plan.size}, references of {plan.test_spp} samples"
+    facts: dict[str, Any] = {"made_by": MADE_BY, "scored_on": frames, "scores": json.dumps(scored(bench))}
+    return replace(model, info={**model.info, **facts})
+
+
+def written(folder: Path, models: dict[str, Model]) -> None:
+    """Write the models, and the digests of all that lie in the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, model in models.items():
+        save_model(folder / f"{name}.safetensors", model)
+    lines = [f"{sum_of(path).sha256}  {path.name}\n" for path in sorted(folder.glob("*.safetensors"))]
+    write_text(folder / SUMS, "".join(lines))
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make and write the models; say their scores."""
+    parser = command.parser(__doc__ or "", "models")
+    parser.add_argument("--scenes", nargs="+", default=list(SCENES), metavar="SCENE", help="canonical scenes")
+    parser.add_argument("--write", type=Path, help="folder of the models, if not that of the results")
+    options = parser.parse_args(arguments)
+    models = {}
+    for scene in options.scenes:
+        models[scene] = shipped(Bench(scene, PLANS[options.scale], options.cache, options.executor))
+        print(scene, models[scene].info["scores"])
+    written(options.write or options.output, models)
+
+
+if __name__ == "__main__":
+    command.begin(main)

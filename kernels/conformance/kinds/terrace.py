@@ -1,0 +1,42 @@
+"""A scene of the vectors' own, with what the canonical ones lack.
+
+Lamps and a sky together, one lamp seen from behind, surfaces that emit without being lamps, boxes whose
+rotations alternate (so that their numbers differ from their order), glass between a lamp and a floor.
+"""
+
+from __future__ import annotations
+
+from ....refimpl.materials import Conductor, Dielectric, Mirror
+from ....refimpl.scene import Box, Camera, Light, Quad, Scene, Sky, Sphere
+
+TURN = ((0.8, 0.0, 0.6), (0.0, 1.0, 0.0), (-0.6, 0.0, 0.8))
+"""A rotation about y."""
+
+TERRACE = Scene(
+    "terrace",
+    Camera((0.0, 1.25, 4.0), (0.0, 0.5, 0.0), (0.0, 1.0, 0.0), 50.0),
+    boxes=(
+        Box((-1.125, 0.3125, -0.25), (0.25, 0.3125, 0.25), (0.75, 0.5, 0.25)),
+        Box((0.0, 0.375, -0.875), (0.375, 0.375, 0.25), (0.875, 0.75, 0.5), TURN, material=Conductor(0.3)),
+        Box((1.375, 0.25, -0.5), (0.25, 0.25, 0.25), (0.25, 0.5, 0.75), emission=(0.125, 0.0, 0.25)),
+        Box(
+            (-0.5, 0.25, 0.875), (0.1875, 0.25, 0.1875), (0.875, 0.9375, 1.0), TURN, material=Dielectric(1.25)
+        ),
+    ),
+    spheres=(
+        Sphere((0.5, 0.4375, 0.5), 0.4375, (0.9375, 0.9375, 0.875), material=Dielectric(1.5)),
+        Sphere((-0.3125, 1.5, -0.5), 0.25, (0.5, 0.25, 0.5), emission=(0.25, 0.5, 0.125)),
+    ),
+    quads=(
+        Quad((-8.0, 0.0, -8.0), (0.0, 0.0, 16.0), (16.0, 0.0, 0.0), (0.5, 0.5, 0.375)),
+        Quad((-2.5, 0.0, -1.5), (5.0, 0.0, -0.5), (0.0, 1.25, 0.0), (0.75, 0.75, 0.75), material=Mirror()),
+    ),
+    lights=(
+        Light((0.25, 1.75, 0.25), (0.5, 0.0, 0.0), (0.0, 0.0, 0.5), (1.0, 0.75, 0.5), 12.0),
+        Light((-1.25, 1.0, 0.25), (0.0, 0.5, 0.0), (0.5, 0.0, 0.125), (0.25, 0.5, 1.0), 4.0),
+    ),
+    environment=Sky(
+        (0.125, 0.25, 0.5), (0.5, 0.5, 0.5), (0.25, 0.1875, 0.125), (1.0, 2.0, 1.0), (2.0, 1.5, 1.0), 40.0
+    ),
+)
+"""Balls, blocks, a mirror and two lamps under a sky."""

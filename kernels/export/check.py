@@ -1,0 +1,286 @@
+"""Hold an export to its promise: compile it by the target's own tools, run it, compare with the check pair.
+
+1. Tools that compile or validate the files are run; one that is missing is a verdict and no error
+   [`COMPILED`].
+2. What is nearest to the target runs the denoiser on the pair's images [`runner`]; each number must lie
+   within the pair's bound. With a scene its paths are run too, and compared with the
+   reference's sums [`_paths`].
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.weight_homes import INLINE, UNIFORM
+from ...refimpl.errors import CompileError, ExecutorUnavailable
+from ..bench import peer_onnxruntime
+from ..executor import Executor, Part
+from ..registry import open_executor
+from . import tools
+from .check_pair import SEED
+from .package import Export
+
+OPERATIONS = 10_000
+"""Operations of a path of six surfaces, rounded up: sums are held to so many roundings of values near 1."""
+
+PATHS_WITHIN = OPERATIONS * 2.0**-24
+"""How far a sum may be off that rounding alone has moved."""
+
+PATHS_ALIKE = 0.98
+"""Share of a picture's sums that must lie within; the others are of paths that passed an edge that near."""
+
+Told = Callable[[Export, Path], str]
+"""(export, its folder) -> what has compiled it, or an error."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What was found: `compiled` and `executed` name tools and device, or say what was missing or wrong.
+
+    `error` is the largest error, `bound` the largest of the pair's bounds, `share` the largest error / bound,
+    `paths` the share of the sums that agree.
+    """
+
+    target: str
+    weights: str
+    size: int
+    compiled: str
+    executed: str
+    error: float | None = None
+    bound: float | None = None
+    promised: bool = True
+    share: float | None = None
+    paths: float | None = None
+    wrong: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """Return whether nothing that was tried has failed."""
+        return not self.wrong
+
+    def cells(self) -> tuple[str, ...]:
+        """Return the row of a table: target, weights, emitted, compiled, executed, error, bound, paths."""
+        bound = "-" if self.bound is None else f"{self.bound:.1e}" + ("" if self.promised else ", expected")
+        return (
+            self.target,
+            self.weights,
+            f"{self.size / 1000:.0f} kB",
+            self.compiled,
+            self.executed,
+            "-" if self.error is None else f"{self.error:.1e}",
+            bound,
+            "-" if self.paths is None else f"{self.paths:.1%}",
+        )
+
+
+HEAD = ("target", "weights", "emitted", "compiled by", "executed on", "error", "bound", "paths alike")
+"""The heads of such a table."""
+
+
+def check(export: Export) -> Verdict:
+    """Return the verdict of an export."""
+    kernels = [n for kernel in export.manifest["kernels"] for n in kernel["files"]]
+    size = sum(len(export.files[name]) for name in kernels)
+    known = (export.target, export.manifest["weights"]["where"], size)
+    compiled, wrong = _compiled(export)
+    if wrong:
+        return Verdict(*known, "refused", "-", wrong=wrong)
+    try:
+        device, found, paths = _executed(export)
+    except ExecutorUnavailable as error:
+        return Verdict(*known, compiled, f"missing: {error}")
+    except CompileError as error:
+        return Verdict(*known, compiled, "refused", wrong=str(error))
+    pair = export.pair
+    off = np.abs(found.astype(np.float64) - pair.output)
+    share = float(np.max(off / pair.bound))
+    wrong = "" if share <= 1 else f"off by {off.max():.3g}, {share:.3g} times the bound"
+    if paths is not None and not paths >= PATHS_ALIKE:
+        wrong = wrong or f"{paths:.1%} of the paths' sums agree, of at least {PATHS_ALIKE:.0%}"
+    numbers = (float(off.max()), float(pair.bound.max()))
+    return Verdict(*known, compiled, device, *numbers, pair.promised, share, paths, wrong)
+
+
+UNTOLD: Mapping[str, str] = {"metal": "none of Apple's here", "onnx": "onnx.checker"}
+"""What the table says of targets without tools here, and whose files a package has checked."""
+
+
+def _compiled(export: Export) -> tuple[str, str]:
+    """Return which tools took the files, and what one of them refused."""
+    told = []
+    with tempfile.TemporaryDirectory(prefix="wamnet-check-") as name:
+        folder = Path(name)
+        for path, data in export.files.items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_bytes(data)
+        for step in COMPILED.get(export.target, ()):
+            try:
+                told.append(step(export, folder))
+            except ExecutorUnavailable as error:
+                told.append(f"missing: {error}")
+            except CompileError as error:
+                return "", str(error)
+    return " + ".join(dict.fromkeys(told)) or UNTOLD.get(export.target, "the device's compiler"), ""
+
+
+def _sources(export: Export, suffix: str) -> list[str]:
+    """Return the kernels' files of a suffix."""
+    named = [name for kernel in export.manifest["kernels"] for name in kernel["files"]]
+    return [name for name in named if name.endswith(suffix)]
+
+
+def _glslang(stage: str, *options: str, suffix: str) -> Told:
+    """Return the step of glslang's reference compiler."""
+
+    def step(export: Export, folder: Path) -> str:
+        for name in _sources(export, suffix):
+            tools.run("glslangValidator", *options, "-S", stage, name, folder=folder)
+        return "glslangValidator"
+
+    return step
+
+
+def _validated(export: Export, folder: Path) -> str:
+    """Validate SPIR-V."""
+    for name in _sources(export, ".spv"):
+        tools.validate(folder, name)
+    return "spirv-val"
+
+
+def _translated(export: Export, folder: Path) -> str:
+    """Translate GLSL for Vulkan to SPIR-V, and validate that."""
+    for name in _sources(export, ".comp"):
+        tools.spirv((folder / name).read_text())
+    return "glslangValidator + spirv-val"
+
+
+def _hlsl(export: Export, folder: Path) -> str:
+    """Compile HLSL to SPIR-V, and validate that."""
+    for name in _sources(export, ".hlsl"):
+        tools.spirv((folder / name).read_text(), "hlsl")
+    return "glslangValidator -D + spirv-val"
+
+
+UNREAD = "177"
+"""Number of the warning that a variable is not read: a path's program has some, whatever it adds up."""
+
+
+def _nvcc(export: Export, folder: Path) -> str:
+    """Compile CUDA C to PTX."""
+    for name in _sources(export, ".cu"):
+        tools.run(
+            "nvcc",
+            "-ptx",
+            "-Werror",
+            "all-warnings",
+            "-diag-suppress",
+            UNREAD,
+            "-o",
+            "kernel.ptx",
+            name,
+            folder=folder,
+        )
+    return "nvcc -ptx"
+
+
+WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror", "-c")
+"""What a careful project compiles C with."""
+
+
+def _cc(export: Export, folder: Path) -> str:
+    """Compile each header by itself, with all warnings as errors."""
+    for name in _sources(export, ".h"):
+        (folder / "one.c").write_text(f'#include "{name}"\nint wamnet_one;\n')
+        tools.run("cc", *WARNINGS, "-Wno-unused-function", "-o", "one.o", "one.c", folder=folder)
+    return "cc -Wall -Wextra -Wconversion -Werror"
+
+
+COMPILED: Mapping[str, Sequence[Told]] = {
+    "glsl-compute": (_glslang("comp", suffix=".comp"),),
+    "glsl-es": (_glslang("frag", suffix=".frag"),),
+    "glsl-vulkan": (_translated,),
+    "spirv": (_validated,),
+    "hlsl": (_hlsl,),
+    "c": (_cc,),
+    "cuda": (_nvcc,),
+}
+"""Tools by target; the others' files are compiled by what runs them."""
+
+
+def runner(target: str, kernel: str) -> Executor:
+    """Return what runs a target's kernels here; `kernel` is the compiler's name of target and place."""
+    from . import compute_runner, gl_runner, host_pass_runner, host_runner, wgpu_runner
+
+    if target in ("opencl", "glsl"):
+        if kernel.endswith((INLINE, UNIFORM)) and kernel != f"opencl:{UNIFORM}":
+            raise ExecutorUnavailable(f"nothing runs {target} here with weights in that place")
+        opened = open_executor("opencl" if target == "opencl" else "opengl")
+        opened.name = kernel
+        return opened
+    if kernel == f"glsl-es:{UNIFORM}":
+        raise ExecutorUnavailable(f"nothing runs {target} here with weights in that place")
+    openers: Mapping[str, Callable[[], Executor]] = {
+        "glsl-es": gl_runner.ESRunner,
+        "glsl-compute": compute_runner.ComputeRunner,
+        "glsl-vulkan": wgpu_runner.vulkan_runner,
+        "spirv": wgpu_runner.vulkan_runner,
+        "hlsl": wgpu_runner.hlsl_runner,
+        "wgsl": wgpu_runner.WgpuRunner,
+        "metal": host_runner.MetalRunner,
+        "c": host_runner.CRunner,
+        "cuda": host_runner.CUDARunner,
+        "shadertoy": host_pass_runner.ShadertoyRunner,
+        "godot": host_pass_runner.GodotRunner,
+    }
+    opened = openers[target]()
+    opened.name = kernel
+    return opened
+
+
+ROUTES: Mapping[str, str] = {
+    "hlsl": "back to SPIR-V, wgpu, ",
+    "spirv": "wgpu, ",
+    "glsl-vulkan": "SPIR-V, wgpu, ",
+    "wgsl": "wgpu, ",
+    "metal": "as C++ with a shim, ",
+    "cuda": "as C++ with a shim, ",
+    "shadertoy": "its uniforms declared, ",
+    "godot": "its words declared, ",
+}
+"""How a kernel comes to its device, where that is no matter of course."""
+
+
+def _executed(export: Export) -> tuple[str, NDArray[np.float32], float | None]:
+    """Return the device, the picture that an export makes of the pair's images, and how paths compare."""
+    pair = export.pair
+    if export.denoiser is None:
+        data = export.files["denoise/denoise.onnx"]
+        device, found = peer_onnxruntime.run_graph(data, pair.images)
+        return device, found, None
+    with runner(export.target, export.denoiser.target) as opened:
+        found = opened.run(export.denoiser, pair.images)
+        opened.name = opened.name.partition(":")[0]
+        return ROUTES.get(export.target, "") + opened.device, found, _paths(export, opened)
+
+
+def _paths(export: Export, opened: Any) -> float | None:
+    """Return the share of the sums, or of encoded numbers, that are the reference's but for rounding."""
+    height, width, _ = export.pair.output.shape
+    if export.passes:
+        values = {"iFrame": SEED, "seed_number": SEED, "width": width, "height": height}
+        drawn = {name: opened.draw(text, (height, width), values) for name, text in export.passes.items()}
+        held = export.pair.images
+        near = [np.abs(drawn[n][..., : held[n].shape[2]] - held[n]) <= PATHS_WITHIN for n in drawn]
+        return float(np.mean([x.mean() for x in near]))
+    if export.path is None or export.pair.sums is None:
+        return None
+    found = opened.trace(export.path, Part(width, height, 0, height, 0, 1, SEED))
+    near = np.abs(found - export.pair.sums) <= PATHS_WITHIN * np.maximum(1, np.abs(export.pair.sums))
+    return float(near.mean())

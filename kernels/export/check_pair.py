@@ -1,0 +1,176 @@
+"""A small picture to check an integration with: inputs, the reference's output, how far off it may be.
+
+1. Its sides are the window's and a few pixels more: most pixels see a border [`SIDES`].
+2. With a scene its images are those of one sample a pixel, rounded to float32; else every number of an image
+   lies in its range, spread by multiples of the golden ratio [`_spread`].
+   Of several contrasts the one is taken whose output is clipped least [`_livelier`].
+3. The output is the reference's in float64, rounded to float32; the bound is computed for this picture, of
+   this kernel, and holds the rounding. A kernel without a bound states what the emitted sine's would have.
+
+Files are raw little-endian float32, rows from the top, channels interleaved; check.json names their shapes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler import emit_path
+from ...compiler.artifact import Artifact
+from ...compiler.compile import compile_program
+from ...compiler.emit import kernel_gather
+from ...compiler.expected import expected
+from ...compiler.interpret import interpret
+from ...compiler.ir import Gather, Program
+from ...compiler.lower import lower
+from ...compiler.lower_encode import layers_of
+from ...compiler.lower_scene import PathPrograms
+from ...compiler.path_kernel import compile_path
+from ...compiler.schedules import windows
+from ...compiler.variants import parse, vary
+from ...refimpl.dataset import FEATURES, encode_sums
+from ...refimpl.denoise import Model
+from ..executor import Part
+from ..registry import open_executor
+
+SIDES = (1, 3)
+"""Rows and columns beyond the window's."""
+
+SEED = 7
+"""Seed of the sample that a scene's picture has."""
+
+CONTRASTS = (1.0, 0.5, 0.25, 0.1)
+"""Shares of an image's range that are tried: a trained network clips most of what is pure noise."""
+
+GOLDEN = (5.0**0.5 - 1) / 2
+"""Multiples of this, modulo 1, are spread evenly and repeat nothing."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Images (H, W, C) by name, the output and its bound (H, W, 3); sums (planes, H, W) of a scene.
+
+    `promised`: whether the kernel promises the bound.
+    """
+
+    images: Mapping[str, NDArray[np.float32]]
+    output: NDArray[np.float32]
+    bound: NDArray[np.float32]
+    promised: bool
+    sums: NDArray[np.float32] | None = None
+    planes: tuple[str, ...] = ()
+
+    def facts(self) -> dict[str, Any]:
+        """Return what check.json says."""
+        height, width, channels = self.output.shape
+        found: dict[str, Any] = {
+            "width": width,
+            "height": height,
+            "images": {n: {"file": f"image.{n}.f32", "channels": i.shape[2]} for n, i in self.images.items()},
+            "output": {"file": "output.f32", "channels": channels},
+            "bound": {"file": "bound.f32", "channels": channels, "promised": self.promised},
+            "format": "little-endian float32, rows from the top, channels interleaved",
+            "rule": "|yours - output| <= bound, number by number; NaN fails",
+            "sums": None,
+        }
+        if self.sums is not None:
+            found["sums"] = {
+                "file": "sums.f32",
+                "planes": list(self.planes),
+                "samples": 1,
+                "seed": SEED,
+                "format": "one plane of height * width numbers after another",
+            }
+        return found
+
+    def files(self) -> dict[str, bytes]:
+        """Return the files by name."""
+        arrays = {f"image.{name}.f32": image for name, image in self.images.items()}
+        arrays |= {"output.f32": self.output, "bound.f32": self.bound}
+        if self.sums is not None:
+            arrays["sums.f32"] = self.sums
+        text = json.dumps(self.facts(), indent=2, sort_keys=True) + "\n"
+        return {
+            **{name: np.ascontiguousarray(array).astype("<f4").tobytes() for name, array in arrays.items()},
+            "check.json": text.encode(),
+        }
+
+
+def pair(
+    model: Model,
+    variant: str,
+    denoiser: Artifact | None = None,
+    programs: PathPrograms | None = None,
+    profile: str = "ieee",
+) -> Pair:
+    """Return the pair of a model's variant, with its kernel's bound; with a scene, of its picture."""
+    varied = vary(parse(variant), model)
+    program = lower(varied.model)
+    gather = kernel_gather(program)
+    size = (gather.rows + SIDES[0], gather.columns + SIDES[1])
+    sums: NDArray[np.float32] | None = None
+    planes: tuple[str, ...] = ()
+    if programs is None:
+        images = _livelier(program, size)
+    else:
+        planes, sums = _sums(programs, varied.features, profile, size)
+        images = _encoded(varied.model, dict(zip(planes, sums, strict=True)))
+    promised = denoiser is not None and denoiser.manifest["bound"]["output"] is not None
+    one_pass = denoiser is not None and denoiser.before is None and promised
+    held = expected(program, denoiser if one_pass and denoiser else compile_program(program, "numpy"), images)
+    output, bound = held.value.astype(np.float32), held.bound
+    if denoiser is not None and promised and not one_pass:
+        # Two passes have a bound for all pictures.
+        bound = np.broadcast_to(np.asarray(denoiser.manifest["bound"]["output"]), output.shape)
+    rounded = np.nextafter((bound + np.abs(output - held.value)).astype(np.float32), np.float32(np.inf))
+    return Pair(images, output, rounded, promised, sums, planes)
+
+
+def _livelier(program: Program, size: tuple[int, int]) -> dict[str, NDArray[np.float32]]:
+    """Return the images of the contrast whose output has most numbers that are not clipped."""
+    gather = kernel_gather(program)
+    best, most = {}, -1
+    for contrast in CONTRASTS:
+        images = _spread(gather, size, contrast)
+        (value,) = interpret(program, {"window": windows(gather, images)}, np.float64).values()
+        lively = int(((value > 0) & (value < 1)).sum())
+        if lively > most:
+            best, most = images, lively
+    return best
+
+
+def _spread(gather: Gather, size: tuple[int, int], contrast: float) -> dict[str, NDArray[np.float32]]:
+    """Return images (H, W, C) whose numbers lie in that share of their ranges, around the middle."""
+    found = {}
+    for number, image in enumerate(gather.images):
+        count = size[0] * size[1] * image.channels
+        shares = 0.5 + contrast * (((np.arange(count) + 1) * GOLDEN + number / 7) % 1.0 - 0.5)
+        values = (image.low + (image.high - image.low) * shares).reshape(*size, image.channels)
+        found[image.name] = np.clip(values.astype(np.float32), np.float32(image.low), np.float32(image.high))
+    return found
+
+
+def _sums(
+    programs: PathPrograms, features: Sequence[str], profile: str, size: tuple[int, int]
+) -> tuple[tuple[str, ...], NDArray[np.float32]]:
+    """Return the planes of features, and the interpreter's sums (planes, H, W) over one sample."""
+    kernel = compile_path(programs, "numpy", profile, groups=tuple(dict.fromkeys(layers_of(features))))
+    with open_executor("numpy") as executor:
+        return kernel.planes, executor.trace(kernel, Part(size[1], size[0], 0, size[0], 0, 1, SEED))
+
+
+def _encoded(model: Model, sums: Mapping[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:
+    """Return the encoded images (H, W, C) of a model's features, from sums over one sample."""
+    found = {}
+    for name in model.features:
+        planes = [sums[plane].astype(np.float64) for plane in emit_path.GROUPS[FEATURES[name].layer]]
+        layer = planes[0] if len(planes) == 1 else np.stack(planes, axis=-1)
+        encoded = encode_sums({FEATURES[name].layer: layer}, 1.0, (name,), model.normalization)[name]
+        image = encoded[..., None] if encoded.ndim == 2 else encoded
+        found[name] = image.astype(np.float32)
+    return found

@@ -1,0 +1,311 @@
+"""An export: everything that another program needs to run a denoiser, and to find out whether it does.
+
+1. Compile the denoiser for the target's language and place of weights, and with a scene its paths and the
+   encoding of features [`export`]; what the host cannot take is refused with the name of its limit.
+2. Each kernel has a folder of its own, as `wamnet compile` writes it, with its certificate; translations
+   stand beside the source that they are made of.
+3. `check/` holds inputs, the reference's output and how far off each number may be [check_pair.py].
+4. `manifest.json` says what there is and how it is bound [`manifest_of`], `README.md` how to call it.
+
+Everything is a function of model, scene and request, and of the translators' versions.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...compiler import artifact as artifacts
+from ...compiler import weights as weight_layout
+from ...compiler.artifact import Artifact
+from ...compiler.compile import target_named
+from ...compiler.encode_kernel import EncodeArtifact, compile_encode
+from ...compiler.host_pass import feature_pass
+from ...compiler.ir import sha256
+from ...compiler.lower_encode import layers_of
+from ...compiler.lower_scene import PathPrograms, lower_scene
+from ...compiler.path_kernel import PathArtifact, compile_path, most_unrolled
+from ...compiler.variants import FULL, compile_variant, parse, vary
+from ...refimpl.denoise import Model
+from ...refimpl.errors import InputError
+from ...refimpl.scene import Scene
+from ...refimpl.transport import Settings
+from . import bindings, check_pair, onnx_export, readme
+from .targets import NAMES, ONNX, TARGETS, Limit, Place, Row
+
+SCHEMA = "wamnet-export-1"
+"""Name and version of the manifest's form; spec/export.schema.json."""
+
+LICENCE = (
+    "The compiler's licence, Apache-2.0, makes no claim on what it writes: kernels, weights and texts of "
+    "this export are yours, as the model is, without any condition of ours"
+)
+"""What a manifest says about rights."""
+
+MANIFEST_NAME, README_NAME = "manifest.json", "README.md"
+"""Files of every export."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is wanted. `weights`: a place, or the target's usual one where it is empty."""
+
+    model: Model
+    target: str
+    scene: Scene | None = None
+    profile: str = "ieee"
+    weights: str = ""
+    variant: str = FULL
+    settings: Settings = field(default_factory=Settings)
+
+
+@dataclass(frozen=True)
+class Export:
+    """A whole export: files besides the manifest by path, the manifest, and what they are made of."""
+
+    request: Request
+    files: Mapping[str, bytes]
+    manifest: Mapping[str, Any]
+    denoiser: Artifact | None
+    path: PathArtifact | None
+    encoder: EncodeArtifact | None
+    passes: Mapping[str, str]
+    pair: check_pair.Pair
+
+    @property
+    def target(self) -> str:
+        """Return the target's name."""
+        return self.request.target
+
+    def contents(self) -> Mapping[str, bytes]:
+        """Return all files by path."""
+        text = json.dumps(self.manifest, indent=2, sort_keys=True, allow_nan=False) + "\n"
+        return {**self.files, MANIFEST_NAME: text.encode()}
+
+
+def export(request: Request) -> Export:
+    """Return the export of a model, or say which limit of the target it exceeds."""
+    if request.target not in NAMES:
+        rule = f"must be one of {', '.join(NAMES)}, html"
+        raise InputError("--target", request.target, rule, "choose one of these")
+    if request.target == ONNX:
+        return _graph(request)
+    row = TARGETS[request.target]
+    how, place = _place(row, request.weights)
+    denoiser = compile_variant(request.model, request.variant, place.kernel, request.profile, place.schedule)
+    limits = _limits(row, place, denoiser)
+    files: dict[str, bytes] = {}
+    for kernel, folder in _folders(denoiser):
+        files |= _written(kernel, folder)
+        files |= {f"{folder}/{n}": data for n, data in row.files("denoise", kernel.source).items()}
+    programs = _programs(request, row)
+    path, encoder, passes = _of_scene(request, row, programs)
+    for name, made in (("path", path), ("encode", encoder)):
+        if made is not None:
+            files |= _written(made, name)
+            files |= {f"{name}/{n}": data for n, data in row.files(name, made.source).items()}
+    for name, text in passes.items():
+        found = row.files(f"feature.{name}", text)
+        files |= {f"features/{n}": data for n, data in found.items()}
+        _check(row.source, max(map(len, found.values())), row.name)
+    pair = check_pair.pair(request.model, request.variant, denoiser, programs, request.profile)
+    files |= {f"check/{name}": data for name, data in pair.files().items()}
+    facts = _facts(request, row, how, denoiser, limits)
+    facts["kernels"] = bindings.kernels(row, denoiser, path, encoder, passes)
+    return _finished(request, facts, files, denoiser, path, encoder, passes, pair)
+
+
+def _graph(request: Request) -> Export:
+    """Return the export as an ONNX graph."""
+    if request.scene is not None:
+        rule = "a graph denoises; it traces no paths"
+        raise InputError("--scene", request.scene.name, rule, "leave it out, or choose another target")
+    if request.weights not in ("", "inline"):
+        raise InputError("--weights", request.weights, "a graph holds its weights", "leave it out")
+    varied = vary(parse(request.variant), request.model)
+    data = onnx_export.graph(varied.model)
+    pair = check_pair.pair(request.model, request.variant)
+    files = {"denoise/denoise.onnx": data}
+    files |= {f"check/{name}": content for name, content in pair.files().items()}
+    model = varied.model
+    facts = {
+        "language": onnx_export.TEXT,
+        "profile": {"name": "native", "text": "the runtime's own sine, of which ONNX promises nothing"},
+        "model": _model(request),
+        "scene": None,
+        "images": bindings.images(model),
+        "window": {"size": model.window.size, "border": model.window.border},
+        "output": {"name": "result", "channels": 3, "encoding": bindings.encoding(model)},
+        "bound": {"output": None, "against": "nothing: a runtime may compute Sin as it likes"},
+        "assumes": "",
+        "certificate": None,
+        "weights": {"where": "inline", "count": _count(model), "file": None, "order": "initialisers"},
+        "limits": [],
+        "kernels": [onnx_export.kernel(model)],
+    }
+    return _finished(request, facts, files, None, None, None, {}, pair)
+
+
+def _finished(
+    request: Request,
+    facts: Mapping[str, Any],
+    files: Mapping[str, bytes],
+    denoiser: Artifact | None,
+    path: PathArtifact | None,
+    encoder: EncodeArtifact | None,
+    passes: Mapping[str, str],
+    pair: check_pair.Pair,
+) -> Export:
+    """Return the export with its README and manifest, which carries the hashes of all other files."""
+    facts = {"schema": SCHEMA, "target": request.target, "licence": LICENCE, "check": pair.facts(), **facts}
+    files = {**files, README_NAME: readme.readme(facts, sorted(files)).encode()}
+    hashes = {name: sha256(data) for name, data in sorted(files.items())}
+    digest = sha256(*(value.encode() for value in hashes.values()))
+    manifest = json.loads(json.dumps({**facts, "files": hashes, "digest": digest}, allow_nan=False))
+    return Export(request, files, manifest, denoiser, path, encoder, passes, pair)
+
+
+def _facts(
+    request: Request, row: Row, how: str, denoiser: Artifact, limits: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
+    """Return what a manifest says besides kernels and files."""
+    held = denoiser.manifest
+    first = denoiser.kernels[0].manifest
+    size = vary(parse(request.variant), request.model).model.window.size
+    return {
+        "language": row.text,
+        "profile": held["profile"],
+        "model": _model(request),
+        "scene": None
+        if request.scene is None
+        else {"name": request.scene.name, "settings": request.settings.facts()},
+        "images": first["images"],
+        "window": {"size": size, "border": first["window"]["border"]},
+        "output": held["output"],
+        "bound": held["bound"],
+        "assumes": target_named(denoiser.target).assumes,
+        "certificate": f"denoise/{held['certificate']}" if held["certificate"] else None,
+        "weights": {
+            "where": how,
+            "count": held["weights"]["count"],
+            "file": f"denoise/{artifacts.WEIGHTS_NAME}",
+            "order": held["weights"]["order"],
+        },
+        "limits": list(limits),
+    }
+
+
+def _model(request: Request) -> dict[str, Any]:
+    """Return what a manifest says about the model."""
+    varied = vary(parse(request.variant), request.model).model
+    return {
+        "features": list(varied.features),
+        "widths": [varied.siren.weights[0].shape[1], *(len(b) for b in varied.siren.biases)],
+        "variant": request.variant,
+        "feature_spp": int(request.model.info.get("trained_on_feature_spp", "1") or 1),
+    }
+
+
+def _count(model: Model) -> int:
+    """Return the number of a model's weights and biases."""
+    return int(sum(array.size for array in (*model.siren.weights, *model.siren.biases)))
+
+
+def _place(row: Row, wanted: str) -> tuple[str, Place]:
+    """Return the place of the weights and its name."""
+    how = wanted or next(iter(row.places))
+    if how not in row.places:
+        rule = f"target {row.name} has weights in: {', '.join(row.places)}"
+        raise InputError("--weights", how, rule, "choose one of these, or leave it out")
+    return how, row.places[how]
+
+
+def _check(limit: Limit | None, needs: float, target: str) -> list[dict[str, Any]]:
+    """Return what a manifest says about a limit, or refuse what exceeds it."""
+    if limit is None:
+        return []
+    if needs > limit.most:
+        rule = f"{target} takes at most {limit.most}"
+        raise InputError(limit.name, int(np.ceil(needs)), rule, limit.way_out)
+    return [{"name": limit.name, "needs": int(np.ceil(needs)), "most": limit.most}]
+
+
+def _limits(row: Row, place: Place, denoiser: Artifact) -> list[dict[str, Any]]:
+    """Return the limits that an export keeps, or refuse it."""
+    found = []
+    for kernel in denoiser.kernels:
+        schedule = {s.name: s for s in target_named(place.kernel).schedules}[place.schedule]
+        picked = kernel.manifest["schedule"]["name"]
+        count = sum(array.size for array in weight_layout.weights(kernel.program).values())
+        found += _check(place.limit, place.each * count, row.name)
+        reason = schedule.refusal(kernel.program)
+        if picked != place.schedule or reason:
+            reason = reason or kernel.manifest["schedule"].get("reason", "")
+            raise InputError(
+                "--weights", "inline", f"this model's cannot be there: {reason}", "choose another place"
+            )
+        gather = kernel.program.gather
+        assert gather is not None, "kernels have windows"
+        found += _check(row.most_images, len(gather.images), row.name)
+        found += _check(row.source, len(kernel.source), row.name)
+    if row.single and denoiser.before is not None:
+        rule = f"target {row.name} has one pass for the denoiser, and a rank is two"
+        raise InputError("--variant", denoiser.manifest["variant"]["name"], rule, "leave the rank out")
+    return found
+
+
+def _folders(denoiser: Artifact) -> list[tuple[Artifact, str]]:
+    """Return the kernels of a denoiser and their folders."""
+    first = [(denoiser.before, "horizontal")] if denoiser.before is not None else []
+    return [*first, (denoiser, "denoise")]
+
+
+def _written(kernel: artifacts.Files, folder: str) -> dict[str, bytes]:
+    """Return the files that `wamnet compile` would write, in a folder."""
+    held = {**kernel.contents(), artifacts.MANIFEST_NAME: artifacts.manifest_text(kernel).encode()}
+    return {f"{folder}/{name}": data for name, data in held.items()}
+
+
+def _programs(request: Request, row: Row) -> PathPrograms | None:
+    """Return the programs of a scene's paths, as the target unrolls them."""
+    if request.scene is None:
+        return None
+    return lower_scene(request.scene, request.settings, most_unrolled(_usual(row)))
+
+
+def _usual(row: Row) -> str:
+    """Return the compiler's name of a target, wherever weights are."""
+    return next(iter(row.places.values())).kernel.partition(":")[0]
+
+
+def _of_scene(
+    request: Request, row: Row, programs: PathPrograms | None
+) -> tuple[PathArtifact | None, EncodeArtifact | None, Mapping[str, str]]:
+    """Return the kernels of a scene: paths and encoding, or passes that write a feature each."""
+    if request.scene is None or programs is None:
+        return None, None, {}
+    model, target = vary(parse(request.variant), request.model).model, _usual(row)
+    if row.single:
+        header = [f"wamnet: a noisy feature of scene {_plain(request.scene.name)}, one sample a pixel."]
+        return (
+            None,
+            None,
+            {
+                name: feature_pass(programs, name, model.normalization, target, header)
+                for name in model.features
+            },
+        )
+    path = compile_path(
+        programs, target, request.profile, groups=tuple(dict.fromkeys(layers_of(model.features)))
+    )
+    encoder = compile_encode(model.features, model.normalization, target, request.profile, path.planes)
+    return path, encoder, {}
+
+
+def _plain(name: str) -> str:
+    """Return a scene's name for a comment."""
+    return "".join(letter if letter.isalnum() else "_" for letter in name[:60])

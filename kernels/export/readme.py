@@ -1,0 +1,155 @@
+"""The README of an export: what there is, how it is called, how to check it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .targets import ONNX, TARGETS
+
+ONNX_CODE = """\
+import numpy as np, onnxruntime
+
+session = onnxruntime.InferenceSession("denoise/denoise.onnx")
+shape = {shape}
+images = {{
+    name: np.fromfile(f"check/image.{{name}}.f32", "<f4").reshape({height}, {width}, channels)
+    for name, channels in shape.items()
+}}
+(result,) = session.run(["result"], images)   # any height and width
+expected, bound = (np.fromfile(f"check/{{n}}.f32", "<f4").reshape(result.shape) for n in ("output", "bound"))
+print("largest error", np.abs(result - expected).max(), "expected at most", bound.max())"""
+"""A program for a graph, which checks itself."""
+
+IMAGE_LINES: Mapping[str, str] = {
+    "numbered": "bind_storage(pipeline, {slot}, {name});",
+    "registers": "bind_storage(pipeline, {slot}, {name});",
+    "names": 'bind_texture({number}, {name}, "{name}");',
+    "channels": "   {slot}: {name}",
+    "arguments": "",
+}
+"""How a line of the code binds an image, by the kind of slots."""
+
+
+def readme(facts: Mapping[str, Any], files: Sequence[str]) -> str:
+    """Return the text for what a manifest says."""
+    lines = [
+        f"# Denoiser for {facts['target']}",
+        "",
+        f"{facts['language']}. Written by `wamnet export`; `manifest.json` says the same for programs.",
+        "",
+        *_facts(facts),
+        "",
+        "## Kernels, in the order in which they run",
+        "",
+        *(line for kernel in facts["kernels"] for line in _kernel(kernel)),
+        "## Integration",
+        "",
+        f"```{'python' if facts['target'] == ONNX else 'text'}",
+        _code(facts),
+        "```",
+        "",
+        "Rows: row 0 of every image is the picture's TOP row. Colour is encoded for the display already.",
+        "",
+        "## Check",
+        "",
+        *_check(facts["check"]),
+        "",
+        "## Rights",
+        "",
+        facts["licence"] + ".",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _facts(facts: Mapping[str, Any]) -> list[str]:
+    """Return the lines about the whole."""
+    bound, window, weights = facts["bound"]["output"], facts["window"], facts["weights"]
+    promise = (
+        f"at most {max(bound):g} from the float64 reference, for every picture in the stated ranges"
+        if bound
+        else f"no promise ({facts['bound']['against']})"
+    )
+    images = [
+        f"* Image `{i['name']}`: {i['channels']} channels in [{i['low']:g}, {i['high']:g}]; {i['encoding']}."
+        for i in facts["images"]
+    ]
+    return [
+        f"* Error: {promise}.",
+        *([f"* This assumes: {facts['assumes']}."] if facts["assumes"] else []),
+        f"* Window: {window['size']} x {window['size']} pixels, border rule `{window['border']}`.",
+        f"* Weights: {weights['count'] or 'all'} numbers, {weights['where']}.",
+        f"* Output: {facts['output']['encoding'] or 'linear'}.",
+        *images,
+        *_rays(facts),
+        *(f"* Limit: {x['name']}: needs {x['needs']} of {x['most']}." for x in facts["limits"]),
+    ]
+
+
+def _rays(facts: Mapping[str, Any]) -> list[str]:
+    """Return the line about features of more camera rays than the colour's."""
+    rays = facts["model"]["feature_spp"]
+    if rays < 2 or facts["scene"] is None:
+        return []
+    return [
+        f"* The model has learned from features that are means over {rays} camera rays. Run the path kernel "
+        f"again with samples = {rays}, divide all planes but the colour's by {rays}, and give the encoding those, "
+        "with sample_count = 1; with features of one ray edges are worse."
+    ]
+
+
+def _check(check: Mapping[str, Any]) -> list[str]:
+    """Return the lines about the check pair."""
+    promised = "" if check["bound"]["promised"] else "; expected, not promised, for this target"
+    found = [
+        f"`check/` holds a picture of {check['width']} x {check['height']} pixels, raw {check['format']}:",
+        "feed the images to the denoiser, and compare with output.f32:",
+        f"{check['rule']} (bound.f32{promised}).",
+    ]
+    if check["sums"]:
+        found += [
+            f"`sums.f32` are the paths' sums of the same picture, for seed {check['sums']['seed']}; a path",
+            "that passes an edge within rounding may differ.",
+        ]
+    return found
+
+
+def _kernel(kernel: Mapping[str, Any]) -> list[str]:
+    """Return the lines about one kernel."""
+    rows = []
+    for b in kernel["bindings"]:
+        shape = ", ".join(map(str, b["shape"])) or "1"
+        rows.append(f"| {b['slot']} | `{b['name']}` | {b['access']} | {b['type']} | {shape} |")
+    named = ", ".join(f"`{name}`" for name in kernel["files"])
+    return [
+        f"**{kernel['role']}**: {named}, entry point `{kernel['entry_point']}`.",
+        "",
+        "| where | what | access | type | shape |",
+        "|---|---|---|---|---|",
+        *rows,
+        "",
+    ]
+
+
+def _code(facts: Mapping[str, Any]) -> str:
+    """Return the lines of a program that calls the denoiser."""
+    check = facts["check"]
+    if facts["target"] == ONNX:
+        shape = {name: image["channels"] for name, image in check["images"].items()}
+        return ONNX_CODE.format(shape=shape, height=check["height"], width=check["width"])
+    row, kernel = TARGETS[facts["target"]], facts["kernels"][-1]
+    read = [
+        b for b in kernel["bindings"] if b["name"].startswith("image_") or b["name"].startswith("horizontal")
+    ]
+    template = IMAGE_LINES[row.slots]
+    if row.name == "godot":
+        template = 'material.set_shader_parameter("{name}", ImageTexture.create_from_image({name}))'
+    each = [template.format(slot=b["slot"], name=b["name"], number=i) for i, b in enumerate(read)]
+    return row.code.format(
+        images="\n".join(each),
+        arguments=", ".join(b["name"] for b in kernel["bindings"]),
+        count=len(read),
+        file=kernel["files"][0],
+        entry=kernel["entry_point"],
+    )

@@ -1,0 +1,119 @@
+"""The shelf: kernels of canonical models that are kept in the repository, with an index page.
+
+`python -m wamnet.kernels.export.shelf -o kernels/shelf MODEL.safetensors ...` writes it anew; without
+models it is a small network of random weights. A test holds what is there to what the command would write.
+The index says for each kernel its size, products a pixel, certified bound and, where `--times` gives it, its
+speed.
+
+The paper's network takes 600 kB of text where weights are inlined: the shelf has sources that read weights,
+which are one file a model, and leaves out what `wamnet export` adds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...compiler.model_file import load_model
+from ...refimpl import siren
+from ...refimpl.dataset import Normalization, Window
+from ...refimpl.denoise import Model
+from ..bench.cost import products_of
+from .package import Export, Request, export
+
+KEPT = ("opencl", "glsl", "glsl-es", "wgsl", "c", "cuda", "metal", "glsl-vulkan")
+"""Targets whose files need no translator, so that they are the same on every machine."""
+
+INDEX = "README.md"
+"""The index page."""
+
+SMALL = "small"
+"""Name of the network of random weights."""
+
+
+def contents(models: Mapping[str, Model], times: Mapping[str, Any] | None = None) -> Mapping[str, bytes]:
+    """Return all files of the shelf by path, for models by name; `times` are milliseconds by digest."""
+    files: dict[str, bytes] = {}
+    lines = [
+        "# Kernels of the canonical models",
+        "",
+        "Written by `python -m wamnet.kernels.export.shelf`; a test keeps them equal to what the compiler",
+        "writes. `wamnet export` adds certificate, manifest, check pair and everything else. Weights are one",
+        "file a model: little-endian float32, in the order that each source's header states.",
+        "",
+        "| model | target | source | products a pixel | certified bound | speed |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, model in models.items():
+        for target in KEPT:
+            made = export(Request(model, target))
+            source = _source(made)
+            files[f"{name}/{target}/{Path(source).name}"] = made.files[source]
+            files[f"{name}/weights.bin"] = made.files["denoise/weights.bin"]
+            lines.append(_row(name, target, made, source, times or {}))
+    files[INDEX] = ("\n".join([*lines, ""])).encode()
+    return files
+
+
+def _source(made: Export) -> str:
+    """Return the path of the denoiser's source."""
+    return str(made.manifest["kernels"][-1]["files"][0])
+
+
+def _row(name: str, target: str, made: Export, source: str, times: Mapping[str, Any]) -> str:
+    """Return the line of one kernel."""
+    bound = made.manifest["bound"]["output"]
+    assert made.denoiser is not None, "every target of the shelf has a kernel"
+    speed = times.get(made.denoiser.digest)
+    cells = (
+        name,
+        f"[{target}]({name}/{target}/{Path(source).name})",
+        f"{len(made.files[source]) / 1000:.1f} kB",
+        f"{products_of(made.denoiser.program):,}",
+        f"{max(bound):.2g}" if bound else "-",
+        f"{speed:g} ms" if speed else "not measured",
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def random_model() -> Model:
+    """Return a small network of random weights, whose outputs lie around the middle."""
+    network = siren.init((96, 8, 3), 2.0, 2.0, 5, np.float32)
+    network = replace(network, biases=(*network.biases[:-1], np.full(3, 0.5, np.float32)))
+    return Model(network, ("color", "normal"), Window(4, "clamp"), Normalization(), {})
+
+
+def write(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write the shelf in the place of the one that is there."""
+    new = folder.with_name(f".{folder.name}.new")
+    shutil.rmtree(new, ignore_errors=True)
+    for name, data in files.items():
+        (new / name).parent.mkdir(parents=True, exist_ok=True)
+        (new / name).write_bytes(data)
+    shutil.rmtree(folder, ignore_errors=True)
+    new.replace(folder)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write the shelf."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("models", nargs="*", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--times", type=Path, help="JSON: milliseconds a picture by a kernel's digest")
+    options = parser.parse_args(arguments)
+    models = {path.stem: load_model(path) for path in options.models} or {SMALL: random_model()}
+    times = json.loads(options.times.read_text()) if options.times else None
+    write(options.output, contents(models, times))
+
+
+if __name__ == "__main__":
+    main()

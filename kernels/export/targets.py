@@ -1,0 +1,312 @@
+"""The targets of `wamnet export`: which kernels are written for each, how they are called, what limits hold.
+
+One row a target [`TARGETS`]. A row names a compiler target for each place that weights can have, the first
+one being the usual one, and says how files are named, how kernels are called, and which limits hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from ...compiler.emit_inlined import LARGEST_WEIGHTS
+from ...compiler.glsl import WEIGHT_TEXTURE_WIDTH
+from ...compiler.schedules import PLAIN
+from ...compiler.weight_homes import INLINE, UNIFORM
+from . import tools
+
+BUFFER, TEXTURE = "buffer", "texture"
+"""The other places of weights."""
+
+KILOBYTE = 1024
+"""Bytes."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What a host takes: `most` of something that an export needs; `name` is the host's own word for it."""
+
+    name: str
+    most: int
+    way_out: str
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place of weights: the compiler's target and schedule, and the limit of what stands there.
+
+    `each`: how much of it a weight takes.
+    """
+
+    kernel: str
+    schedule: str = PLAIN
+    limit: Limit | None = None
+    each: float = 4.0
+
+
+Files = Callable[[str, str], Mapping[str, bytes]]
+"""(stem of a file, source) -> files."""
+
+
+def _as(suffix: str) -> Files:
+    """Return the files of a language that is written as it is."""
+    return lambda stem, source: {f"{stem}{suffix}": source.encode()}
+
+
+def _spirv(stem: str, source: str) -> Mapping[str, bytes]:
+    """Return SPIR-V, and the GLSL that it is made of."""
+    return {f"{stem}.spv": tools.spirv(source), f"{stem}.comp": source.encode()}
+
+
+def _hlsl(stem: str, source: str) -> Mapping[str, bytes]:
+    """Return HLSL for both compilers."""
+    binary = tools.spirv(source)
+    return {f"{stem}.{style}.hlsl": tools.hlsl(binary, style).encode() for style in tools.HLSL_STYLES}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One target. `slots`: what kernels are bound to, `code`: ten lines of a program that calls the denoiser.
+
+    `single`: a pass of the host writes one image, so that a noisy picture's features are passes of their own.
+    """
+
+    name: str
+    text: str
+    places: Mapping[str, Place]
+    files: Files
+    slots: str
+    code: str
+    entry: str = ""
+    single: bool = False
+    most_images: Limit | None = None
+    source: Limit | None = None
+
+
+def _block(bytes_: int, name: str) -> Limit:
+    """Return the limit of a uniform block."""
+    return Limit(name, bytes_, "use another place with --weights, or a smaller --variant, as window8+rank16")
+
+
+INLINED = Limit(
+    "weights that a driver compiles in reasonable time",
+    LARGEST_WEIGHTS,
+    "use --weights texture or uniform where the target has it, or a smaller --variant",
+)
+"""Weights as straight code."""
+
+TABLE_WEIGHTS = Limit("weights of a constant table", 2**20, "use --weights buffer")
+"""Weights as a table."""
+
+
+def _texture(side: int) -> Limit:
+    """Return the limit of a texture of so many rows."""
+    return Limit(f"GL_MAX_TEXTURE_SIZE rows of {WEIGHT_TEXTURE_WIDTH}", side, "use a smaller --variant")
+
+
+def _storage(kernel: str, uniform: int = 0, name: str = "") -> dict[str, Place]:
+    """Return the places of a target with storage buffers."""
+    found = {BUFFER: Place(kernel)}
+    return found | {UNIFORM: Place(f"{kernel}:{UNIFORM}", limit=_block(uniform, name))} if uniform else found
+
+
+def _tabled(kernel: str) -> dict[str, Place]:
+    """Return the place of a table."""
+    return {INLINE: Place(f"{kernel}:{INLINE}", limit=TABLE_WEIGHTS, each=1.0)}
+
+
+def _fragment(kernel: str, rows: int) -> dict[str, Place]:
+    """Return the places of a fragment shader."""
+    return {
+        TEXTURE: Place(kernel, limit=_texture(rows), each=1 / WEIGHT_TEXTURE_WIDTH),
+        INLINE: Place(kernel, "inlined", limit=INLINED, each=1.0),
+        UNIFORM: Place(f"{kernel}:{UNIFORM}", limit=_block(16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE")),
+    }
+
+
+VULKAN_PLACES = _storage("glsl-vulkan", 16 * KILOBYTE, "maxUniformBufferRange")
+"""Places of weights for Vulkan, and what is made of its GLSL."""
+
+DISPATCH = "dispatch(ceil(width / 8), ceil(height / 8), 1)"
+"""How kernels on buffers are started."""
+
+GL_CODE = """\
+GLuint program = link(fullscreen_triangle, compile(GL_FRAGMENT_SHADER, "denoise.frag"));
+glUseProgram(program);
+/* One RGBA32F texture for each image (texel row 0 is the top row), and the weights: R32F, 1024 wide. */
+{images}
+bind_texture({count}, weight_texture, "weight_texture");
+/* The result: an RGBA32F colour buffer of the picture's size; its values are display-encoded already. */
+glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_of(result_texture));
+glViewport(0, 0, width, height);
+glDisable(GL_FRAMEBUFFER_SRGB);
+glDrawArrays(GL_TRIANGLES, 0, 3);"""
+"""Integration with OpenGL; helpers are the program's own."""
+
+BUFFERS_CODE = """\
+/* All buffers hold 32-bit floats; images (height, width, channels), rows from the top. */
+{api} pipeline = create_pipeline("{file}", "{entry}");
+bind_uniform(pipeline, 0, sizes);          /* int32: width, height */
+bind_storage(pipeline, 1, weights);        /* weights.bin */
+bind_storage(pipeline, 2, result);         /* width * height * 3 floats, display-encoded */
+{images}
+{dispatch};
+wait();
+show(result);                              /* do not encode for the display again */"""
+"""Integration with buffers that have numbers; helpers are the program's own."""
+
+ARGUMENTS_CODE = """\
+/* Arrays of float: images (height, width, channels), rows from the top; weights as in weights.bin. */
+{call}
+/* result: width * height * 3 floats, display-encoded: do not encode them for the display again. */"""
+"""Integration with functions."""
+
+
+def _rows() -> tuple[Row, ...]:
+    """Return all rows but ONNX, which is no kernel's text."""
+    buffers, arguments = "numbered", "arguments"
+    return (
+        Row(
+            "opencl",
+            "OpenCL C 1.2",
+            _storage("opencl", 64 * KILOBYTE, "CL_DEVICE_MAX_CONSTANT_BUFFER_SIZE") | _tabled("opencl"),
+            _as(".cl"),
+            arguments,
+            'cl_kernel kernel = clCreateKernel(program, "wamnet_denoise", &error);\n'
+            "/* Arguments in this order: {arguments}. */\n"
+            "set_arguments(kernel, {arguments});\n"
+            "size_t global[2] = {{round_up(width, 16), round_up(height, 4)}}, local[2] = {{16, 4}};\n"
+            "clEnqueueNDRangeKernel(queue, kernel, 2, NULL, global, local, 0, NULL, NULL);",
+        ),
+        Row("glsl", "GLSL 3.30, fragment shader", _fragment("opengl", 1024), _as(".frag"), "names", GL_CODE),
+        Row(
+            "glsl-compute",
+            "GLSL 4.30, compute shader",
+            _storage("glsl-compute", 16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE"),
+            _as(".comp"),
+            buffers,
+            BUFFERS_CODE.replace("{api}", "GLuint").replace("{dispatch}", f"gl{DISPATCH}"),
+        ),
+        Row(
+            "glsl-es",
+            "GLSL ES 3.00, fragment shader",
+            _fragment("glsl-es", 2048),
+            _as(".frag"),
+            "names",
+            GL_CODE,
+        ),
+        Row(
+            "glsl-vulkan",
+            "GLSL 4.50 for Vulkan, compute shader",
+            VULKAN_PLACES,
+            _as(".comp"),
+            buffers,
+            BUFFERS_CODE.replace("{api}", "VkPipeline").replace("{dispatch}", DISPATCH),
+        ),
+        Row(
+            "wgsl",
+            "WGSL",
+            _storage("wgsl", 64 * KILOBYTE, "maxUniformBufferBindingSize"),
+            _as(".wgsl"),
+            buffers,
+            BUFFERS_CODE.replace("{api}", "const").replace("{dispatch}", DISPATCH),
+            most_images=Limit("maxStorageBuffersPerShaderStage, less 2", 6, "use fewer features"),
+        ),
+        Row(
+            "hlsl",
+            "HLSL, compute shader for fxc (shader model 5.0) and dxc (6.0)",
+            VULKAN_PLACES,
+            _hlsl,
+            "registers",
+            BUFFERS_CODE.replace("{api}", "auto").replace("{dispatch}", DISPATCH),
+        ),
+        Row(
+            "metal",
+            "Metal Shading Language",
+            _storage("metal", 64 * KILOBYTE, "constant memory of a kernel") | _tabled("metal"),
+            _as(".metal"),
+            buffers,
+            BUFFERS_CODE.replace("{api}", "id<MTLComputePipelineState>").replace(
+                "{dispatch}", "dispatchThreads(width, height)"
+            ),
+        ),
+        Row(
+            "spirv",
+            "SPIR-V 1.0, compute shader",
+            VULKAN_PLACES,
+            _spirv,
+            buffers,
+            BUFFERS_CODE.replace("{api}", "VkPipeline").replace("{dispatch}", DISPATCH),
+        ),
+        Row(
+            "c",
+            "C99, one header",
+            {BUFFER: Place("c"), **_tabled("c")},
+            _as(".h"),
+            arguments,
+            '#include "denoise.h"\n'
+            + ARGUMENTS_CODE.replace("{call}", "wamnet_image({arguments});")
+            + "\n/* Compile with -ffp-contract=off; wamnet_pixel does one pixel, for loops of your own. */",
+        ),
+        Row(
+            "cuda",
+            "CUDA C",
+            {BUFFER: Place("cuda"), **_tabled("cuda")},
+            _as(".cu"),
+            arguments,
+            ARGUMENTS_CODE.replace(
+                "{call}",
+                "dim3 block(16, 8), grid((width + 15) / 16, (height + 7) / 8);\n"
+                "wamnet_denoise<<<grid, block>>>({arguments});\n"
+                "cudaDeviceSynchronize();",
+            ),
+        ),
+        Row(
+            "shadertoy",
+            "Shadertoy's tabs",
+            {INLINE: Place("shadertoy", "inlined", limit=INLINED, each=1.0)},
+            _as(".glsl"),
+            "channels",
+            "1. Make buffers A, B, ... and paste features/feature.<name>.glsl into one each, in this order.\n"
+            "2. Paste denoise.glsl into the tab Image.\n"
+            "3. In Image, set iChannel0, iChannel1, ... to the buffers in that order:\n"
+            "{images}\n"
+            "4. Set each channel's filter to nearest and its wrap to clamp.",
+            entry="mainImage",
+            single=True,
+            most_images=Limit("buffers of a Shadertoy, A to D", 4, "use fewer features"),
+            source=Limit(
+                "characters of a tab, a bound of ours: the site states none",
+                1_000_000,
+                "use a smaller --variant",
+            ),
+        ),
+        Row(
+            "godot",
+            "Godot 4 shading language, canvas item",
+            {
+                TEXTURE: Place("godot", limit=_texture(16384), each=1 / WEIGHT_TEXTURE_WIDTH),
+                **_tabled("godot"),
+            },
+            _as(".gdshader"),
+            "names",
+            "var material = ShaderMaterial.new()\n"
+            'material.shader = load("res://denoise.gdshader")\n'
+            "# Images: FORMAT_RGBF, row 0 the top row; weights: FORMAT_RF, 1024 wide, padded with zeros.\n"
+            "{images}\n"
+            'material.set_shader_parameter("weight_texture", ImageTexture.create_from_image(weights))\n'
+            "$Picture.material = material   # a TextureRect of the picture's size\n"
+            "get_viewport().use_hdr_2d = true   # else colours keep 8 bits",
+            single=True,
+        ),
+    )
+
+
+TARGETS: Mapping[str, Row] = {row.name: row for row in _rows()}
+"""All targets whose kernels are text or SPIR-V, by name."""
+
+ONNX = "onnx"
+"""The target that is a graph."""
+
+NAMES = (*TARGETS, ONNX)
+"""All names of targets here; the web page is another command's."""

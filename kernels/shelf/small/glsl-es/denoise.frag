@@ -1,0 +1,163 @@
+#version 300 es
+/*
+ * wamnet denoiser, GLSL ES 3.00, fragment shader. Generated: change the compiler, not this text.
+ * program   ec6980fdf7f222c9e4138f87e048f8a2
+ * images    color: 3 channels in [0.0, 1.0], sRGB of (linear radiance * 2^0.0) clipped to 0 .. 1 (IEC 61966-2-1)
+ *           normal: 3 channels in [-1.0, 1.0], unit normal in world space towards the ray's origin, mean over samples; 0 where nothing is hit
+ * window    4 x 4 pixels, the pixel itself is tap 2
+ * border    clamp
+ * output    3 channels, sRGB of (linear radiance * 2^0.0) clipped to 0 .. 1 (IEC 61966-2-1)
+ * profile   ieee: any order of summation, fused multiply-add allowed, emitted sine
+ * sine      emitted, odd polynomial of degree 11
+ * bound     |output - float64 reference| <= 3.37e-06 for all images in these ranges
+ * assumes   the compiler keeps the order of the operations of an expression, fused or not: the
+ *           language has no word to demand it. Run the check pair on a new device before you rely on
+ *           the bound
+ * sums      over the window: a partial sum for each image and row of taps, in any order; then these
+ * arguments each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel
+ *           row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the
+ *           bottom, or the window stands on its head;
+ *           weight_texture: R32F, 1024 texels wide, as many rows as weights fill (the last
+ *           padded), row by row; it is read with texelFetch alone, so filters do not matter;
+ *           result: a float colour buffer of width x height, row 0 again the top row; no sRGB conversion by
+ *           the target, the values are encoded already. Draw one triangle that covers it.
+ *           float textures to draw into need EXT_color_buffer_float in OpenGL ES 3.0 and WebGL 2
+ * weights   W0 (96 x 8) at 0, b0 (8) at 768, W1 (8 x 3) at 776, b1 (3) at 800; matrices input-major:
+ *           D_in x D_out, in C order
+ */
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+#define PRECISE /* GLSL ES 3.00 has no `precise` */
+#define WINDOW_SIZE 4
+#define WINDOW_CENTRE 2 /* the tap that lies on the pixel itself */
+uniform sampler2D image_color;
+uniform sampler2D image_normal;
+uniform sampler2D weight_texture;
+layout(location = 0) out vec4 result;
+
+float weights(int index)
+{
+    ivec2 texel = ivec2(index % 1024, index / 1024);
+    return texelFetch(weight_texture, texel, 0).r;
+}
+
+void main()
+{
+    int width = textureSize(image_color, 0).x;
+    int height = textureSize(image_color, 0).y;
+    int x = int(gl_FragCoord.x);
+    int y = int(gl_FragCoord.y);
+    result = vec4(0.0, 0.0, 0.0, 1.0);
+
+    /* %1: affine map W0 from 96 to 8 */
+    float v1[8];
+    for (int j = 0; j < 8; ++j) {
+        v1[j] = weights(768 + j);
+    }
+    PRECISE float part1[8];
+    for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
+        int row = clamp(y + dy - WINDOW_CENTRE, 0, height - 1);
+        for (int j = 0; j < 8; ++j) {
+            part1[j] = 0.0f;
+        }
+        for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
+            int column = clamp(x + dx - WINDOW_CENTRE, 0, width - 1);
+            int tap = (dy * WINDOW_SIZE + dx) * 6;
+            for (int c = 0; c < 3; ++c) {
+                float value = texelFetch(image_color, ivec2(column, row), 0)[c];
+                for (int j = 0; j < 8; ++j) {
+                    part1[j] += weights((tap + c) * 8 + j) * value;
+                }
+            }
+        }
+        for (int j = 0; j < 8; ++j) {
+            v1[j] += part1[j];
+        }
+    }
+    for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
+        int row = clamp(y + dy - WINDOW_CENTRE, 0, height - 1);
+        for (int j = 0; j < 8; ++j) {
+            part1[j] = 0.0f;
+        }
+        for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
+            int column = clamp(x + dx - WINDOW_CENTRE, 0, width - 1);
+            int tap = (dy * WINDOW_SIZE + dx) * 6;
+            for (int c = 0; c < 3; ++c) {
+                float value = texelFetch(image_normal, ivec2(column, row), 0)[c];
+                for (int j = 0; j < 8; ++j) {
+                    part1[j] += weights((tap + 3 + c) * 8 + j) * value;
+                }
+            }
+        }
+        for (int j = 0; j < 8; ++j) {
+            v1[j] += part1[j];
+        }
+    }
+
+    /* %3 to %50: elementwise on 8 numbers */
+    float v50[8];
+    for (int i = 0; i < 8; ++i) {
+        PRECISE float t3 = 2.0f * v1[i];
+        PRECISE float t5 = t3 * 0.318309873f;
+        PRECISE float t7 = t5 + 0.5f;
+        PRECISE float t8 = floor(t7);
+        PRECISE float t10 = t8 * 3.14160156f;
+        PRECISE float t11 = t3 - t10;
+        PRECISE float t13 = t8 * (-8.9071691e-06f);
+        PRECISE float t14 = t11 - t13;
+        PRECISE float t16 = t8 * (-1.74122761e-09f);
+        PRECISE float t17 = t14 - t16;
+        PRECISE float t18 = 0.5f * t8;
+        PRECISE float t19 = floor(t18);
+        PRECISE float t20 = 2.0f * t19;
+        PRECISE float t21 = t8 - t20;
+        PRECISE float t22 = 2.0f * t21;
+        PRECISE float t24 = 1.0f - t22;
+        PRECISE float t25 = t17 * t17;
+        PRECISE float t27 = t25 * (-2.51969432e-08f);
+        PRECISE float t29 = t27 + 2.76094511e-06f;
+        PRECISE float t30 = t25 * t29;
+        PRECISE float t32 = t30 + (-0.000198427704f);
+        PRECISE float t33 = t25 * t32;
+        PRECISE float t35 = t33 + 0.00833334867f;
+        PRECISE float t36 = t25 * t35;
+        PRECISE float t38 = t36 + (-0.166666672f);
+        PRECISE float t39 = t25 * t38;
+        PRECISE float t40 = t17 * t39;
+        PRECISE float t41 = t17 + t40;
+        PRECISE float t42 = t24 * t41;
+        PRECISE float t43 = min(t42, 1.0f);
+        PRECISE float t45 = max(t43, (-1.0f));
+        PRECISE float t46 = abs(t3);
+        bool t48 = t46 <= 12800.0f;
+        PRECISE float t49 = t3 - t3;
+        PRECISE float t50 = t48 ? t45 : t49;
+        v50[i] = t50;
+    }
+
+    /* %51: affine map W1 from 8 to 3 */
+    float v51[3];
+    for (int j = 0; j < 3; ++j) {
+        v51[j] = weights(800 + j);
+    }
+    for (int i = 0; i < 8; ++i) {
+        float value = v50[i];
+        for (int j = 0; j < 3; ++j) {
+            v51[j] += weights(776 + i * 3 + j) * value;
+        }
+    }
+
+    /* %53 to %54: elementwise on 3 numbers */
+    float v54[3];
+    for (int i = 0; i < 3; ++i) {
+        PRECISE float t53 = max(v51[i], 0.0f);
+        PRECISE float t54 = min(t53, 1.0f);
+        v54[i] = t54;
+    }
+
+    /* output color */
+    result[0] = v54[0];
+    result[1] = v54[1];
+    result[2] = v54[2];
+}

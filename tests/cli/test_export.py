@@ -1,0 +1,74 @@
+"""`wamnet export`: files of each target, options of scenes, verdicts, refusals."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from wamnet.cli import export as command
+from wamnet.kernels.export import check, targets
+
+
+def test_an_export_is_a_folder_that_certify_takes(wamnet, samples, tmp_path):
+    outcome = wamnet(
+        "export", samples / "model.safetensors", "--target", "c", "--weights", "inline", "-o", "x"
+    )
+    assert outcome.status == 0, outcome.err
+    manifest = json.loads((tmp_path / "x/manifest.json").read_text())
+    assert manifest["target"] == "c"
+    assert manifest["weights"]["where"] == "inline"
+    assert "weights of a constant table: 803 of 1048576" in outcome.out
+    assert {*manifest["files"], "manifest.json"} == {
+        path.relative_to(tmp_path / "x").as_posix() for path in (tmp_path / "x").rglob("*") if path.is_file()
+    }
+    assert wamnet("certify", "x/denoise").status == 0
+
+
+def test_a_scene_comes_along_and_the_check_is_told(wamnet, samples, tmp_path):
+    arguments = ["--scene", "lone_light", "--max-depth", "1", "--target", "cuda", "--check", "-o", "x"]
+    outcome = wamnet("export", samples / "model.safetensors", *arguments)
+    assert outcome.status == 0, outcome.err
+    assert {path.name for path in (tmp_path / "x").iterdir() if path.is_dir()} == {
+        *("denoise", "path", "encode", "check")
+    }
+    assert "the bound assumes: the compiler is not told to relax arithmetic" in outcome.out
+    assert "error: " in outcome.out
+    manifest = json.loads((tmp_path / "x/manifest.json").read_text())
+    assert manifest["scene"]["settings"]["max_depth"] == 1
+    assert [kernel["role"] for kernel in manifest["kernels"]] == ["path", "encode", "denoise"]
+
+
+def test_a_wrong_export_ends_with_status_1(wamnet, samples, monkeypatch):
+    verdict = check.Verdict("c", "buffer", 1, "cc", "cc", wrong="off by 1, 9 times the bound")
+    monkeypatch.setattr(check, "check", lambda made: verdict)
+    outcome = wamnet("export", samples / "model.safetensors", "--target", "c", "--check", "-o", "x")
+    assert outcome.status == 1
+    assert "wrong: off by 1, 9 times the bound" in outcome.out
+
+
+def test_help_names_every_target():
+    assert command.TARGETS.replace(" ", "").split(",") == [
+        *(name for name in targets.NAMES if name != "onnx"),
+        "onnx",
+        "html",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--target", "abacus"], "--target is abacus: must be one of opencl, glsl"),
+        (
+            ["--target", "c", "--weights", "texture"],
+            "--weights is texture: target c has weights in: buffer, inline",
+        ),
+        (["--target", "c", "--time", "2"], "--time is 2.0: there is no scene; name one with --scene"),
+        (["--target", "c", "--max-depth", "2"], "--max-depth is 2: there is no scene"),
+        (["--target", "html", "--weights", "inline"], "--weights is inline: a web page has its own"),
+        (["--target", "c", "-o", "noisy.exr"], "output folder is noisy.exr: it is a file"),
+    ],
+)
+def test_refusals(refused, samples, tmp_path, arguments, told):
+    (tmp_path / "noisy.exr").write_bytes(b"")
+    assert told in refused("export", samples / "model.safetensors", *arguments)

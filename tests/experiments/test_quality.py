@@ -1,0 +1,130 @@
+"""The comparison of quality: what its rows are given, the whole way at toy size, and the models it makes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import models
+import numpy as np
+import pytest
+import quality
+from lab import scores
+from lab.results import Results
+
+from wamnet.compiler.model_file import load_model
+from wamnet.refimpl.encoding import to_display
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.frame import Frame
+
+TOY = quality.PLANS["toy"]
+
+
+@pytest.fixture
+def bench(tmp_path) -> quality.Bench:
+    return quality.Bench("cornell", TOY, tmp_path / "cache", "numpy")
+
+
+def test_test_frames_are_new(bench):
+    """Their times, and the noise of each seed; references are the same for all seeds and features."""
+    train, test = bench.times
+    assert not set(train) & set(test)
+    first, second = bench.tests(0, 1), bench.tests(1, 1)
+    assert not np.array_equal(first[0][0]["color"], second[0][0]["color"])
+    assert np.array_equal(first[0][1]["color"], second[0][1]["color"])
+    noises = [frame["color"] for frame, _ in bench.training(1)]
+    assert not any(np.array_equal(first[0][0]["color"], noise) for noise in noises)
+
+
+def test_rays_change_features_alone(bench):
+    (one, clean), (many, same) = bench.tests(0, 1)[0], bench.tests(0, quality.RAYS)[0]
+    assert np.array_equal(one["color"], many["color"])
+    assert np.array_equal(clean["color"], same["color"])
+    assert not np.array_equal(one["normal"], many["normal"])
+    assert many.info["feature_spp"] == str(quality.RAYS)
+
+
+def test_what_open_image_denoise_is_given(monkeypatch):
+    """Radiance as it is; features or none; what is declared clean."""
+    seen = []
+    monkeypatch.setattr(quality, "filtered", lambda *given: seen.append(given) or given[0]["color"])
+    frame = Frame({"color": np.full((2, 2, 3), 3.0)})
+    for row in ("oidn-color", "oidn-1", "oidn-clean1", "oidn-clean16", "oidn-fast16"):
+        assert np.array_equal(quality.oidn(quality.ROWS[row], frame), frame["color"])
+    assert [aux for _, aux, _, _ in seen] == [None, frame, frame, frame, frame]
+    assert [clean for _, _, clean, _ in seen] == [False, False, True, True, True]
+    assert [how for *_, how in seen] == ["high", "high", "high", "high", "fast"]
+    # What is judged is its radiance as a screen shows it.
+    pictures, _ = quality.denoised(
+        SimpleNamespace(executor="numpy"),
+        quality.ROWS["oidn-1"],
+        [frame],
+        0,  # type: ignore[arg-type]
+    )
+    assert np.array_equal(pictures[0][0], to_display(frame["color"]))
+
+
+def test_the_whole_way(tmp_path, capsys):
+    """Tables, JSON and a sheet; a second run finds all of it there and says the same."""
+    options = ["--scale", "toy", "--scenes", "cornell", "--only", "input", "best-16", "--seeds", "0", "1"]
+    options += ["--executor", "numpy", "--rounds", "0", "--cache", str(tmp_path / "c"), "-o", str(tmp_path)]
+    quality.main(options)
+    text = (tmp_path / "quality.md").read_text()
+    assert capsys.readouterr().out.strip().endswith(text.strip())
+    assert "| input, 1 spp |" in text
+    data = json.loads((tmp_path / "quality.json").read_text())
+    found = {(r["configuration"], r["seed"]) for r in data["records"]}
+    rows = {(f"cornell: {row}", seed) for row in ("input", "best-16") for seed in (0, 1)}
+    assert found == {*rows, ("cornell: ladder", 0)}
+    assert (tmp_path / "cornell.png").stat().st_size > 0
+    before = (tmp_path / "quality.json").read_bytes()
+    quality.main(options)
+    assert (tmp_path / "quality.md").read_text() == text
+    assert (tmp_path / "quality.json").read_bytes() == before
+
+
+def test_gaps_are_to_the_best_peer_with_the_same_features(tmp_path):
+    """By hand: 36 and 38 against 33 and 34 are 3.5 ± 0.71 ahead; features of 16 rays are no peer of 1."""
+    kept = Results.open(tmp_path / "r.json", "quality", {})
+    values = {"best-1": (34, 34), "best-16": (36, 38), "oidn-1": (32, 31), "oidn-clean16": (33, 34)}
+    for row, numbers in values.items():
+        for seed, number in enumerate(numbers):
+            kept.put(f"cornell: {row}", seed, {"psnr": number})
+    lines = quality._ahead(kept, "cornell", list(values)).splitlines()
+    assert lines == [
+        "wamnet, best, features of 1 ray: 2.50 ± 0.71 dB ahead of "
+        "Open Image Denoise, high, features of 1 ray.",
+        "wamnet, best, 16 rays: 3.50 ± 0.71 dB ahead of Open Image Denoise, high, clean, 16 rays.",
+    ]
+
+
+def test_an_unknown_row_is_refused(tmp_path):
+    with pytest.raises(InputError, match="row is best-9: there is none of this name; use some of input"):
+        quality.main(["--only", "best-9", "-o", str(tmp_path / "none")])
+    assert not (tmp_path / "none").exists()
+
+
+def test_models_carry_their_scores(bench, tmp_path, monkeypatch):
+    """Those of the experiment's rows, and a digest beside each file."""
+    monkeypatch.setattr(quality, "filtered", lambda frame, *_: frame["color"])
+    models.written(tmp_path / "m", {"cornell": models.shipped(bench)})
+    model = load_model(tmp_path / "m" / "cornell.safetensors")
+    found = json.loads(model.info["scores"])
+    assert list(found) == list(models.SCORED)
+    row, ladder = quality.ROWS["best-16"], scores.Ladder((1,), (1.0,))
+    want = quality.judged(bench, row, ladder, 0)
+    assert found["16 rays"] == {name: round(want[name], 4) for name in ("psnr", "ssim", "flip")}
+    want = quality.judged(bench, quality.ROWS["input"], ladder, 0)
+    assert found["input"]["psnr"] == round(want["psnr"], 4)
+    assert model.info["trained_on_feature_spp"] == "16"
+    digest, name = (tmp_path / "m" / models.SUMS).read_text().split()
+    assert name == "cornell.safetensors"
+    assert digest == quality_sum(tmp_path / "m" / name)
+    assert replace(model, info={}).siren.widths[0] == 12 * 12 * 12
+
+
+def quality_sum(path) -> str:
+    import hashlib
+
+    return hashlib.sha256(path.read_bytes()).hexdigest()

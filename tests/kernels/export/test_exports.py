@@ -1,0 +1,251 @@
+"""Whole exports: files, manifest and pair of every target; what runs them holds them to their bound."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from wamnet.kernels.conformance.numbers import to_json
+from wamnet.kernels.conformance.on_executor import OnExecutor
+from wamnet.kernels.conformance.program import serve
+from wamnet.kernels.conformance.run import judge, read_vectors
+from wamnet.kernels.conformance.vectors import FOLDER
+from wamnet.kernels.export import check, runners, targets, tools
+from wamnet.kernels.export.package import Request, export
+from wamnet.refimpl import siren
+from wamnet.refimpl.dataset import Normalization, Window
+from wamnet.refimpl.denoise import Model
+from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
+from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.transport import Settings
+
+ROOT = Path(__file__).resolve().parents[3]
+"""The repository's root folder."""
+
+
+def model(widths=(96, 8, 3), size=4, features=("color", "normal")):
+    """An untrained network whose outputs lie around the middle: clipped ones would hide errors."""
+    network = siren.init(widths, 2.0, 2.0, 5, np.float32)
+    middle = np.full(3, 0.5, np.float32)
+    network = replace(network, biases=(*network.biases[:-1], middle))
+    return Model(network, features, Window(size, "clamp"), Normalization(), {})
+
+
+SCENE = canonical("lone_light")
+"""A small scene: test_runners.py has a large one."""
+
+
+def made(target, **options):
+    """Return an export, with a scene where the target has paths."""
+    scene = None if target == "onnx" else SCENE
+    return export(Request(model(), target, scene, settings=Settings(max_depth=1), **options))
+
+
+@pytest.fixture(scope="module", params=targets.NAMES)
+def exported(request):
+    try:
+        return made(request.param)
+    except ExecutorUnavailable as error:
+        pytest.skip(str(error))
+
+
+def test_an_export_keeps_its_bound_where_it_is_run(exported):
+    """EXP-4, EXP-6, EXP-10, EXP-11: the pair's picture within its bound; the paths' sums but for 2 %."""
+    verdict = check.check(exported)
+    assert verdict.holds, verdict.wrong
+    if "missing" in verdict.executed:
+        pytest.skip(verdict.executed)
+    assert verdict.share <= 1
+    assert verdict.error > 0, "clipped outputs would hide errors"
+    assert exported.target == "onnx" or verdict.paths >= check.PATHS_ALIKE
+
+
+def test_the_manifest_is_of_the_schema_and_names_every_file(exported):
+    """EXP-8: all that the clause lists."""
+    schema = json.loads((ROOT / "spec/export.schema.json").read_text())
+    contents = exported.contents()
+    manifest = json.loads(contents["manifest.json"])
+    jsonschema.Draft202012Validator(schema).validate(manifest)
+    hashes = {n: hashlib.sha256(data).hexdigest() for n, data in contents.items() if n != "manifest.json"}
+    assert manifest["files"] == hashes
+    named = {name for kernel in manifest["kernels"] for name in kernel["files"]}
+    assert named <= set(hashes)
+    assert manifest["kernels"][-1]["role"] == "denoise"
+    assert "are yours" in manifest["licence"]
+    readme = contents["README.md"].decode()
+    assert all(name in readme for name in named)
+    assert "{" not in readme.partition("## Integration")[2].partition("```")[0]
+
+
+def test_entry_points_and_names_stand_in_the_source(exported):
+    if exported.denoiser is None:
+        pytest.skip("a graph has no text")
+    for kernel in exported.manifest["kernels"]:
+        texts = [exported.files[n].decode() for n in kernel["files"] if not n.endswith(".spv")]
+        for text in texts:
+            assert kernel["entry_point"] in text
+        if exported.target in ("opencl", "glsl", "glsl-es", "metal", "cuda", "c", "wgsl", "glsl-vulkan"):
+            names = [b["name"] for b in kernel["bindings"] if b["name"].startswith("image_")]
+            assert all(name in texts[0] for name in names)
+
+
+def test_the_pair_s_files_are_as_they_say(exported):
+    """EXP-9: shapes, and bounds that are not zero."""
+    told = json.loads(exported.files["check/check.json"])
+    pixels = told["width"] * told["height"]
+    for name, image in told["images"].items():
+        data = np.frombuffer(exported.files[f"check/{image['file']}"], "<f4")
+        assert data.size == pixels * image["channels"], name
+    output, bound = (np.frombuffer(exported.files[f"check/{n}.f32"], "<f4") for n in ("output", "bound"))
+    assert output.size == bound.size == 3 * pixels
+    assert (bound > 0).all()
+    assert told["width"] > model().window.size, "the pair shows borders and what is between"
+
+
+@pytest.mark.parametrize("target", ["c", "shadertoy", "onnx"])
+def test_an_export_is_the_same_to_the_byte(target):
+    assert made(target).contents() == made(target).contents()
+
+
+@pytest.mark.parametrize("target", ["wgsl", "c", "glsl-es"])
+def test_a_fault_in_the_weights_is_found(target):
+    """One weight of 800 is off by a tenth."""
+    whole = made(target)
+    weights = whole.denoiser.weights.copy()
+    weights[3] += 0.1
+    wrong = replace(whole.denoiser, weights=weights, manifest={**whole.denoiser.manifest, "digest": "0" * 64})
+    verdict = check.check(replace(whole, denoiser=wrong))
+    if "missing" in verdict.executed:
+        pytest.skip(verdict.executed)
+    assert not verdict.holds
+    assert "times the bound" in verdict.wrong
+
+
+def test_a_fault_in_the_paths_is_found():
+    """Red is one percent too bright, in a room that is lit all over."""
+    scene = canonical("cornell")
+    whole = export(Request(model(), "c", scene, settings=Settings(max_depth=1)))
+    source = whole.path.source.replace("sum_color_r += radiance_r", "sum_color_r += radiance_r * 1.01f")
+    assert source != whole.path.source
+    wrong = replace(whole.path, source=source, manifest={**whole.path.manifest, "digest": "1" * 64})
+    verdict = check.check(replace(whole, path=wrong))
+    assert "of the paths' sums agree" in verdict.wrong
+
+
+def test_what_a_tool_refuses_is_a_verdict():
+    whole = made("c")
+    files = {**whole.files, "denoise/denoise.h": b"int wamnet(int x) { return x + 1.5; }\n"}
+    verdict = check.check(replace(whole, files=files))
+    assert verdict.wrong.startswith("cc refuses the kernel")
+
+
+# ---- places of weights, variants, limits -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("target", "place"),
+    [(row.name, place) for row in targets.TARGETS.values() for place in [*row.places][1:]],
+)
+def test_other_places_of_weights_keep_the_bound(target, place):
+    """EXP-7: each place that a target has is compiled and, where something runs it, held to the bound."""
+    try:
+        whole = export(Request(model(), target, weights=place))
+    except ExecutorUnavailable as error:
+        pytest.skip(str(error))
+    assert whole.manifest["weights"]["where"] == place
+    verdict = check.check(whole)
+    assert verdict.holds, verdict.wrong
+    if "missing" in verdict.executed:
+        assert (target, place) in {("opencl", "inline"), ("glsl", "uniform"), ("glsl-es", "uniform")} or (
+            "not installed" in verdict.executed
+        )
+
+
+@pytest.mark.parametrize("target", ["wgsl", "cuda", "metal", "glsl-es"])
+def test_a_variant_of_low_rank_is_two_kernels(target):
+    whole = export(Request(model(), target, variant="rank2"))
+    assert [k["role"] for k in whole.manifest["kernels"]] == ["horizontal", "denoise"]
+    verdict = check.check(whole)
+    assert verdict.holds, verdict.wrong
+
+
+@pytest.mark.parametrize(
+    ("request_", "told"),
+    [
+        (Request(model(), "abacus"), "--target is abacus: must be one of opencl, .*, html"),
+        (Request(model(), "wgsl", weights="texture"), "--weights is texture: target wgsl has weights in"),
+        (Request(model(), "onnx", SCENE), "--scene is lone_light: a graph denoises"),
+        (Request(model(), "onnx", weights="buffer"), "--weights is buffer: a graph holds its weights"),
+        (
+            Request(model((96, 48, 3)), "glsl-es", weights="uniform"),
+            "GL_MAX_UNIFORM_BLOCK_SIZE is 19212: glsl-es takes at most 16384; use another place",
+        ),
+        (
+            Request(model((96, 700, 3)), "glsl-es", weights="inline"),
+            "weights that a driver compiles in reasonable time is 70003: glsl-es takes at most 65536",
+        ),
+        (Request(model(), "shadertoy", variant="rank2"), "--variant is rank2: target shadertoy has one pass"),
+        (
+            Request(
+                model((16 * 15, 4, 3), 4, ("color", "normal", "albedo", "position", "direction")), "shadertoy"
+            ),
+            "buffers of a Shadertoy, A to D is 5: shadertoy takes at most 4",
+        ),
+    ],
+    ids=lambda value: value.target + value.weights if isinstance(value, Request) else "",
+)
+def test_refusals_name_the_limit(request_, told):
+    with pytest.raises(InputError, match=told):
+        export(request_)
+
+
+def test_a_tool_that_is_missing_is_named(monkeypatch, tmp_path):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(ExecutorUnavailable, match="cc is not installed: apt-get install gcc"):
+        tools.run("cc", "--version", folder=tmp_path)
+    verdict = check.check(made("c"))
+    assert "missing: cc is not installed" in verdict.compiled
+
+
+def test_a_kernel_that_a_tool_refuses(tmp_path):
+    if not tools.have("glslangValidator"):
+        pytest.skip("glslangValidator is not installed")
+    with pytest.raises(CompileError, match=r"glslangValidator refuses the kernel: .*error"):
+        tools.spirv("#version 450\nvoid main() { flaot x; }")
+
+
+# ---- conformance -------------------------------------------------------------------------------------------
+
+KINDS = {"sine", "random.block", "sampling.cosine_hemisphere", "picture.denoised"}
+"""Kinds that runners are asked here; `wamnet conformance --executor wgsl` asks all."""
+
+
+@pytest.mark.parametrize("name", ["wgsl", "c99", "glsl-es", "metal"])
+def test_runners_answer_the_vectors_of_the_profile(name):
+    cases = {kind: some for kind, some in read_vectors(FOLDER).items() if kind in KINDS}
+    assert set(cases) == KINDS
+    try:
+        runner = runners.RUNNERS[name]()
+    except ExecutorUnavailable as error:
+        pytest.skip(str(error))
+    with runner:
+        answers = OnExecutor(runner)
+        requests = [
+            json.dumps({"id": case.id, "kind": kind, "profile": "ieee", "input": to_json(dict(case.inputs))})
+            for kind, some in cases.items()
+            for case in some
+        ]
+        written = io.StringIO()
+        serve(requests, written, name, answers.kinds, answers.answer)
+    told = map(json.loads, written.getvalue().splitlines())
+    asked = [(kind, case) for kind, some in cases.items() for case in some]
+    verdicts = [judge(kind, case, answer) for (kind, case), answer in zip(asked, told, strict=True)]
+    assert [v for v in verdicts if v.failed] == []
+    assert any(v.verdict == "pass" for v in verdicts)

@@ -57,11 +57,23 @@ class Shot:
     origin: str
 
 
+SceneToShow = Annotated[
+    str | None, typer.Option(help="Canonical scene.", show_default="the one that the model has learned")
+]
+Rays = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Camera rays per pixel of the features; with more than the colour's, pictures are rendered and "
+        "denoised one after the other.",
+        show_default="as in training",
+    ),
+]
+
+
 def animate(
     model: options.ModelFile,
-    scene: Annotated[
-        str | None, typer.Option(help="Canonical scene.", show_default="the one that the model has learned")
-    ] = None,
+    scene: SceneToShow = None,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="PATH", help="Film (.mp4, .gif), or folder of pictures.")
     ] = Path("animation"),
@@ -73,15 +85,7 @@ def animate(
         int, typer.Option(help="Paths per pixel of a reference beside them; 0 shows none.")
     ] = 0,
     seed: options.Seed = 0,
-    feature_spp: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            help="Camera rays per pixel of the features; with more than the colour's, pictures are rendered "
-            "and denoised one after the other.",
-            show_default="as in training",
-        ),
-    ] = None,
+    feature_spp: Rays = None,
     parameters: options.Parameters = None,
     executor: options.Executor = ExecutorName.numpy,
     renderer: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
@@ -97,12 +101,7 @@ def animate(
 
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
-    if is_film:
-        check_output(output, tuple(movie.WRITERS), [model])
-        movie.check(output, fps)
-    elif output.suffix:
-        rule = f"a film's name must end in {' or '.join(movie.WRITERS)}, a folder's in none"
-        raise InputError("output", str(output), rule, "rename it")
+    _check_names(output, model, fps)
     model = model_path(model)
     network = load_model(model)
     chosen = options.parse_parameters(parameters or [])
@@ -132,6 +131,16 @@ def animate(
         movie.write_movie(output, [shot.path for shot in shots], fps)
         shutil.rmtree(folder)
     say(f"{output}: {len(shots)} pictures, {len(left)} of them made now")
+
+
+def _check_names(output: Path, model: Path, fps: float) -> None:
+    """Refuse an output that is no film and no folder, and a film that cannot be written."""
+    if output.suffix.lower() in movie.WRITERS:
+        check_output(output, tuple(movie.WRITERS), [model])
+        movie.check(output, fps)
+    elif output.suffix:
+        rule = f"a film's name must end in {' or '.join(movie.WRITERS)}, a folder's in none"
+        raise InputError("output", str(output), rule, "rename it")
 
 
 def rays_of(model: Model) -> int:

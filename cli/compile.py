@@ -60,8 +60,7 @@ def compile_model(
         str,
         typer.Argument(
             metavar="MODEL",
-            help="Trained model (.safetensors, or model:NAME for one that comes along), canonical scene or "
-            "scene file (.json).",
+            help="Trained model (.safetensors), model:NAME, canonical scene or scene file (.json).",
             show_default=False,
         ),
     ],

@@ -170,7 +170,7 @@ def report(ground: Ground, results: Results, scale: str, seed: int, folder: Path
 
     def line(name: str, moving: Floats, still: Floats) -> figures.Row:
         slices = [motion.slice_over_time(pictures, row, repeat) for pictures in (moving, still)]
-        return name, [("a row over time, moving", slices[0]), ("standing still", slices[1])]
+        return "", [(f"{name}: a row over time", slices[0]), ("the same, standing still", slices[1])]
 
     rows = [
         line(name, *(method(ground, scale, kind, seed) for kind in (MOVING, STILL)))

@@ -4,8 +4,8 @@
    the tests were never trained on.
 2. Networks are trained on A alone, on several sets, or on one of the tests' sets alone, which is as good as
    it can get. Frames are as many in all cases [`trained_on`].
-3. Three inputs are compared [`INPUTS`]: the paper's colour and normal; the preset `short`; and the lamps'
-   light without shadows in place of the albedo (spec/transport.md, LTR-11), which tells the light colours.
+3. Four inputs are compared [`INPUTS`]: the paper's colour and normal; the preset `short`; the lamps' light
+   without shadows in place of its albedo (spec/transport.md, LTR-11), which tells their colours; and both.
 4. Pictures of unseen sets at unseen times are scored, and their error of colour is told [`lab/colors.py`].
 
     python experiments/lights.py
@@ -43,8 +43,9 @@ INPUTS: Mapping[str, tuple[str, ...]] = {
     "paper": PAPER.features,
     "short": SHORT.features,
     "unshadowed": ("color", "normal", "unshadowed", "position"),
+    "both": (*SHORT.features, "unshadowed"),
 }
-"""What the networks see. The last two have as many parameters."""
+"""What the networks see. `short` and `unshadowed` have as many parameters, `both` a quarter more."""
 
 SET_SEED = 61
 """Seed of the light sets' colours."""

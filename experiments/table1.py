@@ -65,8 +65,8 @@ SCALES: Mapping[str, Scale] = {
         ladder=(1, 2, 4, 8, 16, 32, 64, 128, 256),
         short_frames=24,
         paper={"steps": 4000},
-        dncnn={"steps": 1600, "batch": 2, "crop": 40, "half": True},
-        shrunk={"steps": 400, "batch": 2, "crop": 40, "half": True, "shrink": 4},
+        dncnn={"steps": 600, "batch": 8, "crop": 40, "half": True},
+        shrunk={"steps": 200, "batch": 8, "crop": 40, "half": True, "shrink": 4},
         pix2pix={"steps": 1500, "batch": 1, "crop": 128, "width": 32},
     ),
     "paper": Scale(
@@ -203,13 +203,14 @@ TIMES = (
 def written(kept: Results, times: Results) -> str:
     """Return the table."""
     rows = [row for row in ROWS if kept.summary(row, "mse") is not None]
+    clocks = TIMES if times.configurations() else ()
     cells = []
     for row in rows:
         shown = [column.cell(kept.summary(row, column.value)) for column in COLUMNS]
         cells.append(
             [ROWS[row].text, *shown, *(column.cell(times.summary(row, column.value)) for column in TIMES)]
         )
-    return tables.markdown(["", *(column.heading for column in (*COLUMNS, *TIMES))], cells)
+    return tables.markdown(["", *(column.heading for column in (*COLUMNS, *clocks))], cells)
 
 
 def drawn(folder: Path, pictures: Path, size: int, patch: int) -> None:

@@ -6,6 +6,8 @@ const AUTO_LARGEST = 512;
 const AUTO_QUICK_MS = 20; // a larger picture is tried below this
 const AUTO_SLOW_MS = 400; // a smaller one above this
 const AUTO_FRAMES = 4; // frames before either is believed
+const SLOW_MS = 60; // a device that needs more for a frame
+const REST_MS = 100; // is left this long, at most, to the rest of the page before the next one
 const GRAB_PX = 18; // how near to the line a pointer takes hold of it
 const DEGREES_PER_PX = 0.4;
 const LABELS = { color: "1 sample per pixel", normal: "Normals", albedo: "Albedo", picture: "Denoised" };
@@ -150,7 +152,8 @@ class Page {
       this.dirty = this.dirty || times.length > 1;
     }
     renderer.strips.tick(now);
-    if (this.dirty && !this.held && !renderer.strips.busy && renderer.variant(state.variant).ready) {
+    const rested = performance.now() >= (this.restUntil || 0);
+    if (this.dirty && rested && !this.held && !renderer.strips.busy && renderer.variant(state.variant).ready) {
       this.dirty = false;
       this.drawNext();
       renderer.strips.tick(now);
@@ -163,6 +166,7 @@ class Page {
     const size = state.size === "auto" ? this.auto.size : state.size;
     try {
       const ms = await this.renderer.draw(this.request(size));
+      this.restUntil = performance.now() + (ms > SLOW_MS ? Math.min(REST_MS, ms / 4) : 0);
       this.measured(size, ms);
       this.show();
     } catch (error) {

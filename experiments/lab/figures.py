@@ -68,7 +68,7 @@ def curves(
     title: str = "",
 ) -> None:
     """Write lines of means over x, each with a band from the least to the largest of the values at x."""
-    figure, axes = _axes((1, 1), (6.4, 4.0))
+    figure, axes = _axes((1, 1), (6.4 if len(lines) < 2 else 8.4, 4.0))
     axis = axes[0][0]
     for number, (name, found) in enumerate(lines.items()):
         x = [place for place, _ in found]
@@ -87,7 +87,8 @@ def curves(
     axis.set_title(title, fontsize=10)
     axis.grid(visible=True, which="major", color=PAPER.text, alpha=0.15, linewidth=0.6)
     if len(lines) > 1:
-        axis.legend(frameon=False, fontsize=8)
+        # Beside the axes, where it hides no line.
+        figure.legend(frameon=False, fontsize=8, loc="outside right center")
     save(path, figure)
 
 

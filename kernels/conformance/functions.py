@@ -75,7 +75,7 @@ class Function:
 
     def cases(self) -> list[Case]:
         """Return the cases with their answers and bounds."""
-        rows = [(note, values, *(own or [self.clause])) for note, values, *own in self.given]
+        rows = [(row[0], row[1], row[2] if len(row) == 3 else self.clause) for row in self.given]
         if self.draw is not None:
             rows += [("", self.draw(drawn(self.name, index)), self.clause) for index in range(self.draws)]
         found = []

@@ -145,7 +145,9 @@ def test_the_networks_of_lights_are_of_one_size():
     from wamnet.refimpl.dataset import channels_of
 
     inputs = importlib.import_module("lights").INPUTS
-    assert channels_of(inputs["unshadowed"]) == channels_of(inputs["short"])
+    assert (
+        channels_of(inputs["unshadowed"]) == channels_of(inputs["short"]) == channels_of(inputs["both"]) - 3
+    )
     assert inputs["paper"] == PAPER.features
 
 

@@ -269,7 +269,7 @@ UNSHADOWED = Function(
     "Light of the lamps of scenes/terrace.json, as if nothing stood in between",
     "LTR-11",
     {
-        "point": Field("point of a surface", 3, -2.0, 2.0),
+        "point": Field("point of a surface", 3, -4.0, 4.0),
         "normal": Field("unit normal", 3, -1.0),
         "reflectance": Field("of the surface", 3),
     },

@@ -59,13 +59,14 @@ BLOCK = Kind(
 
 def _sobol(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the floats of a block of scrambled Sobol points."""
-    floats = sobol.uniforms(*(rng.counter(int(inputs[name])) for name in COUNTERS), np.float64)
+    seed, pixel, sample, block = (rng.counter(int(inputs[name])) for name in COUNTERS)
+    floats = sobol.uniforms(seed, pixel, sample, block, np.float64)
     return {"floats": np.array([f[0] for f in floats])}
 
 
 def _sobol_blocks() -> list[Case]:
     """Return blocks of a pixel's first samples, at the ends of the counters, and others."""
-    rows = [("", (3, 65536, sample, 1)) for sample in range(6)]
+    rows: list[tuple[str, tuple[int, ...]]] = [("", (3, 65536, sample, 1)) for sample in range(6)]
     rows += [("all at their end", (LAST,) * 4), ("half of all samples", (0, 0, 2**31, 0))]
     rows += [("", tuple(int(u * 2**32) for u in drawn("random.sobol", i, 4))) for i in range(4)]
     found = []

@@ -208,7 +208,7 @@ def written(kept: Results, times: Results) -> str:
     for row in rows:
         shown = [column.cell(kept.summary(row, column.value)) for column in COLUMNS]
         cells.append(
-            [ROWS[row].text, *shown, *(column.cell(times.summary(row, column.value)) for column in TIMES)]
+            [ROWS[row].text, *shown, *(column.cell(times.summary(row, column.value)) for column in clocks)]
         )
     return tables.markdown(["", *(column.heading for column in (*COLUMNS, *clocks))], cells)
 

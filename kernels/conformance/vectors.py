@@ -57,27 +57,6 @@ def schema() -> dict[str, Any]:
         "additionalProperties": False,
         "properties": {name: {"$ref": "#/$defs/numbers"} for name in ("value", "bound")},
     }
-    case = {
-        "type": "object",
-        "required": ["id", "clause", "flags", "valid", "input"],
-        "additionalProperties": False,
-        "properties": {
-            "id": {"type": "string", "pattern": "^[a-z0-9_.]+/[0-9]+$"},
-            "clause": {"$ref": "#/$defs/clause"},
-            "flags": {"type": "array", "items": {"enum": ["undecided", "statistical"]}, "uniqueItems": True},
-            "note": {"type": "string", "minLength": 1},
-            "valid": {"type": "boolean"},
-            "input": {"type": "object", "minProperties": 1},
-            "expected": {
-                "type": "object",
-                "minProperties": 1,
-                "additionalProperties": {"$ref": "#/$defs/output"},
-            },
-        },
-        "if": {"properties": {"valid": {"const": True}}},
-        "then": {"required": ["expected"]},
-        "else": {"not": {"required": ["expected"]}},
-    }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Vectors of one kind",
@@ -97,8 +76,33 @@ def schema() -> dict[str, Any]:
             "clause": CLAUSE,
             "output": output,
             "accepted": accepted,
-            "case": case,
+            "case": _case_schema(),
         },
+    }
+
+
+def _case_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a case."""
+    return {
+        "type": "object",
+        "required": ["id", "clause", "flags", "valid", "input"],
+        "additionalProperties": False,
+        "properties": {
+            "id": {"type": "string", "pattern": "^[a-z0-9_.]+/[0-9]+$"},
+            "clause": {"$ref": "#/$defs/clause"},
+            "flags": {"type": "array", "items": {"enum": ["undecided", "statistical"]}, "uniqueItems": True},
+            "note": {"type": "string", "minLength": 1},
+            "valid": {"type": "boolean"},
+            "input": {"type": "object", "minProperties": 1},
+            "expected": {
+                "type": "object",
+                "minProperties": 1,
+                "additionalProperties": {"$ref": "#/$defs/output"},
+            },
+        },
+        "if": {"properties": {"valid": {"const": True}}},
+        "then": {"required": ["expected"]},
+        "else": {"not": {"required": ["expected"]}},
     }
 
 

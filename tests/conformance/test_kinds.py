@@ -77,8 +77,8 @@ MUTANTS = {
         "camera.ray",
         "CAM-2",
     ),
-    "biased light sampling": (sampling, "sample_quad", biased(sampling.sample_quad), "path.scatter", "LTR-7"),
-    "no offset from surfaces": (intersection, "SPAWN_OFFSET", 0.0, "path.scatter", "LTR-7"),
+    "biased light sampling": (sampling, "sample_quad", biased(sampling.sample_quad), "path.scatter", "LTR-4"),
+    "no offset from surfaces": (intersection, "SPAWN_OFFSET", 0.0, "path.scatter", "ISC-9"),
     "weights the other way round": (
         transport,
         "mis_weight",
@@ -93,7 +93,7 @@ MUTANTS = {
         "transport.mis_weight",
         "LTR-5",
     ),
-    "roulette at 0.9": (transport, "ROULETTE_LIMIT", 0.5, "path.scatter", "LTR-7"),
+    "roulette at 0.9": (transport, "ROULETTE_LIMIT", 0.5, "path.scatter", "LTR-9"),
     "a sky upside down": (
         environment,
         "radiance",

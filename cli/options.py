@@ -18,7 +18,7 @@ from ..refimpl.errors import InputError
 SCENES = "minicubes, glossy, daylight, cornell, furnace, lone_light, empty"
 """Canonical scenes by name, for help texts; equal to the registry in refimpl, which they do not import."""
 
-MODELS = "minicubes"
+MODELS = "minicubes, cornell, glossy"
 """Models that come along by name, for help texts; equal to the files in cli/models."""
 
 LARGEST_EXPOSURE_STOPS = 64.0

@@ -26,9 +26,10 @@ LARGEST_BYTES = 300_000
 ROWS = (116, 140)
 """Rows of a 256x256 frame that are rendered here: the size of the training, at a tenth of the time."""
 
-LEAST_DB = {"minicubes": 28.0}
-"""PSNR against references of 64 samples, whose own noise is at 31 dB: with an error of 35 dB beside it 29.5,
-and windows that end at the band cost some of it."""
+LEAST_DB = {"minicubes": 28.0, "cornell": 33.0, "glossy": 22.0}
+"""PSNR against references of 64 samples, whose own noise is at 31 dB (minicubes), 37 (cornell) and 30
+(glossy): with errors of 35, 46 and 30 dB beside it 29.5, 36.5 and 27, and windows that end at the band, which has
+more edges and mirrors than the picture, cost some of it."""
 
 UNSEEN_S = 1.1
 """A time between two training times, which are 0.125 s apart."""
@@ -73,4 +74,4 @@ def test_a_model_denoises_an_unseen_frame(name):
     assert found >= LEAST_DB[name]
     # The features matter: without normals the same network is far off.
     blind = {**noisy.layers, "normal": np.zeros_like(noisy["normal"])}
-    assert metrics.psnr(denoise(model, Frame(blind)), target) <= found - 3.0
+    assert metrics.psnr(denoise(model, Frame(blind)), target) <= found - 2.0

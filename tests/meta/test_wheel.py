@@ -15,6 +15,9 @@ PARTS = ("refimpl", "compiler", "kernels", "cli")
 VECTORS = "spec/vectors"
 """The folder of data that becomes `wamnet.spec.vectors`."""
 
+SHELF = "kernels/shelf/"
+"""Kernels to be read and pasted: no program needs them, `wamnet export` writes them anew."""
+
 NOT_DATA = {".pyc"}
 """Suffixes of files in these folders that are no part of the package."""
 
@@ -40,6 +43,7 @@ def test_wheel_equals_the_tree(house, wheel):
         f"wamnet/{path.relative_to(house.root).as_posix()}"
         for path in house.files()
         if path.relative_to(house.root).as_posix().startswith(tuple(f"{part}/" for part in (*PARTS, VECTORS)))
+        and not path.relative_to(house.root).as_posix().startswith(SHELF)
         and path.suffix not in NOT_DATA
     }
     found = {name for name in wheel.namelist() if ".dist-info/" not in name}

@@ -28,8 +28,8 @@ ROWS = (116, 140)
 
 LEAST_DB = {"minicubes": 28.0, "cornell": 33.0, "glossy": 22.0}
 """PSNR against references of 64 samples, whose own noise is at 31 dB (minicubes), 37 (cornell) and 30
-(glossy): with errors of 35, 46 and 30 dB beside it 29.5, 36.5 and 27, and windows that end at the band, which has
-more edges and mirrors than the picture, cost some of it."""
+(glossy): with errors of 35, 46 and 30 dB beside it 29.5, 36.5 and 27, and windows that end at the band,
+which has more edges and mirrors than the picture, cost some of it."""
 
 UNSEEN_S = 1.1
 """A time between two training times, which are 0.125 s apart."""

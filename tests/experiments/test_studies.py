@@ -28,6 +28,7 @@ FIGURES = {
     "flicker": {"flip.png", "rows.png"},
     "generalisation": {"orientations.png", "pictures.png"},
     "learning_curve": {"curve.png"},
+    "losses": set(),
     "lights": {"psnr.png", "color.png", "a-on-b.png", "2-sets.png"},
 }
 """The experiments, and figures that each must leave."""

@@ -2,8 +2,8 @@
 
 `python -m wamnet.kernels.export.shelf -o kernels/shelf MODEL.safetensors ...` writes it anew; without
 models it is a small network of random weights. A test holds what is there to what the command would write.
-The index says for each kernel its size, products a pixel, certified bound and, where `--times` gives it, its
-speed.
+The index says for each kernel its size, products a pixel, certified bound and, with `--measure`, how long a
+picture of so many pixels a side takes here, copies included, on what is nearest to its target [`measured`].
 
 The paper's network takes 600 kB of text where weights are inlined: the shelf has sources that read weights,
 which are one file a model, and leaves out what `wamnet export` adds.
@@ -12,24 +12,35 @@ which are one file a model, and leaves out what `wamnet export` adds.
 from __future__ import annotations
 
 import argparse
-import json
 import shutil
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from ...compiler.artifact import Artifact
 from ...compiler.model_file import load_model
 from ...refimpl import siren
 from ...refimpl.dataset import Normalization, Window
 from ...refimpl.denoise import Model
+from ...refimpl.errors import ExecutorUnavailable
 from ..bench.cost import products_of
+from ..executor import Executor, Images, black
+from ..measure import in_turns
+from .check import runner
 from .package import Export, Request, export
 
 KEPT = ("opencl", "glsl", "glsl-es", "wgsl", "c", "cuda", "metal", "glsl-vulkan")
 """Targets whose files need no translator, so that they are the same on every machine."""
+
+TIMED = ("opencl", "glsl", "glsl-es", "wgsl", "c", "glsl-vulkan")
+"""Those that run here as they are; Metal and CUDA C as C++ with a shim would say nothing of their speed."""
+
+TURNS = 3
+"""Measurements of each kernel."""
 
 INDEX = "README.md"
 """The index page."""
@@ -38,8 +49,8 @@ SMALL = "small"
 """Name of the network of random weights."""
 
 
-def contents(models: Mapping[str, Model], times: Mapping[str, Any] | None = None) -> Mapping[str, bytes]:
-    """Return all files of the shelf by path, for models by name; `times` are milliseconds by digest."""
+def contents(models: Mapping[str, Model], times: Mapping[str, str] | None = None) -> Mapping[str, bytes]:
+    """Return all files of the shelf by path, for models by name; `times` are texts by `model/target`."""
     files: dict[str, bytes] = {}
     lines = [
         "# Kernels of the canonical models",
@@ -67,20 +78,43 @@ def _source(made: Export) -> str:
     return str(made.manifest["kernels"][-1]["files"][0])
 
 
-def _row(name: str, target: str, made: Export, source: str, times: Mapping[str, Any]) -> str:
+def _row(name: str, target: str, made: Export, source: str, times: Mapping[str, str]) -> str:
     """Return the line of one kernel."""
     bound = made.manifest["bound"]["output"]
     assert made.denoiser is not None, "every target of the shelf has a kernel"
-    speed = times.get(made.denoiser.digest)
     cells = (
         name,
         f"[{target}]({name}/{target}/{Path(source).name})",
         f"{len(made.files[source]) / 1000:.1f} kB",
         f"{products_of(made.denoiser.program):,}",
         f"{max(bound):.2g}" if bound else "-",
-        f"{speed:g} ms" if speed else "not measured",
+        times.get(f"{name}/{target}", "not measured"),
     )
     return f"| {' | '.join(cells)} |"
+
+
+def measured(models: Mapping[str, Model], size: int) -> dict[str, str]:
+    """Return the median time of a picture of size x size pixels, in words, by `model/target`."""
+    found = {}
+    for name, model in models.items():
+        with ExitStack() as stack:
+            ways = {}
+            for target in TIMED:
+                kernel = export(Request(model, target)).denoiser
+                assert kernel is not None, "every target of the shelf has a kernel"
+                try:
+                    opened = stack.enter_context(runner(target, kernel.target))
+                except ExecutorUnavailable:
+                    continue
+                ways[target] = partial(_ran, opened, kernel, black(kernel, (size, size)))
+            for target, times in in_turns(ways, TURNS).items():
+                found[f"{name}/{target}"] = f"{1000 * times.median:.0f} ms, {size}x{size}"
+    return found
+
+
+def _ran(opened: Executor, kernel: Artifact, images: Images) -> None:
+    """Run a kernel once, from images in memory to a picture in memory."""
+    opened.run(kernel, images)
 
 
 def random_model() -> Model:
@@ -108,11 +142,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("models", nargs="*", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--times", type=Path, help="JSON: milliseconds a picture by a kernel's digest")
+    parser.add_argument("--measure", type=int, metavar="SIZE", help="time pictures of SIZE x SIZE pixels")
     options = parser.parse_args(arguments)
     models = {path.stem: load_model(path) for path in options.models} or {SMALL: random_model()}
-    times = json.loads(options.times.read_text()) if options.times else None
-    write(options.output, contents(models, times))
+    write(options.output, contents(models, measured(models, options.measure) if options.measure else None))
 
 
 if __name__ == "__main__":

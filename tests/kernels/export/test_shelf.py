@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from wamnet.compiler.model_file import load_model
@@ -42,11 +41,12 @@ def test_the_shelf_is_what_the_compiler_writes():
 
 
 def test_the_command_replaces_a_shelf(tmp_path):
-    out, times = tmp_path / "shelf", tmp_path / "times.json"
+    out = tmp_path / "shelf"
     shelf.write(out, {"old.txt": b"x"})
-    times.write_text(json.dumps({}))
-    shelf.main(["-o", str(out), "--times", str(times)])
+    shelf.main(["-o", str(out), "--measure", "8"])
     assert not (out / "old.txt").exists()
     index = (out / "README.md").read_text()
     assert all(f"{target}](small/{target}/" in index for target in shelf.KEPT)
-    assert "not measured" in index
+    lines = {target: line for line in index.splitlines() for target in shelf.KEPT if f"[{target}]" in line}
+    assert all(line.endswith("| not measured |") for t, line in lines.items() if t not in shelf.TIMED)
+    assert any(line.endswith(" ms, 8x8 |") for line in lines.values())

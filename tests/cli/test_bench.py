@@ -248,6 +248,7 @@ def page(**facts) -> str:
             "trainer": "numpy",
             "size_px": 8,
             "reference_spp": 4,
+            "feature_spp": 1,
         },
         "model": {"features": ["color"], "window": {"size": 2}, "parameters": 7, "widths": [4, 3]},
         "unseen": [{"time_s": 0.5, "input": scores, "denoised": scores}],

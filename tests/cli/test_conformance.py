@@ -138,8 +138,8 @@ def test_vectors_are_written(wamnet, tmp_path, monkeypatch):
             "it must answer to hello (crash: /no/such/program cannot be started",
         ),
         (
-            ("--executor", "metal"),
-            "--executor is metal: it is unknown; known are reference, numpy, opencl, opengl",
+            ("--executor", "abacus"),
+            "--executor is abacus: it is unknown; known are reference, numpy, opencl, opengl",
         ),
         (("--executor", "numpy", "--profile", "fast"), "fast"),
         (

@@ -249,6 +249,7 @@ def page(**facts) -> str:
             "size_px": 8,
             "reference_spp": 4,
             "feature_spp": 1,
+            "train_spp": 4,
         },
         "model": {"features": ["color"], "window": {"size": 2}, "parameters": 7, "widths": [4, 3]},
         "unseen": [{"time_s": 0.5, "input": scores, "denoised": scores}],

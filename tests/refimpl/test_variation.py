@@ -1,0 +1,148 @@
+"""Tests of variations: the orbit, lamps that keep their brightness, ranges as text, what lies outside."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.refimpl import variation as V
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.scene import Camera
+from wamnet.refimpl.scenes import canonical
+
+CUBES = canonical("minicubes")
+OWN = [light.color for light in CUBES.lights]
+U = 2.0**-53
+"""Unit roundoff of float64."""
+
+
+def test_the_orbit_by_hand() -> None:
+    """A quarter turn to the side, a quarter pitch clamped at 85 degrees, twice the distance."""
+    camera = Camera((0.0, 0.0, 3.0), (0.0, 0.0, 1.0))
+    assert V.orbited(camera, 0.0, 0.0, 1.0) is camera
+    # Each position is a product of two sines and a sum: a few roundings of numbers up to 4.
+    assert np.allclose(V.orbited(camera, 90.0, 0.0, 1.0).position, (2.0, 0.0, 1.0), rtol=0, atol=16 * U)
+    assert np.allclose(V.orbited(camera, 0.0, 0.0, 2.0).position, (0.0, 0.0, 5.0), rtol=0, atol=16 * U)
+    steep = V.orbited(camera, 0.0, 90.0, 1.0).position
+    b = math.radians(85.0)
+    assert np.allclose(steep, (0.0, 2 * math.sin(b), 1 + 2 * math.cos(b)), rtol=0, atol=16 * U)
+
+
+@given(st.floats(-180, 180), st.floats(-80, 80), st.floats(0.1, 10))
+def test_the_orbit_keeps_what_it_must(yaw, pitch, distance) -> None:
+    """The distance is the factor times its own; the way back leads back, as long as nothing was clamped."""
+    camera = CUBES.camera
+    there = V.orbited(camera, yaw, pitch, distance)
+    assert (there.look_at, there.up, there.vertical_fov_deg) == (
+        camera.look_at,
+        camera.up,
+        camera.vertical_fov_deg,
+    )
+    radius = math.dist(camera.position, camera.look_at)
+    # The square root of a sum of squares: relative error below 8 roundings of each side.
+    assert abs(math.dist(there.position, there.look_at) / (radius * distance) - 1) <= 16 * U
+    back = V.orbited(there, -yaw, -pitch, 1.0 / distance).position
+    # Angles of up to pi and tangents of angles below 83 degrees amplify a rounding by less than 100.
+    assert np.allclose(back, camera.position, rtol=0, atol=1000 * U * radius)
+
+
+@given(st.floats(0, 1), st.floats(0, 1))
+def test_a_lamp_keeps_its_brightness(hue, saturation) -> None:
+    """The mean of the channels is the lamp's own, the saturation the one that was asked for."""
+    color = V.lamp_color(OWN[0], hue, saturation)
+    assert abs(sum(color) / sum(OWN[0]) - 1) <= 16 * U
+    assert abs(V.saturation_of(color) - saturation) <= 16 * U
+    assert V.saturation_of((0.0, 0.0, 0.0)) == 0.0
+
+
+def test_a_frame_says_what_was_varied() -> None:
+    """The info has the numbers; everything but camera and lamps stays."""
+    lights = ((1.0, 0.5, 0.25), (0.5, 0.5, 0.5))
+    found = V.varied(CUBES, V.Variation(30.0, -5.0, 1.5, lights))
+    told = {name: found.info[name] for name in ("yaw_deg", "pitch_deg", "distance", "lights", "time")}
+    assert told == {
+        "yaw_deg": "30.0",
+        "pitch_deg": "-5.0",
+        "distance": "1.5",
+        "lights": "[[1.0, 0.5, 0.25], [0.5, 0.5, 0.5]]",
+        "time": "0.0",
+    }
+    assert tuple(light.color for light in found.lights) == lights
+    assert (found.boxes, found.room) == (CUBES.boxes, CUBES.room)
+    rest = V.varied(CUBES, V.AT_REST)
+    assert (rest.camera, rest.lights) == (CUBES.camera, CUBES.lights)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"yaw_deg": 181.0}, "yaw_deg is 181.0: it must be a number from -180 to 180"),
+        ({"pitch_deg": float("nan")}, "pitch_deg is nan"),
+        ({"distance": 0.0}, "distance is 0.0: it must be a number from 0.1 to 10"),
+        ({"lights": ((1.0, 1.0, 1.0),)}, "number of lamps' colours is 1: the scene has 2"),
+    ],
+)
+def test_variations_that_are_refused(change, text) -> None:
+    """With the value and the rule."""
+    with pytest.raises(InputError, match=text):
+        V.varied(CUBES, V.Variation(**change))
+
+
+def test_ranges_as_text() -> None:
+    """There and back; what is none is refused."""
+    for ranges in (V.Ranges(), V.Ranges((1.0, 7.0), (-24.0, 24.0), (0.0, 8.0), (0.9, 1.1), (0.0, 0.7))):
+        assert V.ranges_from_json(ranges.to_json()) == ranges
+    for text in ("", "[]", '{"yaw_deg": [1]}', '{"yaw": [0, 1]}', '{"yaw_deg": [2, 1]}', "[" * 100_000):
+        with pytest.raises(InputError, match="ranges is"):
+            V.ranges_from_json(text)
+
+
+@pytest.mark.parametrize(
+    ("ranges", "text"),
+    [
+        (V.Ranges(yaw_deg=(5.0, -5.0)), r"range of yaw_deg is 5.0:-5.0: LOW:HIGH within -180 to 180"),
+        (V.Ranges(pitch_deg=(0.0, 90.0)), "range of pitch_deg"),
+        (V.Ranges(distance=(0.0, 1.0)), "range of distance"),
+        (V.Ranges(saturation=(0.0, 1.5)), "range of saturation"),
+        (V.Ranges(time_s=(0.0, float("inf"))), "range of time_s"),
+    ],
+)
+def test_ranges_that_are_refused(ranges, text) -> None:
+    """Limits that a camera or a colour cannot have, or that are exchanged."""
+    with pytest.raises(InputError, match=text):
+        V.check_ranges(ranges)
+
+
+def test_what_is_outside() -> None:
+    """Each respect by itself, at its limit inside and beyond it outside; times modulo a turn."""
+    ranges = V.Ranges((0.0, 6.0), (-24.0, 24.0), (-8.0, 8.0), (0.9, 1.1), (0.0, 0.7))
+
+    def told(time: float = 1.0, **changes) -> list[str]:
+        scene = V.varied(canonical("minicubes", time=time), V.Variation(**changes))
+        return V.outside(ranges, scene.info, OWN)
+
+    assert told() == told(yaw_deg=24.0, pitch_deg=-8.0, distance=1.1) == told(time=14.0) == []
+    assert told(time=15.0) == ["the time is 15 s (learned: 0 s to 6 s)"]
+    assert told(yaw_deg=-40.0) == ["the camera's yaw is -40° (learned: -24° to 24°)"]
+    assert told(pitch_deg=9.0, distance=0.5) == [
+        "the camera's pitch is 9° (learned: -8° to 8°)",
+        "the camera's distance is 0.5 (learned: 0.9 to 1.1)",
+    ]
+    inside, vivid = (V.lamp_color(OWN[0], 0.6, s) for s in (0.7, 0.9))
+    assert told(lights=(inside, OWN[1])) == []
+    assert told(lights=(vivid, OWN[1])) == ["the saturation of lamp 1 is 0.90 (learned: 0.00 to 0.70)"]
+    bright = tuple(1.5 * c for c in inside)
+    assert told(lights=(bright, OWN[1])) == ["lamp 1 is 1.50 times as bright as the one that was learned"]
+
+
+def test_outside_without_lamps_or_facts() -> None:
+    """Colours that were never varied are the lamps' own only; what nobody says is inside."""
+    still = V.Ranges()
+    scene = V.varied(CUBES, V.Variation(lights=((0.2, 0.2, 0.9), OWN[1])))
+    assert V.outside(still, scene.info, OWN) == ["lamp 1 has another colour (learned: its own)"]
+    assert V.outside(still, {}, OWN) == []
+    assert V.outside(still, {"yaw_deg": "much", "lights": "none", "time": "nan"}, OWN) == []

@@ -3,8 +3,8 @@
 `minicubes` is the kind of scene that the paper describes: a room with tinted walls, 27 mini cubes of
 different colours in a 3x3x3 frame that turns with time, two coloured area lights, soft shadows. The paper
 does not give its geometry; the numbers here are decisions (spec/scenes.md). `glossy` shows metal, glass and
-a mirror on a turntable. `cornell` is a box with two blocks; `furnace`, `lone_light` and `empty` have answers
-in closed form."""
+a mirror on a turntable. `cornell` is a box with two turning blocks; `furnace`, `lone_light` and `empty` have
+answers in closed form."""
 
 from __future__ import annotations
 
@@ -156,12 +156,13 @@ def daylight(time: float = 0.0, sun_concentration: float = 400.0) -> Scene:
 
 
 def cornell(time: float = 0.0) -> Scene:
-    """Return a box with a red and a green wall, two turned blocks and one light; time changes nothing."""
+    """Return a box with a red and a green wall, one light and two blocks that turn in opposite directions."""
     white, red, green = (0.73, 0.73, 0.73), (0.65, 0.06, 0.05), (0.12, 0.45, 0.15)
     room = Room((-1.0, 0.0, -1.0), (1.0, 2.0, 1.0), (red, green, white, white, white, white))
+    angle = 2.0 * math.pi * time / TURN_SECONDS
     blocks = (
-        Box((-0.33, 0.6, -0.30), (0.29, 0.6, 0.29), white, _about_y(math.radians(17.0))),
-        Box((0.35, 0.3, 0.28), (0.29, 0.3, 0.29), white, _about_y(math.radians(-18.0))),
+        Box((-0.33, 0.6, -0.30), (0.29, 0.6, 0.29), white, _about_y(math.radians(17.0) + angle)),
+        Box((0.35, 0.3, 0.28), (0.29, 0.3, 0.29), white, _about_y(math.radians(-18.0) - angle)),
     )
     light = Light((-0.25, 1.99, -0.25), (0.5, 0.0, 0.0), (0.0, 0.0, 0.5), (1.0, 0.78, 0.5), 14.0)
     camera = Camera((0.0, 1.0, 4.4), (0.0, 1.0, 0.0), vertical_fov_deg=37.0)

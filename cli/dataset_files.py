@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ..kernels.render_frame import Rows
     from ..refimpl.frame import Frame
 
-SCHEMA = "wamnet-dataset-1"
+SCHEMA = "wamnet-dataset-2"
 """Name and version of the manifest's form; described in spec/dataset_files.md."""
 
 MANIFEST = "manifest.json"
@@ -50,10 +50,10 @@ JOURNAL = "journal.jsonl"
 LOCK = ".lock"
 """File that is locked, and there, as long as a process works in the folder."""
 
-NAME = re.compile(r"(train|test)/\d{5}-(noisy|target)\.exr")
+NAME = re.compile(r"(train|test|outside)/\d{5}-(noisy|target)\.exr")
 """What a picture's file may be called; nothing that leads out of the folder."""
 
-BAND = re.compile(r"(train|test)-(\d{5}-(?:noisy|target))\.(\d+)-(\d+)\.([0-9a-f]{64})\.exr")
+BAND = re.compile(r"(train|test|outside)-(\d{5}-(?:noisy|target))\.(\d+)-(\d+)\.([0-9a-f]{64})\.exr")
 """What a band's file is called: its picture, its rows [first, last), its SHA-256."""
 
 KINDS = ("noisy", "target")
@@ -115,8 +115,16 @@ def bytes_of(manifest: Mapping[str, Any]) -> int:
 # ---- the manifest ----------------------------------------------------------------------------------------
 
 
-def manifest_of(request: Request, frames: Sequence[FramePlan], sums: Sums) -> dict[str, Any]:
-    """Return the manifest of a data set of which these pictures are finished."""
+def manifest_of(
+    request: Request,
+    frames: Sequence[FramePlan],
+    sums: Sums,
+    nearest: Mapping[str, Mapping[str, float]] | None = None,
+) -> dict[str, Any]:
+    """Return the manifest of a data set of which these pictures are finished.
+
+    `nearest` says of each split of test frames how far the nearest training frame is.
+    """
     from ..kernels.frame_plan import describe, version
 
     facts = [describe(frame) for frame in frames]
@@ -125,7 +133,8 @@ def manifest_of(request: Request, frames: Sequence[FramePlan], sums: Sums) -> di
             known = sums.get(frame[kind]["file"])
             frame[kind] |= {"bytes": known and known.bytes, "sha256": known and known.sha256}
     head = {"schema": SCHEMA, "wamnet": version(), "request": request.as_data()}
-    return {**head, "complete": all(known is not None for known in _known(facts)), "frames": facts}
+    complete = all(known is not None for known in _known(facts))
+    return {**head, "complete": complete, "nearest": dict(nearest or {}), "frames": facts}
 
 
 def _known(frames: Sequence[Mapping[str, Any]]) -> Iterator[str | None]:
@@ -149,7 +158,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     try:
         good = isinstance(manifest["request"], dict) and isinstance(manifest["wamnet"], str)
         good &= all(NAME.fullmatch(name) for name in _names(manifest)) and bool(manifest["frames"])
-        good &= all(frame["split"] in ("train", "test") for frame in manifest["frames"])
+        good &= all(frame["split"] in ("train", "test", "outside") for frame in manifest["frames"])
         _sums_of(manifest)
     except (TypeError, KeyError, ValueError, AttributeError, OverflowError):
         good = False
@@ -212,9 +221,16 @@ def refuse_wrong(folder: Path, wrong: Mapping[str, str]) -> None:
 class Store:
     """An open folder of a data set that is being made; made by [`Store.open`]."""
 
-    def __init__(self, folder: Path, request: Request, frames: Sequence[FramePlan], before: Sums) -> None:
-        """Keep what is to be made and the sums of an earlier run."""
-        self.folder, self.request, self.frames = folder, request, frames
+    def __init__(
+        self,
+        folder: Path,
+        request: Request,
+        frames: Sequence[FramePlan],
+        before: Sums,
+        nearest: Mapping[str, Mapping[str, float]],
+    ) -> None:
+        """Keep what is to be made, how its frames compare, and the sums of an earlier run."""
+        self.folder, self.request, self.frames, self.nearest = folder, request, frames, nearest
         self.unfinished = folder / UNFINISHED
         self.pictures = {p.name: p for frame in frames for p in frame.pictures.values()}
         self.before, self.sums = before, dict(before)
@@ -225,7 +241,12 @@ class Store:
     @classmethod
     @contextmanager
     def open(
-        cls, folder: Path, request: Request, frames: Sequence[FramePlan], on_look: Look | None = None
+        cls,
+        folder: Path,
+        request: Request,
+        frames: Sequence[FramePlan],
+        on_look: Look | None = None,
+        nearest: Mapping[str, Mapping[str, float]] | None = None,
     ) -> Iterator[Store]:
         """Yield the store of a new data set, or of the same one begun before; refuse every other folder.
 
@@ -239,7 +260,7 @@ class Store:
         before = _known_before(folder, request, frames) if (folder / MANIFEST).exists() else {}
         folder.mkdir(parents=True, exist_ok=True)
         with _locked(folder):
-            store = cls(folder, request, frames, before)
+            store = cls(folder, request, frames, before, nearest or {})
             store._begin(on_look)
             yield store
             if not store.missing and store.unfinished.exists():
@@ -335,7 +356,7 @@ class Store:
 
     def _write_manifest(self) -> None:
         """Write the manifest, all of it or nothing."""
-        manifest = manifest_of(self.request, self.frames, self.sums)
+        manifest = manifest_of(self.request, self.frames, self.sums, self.nearest)
         write_text(self.folder / MANIFEST, json.dumps(manifest, indent=1, allow_nan=False) + "\n")
 
 

@@ -270,6 +270,15 @@ def parse_parameters(texts: Sequence[str]) -> dict[str, float | tuple[float, ...
     return parameters
 
 
+def parse_limits(option: str, text: str) -> tuple[float, float]:
+    """Return the two numbers of a text like `-24:24`, or refuse it."""
+    try:
+        low, high = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise InputError(option, text, "it must be LOW:HIGH", f"for example {option}=-24:24") from None
+    return low, high
+
+
 def parse_names(text: str) -> tuple[str, ...]:
     """Return names that are separated by commas."""
     return tuple(part.strip() for part in text.split(",") if part.strip())

@@ -340,13 +340,21 @@ def _trainer(executor: str) -> Iterator[Callable[..., TrainState]]:
 
 
 def facts(pairs: Sequence[tuple[Frame, Frame]]) -> dict[str, str]:
-    """Return what the training frames say of themselves, each value once: facts for the model's reader."""
+    """Return what the training frames say of themselves, each value once: facts for the model's reader.
+
+    Frames that say their ranges need not list what each of them has drawn.
+    """
+    from ..refimpl.variation import RANGES
+
     names = dict.fromkeys(name for pair in pairs for name in pair[0].info)
+    values = {
+        name: dict.fromkeys(noisy.info[name] for noisy, _ in pairs if name in noisy.info) for name in names
+    }
+    drawn = RANGES in values
     return {
-        f"trained_on_{name}": ", ".join(
-            dict.fromkeys(noisy.info[name] for noisy, _ in pairs if name in noisy.info)
-        )
-        for name in names
+        f"trained_on_{name}": ", ".join(found)
+        for name, found in values.items()
+        if len(found) == 1 or not drawn
     }
 
 

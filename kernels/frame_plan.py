@@ -1,10 +1,13 @@
-"""What a data set consists of: times, seeds, pictures, and the independent tasks that make them.
+"""What a data set consists of: draws, seeds, pictures, and the independent tasks that make them.
 
-1. Training times divide the animation evenly; test times lie between them, none on one [`frame_times`].
-2. Each time has a noisy picture and a target, each with random numbers of its own [`plan`].
-3. A picture is cut into bands of rows, each an independent task [`tasks_of`]; how is a function of the
-   request alone, so that an interrupted run finds its bands again whatever the number of workers is.
-4. A task is carried out anywhere [`carry_out`], and the bands of a picture are joined [`join`].
+1. Each frame draws a time, a camera and lamps' colours from the request's ranges: training frames, test
+   frames inside of the ranges, test frames outside [`frame_draws`].
+2. Each draw has a noisy picture and a target, each with random numbers of its own [`plan`].
+3. What the frames show is compared: test frames that repeat one another or a training frame are refused
+   [`compared`].
+4. A picture is cut into bands of rows, each an independent task [`tasks_of`]; how is a function of the
+   request only, so that an interrupted run finds its bands again whatever the number of workers is.
+5. A task is carried out anywhere [`carry_out`], and the bands of a picture are joined [`join`].
 
 The pictures are a function of the request and of the version of this package.
 """
@@ -12,7 +15,7 @@ The pictures are a function of the request and of the version of this package.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from importlib import metadata
 from typing import Any
@@ -25,6 +28,9 @@ from ..refimpl.render import TILE_PIXELS, Job
 from ..refimpl.scene import Scene, scene_digest
 from ..refimpl.scenes import TURN_SECONDS, canonical
 from ..refimpl.transport import Settings
+from ..refimpl.variation import RANGES, Ranges, check_ranges, varied
+from .draws import Draw, drawn, drawn_outside
+from .geometry import Comparison, Shown, compare
 from .render_frame import Progress, Rows, render_frame, renderer
 
 NOISY_SPP = 1
@@ -40,14 +46,24 @@ LARGEST_FRAMES = 100_000
 KINDS = ("noisy", "target")
 """The two pictures of each frame, in the order of their seeds."""
 
+TRAIN, TEST, OUTSIDE = "train", "test", "outside"
+"""The splits: frames to train on, frames at other draws inside the same ranges, frames outside of them."""
+
+SPLITS = (TRAIN, TEST, OUTSIDE)
+"""The splits in the order of their frames."""
+
+Pair = tuple[float, float]
+
 
 @dataclass(frozen=True)
 class Request:
     """All that determines a data set, besides the version: scene, animation, numbers, sizes, seed, ways.
 
-    The animation runs from `start_s` for `seconds`; `parameters` are those of the canonical scene. The
-    features of noisy pictures are means over `feature_spp` camera rays; 0: over the colour's one. Targets
-    have `spp` samples, those of test frames `test_spp`; 0: as many.
+    The animation runs from `start_s` for `seconds`, of which training leaves out the last `arc_s`;
+    `parameters` are those of the canonical scene. Cameras are drawn from the ranges `yaw_deg`, `pitch_deg`
+    and `distance` (a factor), lamps' colours from the range `saturation` (None: the lamps' own). The features
+    of noisy pictures are means over `feature_spp` camera rays; 0: over the colour's one. Targets have `spp`
+    samples, those of test frames `test_spp`; 0: as many.
     """
 
     scene: str
@@ -64,39 +80,64 @@ class Request:
     sampler: str = "pcg4d"
     feature_spp: int = 0
     test_spp: int = 0
+    outside_frames: int = 0
+    arc_s: float = 0.0
+    yaw_deg: Pair = (0.0, 0.0)
+    pitch_deg: Pair = (0.0, 0.0)
+    distance: Pair = (1.0, 1.0)
+    saturation: Pair | None = None
 
     def as_data(self) -> dict[str, Any]:
-        """Return the request as JSON's types, without the last two where they are 0."""
-        data = asdict(self)
-        for name in ("feature_spp", "test_spp"):
-            if not data[name]:
-                del data[name]
+        """Return the request as JSON's types."""
+        data = {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(self).items()}
         lists = {k: list(v) if isinstance(v, tuple) else v for k, v in sorted(self.parameters.items())}
         return {**data, "parameters": lists}
+
+    @property
+    def ranges(self) -> Ranges:
+        """Return what training frames are drawn from."""
+        times = (self.start_s, self.start_s + self.seconds - self.arc_s)
+        return Ranges(times, self.yaw_deg, self.pitch_deg, self.distance, self.saturation)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Return the number of frames of each split, in their order."""
+        return dict(zip(SPLITS, (self.frames, self.test_frames, self.outside_frames), strict=True))
+
+    def scene_at(self, draw: Draw) -> Scene:
+        """Return the scene that a frame shows; its info has the ranges too."""
+        scene = canonical(self.scene, **{**self.parameters, "time": draw.time_s})
+        found = varied(scene, draw.variation)
+        return replace(found, info={**found.info, RANGES: self.ranges.to_json()})
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One file: its name within the data set (with slashes), and what it shows: a scene at a time, a job."""
+    """One file: its name within the data set (with slashes), and what it shows: a draw, a job."""
 
     name: str
     request: Request
-    time_s: float
+    draw: Draw
     job: Job
 
     @property
     def scene(self) -> Scene:
-        """Return the scene, made anew: thousands of pictures are kept, and few are looked at."""
-        return canonical(self.request.scene, **{**self.request.parameters, "time": self.time_s})
+        """Return the scene, made again each time: thousands of pictures are kept, and few are looked at."""
+        return self.request.scene_at(self.draw)
 
 
 @dataclass(frozen=True)
 class FramePlan:
-    """One time of the animation: its split, train or test, and its two pictures, by kind."""
+    """One frame: its split, its draw, and its two pictures, by kind."""
 
     split: str
-    time_s: float
+    draw: Draw
     pictures: Mapping[str, Picture]
+
+    @property
+    def name(self) -> str:
+        """Return what its pictures have in common: split and number."""
+        return self.pictures[KINDS[0]].name.removesuffix(f"-{KINDS[0]}.exr")
 
 
 @dataclass(frozen=True)
@@ -119,27 +160,21 @@ def version() -> str:
     return metadata.version("wamnet")
 
 
-def frame_times(request: Request) -> list[tuple[str, float]]:
-    """Return (split, time in seconds) of all frames, training first.
+def frame_draws(request: Request) -> list[tuple[str, Draw]]:
+    """Return (split, draw) of all frames: training, then inside, then outside.
 
-    Training time k is start + seconds k / frames: the end of the animation, which is its start again in a
-    loop, is no time of its own. Test j lies in the gap after training time floor(j frames / tests); the tests
-    of one gap divide it evenly, so that a lone one is in its middle.
+    Test frames inside continue the sequences of the training frames, those outside the sequences of both.
     """
-    n, tests = request.frames, request.test_frames
-    train = [("train", request.start_s + request.seconds * k / n) for k in range(n)]
-    test = []
-    for j in range(tests):
-        gap = j * n // tests
-        # The gap's tests are those from ceil(gap tests / n) to before ceil((gap + 1) tests / n).
-        first, after = -(-gap * tests // n), -(-(gap + 1) * tests // n)
-        place = (j - first + 1) / (after - first + 1)
-        test.append(("test", request.start_s + request.seconds * (gap + place) / n))
-    times = [time for _, time in train + test]
+    lights = canonical(request.scene, **request.parameters).lights
+    ranges, (train, inside, beyond) = request.ranges, request.counts.values()
+    found = drawn(request.seed, ranges, lights, 0, train + inside)
+    far = drawn_outside(request.seed, ranges, request.arc_s, lights, train + inside, beyond)
+    times = [draw.time_s for draw in (*found, *far)]
     if len(set(times)) < len(times) or not all(map(math.isfinite, times)):
         rule = f"{len(times)} different times must fit into it"
         raise InputError("seconds of the animation", request.seconds, rule, "make it longer")
-    return train + test
+    splits = [split for split, count in request.counts.items() for _ in range(count)]
+    return list(zip(splits, (*found, *far), strict=True))
 
 
 def animation_times(start_s: float, seconds: float, fps: float) -> list[float]:
@@ -162,16 +197,16 @@ def plan(request: Request) -> list[FramePlan]:
     _check(request)
     size, settings = request.size_px, Settings(max_depth=request.max_depth, sampler=request.sampler)
     frames = []
-    numbers = {"train": 0, "test": 0}
-    for index, (split, time) in enumerate(frame_times(request)):
+    numbers = dict.fromkeys(SPLITS, 0)
+    for index, (split, draw) in enumerate(frame_draws(request)):
         pictures = {}
-        target_spp = request.test_spp or request.spp if split == "test" else request.spp
+        target_spp = request.spp if split == TRAIN else request.test_spp or request.spp
         for offset, (kind, spp) in enumerate(zip(KINDS, (NOISY_SPP, target_spp), strict=True)):
             job = Job(size, size, spp, request.seed + 2 * index + offset, settings)
             if kind == KINDS[0]:
                 job = replace(job, feature_spp=request.feature_spp)
-            pictures[kind] = Picture(f"{split}/{numbers[split]:05d}-{kind}.exr", request, time, job)
-        frames.append(FramePlan(split, time, pictures))
+            pictures[kind] = Picture(f"{split}/{numbers[split]:05d}-{kind}.exr", request, draw, job)
+        frames.append(FramePlan(split, draw, pictures))
         numbers[split] += 1
     return frames
 
@@ -179,7 +214,7 @@ def plan(request: Request) -> list[FramePlan]:
 def _check(request: Request) -> None:
     """Refuse an executor, a scene, numbers of frames, an animation or a seed that mean nothing."""
     renderer(request.executor)
-    for name, low in (("frames", 1), ("test_frames", 0)):
+    for name, low in (("frames", 1), ("test_frames", 0), ("outside_frames", 0)):
         value = getattr(request, name)
         if not low <= value <= LARGEST_FRAMES:
             rule = f"it must be an integer from {low} to {LARGEST_FRAMES}"
@@ -187,25 +222,47 @@ def _check(request: Request) -> None:
     if not (math.isfinite(request.seconds) and request.seconds > 0.0 and math.isfinite(request.start_s)):
         what = "animation (start, seconds)"
         raise InputError(what, (request.start_s, request.seconds), "it must be finite and last", "change it")
+    if not (math.isfinite(request.arc_s) and 0.0 <= request.arc_s < request.seconds):
+        rule = "training leaves it out of the animation: it must be 0 or more and shorter"
+        raise InputError("arc_s", request.arc_s, rule, "use a shorter --arc")
+    check_ranges(request.ranges)
     if "time" in request.parameters:
         value = request.parameters["time"]
         raise InputError("parameter time", value, "each frame has its own", "use --start and --seconds")
     canonical(request.scene, **request.parameters)
-    last = request.seed + 2 * (request.frames + request.test_frames) - 1
+    last = request.seed + 2 * sum(request.counts.values()) - 1
     if request.seed < 0 or last >= 1 << 32:
         rule = "seeds up to that plus twice the number of frames must fit into 32 bits"
         raise InputError("seed", request.seed, rule, "choose a smaller one, 0 or more")
 
 
+def compared(
+    frames: Sequence[FramePlan], on_progress: Callable[[int], None] = lambda frames: None
+) -> dict[str, Comparison]:
+    """Return how far the nearest training frame is from each split of test frames, or refuse frames alike."""
+    shown: dict[str, list[Shown]] = {split: [] for split in SPLITS}
+    for frame in frames:
+        scene = frame.pictures[KINDS[0]].scene
+        shown[frame.split].append(Shown(frame.name, frame.draw.time_s, scene))
+    train = shown.pop(TRAIN)
+    return compare(train, shown, on_progress) if any(shown.values()) else {}
+
+
 def describe(frame: FramePlan) -> dict[str, Any]:
-    """Return a frame as JSON's types: split, scene, time, and of each picture its name and its job."""
-    scene = frame.pictures[KINDS[0]].scene
+    """Return a frame as JSON's types: split, scene, draw, and of each picture its name and its job."""
+    scene, variation = frame.pictures[KINDS[0]].scene, frame.draw.variation
     facts: dict[str, Any] = {
         "split": frame.split,
-        "time_s": frame.time_s,
+        "time_s": frame.draw.time_s,
+        "yaw_deg": variation.yaw_deg,
+        "pitch_deg": variation.pitch_deg,
+        "distance": variation.distance,
+        "lights": [list(light.color) for light in scene.lights],
         "scene": scene.name,
         "scene_digest": scene_digest(scene),
     }
+    if frame.draw.outside:
+        facts["outside"] = frame.draw.outside
     for kind, picture in frame.pictures.items():
         job = picture.job
         facts[kind] = {"file": picture.name, "width": job.width, "height": job.height}

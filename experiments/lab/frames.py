@@ -28,6 +28,7 @@ from wamnet.refimpl.frame import LAYERS, Frame
 from wamnet.refimpl.render import Job, feature_job, render_info
 from wamnet.refimpl.scene import Scene, scene_digest
 from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.variation import AT_REST, Variation, varied
 
 NOISY_SPP = 1
 """Samples per pixel of what is denoised."""
@@ -53,6 +54,7 @@ class Shot:
     seed: int = 0
     parameters: Mapping[str, Any] = field(default_factory=dict)
     feature_spp: int = 0
+    variation: Variation = AT_REST
 
     @property
     def job(self) -> Job:
@@ -60,8 +62,9 @@ class Shot:
         return Job(self.size, self.size, self.spp, self.seed, feature_spp=self.feature_spp)
 
     def build(self) -> Scene:
-        """Return the scene at its time."""
-        return canonical(self.scene, **{**self.parameters, "time": self.time})
+        """Return the scene at its time, from its side and under its lamps."""
+        scene = canonical(self.scene, **{**self.parameters, "time": self.time})
+        return scene if self.variation == AT_REST else varied(scene, self.variation)
 
 
 def path_of(folder: Path, shot: Shot, executor: str) -> Path:

@@ -16,12 +16,13 @@ import pytest
 
 from wamnet import kernels
 from wamnet.cli import cluster, dataset_files, exr
-from wamnet.kernels import frame_plan, render_frame
+from wamnet.kernels import draws, frame_plan, render_frame
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.render import Job, render
 from wamnet.refimpl.scene import scene_digest
 from wamnet.refimpl.scenes import canonical
 from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.variation import Ranges, Variation, ranges_from_json, varied
 
 TINY = ("minicubes", "--frames", 2, "--test", 1, "--size", 12, "--spp", 4)
 
@@ -34,13 +35,17 @@ def content(folder: Path) -> dict[str, bytes]:
 def test_the_pictures_are_the_references(wamnet, tmp_path) -> None:
     """Times, seeds and samples as the manifest says, all layers, to the bit; checked, and made once."""
     outcome = wamnet("dataset", *TINY, "--seed", 5, "-o", "a")
-    assert (outcome.status, outcome.out) == (0, "a: 6 pictures at 3 times, 6 of them made now\n")
-    frames = json.loads((tmp_path / "a/manifest.json").read_text())["frames"]
-    assert [(frame["split"], frame["time_s"]) for frame in frames] == [
-        ("train", 0.0),
-        ("train", 4.0),
-        ("test", 2.0),
-    ]
+    assert outcome.status == 0
+    summary, made = outcome.out.splitlines()
+    assert summary.startswith("test frames differ from the nearest training frame in ")
+    assert made == "a: 6 pictures of 3 frames, 6 of them made now"
+    manifest = json.loads((tmp_path / "a/manifest.json").read_text())
+    assert set(manifest["nearest"]) == {"test"}
+    frames = manifest["frames"]
+    times = draws.times(5, 0.0, 8.0, 0, 3)
+    assert [(frame["split"], frame["time_s"]) for frame in frames] == list(
+        zip(("train", "train", "test"), times, strict=True)
+    )
     for frame in frames:
         scene = canonical("minicubes", time=frame["time_s"])
         assert frame["scene_digest"] == scene_digest(scene)
@@ -49,7 +54,8 @@ def test_the_pictures_are_the_references(wamnet, tmp_path) -> None:
             want = render(scene, Job(12, 12, spp, facts["seed"])).frame
             got = exr.read_frame(tmp_path / "a" / facts["file"])
             assert all((got[name] == values).all() for name, values in want.layers.items())
-            assert got.info == want.info
+            assert want.info.items() <= got.info.items()
+            assert ranges_from_json(got.info["ranges"]) == Ranges()
     assert wamnet("dataset", "--check", "-o", "a").out == "a: 6 pictures are as manifest.json says\n"
     assert wamnet("dataset", *TINY, "--seed", 5, "-o", "a").out.endswith(", 0 of them made now\n")
 
@@ -83,7 +89,8 @@ def test_the_sampler_is_the_request_s(wamnet, tmp_path) -> None:
     manifest = json.loads((tmp_path / "a/manifest.json").read_text())
     assert manifest["request"]["sampler"] == "sobol"
     job = Job(12, 12, 4, manifest["frames"][0]["target"]["seed"], Settings(sampler="sobol"))
-    want = render(canonical("minicubes", time=0.0), job).frame["color"]
+    time = manifest["frames"][0]["time_s"]
+    want = render(canonical("minicubes", time=time), job).frame["color"]
     assert (exr.read_frame(tmp_path / "a/train/00000-target.exr")["color"] == want).all()
     outcome = wamnet("dataset", *TINY, "-o", "a")
     assert outcome.status == 2
@@ -167,7 +174,7 @@ def test_an_interrupted_process_is_gone_on_with(wamnet, tmp_path, sent, workers)
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
     if sent == signal.SIGINT:
-        hint = b"wamnet: the same command goes on where it was, in a\n"
+        hint = b"wamnet: the same command resumes where it was, in a\n"
         assert (process.returncode, errors) == (130, hint + b"wamnet: interrupted\n")
     done = list((tmp_path / "a").rglob("0*.exr"))
     times = {path: path.stat().st_mtime_ns for path in done}
@@ -179,15 +186,35 @@ def test_an_interrupted_process_is_gone_on_with(wamnet, tmp_path, sent, workers)
 
 
 def test_ranges_and_parameters_are_passed_on(wamnet, tmp_path) -> None:
-    """Start, length, a parameter of the scene, depth."""
-    options = ("--start", 1, "--seconds", 2, "--set", "orbit_deg=20", "--max-depth", 1)
-    assert wamnet("dataset", *TINY, *options, "-o", "a").status == 0
+    """Start, length, a parameter of the scene, depth, arc, camera, lamps."""
+    options = ("--start", 1, "--seconds", 2, "--set", "warm=1,0.5,0.5", "--max-depth", 1)
+    ranges = ("--arc", 0.5, "--yaw=-24:24", "--pitch=-8:8", "--distance", "0.9:1.1", "--saturation", "0:0.7")
+    assert wamnet("dataset", *TINY, *options, *ranges, "--outside", 3, "-o", "a").status == 0
     manifest = json.loads((tmp_path / "a/manifest.json").read_text())
-    assert [frame["time_s"] for frame in manifest["frames"]] == [1.0, 2.0, 1.5]
-    assert manifest["request"]["parameters"] == {"orbit_deg": 20.0}
-    got = exr.read_frame(tmp_path / "a/test/00000-noisy.exr").info
-    assert got["scene_digest"] == scene_digest(canonical("minicubes", time=1.5, orbit_deg=20.0))
-    assert got["max_depth"] == "1"
+    assert manifest["request"]["parameters"] == {"warm": [1.0, 0.5, 0.5]}
+    assert set(manifest["nearest"]) == {"test", "outside"}
+    frames = manifest["frames"]
+    assert [f["split"] for f in frames] == ["train", "train", "test", "outside", "outside", "outside"]
+    assert [f.get("outside") for f in frames[3:]] == ["time", "camera", "lamps"]
+    assert all(1.0 <= f["time_s"] < 2.5 for f in frames[:3])
+    assert 2.5 <= frames[3]["time_s"] < 3.0
+    wanted = Ranges((1.0, 2.5), (-24.0, 24.0), (-8.0, 8.0), (0.9, 1.1), (0.0, 0.7))
+    for facts in frames:
+        scene = canonical("minicubes", time=facts["time_s"], warm=(1.0, 0.5, 0.5))
+        lights = tuple(tuple(color) for color in facts["lights"])
+        v = Variation(facts["yaw_deg"], facts["pitch_deg"], facts["distance"], lights)
+        got = exr.read_frame(tmp_path / "a" / facts["noisy"]["file"]).info
+        assert got["scene_digest"] == scene_digest(varied(scene, v))
+        assert got["max_depth"] == "1"
+        assert ranges_from_json(got["ranges"]) == wanted
+
+
+def test_test_frames_that_were_seen_are_refused(refused, tmp_path) -> None:
+    """Before anything is rendered: the lattice of a scene that stands still is one picture."""
+    text = refused("dataset", "daylight", "--frames", 2, "--test", 1, "--size", 12, "-o", "still")
+    assert "test frame is test/00000" in text
+    assert "over 99 % of the pixels; move the camera (--yaw, --pitch, --distance)" in text
+    assert not (tmp_path / "still").exists()
 
 
 @pytest.mark.parametrize(
@@ -201,6 +228,10 @@ def test_ranges_and_parameters_are_passed_on(wamnet, tmp_path) -> None:
         (["minicubes", "--workers", 2, "--scheduler", "x"], "a running scheduler has its own workers; leave"),
         (["minicubes", "--set", "time=1"], "parameter time is 1.0: each frame has its own"),
         (["minicubes", "--set", "warm=1"], "parameter warm is 1.0: minicubes wants three numbers"),
+        (["minicubes", "--yaw", "5"], "--yaw is 5: it must be LOW:HIGH; for example --yaw=-24:24"),
+        (["minicubes", "--pitch", "0:99"], "range of pitch_deg is 0.0:99.0: LOW:HIGH within -85 to 85"),
+        (["minicubes", "--outside", 1], "number of frames outside is 1: a data set whose frames differ"),
+        (["minicubes", "--arc", 9], "arc_s is 9.0: training leaves it out of the animation"),
         (["minicubes", "--spp", 0], "spp is 0: it must be an integer from 1"),
     ],
 )

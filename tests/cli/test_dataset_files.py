@@ -218,7 +218,7 @@ def test_a_journal_that_is_damaged(tmp_path, whole, line) -> None:
     ("old", "new", "text"),
     [
         ("{", "[", "manifest is .*: it is no manifest of a data set, or damaged; restore it, or make"),
-        ("wamnet-dataset-1", "wamnet-dataset-9", "schema is wamnet-dataset-9: it must be wamnet-dataset-1"),
+        ("wamnet-dataset-2", "wamnet-dataset-9", "schema is wamnet-dataset-9: it must be wamnet-dataset-2"),
         ('"schema"', '"schemes"', "or damaged"),
         ('"frames": [', '"pictures": [', "or damaged"),
         ("train/00000-noisy.exr", "../../00000-noisy.exr", "or damaged"),

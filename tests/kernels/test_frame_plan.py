@@ -11,43 +11,61 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wamnet.kernels import frame_plan
-from wamnet.kernels.frame_plan import Request, carry_out, frame_times, join, plan, tasks_of
+from wamnet.kernels.frame_plan import Request, carry_out, frame_draws, join, plan, tasks_of
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.render import render
 from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.variation import ranges_from_json
 
 TINY = Request("minicubes", frames=2, test_frames=1, size_px=6, spp=2)
 
 
-def test_the_times_by_hand() -> None:
-    """Four training times in 8 s; two tests in the middle of the first and third gap; three and six share."""
-    request = Request("minicubes", frames=4, test_frames=2)
-    assert frame_times(request) == [
-        ("train", 0.0),
-        ("train", 2.0),
-        ("train", 4.0),
-        ("train", 6.0),
-        ("test", 1.0),
-        ("test", 5.0),
+@given(st.integers(1, 40), st.integers(0, 30), st.sampled_from([0.0, -3.7, 1e6]), st.sampled_from([0.1, 8.0]))
+def test_no_time_is_another(frames, tests, start, seconds) -> None:
+    """All times differ and lie in the animation without its arc; tests continue the training's sequence."""
+    request = Request(
+        "minicubes", start_s=start, seconds=seconds, frames=frames, test_frames=tests, arc_s=seconds / 4
+    )
+    draws = frame_draws(request)
+    assert [split for split, _ in draws] == ["train"] * frames + ["test"] * tests
+    moments = [draw.time_s for _, draw in draws]
+    assert len(set(moments)) == frames + tests
+    assert all(start <= moment < start + 0.75 * seconds for moment in moments)
+    assert times == [
+        draw.time_s for _, draw in frame_draws(replace(request, frames=frames + tests, test_frames=0))
     ]
-    crowded = frame_times(replace(request, frames=2, test_frames=6, start_s=1.0))
-    assert [time for _, time in crowded] == [1.0, 5.0, 2.0, 3.0, 4.0, 6.0, 7.0, 8.0]
 
 
-@given(st.integers(1, 40), st.integers(0, 90), st.sampled_from([0.0, -3.7, 1e6]), st.sampled_from([0.1, 8.0]))
-def test_no_test_time_is_a_training_time(frames, tests, start, seconds) -> None:
-    """All times differ and lie in the animation; every gap has its share of tests, give or take one."""
-    request = Request("minicubes", start_s=start, seconds=seconds, frames=frames, test_frames=tests)
-    times = frame_times(request)
-    assert len({time for _, time in times}) == frames + tests
-    end = start + seconds
-    assert all(start <= time < end for _, time in times)
-    train = sorted(time for split, time in times if split == "train")
-    counts = [0] * frames
-    for split, time in times:
-        if split == "test":
-            counts[sum(known < time for known in train) - 1] += 1
-    assert max(counts) - min(counts) <= 1
+def test_splits_and_draws() -> None:
+    """Training, inside, outside; each frame's scene is its draw's, and says the ranges."""
+    request = replace(
+        TINY, outside_frames=3, arc_s=1.0, yaw_deg=(-24.0, 24.0), saturation=(0.0, 0.7), test_frames=2
+    )
+    frames = plan(request)
+    assert [f.name for f in frames] == [
+        *("train/00000", "train/00001", "test/00000", "test/00001"),
+        *("outside/00000", "outside/00001", "outside/00002"),
+    ]
+    assert [f.draw.outside for f in frames] == ["", "", "", "", "time", "camera", "lamps"]
+    facts = [frame_plan.describe(frame) for frame in frames]
+    assert [f.get("outside", "") for f in facts] == [f.draw.outside for f in frames]
+    assert facts[5]["yaw_deg"] == -34.0
+    assert len(facts[0]["lights"]) == 2
+    scene = frames[5].pictures["noisy"].scene
+    assert scene.info["yaw_deg"] == "-34.0"
+    assert ranges_from_json(scene.info["ranges"]) == request.ranges
+    assert request.ranges.time_s == (0.0, 7.0)
+    found = frame_plan.compared(frames)
+    assert list(found) == ["test", "outside"]
+
+
+def test_frames_that_are_alike_are_refused() -> None:
+    """A scene that does not move has no unseen frames, unless its camera does."""
+    still = replace(TINY, scene="daylight")
+    with pytest.raises(InputError, match="test frame is test/00000"):
+        frame_plan.compared(plan(still))
+    assert frame_plan.compared(plan(replace(still, test_frames=0))) == {}
+    assert set(frame_plan.compared(plan(replace(still, yaw_deg=(-20.0, 20.0))))) == {"test"}
 
 
 def test_pictures_have_names_and_seeds_of_their_own() -> None:
@@ -60,9 +78,10 @@ def test_pictures_have_names_and_seeds_of_their_own() -> None:
     assert [picture.name for picture in pictures] == names
     assert [picture.job.seed for picture in pictures] == list(range(10, 16))
     assert [picture.job.spp for picture in pictures] == [1, 2] * 3
-    assert pictures[-1].scene == canonical("minicubes", time=2.0)
+    scene = canonical("minicubes", time=frames[-1].draw.time_s)
+    assert replace(pictures[-1].scene, info={}) == replace(scene, info={})
     facts = frame_plan.describe(frames[0])
-    assert (facts["split"], facts["time_s"], facts["noisy"]["spp"]) == ("train", 0.0, 1)
+    assert (facts["split"], facts["yaw_deg"], facts["noisy"]["spp"]) == ("train", 0.0, 1)
 
 
 def test_rays_of_features_and_samples_of_tests() -> None:
@@ -76,7 +95,6 @@ def test_rays_of_features_and_samples_of_tests() -> None:
     assert (noisy["spp"], noisy["feature_spp"]) == (1, 16)
     assert "feature_spp" not in frame_plan.describe(plan(TINY)[0])["noisy"]
     assert {"feature_spp": 16, "test_spp": 5}.items() <= request.as_data().items()
-    assert not {"feature_spp", "test_spp"} & TINY.as_data().keys()  # as texts of the time before had it
     task = tasks_of(plan(request)[0].pictures["noisy"])[0]
     assert task.samples == 6 * 6 * (1 + 16)
     assert carry_out(task).info["feature_spp"] == "16"
@@ -120,6 +138,10 @@ def test_joined_bands_are_the_reference(monkeypatch) -> None:
         ({"start_s": 1e18}, "seconds of the animation is 8.0: 3 different times must fit into it"),
         ({"seed": -1}, "seed is -1: seeds up to that plus twice"),
         ({"seed": (1 << 32) - 5}, "seed is 4294967291: seeds up to that plus twice"),
+        ({"outside_frames": -1}, "outside_frames is -1"),
+        ({"outside_frames": 1}, "number of frames outside is 1"),
+        ({"arc_s": 8.0}, "arc_s is 8.0: training leaves it out of the animation"),
+        ({"yaw_deg": (10.0, -10.0)}, "range of yaw_deg is 10.0:-10.0"),
         ({"executor": "abacus"}, "executor that renders is abacus"),
         ({"scene": "nowhere"}, "scene is nowhere: no canonical scene"),
         ({"parameters": {"time": 1.0}}, "parameter time is 1.0: each frame has its own; use --start"),

@@ -30,10 +30,11 @@ def test_no_time_is_another(frames, tests, start, seconds) -> None:
     assert [split for split, _ in draws] == ["train"] * frames + ["test"] * tests
     moments = [draw.time_s for _, draw in draws]
     assert len(set(moments)) == frames + tests
-    assert all(start <= moment < start + 0.75 * seconds for moment in moments)
-    assert times == [
-        draw.time_s for _, draw in frame_draws(replace(request, frames=frames + tests, test_frames=0))
-    ]
+    low, high = request.ranges.time_s
+    assert (low, high) == (start, start + seconds - seconds / 4)
+    assert all(low <= moment < high for moment in moments)
+    only = replace(request, frames=frames + tests, test_frames=0)
+    assert moments == [draw.time_s for _, draw in frame_draws(only)]
 
 
 def test_splits_and_draws() -> None:

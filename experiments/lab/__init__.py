@@ -5,7 +5,7 @@
 3. A picture is scored against its reference in both spaces [`scores.score`].
 4. One record per configuration and seed is kept as JSON, so that an interrupted run goes on
    [`results.Results`], [`results.fill`]; records become means with their spread, and Markdown tables
-   [`tables.table`].
+   [`tables.table`]; values per pose and seed become bootstrap intervals [`intervals.interval`].
 5. Contact sheets and curves are PNG [`figures`].
 6. Every experiment has the same options [`command.parser`], [`command.begin`].
 

@@ -1,0 +1,120 @@
+"""Bootstrap intervals: against exact distributions of resampled means, and against a known coverage."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+from lab.intervals import RESAMPLES, interval, paired, resampled_means
+from scipy import stats
+
+from wamnet.refimpl.errors import InputError
+
+ALPHA = 1e-6
+"""Significance of each statistical test here."""
+
+EPS = float(np.finfo(np.float64).eps)
+"""One rounding of numbers near one."""
+
+DKW = math.sqrt(math.log(2.0 / ALPHA) / (2.0 * RESAMPLES))
+"""How far the distribution of so many draws may be from the true one (inequality of Dvoretzky, Kiefer and
+Wolfowitz with the constant of Massart)."""
+
+
+def assert_is_quantile(at: float, level: float, distribution: dict[float, float]) -> None:
+    """Check that a value is the quantile of a discrete distribution, within the bound of so many draws."""
+    below = sum(p for value, p in distribution.items() if value < at - 1e-9)
+    up_to = sum(p for value, p in distribution.items() if value <= at + 1e-9)
+    assert below - DKW <= level <= up_to + DKW
+
+
+def binomial_means(zeros: int, ones: int) -> dict[float, float]:
+    """Return the exact distribution of the mean of a resample of zeros and ones."""
+    n = zeros + ones
+    return {k / n: float(stats.binom.pmf(k, n, ones / n)) for k in range(n + 1)}
+
+
+@pytest.mark.parametrize("level", [0.5, 0.9, 0.95])
+def test_resampled_means_of_zeros_and_ones_are_binomial(level):
+    found = interval([0.0] * 14 + [1.0] * 6, level)
+    exact = binomial_means(14, 6)
+    assert_is_quantile(found.low, 0.5 - level / 2, exact)
+    assert_is_quantile(found.high, 0.5 + level / 2, exact)
+    assert (found.seeds, found.poses) == (1, 20)
+    assert abs(found.mean - 0.3) <= EPS
+
+
+def test_seeds_and_poses_are_drawn_independently():
+    seeds, poses = np.array([0.0, 0.0, 1.0]), np.array([0.0] * 5 + [10.0] * 3)
+    found = interval(seeds[:, None] + poses)
+    exact: Counter[float] = Counter()
+    for a, p in binomial_means(2, 1).items():
+        for b, q in binomial_means(5, 3).items():
+            exact[round(a + 10.0 * b, 9)] += p * q
+    assert_is_quantile(found.low, 0.025, exact)
+    assert_is_quantile(found.high, 0.975, exact)
+
+
+def test_the_variance_is_the_sum_of_both_parts():
+    generator = np.random.default_rng(2)
+    seeds, poses = generator.normal(0.0, 1.0, 5), generator.normal(0.0, 2.0, 12)
+    means = resampled_means(seeds[:, None] + poses, 100_000)
+    expected = seeds.var() / 5 + poses.var() / 12
+    # The sample variance of n nearly normal draws has a relative deviation of sqrt(2 / n); their kurtosis is
+    # below the normal one's plus 1, which the factor 1.5 covers.
+    tolerance = 1.5 * stats.norm.isf(ALPHA / 2) * math.sqrt(2.0 / 100_000)
+    assert abs(means.var() / expected - 1.0) <= tolerance
+
+
+def test_coverage_is_that_of_student_s_statistic():
+    """The ends are mean -+ z s sqrt((n - 1) / n) / sqrt(n): Student's t says how often the mean is inside."""
+    n, trials = 30, 600
+    samples = np.random.default_rng(3).normal(5.0, 2.0, (trials, n))
+    found = [interval(sample, resamples=1000) for sample in samples]
+    held = sum(one.low <= 5.0 <= one.high for one in found)
+    # An end from 1000 draws is that of another level: three standard deviations of a binomial share.
+    slack = 3.0 * math.sqrt(0.025 * 0.975 / 1000.0)
+    z = stats.norm.isf(0.025)
+    coverage = 1.0 - 2.0 * stats.t.sf(z * math.sqrt((n - 1) / n), n - 1)
+    low = stats.binom.ppf(ALPHA / 2, trials, coverage - 2.0 * slack)
+    high = stats.binom.ppf(1.0 - ALPHA / 2, trials, min(coverage + 2.0 * slack, 1.0))
+    assert 0.93 <= coverage <= 0.95
+    assert low <= held <= high
+
+
+def test_the_same_values_have_the_same_interval():
+    values = np.random.default_rng(4).normal(30.0, 1.0, (3, 8))
+    assert interval(values) == interval(values.tolist())
+    assert interval(values).low < values.mean() < interval(values).high
+
+
+def test_what_methods_share_cancels_in_their_difference():
+    poses = np.random.default_rng(5).normal(30.0, 3.0, 8)
+    mine, other = np.array([[1.0], [1.2], [0.8]]) + poses, poses[None]
+    found = paired(mine, other)
+    assert (found.seeds, found.poses) == (3, 8)
+    # Values near 30 and their differences are rounded.
+    assert 0.8 - 100 * EPS <= found.low <= found.mean <= found.high <= 1.2 + 100 * EPS
+    assert interval(mine).low - poses.mean() < found.low
+
+
+def test_a_lone_value_has_no_interval():
+    assert interval([[31.25]]).text(1) == "31.2"
+    assert interval([[1.0, 1.0]]).text() == "1.00 [1.00, 1.00]"
+
+
+@pytest.mark.parametrize("values", [[], [[]], [[1.0], [1.0, 2.0]], [math.nan], [[[1.0]]]])
+def test_what_has_no_interval_is_refused(values):
+    with pytest.raises(InputError, match="must be finite numbers, seeds by poses"):
+        interval(values)
+
+
+def test_other_poses_and_levels_are_refused():
+    with pytest.raises(InputError, match="must have the same seeds and poses"):
+        paired([[1.0, 2.0]], [[1.0]])
+    with pytest.raises(InputError, match="must have the same seeds and poses"):
+        paired([[1.0], [2.0]], [[1.0], [2.0], [3.0]])
+    with pytest.raises(InputError, match="must lie between 0 and 1"):
+        interval([1.0], 1.0)

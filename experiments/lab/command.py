@@ -2,12 +2,14 @@
 
 1. `--scale` chooses among the sizes that the experiment offers; `-o` names the folder of its results; frames
    and networks that several experiments share lie in `--cache` [`parser`].
-2. What a user can cause ends with one line on standard error and status 2; Ctrl-C with status 130 [`begin`].
+2. Records keep the command that made them, without its folders [`line`].
+3. What a user can cause ends with one line on standard error and status 2; Ctrl-C with status 130 [`begin`].
 """
 
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -22,6 +24,31 @@ SEEDS = (0, 1, 2)
 
 HIDDEN_SCALE = "toy"
 """A scale for tests: seconds, and numbers that mean nothing."""
+
+
+FOLDERS = ("-o", "--output", "--cache")
+"""Options that say where files are, not what is in them."""
+
+SCRIPTS = ("experiments", "bench")
+"""The folders of the programs whose commands are kept."""
+
+
+def line(arguments: Sequence[str] | None = None) -> str:
+    """Return the command of this process as typed in the repository's root, without folders of results.
+
+    Nothing is returned for a program that is none of the project's, such as a test's. `arguments`: those of
+    the process, its script first, unless they are given.
+    """
+    script, *rest = sys.argv if arguments is None else arguments
+    path = Path(script)
+    if path.suffix != ".py" or path.parent.name not in SCRIPTS:
+        return ""
+    kept = [
+        text
+        for before, text in zip(["", *rest], rest, strict=False)
+        if before not in FOLDERS and text.partition("=")[0] not in FOLDERS
+    ]
+    return shlex.join(["python", f"{path.parent.name}/{path.name}", *kept])
 
 
 def parser(text: str, name: str) -> argparse.ArgumentParser:

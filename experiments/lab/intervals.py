@@ -15,7 +15,7 @@ seeds is too narrow by a factor of 0.82, which a table with few seeds should say
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,6 +41,10 @@ class Interval:
     high: float
     seeds: int
     poses: int
+
+    def scaled(self, factor: float) -> Interval:
+        """Return the interval in another unit, `factor` of which are one of this."""
+        return replace(self, mean=self.mean * factor, low=self.low * factor, high=self.high * factor)
 
     def text(self, digits: int = 2) -> str:
         """Return `mean [low, high]` with so many digits after the point; one value has no interval."""

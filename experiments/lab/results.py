@@ -4,7 +4,10 @@
 2. A record is added in one step of the file system, under a lock: an interrupted run loses what it was at
    work on and nothing else, and two runs may share a file [`Results.put`].
 3. Configurations and seeds without a record are worked on, in order [`fill`].
-4. The records of one configuration have a mean and a standard deviation over the seeds [`Summary`].
+4. The records of one configuration have a mean and a standard deviation over the seeds [`Summary`], and an
+   interval over seeds and poses [`Results.interval`].
+5. The file says which commands made it, on which machine and with which versions, one record a line
+   [`written`].
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ import math
 import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +27,24 @@ from wamnet.cli.outputs import write_text
 from wamnet.cli.terminal import hint_on_interrupt, progress
 from wamnet.refimpl.errors import InputError
 
-SCHEMA = "wamnet-experiment-1"
+from .command import line
+from .intervals import Interval, interval
+
+SCHEMA = "wamnet-experiment-2"
 """Name and version of the form of a file of results."""
 
+OLDER = "wamnet-experiment-1"
+"""The form before it, without commands, which is read too."""
+
+PER_FRAME = "per_frame"
+"""The value that holds lists of numbers, one for each pose, by the names of their means."""
+
+PACKAGES = ("torch", "pyoidn", "flip-evaluator", "onnxruntime", "mitsuba", "scikit-image")
+"""Packages whose versions a file of results names too, where they are installed."""
+
 Values = Mapping[str, Any]
-"""What was found for one configuration and seed, by name: numbers, texts, lists of them."""
+"""What was found for one configuration and seed, by name: numbers, texts, lists of them; under `PER_FRAME`
+the numbers of each pose."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +62,31 @@ class Summary:
         return f"{self.mean:.{digits}f} ± {self.deviation:.{digits}f}"
 
 
+WAY_OUT = "choose another folder with -o, or remove the file"
+"""What helps against a file of something else."""
+
+
+def _data(path: Path) -> dict[str, Any]:
+    """Return what a file says, or refuse it."""
+    try:
+        data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        data.setdefault("commands", [])
+        if data["schema"] not in (SCHEMA, OLDER) or not isinstance(data["records"], list):
+            raise KeyError("schema")
+        _ = data["experiment"], data["settings"]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        rule = f"it is no file of results ({type(error).__name__})"
+        raise InputError("file of results", str(path), rule, WAY_OUT) from None
+    return data
+
+
+def written(data: Mapping[str, Any]) -> str:
+    """Return data as JSON, each key on a line and each record on one, so that differences can be read."""
+    lines = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items() if key != "records"]
+    records = ",\n".join(f"  {json.dumps(record)}" for record in data["records"])
+    return "{\n" + ",\n".join([*lines, f' "records": [\n{records}\n ]']) + "\n}\n"
+
+
 def summary(values: Sequence[float]) -> Summary:
     """Return the mean of some numbers, and their sample standard deviation."""
     spread = statistics.stdev(values) if len(values) > 1 else math.nan
@@ -59,6 +100,7 @@ class Results:
     path: Path
     experiment: str
     settings: Mapping[str, Any]
+    command: str = field(default_factory=line, compare=False)
 
     @classmethod
     def open(cls, path: Path, experiment: str, settings: Mapping[str, Any]) -> Results:
@@ -70,6 +112,16 @@ class Results:
                 found._write([])
             found._records()
         return found
+
+    @classmethod
+    def read(cls, path: Path) -> Results:
+        """Return the results of a file as it is, whatever experiment and settings it belongs to."""
+        data = _data(path)
+        return cls(path, data["experiment"], data["settings"])
+
+    def data(self) -> dict[str, Any]:
+        """Return all that the file says."""
+        return _data(self.path)
 
     def records(self) -> list[dict[str, Any]]:
         """Return all records: `configuration`, `seed`, and `values`."""
@@ -87,8 +139,11 @@ class Results:
         """Add a record, in place of an older one of this configuration and seed."""
         with self._locked():
             key = (configuration, seed)
-            kept = [r for r in self._records() if (r["configuration"], r["seed"]) != key]
-            self._write([*kept, {"configuration": configuration, "seed": seed, "values": dict(values)}])
+            found = self._checked()
+            kept = [r for r in found["records"] if (r["configuration"], r["seed"]) != key]
+            record = {"configuration": configuration, "seed": seed, "values": dict(values)}
+            commands = dict.fromkeys([*found["commands"], *([self.command] if self.command else [])])
+            self._write([*kept, record], list(commands))
 
     def configurations(self) -> list[str]:
         """Return the configurations that have a record, in the order of their first ones."""
@@ -110,26 +165,35 @@ class Results:
         found = self.summary(configuration, name)
         return found.text(digits) if found else ""
 
+    def per_pose(self, configuration: str, name: str) -> list[list[float]]:
+        """Return a number's values (seeds, poses): of each pose where they are kept, else the means."""
+        kept = [frames[name] for frames in self.of(configuration, PER_FRAME) if name in frames]
+        rows = kept or [value for value in self.of(configuration, name) if value is not None]
+        return [list(map(float, row)) if isinstance(row, list) else [float(row)] for row in rows]
+
+    def interval(self, configuration: str, name: str) -> Interval | None:
+        """Return mean and interval of a number over seeds and poses, or None without a record of it."""
+        found = self.per_pose(configuration, name)
+        return interval(found) if found else None
+
     def _records(self) -> list[dict[str, Any]]:
-        """Read the file, or refuse it."""
-        way_out = "choose another folder with -o, or remove the file"
-        try:
-            data = json.loads(self.path.read_text(encoding="utf-8"))
-            head = {name: data[name] for name in ("schema", "experiment", "settings")}
-            records: list[dict[str, Any]] = data["records"]
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            rule = f"it is no file of results ({type(error).__name__})"
-            raise InputError("file of results", str(self.path), rule, way_out) from None
-        if head != {"schema": SCHEMA, "experiment": self.experiment, "settings": self.settings}:
-            rule = f"it belongs to {head['experiment']} with settings {json.dumps(head['settings'])}"
-            raise InputError("file of results", str(self.path), rule, way_out)
+        """Return the file's records."""
+        records: list[dict[str, Any]] = self._checked()["records"]
         return records
 
-    def _write(self, records: Sequence[Mapping[str, Any]]) -> None:
+    def _checked(self) -> dict[str, Any]:
+        """Return what the file says, or refuse it as that of something else."""
+        data = _data(self.path)
+        if (data["experiment"], data["settings"]) != (self.experiment, self.settings):
+            rule = f"it belongs to {data['experiment']} with settings {json.dumps(data['settings'])}"
+            raise InputError("file of results", str(self.path), rule, WAY_OUT)
+        return data
+
+    def _write(self, records: Sequence[Mapping[str, Any]], commands: Sequence[str] = ()) -> None:
         """Write the file in one step."""
-        head = {"schema": SCHEMA, "experiment": self.experiment, "settings": self.settings}
-        facts = {"machine": machine.describe(), "versions": machine.versions()}
-        write_text(self.path, json.dumps({**head, **facts, "records": records}, indent=1) + "\n")
+        head = {"schema": SCHEMA, "experiment": self.experiment, "commands": list(commands)}
+        facts = {"machine": machine.describe(), "versions": machine.versions(PACKAGES)}
+        write_text(self.path, written({**head, "settings": self.settings, **facts, "records": records}))
 
     @contextmanager
     def _locked(self) -> Iterator[None]:

@@ -21,6 +21,15 @@ class Column:
     digits: int = 2
     scale: float = 1.0
     write: Callable[[Summary], str] | None = None
+    interval: bool = False
+    """Mean and interval over seeds and poses, not mean and deviation over seeds."""
+
+    def of(self, results: Results, configuration: str) -> str:
+        """Return the cell of a configuration."""
+        if not self.interval:
+            return self.cell(results.summary(configuration, self.value))
+        found = results.interval(configuration, self.value)
+        return found.scaled(self.scale).text(self.digits) if found else ""
 
     def cell(self, found: Summary | None) -> str:
         """Return a cell."""
@@ -35,10 +44,7 @@ def table(
 ) -> str:
     """Return a Markdown table of the configurations in `names`, by their texts; of all without `names`."""
     rows = names or {name: name for name in results.configurations()}
-    cells = [
-        [text, *(column.cell(results.summary(name, column.value)) for column in columns)]
-        for name, text in rows.items()
-    ]
+    cells = [[text, *(column.of(results, name) for column in columns)] for name, text in rows.items()]
     return markdown([first, *(column.heading for column in columns)], cells)
 
 

@@ -73,6 +73,46 @@ def test_settings_may_hold_tuples(tmp_path):
     assert json.loads((tmp_path / "found.json").read_text())["settings"] == {"sizes": [1, 2]}
 
 
+def test_a_file_says_which_commands_made_it(results, tmp_path):
+    made = [
+        command.line(
+            ["experiments/quality.py", "--seeds", "0", "-o", "somewhere", "--cache=x", "--rows", "a b"]
+        ),
+        command.line(["/somewhere/bench/train.py"]),
+        command.line(["pytest", "-x"]),
+    ]
+    assert made == ["python experiments/quality.py --seeds 0 --rows 'a b'", "python bench/train.py", ""]
+    for number, text in enumerate([*made, made[0]]):
+        Results(results.path, "test", {"size": 8}, text).put("a", number, {"psnr": 30.0})
+    assert results.data()["commands"] == made[:2]
+    lines = results.path.read_text().splitlines()
+    assert '  {"configuration": "a", "seed": 1, "values": {"psnr": 30.0}},' in lines
+    assert Results.read(results.path).records() == results.records()
+
+
+def test_a_file_of_the_older_form_goes_on(results):
+    data = results.data()
+    older = {key: value for key, value in data.items() if key != "commands"}
+    results.path.write_text(json.dumps({**older, "schema": "wamnet-experiment-1"}))
+    results.put("a", 0, {"psnr": 30.0})
+    assert results.data()["schema"] == "wamnet-experiment-2"
+    results.path.write_text(json.dumps({**data, "schema": "wamnet-experiment-3"}))
+    with pytest.raises(InputError, match="it is no file of results"):
+        results.records()
+
+
+def test_numbers_of_each_pose_have_an_interval(results):
+    for seed, poses in enumerate(([30.0, 34.0], [31.0, 35.0])):
+        results.put("a", seed, {"psnr": sum(poses) / 2, "ms": 2.0, "per_frame": {"psnr": poses}})
+    assert results.per_pose("a", "psnr") == [[30.0, 34.0], [31.0, 35.0]]
+    assert results.per_pose("a", "ms") == [[2.0], [2.0]]
+    found = results.interval("a", "psnr")
+    assert (found.mean, found.low, found.high) == (32.5, 30.0, 35.0)
+    assert results.interval("a", "ssim") is None
+    columns = [Column("psnr", "PSNR, dB", 1, interval=True), Column("ms", "us", 0, 1000.0, interval=True)]
+    assert table(results, columns).splitlines()[-1] == "| a | 32.5 [30.0, 35.0] | 2000 [2000, 2000] |"
+
+
 def test_tables_have_empty_cells_for_what_was_not_measured(results):
     results.put("a", 0, {"psnr": 30.0, "ms": 0.5})
     results.put("b", 0, {"psnr": 20.0})

@@ -21,6 +21,7 @@ from typing import Any
 from wamnet.cli import exr
 from wamnet.cli.dataset_files import sum_of
 from wamnet.cli.terminal import hint_on_interrupt, progress
+from wamnet.kernels.draws import times
 from wamnet.kernels.frame_plan import version
 from wamnet.kernels.render_frame import render_frame
 from wamnet.refimpl.errors import InputError
@@ -35,6 +36,9 @@ NOISY_SPP = 1
 
 DIGITS = 16
 """Hexadecimal digits of a shot's digest in a file's name: two shots never share them."""
+
+TIMES_SEED = 0
+"""Seed of the sequence of times of all experiments."""
 
 Pair = tuple[Frame, Frame]
 """A noisy frame and its reference."""
@@ -155,10 +159,6 @@ def _with(spp: int) -> Any:
 
 
 def split_times(train: int, test: int, seconds: float, start: float = 0.0) -> tuple[list[float], list[float]]:
-    """Return times of training frames, evenly over an animation, and of tests, each amid a gap."""
-    step = seconds / train
-    gaps = [j * train // test for j in range(test)]
-    if len(set(gaps)) < test:
-        rule = f"a gap between {train} training times has one at most"
-        raise InputError("number of test times", test, rule, "take fewer, or train on more")
-    return [start + k * step for k in range(train)], [start + (gap + 0.5) * step for gap in gaps]
+    """Return times of training frames and, continuing their sequence, of tests: no two show one pose."""
+    found = times(TIMES_SEED, start, seconds, 0, train + test)
+    return found[:train], found[train:]

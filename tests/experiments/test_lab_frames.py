@@ -98,12 +98,15 @@ def test_a_reference_of_one_sample_is_refused(tmp_path):
         frames.pairs(tmp_path, [SHOT], 1, "numpy")
 
 
-def test_test_times_lie_between_training_times():
-    train, test = frames.split_times(4, 2, 8.0, start=1.0)
-    assert train == [1.0, 3.0, 5.0, 7.0]
-    assert test == [2.0, 6.0]
-    with pytest.raises(InputError, match="number of test times is 5"):
-        frames.split_times(4, 5, 8.0)
+def test_times_continue_one_sequence_and_repeat_no_pose():
+    """Modulo a quarter turn, after which the lattice of cubes repeats, no two of 28 are within a degree.
+
+    28 golden steps have gaps of 1/34 or more of what they divide: 90 / 34 degrees.
+    """
+    train, test = frames.split_times(24, 4, 8.0, start=1.0)
+    assert [*train, *test] == frames.split_times(28, 0, 8.0, start=1.0)[0]
+    poses = np.sort(np.array([*train, *test]) % 2.0) * 45.0
+    assert np.diff([*poses, poses[0] + 90.0]).min() >= 1.0
 
 
 def test_a_colour_that_is_there_gets_other_features(tmp_path):

@@ -1,0 +1,97 @@
+"""Sets of frames that experiments train and judge on: a scene, what varies, and frames that are truly unseen.
+
+1. A set has a name, a scene and ranges of time, camera and lamps [`SETS`].
+2. Training frames, test frames inside of the ranges and outside are draws like those of `wamnet dataset`
+   [`FrameSet.draws`], and become shots with seeds of their own [`FrameSet.shots`].
+3. Before a set is used, what its frames show is compared: frames that are alike are refused [`compared`].
+
+The ranges of `minicubes` are those that the web page's camera and lamps have for the model that ships.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from wamnet.kernels.draws import Draw, drawn, drawn_outside
+from wamnet.kernels.frame_plan import OUTSIDE, TEST, TRAIN
+from wamnet.kernels.geometry import Comparison, Shown, compare
+from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.variation import Ranges
+
+from .frames import Shot
+
+DRAW_SEED = 0
+"""Seed of the draws of all sets."""
+
+NOISE_SEEDS_APART = 100_000
+"""Frames of one seed of noise: that of another one begins so many later."""
+
+WIDE = Ranges(yaw_deg=(-45.0, 45.0), pitch_deg=(-15.0, 20.0), distance=(0.85, 1.2))
+"""A camera that a visitor drags around, without a view of the scene's back."""
+
+NARROW = Ranges(yaw_deg=(-24.0, 24.0), pitch_deg=(-8.0, 8.0), distance=(0.9, 1.1))
+"""A camera that stays before the scene."""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Numbers of frames: to train on, inside, outside."""
+
+    train: int
+    test: int
+    outside: int
+
+
+@dataclass(frozen=True)
+class FrameSet:
+    """A scene and the ranges of its frames."""
+
+    scene: str
+    ranges: Ranges
+
+    def draws(self, split: str, counts: Counts) -> list[Draw]:
+        """Return the draws of a split; those of tests continue the sequence of training."""
+        lights = canonical(self.scene).lights
+        if split == TRAIN:
+            return drawn(DRAW_SEED, self.ranges, lights, 0, counts.train)
+        if split == TEST:
+            return drawn(DRAW_SEED, self.ranges, lights, counts.train, counts.test)
+        first = counts.train + counts.test
+        return drawn_outside(DRAW_SEED, self.ranges, 0.0, lights, first, counts.outside)
+
+    def shots(self, split: str, counts: Counts, size: int, rays: int = 0, noise: int = 0) -> list[Shot]:
+        """Return the shots of a split with the noise of a seed; features of `rays` rays, 0: the colour's."""
+        first = {TRAIN: 0, TEST: counts.train, OUTSIDE: counts.train + counts.test}[split]
+        shot = Shot(self.scene, size=size, feature_spp=rays)
+        return [
+            replace(
+                shot,
+                time=draw.time_s,
+                variation=draw.variation,
+                seed=first + k + NOISE_SEEDS_APART * noise,
+            )
+            for k, draw in enumerate(self.draws(split, counts))
+        ]
+
+
+def compared(chosen: FrameSet, counts: Counts) -> dict[str, Comparison]:
+    """Return how far the nearest training frame is from tests inside and outside; refuse frames alike."""
+    shown: dict[str, Sequence[Shown]] = {
+        split: [
+            Shown(f"{split} {k}", shot.time, shot.build())
+            for k, shot in enumerate(chosen.shots(split, counts, 1))
+        ]
+        for split in (TRAIN, TEST, OUTSIDE)
+    }
+    train = shown.pop(TRAIN)
+    return compare(train, shown)
+
+
+SETS: Mapping[str, FrameSet] = {
+    "minicubes": FrameSet("minicubes", WIDE),
+    "minicubes-lamps": FrameSet("minicubes", replace(WIDE, saturation=(0.0, 0.7))),
+    "cornell": FrameSet("cornell", NARROW),
+    "glossy": FrameSet("glossy", NARROW),
+}
+"""The sets by name."""

@@ -1,11 +1,12 @@
-"""Make the models that come with the package: one for each scene of `experiments/quality.py`.
+"""Make the models that ship with the package: one for each scene of `experiments/quality.py`.
 
     python experiments/models.py
     python experiments/models.py --scenes minicubes -o out/models --write cli/models
 
-1. Each is the network of that experiment's row `best-16`, seed 0; it is trained where the cache lacks it.
-2. Its scores on the test frames, with features of 16 rays and of one, and those of Open Image Denoise there
-   go into its facts, beside the recipe [`scored`].
+1. Each is the network of that experiment's row for a set of frames, seed 0; it is trained where the cache
+   lacks it [`MADE_OF`]. That of the mini cubes knows all that the web page moves.
+2. Its scores on the test frames inside of its ranges, with features of 16 rays and of one, and those of Open
+   Image Denoise there go into its facts, beside the recipe and the ranges [`shipped`].
 3. The folder gets a file for each scene, and `SHA256SUMS` [`written`].
 """
 
@@ -18,12 +19,14 @@ from pathlib import Path
 from typing import Any
 
 from lab import command, scores
-from quality import PLANS, RAYS, ROWS, SCENES, Bench, denoised
+from lab.sets import SETS
+from quality import PLANS, RAYS, ROWS, SHIPPED_SET, Bench, denoised
 
 from wamnet.cli.dataset_files import sum_of
 from wamnet.cli.outputs import write_text
 from wamnet.compiler.model_file import save_model
 from wamnet.refimpl.denoise import Model
+from wamnet.refimpl.variation import RANGES
 
 MADE_BY = "experiments/models.py"
 """Fact of these models: what makes them."""
@@ -31,9 +34,19 @@ MADE_BY = "experiments/models.py"
 SUMS = "SHA256SUMS"
 """File with the digest of each model, in the form of `sha256sum`."""
 
+MADE_OF = {
+    "minicubes": (SHIPPED_SET, "shipped"),
+    "cornell": ("cornell", "best-16"),
+    "glossy": ("glossy", "best-16"),
+}
+"""The models by name: the set that each has learned from, and the row that it is."""
+
+OURS = ""
+"""Stands for the model's own row."""
+
 SCORED = {
-    f"{RAYS} rays": ("best-16", RAYS),
-    "1 ray": ("best-16", 1),
+    f"{RAYS} rays": (OURS, RAYS),
+    "1 ray": (OURS, 1),
     f"Open Image Denoise, {RAYS} rays": ("oidn-clean16", RAYS),
     "Open Image Denoise, 1 ray": ("oidn-1", 1),
     "input": ("input", 1),
@@ -44,12 +57,13 @@ DIGITS = 4
 """Digits of a score after the point."""
 
 
-def scored(bench: Bench) -> dict[str, dict[str, float]]:
+def scored(bench: Bench, ours: str) -> dict[str, dict[str, float]]:
     """Return PSNR, SSIM and FLIP on the test frames, means, of each way in the table above."""
     found = {}
     for text, (name, rays) in SCORED.items():
         pairs = bench.tests(0, rays)
-        row = ROWS[name] if ROWS[name].preset else replace(ROWS[name], rays=rays)
+        row = ROWS[name or ours]
+        row = row if row.recipe else replace(row, rays=rays)
         pictures, _ = denoised(bench, row, [frame for frame, _ in pairs], 0)
         each = [
             scores.score(picture, clean["color"], linear)
@@ -60,13 +74,19 @@ def scored(bench: Bench) -> dict[str, dict[str, float]]:
     return found
 
 
-def shipped(bench: Bench) -> Model:
-    """Return a scene's model with its scores among its facts."""
-    model, _ = bench.model(ROWS["best-16"], 0)
+def shipped(bench: Bench, ours: str) -> Model:
+    """Return a set's model with its ranges and its scores among its facts, and without each frame's draw."""
+    model, _ = bench.model(ROWS[ours], 0)
     plan = bench.plan
-    frames = f"{plan.test} unseen times, {plan.size}x{plan.size}, references of {plan.test_spp} samples"
-    facts: dict[str, Any] = {"made_by": MADE_BY, "scored_on": frames, "scores": json.dumps(scored(bench))}
-    return replace(model, info={**model.info, **facts})
+    frames = f"{plan.test} unseen frames, {plan.size}x{plan.size}, references of {plan.test_spp} samples"
+    facts: dict[str, Any] = {"made_by": MADE_BY, "scored_on": frames}
+    facts |= {"scores": json.dumps(scored(bench, ours)), "trained_on_frames": str(plan.train)}
+    facts[f"trained_on_{RANGES}"] = SETS[bench.name].ranges.to_json()
+    kept = {name: text for name, text in model.info.items() if ", " not in text or "trained_on" not in name}
+    drawn = ("time", "yaw_deg", "pitch_deg", "distance", "lights", "scene_digest", "seed")
+    for name in drawn:
+        kept.pop(f"trained_on_{name}", None)
+    return replace(model, info={**kept, **facts})
 
 
 def written(folder: Path, models: dict[str, Model]) -> None:
@@ -81,12 +101,15 @@ def written(folder: Path, models: dict[str, Model]) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make and write the models; say their scores."""
     parser = command.parser(__doc__ or "", "models")
-    parser.add_argument("--scenes", nargs="+", default=list(SCENES), metavar="SCENE", help="canonical scenes")
+    parser.add_argument(
+        "--scenes", nargs="+", default=list(MADE_OF), metavar="SCENE", help=", ".join(MADE_OF)
+    )
     parser.add_argument("--write", type=Path, help="folder of the models, if not that of the results")
     options = parser.parse_args(arguments)
     models = {}
     for scene in options.scenes:
-        models[scene] = shipped(Bench(scene, PLANS[options.scale], options.cache, options.executor))
+        of, row = MADE_OF[scene]
+        models[scene] = shipped(Bench(of, PLANS[options.scale], options.cache, options.executor), row)
         print(scene, models[scene].info["scores"])
     written(options.write or options.output, models)
 

@@ -1,18 +1,22 @@
 """How good the denoiser is on frames that it has not seen, beside Open Image Denoise on the same frames.
 
     python experiments/quality.py
-    python experiments/quality.py --scenes minicubes --only input best-16 oidn-clean16 --seeds 0
+    python experiments/quality.py --sets minicubes --only input best-16 oidn-clean16 --seeds 0
 
-1. Training and test frames of each scene are rendered and kept [`Bench.training`, `Bench.tests`]. Test times
-   lie between training times; `cornell` does not move, so that only the noise of its test frames is new.
+1. A set says what varies: time, camera, lamps [`lab/sets.py`]. Its test frames inside of the ranges and
+   outside are compared with those of training before anything is rendered; none shows what another one shows.
 2. Each row denoises the test frames of each seed, which is that of the noise and of the training [`judged`].
    Features are those of the colour's one camera ray, or means over 16 rays: then for both denoisers.
 3. Beside a score stands the number of samples per pixel whose render has the same error [`climbed`].
 4. Times of a frame are taken in turns, from frame to picture in display encoding [`timed`].
-5. The folder gets `quality.json`, `times.json` and `quality.md`, and a sheet of pictures for each scene.
+5. Records hold every frame's scores. Tables have means and 95 % intervals over frames and seeds, and so have
+   the differences between two rows, frame by frame [`report`]. The folder gets `quality.json`, `times.json`
+   and `quality.md`, and a sheet of pictures for each set.
 
-Open Image Denoise gets linear radiance with `hdr`, and albedo and normals: noisy ones, or such that are
-declared clean. Its result is linear, and is clipped and sRGB-encoded before it is judged, as ours are.
+Open Image Denoise gets linear radiance with `hdr`, and albedo and normals: noisy ones, such that it has
+denoised first, or such that are declared clean. Its result is linear, and is clipped and sRGB-encoded before
+it is judged, as ours are. A network of one set may be judged on another one's frames: `shipped` is that of all
+that the web page moves.
 """
 
 from __future__ import annotations
@@ -20,31 +24,32 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lab import command, figures, results, scores, tables, training
-from lab.frames import Pair, Shot, frames, noisy, reference, split_times
-from lab.results import Results, Values
+from lab import command, figures, intervals, results, scores, tables, training
+from lab.frames import Pair, Shot, frames, noisy, reference
+from lab.results import PER_FRAME, Results, Values
+from lab.sets import SETS, Counts, compared
 
 from wamnet.cli.outputs import write_text
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.lower import lower
 from wamnet.kernels import open_executor, tune
-from wamnet.kernels.bench.peer_oidn import filtered
+from wamnet.kernels.bench.peer_oidn import filtered, prefiltered
 from wamnet.kernels.denoise_on import images_of
+from wamnet.kernels.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.kernels.measure import in_turns
 from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Floats, Frame
-from wamnet.refimpl.scenes import TURN_SECONDS
-from wamnet.refimpl.train import PRESETS
+from wamnet.refimpl.train import BEST, SHORT, Recipe
 
-SCENES = ("minicubes", "cornell", "glossy")
-"""The scenes of the comparison."""
+SHIPPED_SET = "minicubes-lamps"
+"""The set that the network of the web page learns from: everything that the page can move."""
 
 RAYS = 16
 """Camera rays of features that are declared clean; 4 lose 0.7 dB, ours as those of Open Image Denoise."""
@@ -52,46 +57,71 @@ RAYS = 16
 
 @dataclass(frozen=True)
 class Plan:
-    """Sizes: frames and their samples; `steps` None means the preset's; `ladder` are samples per pixel."""
+    """Sizes: frames and their samples; `steps` None means the recipe's; `ladder` are samples per pixel."""
 
     size: int
     train: int
     train_spp: int
     test: int
+    outside: int
     test_spp: int
     ladder: tuple[int, ...]
     steps: int | None = None
 
+    @property
+    def counts(self) -> Counts:
+        """Return the numbers of frames."""
+        return Counts(self.train, self.test, self.outside)
+
 
 PLANS: Mapping[str, Plan] = {
-    "toy": Plan(size=16, train=2, train_spp=4, test=1, test_spp=32, ladder=(1, 4), steps=8),
-    "small": Plan(size=256, train=64, train_spp=64, test=4, test_spp=1024, ladder=(1, 16, 64, 128, 256)),
-    "paper": Plan(size=1024, train=64, train_spp=256, test=8, test_spp=4096, ladder=(1, 16, 64, 128, 256)),
+    "toy": Plan(16, train=2, train_spp=4, test=2, outside=2, test_spp=32, ladder=(1, 4), steps=8),
+    "small": Plan(256, 160, 64, test=8, outside=4, test_spp=1024, ladder=(1, 16, 64, 128, 256)),
+    "paper": Plan(1024, 64, 256, test=8, outside=4, test_spp=4096, ladder=(1, 16, 64, 128, 256)),
 }
 """Sizes by the name of a scale."""
+
+LAMPS = ("color", "normal", "albedo", "position", "unshadowed")
+"""What a network sees that shall follow the lamps."""
+
+RECIPES: Mapping[str, Recipe] = {
+    "short": SHORT,
+    "best": BEST,
+    "page": replace(BEST, features=LAMPS),
+}
+"""Recipes of the rows by name."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A way to a picture: `rays` of its features; a preset of ours, or how Open Image Denoise is called."""
+    """A way to a picture: `rays` of its features; a recipe of ours, or how Open Image Denoise is called.
+
+    `aux`: how its auxiliaries are: "" none are given, `noisy`, `prefiltered`, or `clean`. `of`: the set whose
+    frames a network has learned from, if not that of the test.
+    """
 
     text: str
     rays: int
-    preset: str = ""
+    recipe: str = ""
     quality: str = ""
-    clean: bool = False
+    aux: str = ""
+    of: str = ""
 
 
 ROWS: Mapping[str, Row] = {
     "input": Row("input, 1 spp", 1),
-    "oidn-color": Row("Open Image Denoise, high, colour alone", 0, quality="high"),
-    "oidn-1": Row("Open Image Denoise, high, features of 1 ray", 1, quality="high"),
-    "oidn-clean1": Row("Open Image Denoise, high, the same, declared clean", 1, quality="high", clean=True),
-    "oidn-clean16": Row(f"Open Image Denoise, high, clean, {RAYS} rays", RAYS, quality="high", clean=True),
-    "oidn-fast16": Row(f"Open Image Denoise, fast, clean, {RAYS} rays", RAYS, quality="fast", clean=True),
+    "oidn-color": Row("Open Image Denoise, high, colour only", 1, quality="high"),
+    "oidn-1": Row("Open Image Denoise, high, features of 1 ray", 1, quality="high", aux="noisy"),
+    "oidn-prefiltered1": Row(
+        "Open Image Denoise, high, the same, prefiltered", 1, quality="high", aux="prefiltered"
+    ),
+    "oidn-clean1": Row("Open Image Denoise, high, the same, declared clean", 1, quality="high", aux="clean"),
+    "oidn-clean16": Row(f"Open Image Denoise, high, clean, {RAYS} rays", RAYS, quality="high", aux="clean"),
+    "oidn-fast16": Row(f"Open Image Denoise, fast, clean, {RAYS} rays", RAYS, quality="fast", aux="clean"),
     "short-1": Row("wamnet, short, features of 1 ray", 1, "short"),
     "best-1": Row("wamnet, best, features of 1 ray", 1, "best"),
     "best-16": Row(f"wamnet, best, {RAYS} rays", RAYS, "best"),
+    "shipped": Row(f"wamnet, the network of the page, {RAYS} rays", RAYS, "page", of=SHIPPED_SET),
 }
 """The rows by name."""
 
@@ -102,7 +132,7 @@ SHOWN = ("input", "oidn-clean16", "best-16")
 """Rows that are shown beside the reference."""
 
 COLUMNS = (
-    tables.Column("psnr", "PSNR dB"),
+    tables.Column("psnr", "PSNR, dB"),
     tables.Column("ssim", "SSIM", 4),
     tables.Column("flip", "FLIP", 4),
     tables.Column("relmse", "relMSE", 4),
@@ -111,51 +141,48 @@ COLUMNS = (
 )
 """The columns of the table of scores."""
 
+KEPT = ("psnr", "ssim", "flip", "relmse")
+"""Scores that are kept of every frame."""
+
 
 @dataclass(frozen=True)
 class Bench:
-    """A scene's frames, networks and renders, kept in the folder `cache`."""
+    """A set's frames, networks and renders, kept in the folder `cache`."""
 
-    scene: str
+    name: str
     plan: Plan
     cache: Path
     executor: str
 
-    def _shots(self, times: Sequence[float], seed: int, rays: int) -> list[Shot]:
-        """Return the shots of some times; a frame's number is added to the seed."""
-        rays = rays if rays > 1 else 0
-        return [
-            Shot(self.scene, time, self.plan.size, seed=seed + at, feature_spp=rays)
-            for at, time in enumerate(times)
-        ]
+    @property
+    def scene(self) -> str:
+        """Return the scene of the set."""
+        return SETS[self.name].scene
 
-    @cached_property
-    def times(self) -> tuple[list[float], list[float]]:
-        """Return the times of training and of test frames."""
-        return split_times(self.plan.train, self.plan.test, TURN_SECONDS)
+    def _shots(self, split: str, rays: int, noise: int = 0) -> list[Shot]:
+        """Return the shots of a split with the noise of a seed."""
+        return SETS[self.name].shots(split, self.plan.counts, self.plan.size, rays if rays > 1 else 0, noise)
 
     def training(self, rays: int) -> list[Pair]:
-        """Return the training frames, with features of so many camera rays."""
-        return self._pairs(self._shots(self.times[0], 0, rays), self.plan.train_spp)
+        """Return the training frames, with features of so many camera rays, and their targets' colours."""
+        wanted = [
+            s
+            for shot in self._shots(TRAIN, rays)
+            for s in (noisy(shot), reference(shot, self.plan.train_spp))
+        ]
+        found = self._frames(wanted)
+        targets = [Frame({"color": clean["color"]}, clean.info) for clean in found[1::2]]
+        return list(zip(found[::2], targets, strict=True))
 
-    def tests(self, seed: int, rays: int) -> list[Pair]:
+    def tests(self, seed: int, rays: int, split: str = TEST) -> list[Pair]:
         """Return the test frames with the noise of a seed; their references are the same for all."""
-        first = self.plan.train
-        clean = self._shots(self.times[1], first, 1)
-        own = self._shots(self.times[1], first + (seed + 1) * self.plan.test, rays)
-        found = self._frames(list(map(noisy, own)))
-        return list(zip(found, self._frames([reference(s, self.plan.test_spp) for s in clean]), strict=True))
+        found = self._frames(list(map(noisy, self._shots(split, rays, seed + 1))))
+        clean = self._frames([reference(s, self.plan.test_spp) for s in self._shots(split, 1)])
+        return list(zip(found, clean, strict=True))
 
     def renders(self, spp: int) -> list[Frame]:
         """Return renders of the test frames with so many samples per pixel."""
-        shots = self._shots(self.times[1], self.plan.train, 1)
-        return self._frames([replace(noisy(shot), spp=spp) for shot in shots])
-
-    def _pairs(self, shots: Sequence[Shot], spp: int) -> list[Pair]:
-        """Return a noisy frame and a reference of each shot; both of a time follow each other."""
-        wanted = [shot for each in shots for shot in (noisy(each), reference(each, spp))]
-        found = self._frames(wanted)
-        return list(zip(found[::2], found[1::2], strict=True))
+        return self._frames([replace(noisy(shot), spp=spp) for shot in self._shots(TEST, 1)])
 
     def _frames(self, shots: Sequence[Shot]) -> list[Frame]:
         """Return frames, rendered where they are not there."""
@@ -163,29 +190,32 @@ class Bench:
 
     def model(self, row: Row, seed: int) -> tuple[Model, float]:
         """Return the network of a row, and the seconds of its training."""
-        recipe = replace(PRESETS[row.preset], seed=seed)
+        recipe = replace(RECIPES[row.recipe], seed=seed)
         if self.plan.steps is not None:
             recipe = replace(recipe, steps=self.plan.steps)
-        return training.trained(recipe, self.training(row.rays), self.cache / "models", self.executor)
+        of = replace(self, name=row.of or self.name)
+        return training.trained(recipe, of.training(row.rays), self.cache / "models", self.executor)
 
 
-def judged(bench: Bench, row: Row, ladder: scores.Ladder, seed: int) -> Values:
-    """Return the mean scores of a row over the test frames of a seed, and what else is known of it."""
-    pairs = bench.tests(seed, row.rays)
+def judged(bench: Bench, row: Row, split: str, ladder: scores.Ladder | None, seed: int) -> Values:
+    """Return the scores of a row over the test frames of a seed, of each frame and their means, and more."""
+    pairs = bench.tests(seed, row.rays, split)
     pictures, facts = denoised(bench, row, [frame for frame, _ in pairs], seed)
     found = [
         scores.score(picture, clean["color"], linear)
         for (picture, linear), (_, clean) in zip(pictures, pairs, strict=True)
     ]
     mean = scores.mean_scores(found)
-    return {**mean, "spp": ladder.spp_of(mean["mse"]), **facts}
+    each = {name: [round(scores[name], 5) for scores in found] for name in KEPT}
+    worth = {} if ladder is None else {"spp": ladder.spp_of(mean["mse"])}
+    return {**mean, **worth, **facts, PER_FRAME: each}
 
 
 def denoised(
     bench: Bench, row: Row, given: Sequence[Frame], seed: int
 ) -> tuple[list[tuple[Floats, Floats | None]], dict[str, Any]]:
     """Return display-encoded pictures, with their radiance where a row has it, and facts about the row."""
-    if row.preset:
+    if row.recipe:
         model, seconds = bench.model(row, seed)
         pictures = training.denoised(model, given, bench.executor)
         parameters = sum(w.size for w in (*model.siren.weights, *model.siren.biases))
@@ -196,12 +226,14 @@ def denoised(
 
 def oidn(row: Row, frame: Frame) -> Floats:
     """Return the radiance that Open Image Denoise makes of a frame."""
-    return filtered(frame, frame if row.rays else None, row.clean, row.quality)
+    if row.aux == "prefiltered":
+        return filtered(frame, prefiltered(frame, row.quality), True, row.quality)
+    return filtered(frame, frame if row.aux else None, row.aux == "clean", row.quality)
 
 
 def climbed(bench: Bench, kept: Results) -> scores.Ladder:
     """Return the errors of renders of the test frames, by samples per pixel; they are kept too."""
-    name = f"{bench.scene}: ladder"
+    name = f"{bench.name}: ladder"
     if (found := kept.get(name, 0)) is None:
         clean = [frame["color"] for _, frame in bench.tests(0, 1)]
         renders = {
@@ -245,13 +277,22 @@ def _done(way: Callable[[], Any]) -> Callable[[], None]:
     return run
 
 
-def report(kept: Results, clock: Results, scenes: Sequence[str], rows: Sequence[str]) -> str:
+SPLITS = {TEST: "inside of the ranges", OUTSIDE: "outside"}
+"""The kinds of test frames, in words."""
+
+
+def report(kept: Results, clock: Results | None, names: Sequence[str], rows: Sequence[str]) -> str:
     """Return all tables as Markdown."""
     parts = []
-    for scene in scenes:
-        names = {f"{scene}: {row}": ROWS[row].text for row in rows}
-        parts += [f"## {scene}\n", tables.table(kept, COLUMNS, names), _ahead(kept, scene, rows)]
-    if (times := clock.get("times", 0)) is not None:
+    for name in names:
+        for split, text in SPLITS.items():
+            texts = {configuration(name, split, row): ROWS[row].text for row in rows}
+            found = [key for key in texts if kept.summary(key, "psnr") is not None]
+            if found:
+                shown = {key: texts[key] for key in found}
+                parts += [f"## {name}, {text}\n", tables.table(kept, COLUMNS, shown)]
+                parts.append(ahead(kept, name, split, rows))
+    if clock is not None and (times := clock.get("times", 0)) is not None:
         cells = [
             [name, f"{1000 * float(np.median(s)):.1f}", f"{1000 * min(s):.1f} - {1000 * max(s):.1f}"]
             for name, s in times["seconds"].items()
@@ -264,18 +305,31 @@ def report(kept: Results, clock: Results, scenes: Sequence[str], rows: Sequence[
     return "\n".join(part for part in parts if part)
 
 
-def _ahead(kept: Results, scene: str, rows: Sequence[str]) -> str:
-    """Return by how much the best preset is ahead of the best Open Image Denoise with the same features."""
+def configuration(name: str, split: str, row: str) -> str:
+    """Return the name of a record's configuration."""
+    return f"{name}, {split}: {row}"
+
+
+OURS = {"best-1": (1,), "best-16": (1, RAYS), "shipped": (1, RAYS)}
+"""Rows of ours that are compared with Open Image Denoise, and the rays of what it may be given then."""
+
+
+def ahead(kept: Results, name: str, split: str, rows: Sequence[str]) -> str:
+    """Return by how much each of ours is ahead of the best Open Image Denoise with the same features."""
     lines = []
-    for ours, rays in (("best-1", (0, 1)), ("best-16", (0, 1, RAYS))):
-        peers = [row for row in rows if ROWS[row].quality and ROWS[row].rays in rays]
-        own = kept.of(f"{scene}: {ours}", "psnr")
-        found = {peer: kept.of(f"{scene}: {peer}", "psnr") for peer in peers}
-        if not own or not all(len(values) == len(own) for values in found.values()) or not found:
+    for ours, rays in OURS.items():
+        own = kept.per_pose(configuration(name, split, ours), "psnr")
+        found = {
+            peer: kept.per_pose(configuration(name, split, peer), "psnr")
+            for peer in rows
+            if ROWS[peer].quality and ROWS[peer].rays in rays
+        }
+        found = {peer: values for peer, values in found.items() if len(values) == len(own)}
+        if not own or not found:
             continue
         peer = max(found, key=lambda name: float(np.mean(found[name])))
-        gaps = results.summary([a - b for a, b in zip(own, found[peer], strict=True)])
-        lines.append(f"{ROWS[ours].text}: {gaps.text()} dB ahead of {ROWS[peer].text}.\n")
+        gap = intervals.paired(own, found[peer])
+        lines.append(f"* {ROWS[ours].text}: {gap.text()} dB ahead of {ROWS[peer].text}.\n")
     return "".join(lines)
 
 
@@ -288,13 +342,13 @@ def drawn(bench: Bench, path: Path, rows: Sequence[str]) -> None:
         pictures.append((ROWS[name].text, picture))
         target = to_display(clean["color"])
     if pictures:
-        figures.sheet(path, [(bench.scene, [*pictures, ("reference", target)])], inches=3.2)
+        figures.sheet(path, [(bench.name, [*pictures, ("reference", target)])], inches=3.2)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Render, train, judge, time; write the tables."""
     parser = command.parser(__doc__ or "", "quality")
-    parser.add_argument("--scenes", nargs="+", default=list(SCENES), metavar="SCENE", help="canonical scenes")
+    parser.add_argument("--sets", nargs="+", default=list(SETS), metavar="SET", help=", ".join(SETS))
     parser.add_argument("--only", nargs="+", default=list(ROWS), metavar="ROW", help=", ".join(ROWS))
     parser.add_argument("--rounds", type=int, default=7, help="rounds of the times; 0 takes none")
     options = parser.parse_args(arguments)
@@ -303,24 +357,41 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def work(options: argparse.Namespace) -> None:
     """Do what the options ask for."""
-    for row in options.only:
-        if row not in ROWS:
-            raise InputError("row", row, "there is none of this name", f"use some of {', '.join(ROWS)}")
+    for what, chosen, known in (("row", options.only, ROWS), ("set", options.sets, SETS)):
+        for name in chosen:
+            if name not in known:
+                raise InputError(what, name, "there is none of this name", f"use some of {', '.join(known)}")
     plan = PLANS[options.scale]
     settings = {"scale": options.scale, **asdict(plan), "executor": options.executor}
     kept = Results.open(options.output / "quality.json", "quality", settings)
     clock = Results.open(options.output / "times.json", "quality-times", settings)
-    for scene in options.scenes:
-        bench = Bench(scene, plan, options.cache, options.executor)
+    for name in options.sets:
+        nearest(name, plan, kept)
+        bench = Bench(name, plan, options.cache, options.executor)
         ladder = climbed(bench, kept)
-        ways = {f"{scene}: {row}": partial(judged, bench, ROWS[row], ladder) for row in options.only}
-        results.fill(kept, ways, options.seeds, scene)
-        drawn(bench, options.output / f"{scene}.png", options.only)
+        ways = {
+            configuration(name, split, row): partial(
+                judged, bench, ROWS[row], split, ladder if split == TEST else None
+            )
+            for row in options.only
+            for split in SPLITS
+            if not (ROWS[row].of and SETS[ROWS[row].of].scene != bench.scene)
+        }
+        results.fill(kept, ways, options.seeds, name)
+        drawn(bench, options.output / f"{name}.png", options.only)
     if options.rounds:
-        timed(Bench(options.scenes[0], plan, options.cache, options.executor), clock, options.rounds)
-    text = report(kept, clock, options.scenes, options.only)
+        timed(Bench(options.sets[0], plan, options.cache, options.executor), clock, options.rounds)
+    text = report(kept, clock, options.sets, options.only)
     write_text(options.output / "quality.md", text)
     print(text)
+
+
+def nearest(name: str, plan: Plan, kept: Results) -> None:
+    """Compare what the frames of a set show, and keep how far the nearest training frames are."""
+    key = f"{name}: nearest training frame"
+    if kept.get(key, 0) is None:
+        found = compared(SETS[name], plan.counts)
+        kept.put(key, 0, {split: comparison.as_data() for split, comparison in found.items()})
 
 
 if __name__ == "__main__":

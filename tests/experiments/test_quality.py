@@ -12,11 +12,13 @@ import pytest
 import quality
 from lab import scores
 from lab.results import Results
+from lab.sets import SETS
 
 from wamnet.compiler.model_file import load_model
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.variation import ranges_from_json
 
 TOY = quality.PLANS["toy"]
 
@@ -27,14 +29,15 @@ def bench(tmp_path) -> quality.Bench:
 
 
 def test_test_frames_are_new(bench):
-    """Their times, and the noise of each seed; references are the same for all seeds and features."""
-    train, test = bench.times
-    assert not set(train) & set(test)
+    """Their draws, and the noise of each seed; references are the same for all seeds and features."""
+    times = [shot.time for split in ("train", "test", "outside") for shot in bench._shots(split, 1)]
+    assert len(set(times)) == len(times) == 6
     first, second = bench.tests(0, 1), bench.tests(1, 1)
     assert not np.array_equal(first[0][0]["color"], second[0][0]["color"])
     assert np.array_equal(first[0][1]["color"], second[0][1]["color"])
     noises = [frame["color"] for frame, _ in bench.training(1)]
     assert not any(np.array_equal(first[0][0]["color"], noise) for noise in noises)
+    assert [float(frame.info["yaw_deg"]) for frame, _ in bench.tests(0, 1, "outside")] == [-34.0, 34.0]
 
 
 def test_rays_change_features_alone(bench):
@@ -55,6 +58,10 @@ def test_what_open_image_denoise_is_given(monkeypatch):
     assert [aux for _, aux, _, _ in seen] == [None, frame, frame, frame, frame]
     assert [clean for _, _, clean, _ in seen] == [False, False, True, True, True]
     assert [how for *_, how in seen] == ["high", "high", "high", "high", "fast"]
+    guide = Frame({"albedo": frame["color"], "normal": frame["color"]})
+    monkeypatch.setattr(quality, "prefiltered", lambda *given: guide)
+    quality.oidn(quality.ROWS["oidn-prefiltered1"], frame)
+    assert seen[-1][1:] == (guide, True, "high")
     # What is judged is its radiance as a screen shows it.
     pictures, _ = quality.denoised(
         SimpleNamespace(executor="numpy"),
@@ -67,16 +74,36 @@ def test_what_open_image_denoise_is_given(monkeypatch):
 
 def test_the_whole_way(tmp_path, capsys):
     """Tables, JSON and a sheet; a second run finds all of it there and says the same."""
-    options = ["--scale", "toy", "--scenes", "cornell", "--only", "input", "best-16", "--seeds", "0", "1"]
+    options = [
+        "--scale",
+        "toy",
+        "--sets",
+        "cornell",
+        "--only",
+        "input",
+        "best-16",
+        "shipped",
+        "--seeds",
+        "0",
+        "1",
+    ]
     options += ["--executor", "numpy", "--rounds", "0", "--cache", str(tmp_path / "c"), "-o", str(tmp_path)]
     quality.main(options)
     text = (tmp_path / "quality.md").read_text()
     assert capsys.readouterr().out.strip().endswith(text.strip())
+    assert "## cornell, inside of the ranges" in text
     assert "| input, 1 spp |" in text
     data = json.loads((tmp_path / "quality.json").read_text())
     found = {(r["configuration"], r["seed"]) for r in data["records"]}
-    rows = {(f"cornell: {row}", seed) for row in ("input", "best-16") for seed in (0, 1)}
-    assert found == {*rows, ("cornell: ladder", 0)}
+    rows = {
+        (f"cornell, {split}: {row}", seed)
+        for split in ("test", "outside")
+        for row in ("input", "best-16")
+        for seed in (0, 1)
+    }
+    assert found == {*rows, ("cornell: ladder", 0), ("cornell: nearest training frame", 0)}
+    each = [r["values"]["per_frame"]["psnr"] for r in data["records"] if "best-16" in r["configuration"]]
+    assert [len(values) for values in each] == [2, 2, 2, 2]
     assert (tmp_path / "cornell.png").stat().st_size > 0
     before = (tmp_path / "quality.json").read_bytes()
     quality.main(options)
@@ -85,39 +112,43 @@ def test_the_whole_way(tmp_path, capsys):
 
 
 def test_gaps_are_to_the_best_peer_with_the_same_features(tmp_path):
-    """By hand: 36 and 38 against 33 and 34 are 3.5 ± 0.71 ahead; features of 16 rays are no peer of 1."""
+    """By hand, with frames that are all alike: no interval; features of 16 rays are no peer of 1."""
     kept = Results.open(tmp_path / "r.json", "quality", {})
-    values = {"best-1": (34, 34), "best-16": (36, 38), "oidn-1": (32, 31), "oidn-clean16": (33, 34)}
-    for row, numbers in values.items():
-        for seed, number in enumerate(numbers):
-            kept.put(f"cornell: {row}", seed, {"psnr": number})
-    lines = quality._ahead(kept, "cornell", list(values)).splitlines()
+    values = {"best-1": 34.0, "best-16": 37.0, "oidn-1": 32.5, "oidn-clean16": 33.5}
+    for row, number in values.items():
+        for seed in (0, 1):
+            kept.put(f"cornell, test: {row}", seed, {"psnr": number, "per_frame": {"psnr": [number] * 3}})
+    lines = quality.ahead(kept, "cornell", "test", list(values)).splitlines()
     assert lines == [
-        "wamnet, best, features of 1 ray: 2.50 ± 0.71 dB ahead of "
+        "* wamnet, best, features of 1 ray: 1.50 [1.50, 1.50] dB ahead of "
         "Open Image Denoise, high, features of 1 ray.",
-        "wamnet, best, 16 rays: 3.50 ± 0.71 dB ahead of Open Image Denoise, high, clean, 16 rays.",
+        "* wamnet, best, 16 rays: 3.50 [3.50, 3.50] dB ahead of Open Image Denoise, high, clean, 16 rays.",
     ]
 
 
 def test_an_unknown_row_is_refused(tmp_path):
     with pytest.raises(InputError, match="row is best-9: there is none of this name; use some of input"):
         quality.main(["--only", "best-9", "-o", str(tmp_path / "none")])
+    with pytest.raises(InputError, match="set is attic: there is none of this name; use some of minicubes"):
+        quality.main(["--sets", "attic", "-o", str(tmp_path / "none")])
     assert not (tmp_path / "none").exists()
 
 
 def test_models_carry_their_scores(bench, tmp_path, monkeypatch):
     """Those of the experiment's rows, and a digest beside each file."""
     monkeypatch.setattr(quality, "filtered", lambda frame, *_: frame["color"])
-    models.written(tmp_path / "m", {"cornell": models.shipped(bench)})
+    models.written(tmp_path / "m", {"cornell": models.shipped(bench, "best-16")})
     model = load_model(tmp_path / "m" / "cornell.safetensors")
     found = json.loads(model.info["scores"])
     assert list(found) == list(models.SCORED)
     row, ladder = quality.ROWS["best-16"], scores.Ladder((1,), (1.0,))
-    want = quality.judged(bench, row, ladder, 0)
+    want = quality.judged(bench, row, "test", ladder, 0)
     assert found["16 rays"] == {name: round(want[name], 4) for name in ("psnr", "ssim", "flip")}
-    want = quality.judged(bench, quality.ROWS["input"], ladder, 0)
+    want = quality.judged(bench, quality.ROWS["input"], "test", ladder, 0)
     assert found["input"]["psnr"] == round(want["psnr"], 4)
     assert model.info["trained_on_feature_spp"] == "16"
+    assert ranges_from_json(model.info["trained_on_ranges"]) == SETS["cornell"].ranges
+    assert "trained_on_yaw_deg" not in model.info
     digest, name = (tmp_path / "m" / models.SUMS).read_text().split()
     assert name == "cornell.safetensors"
     assert digest == quality_sum(tmp_path / "m" / name)

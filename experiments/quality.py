@@ -15,8 +15,8 @@
 
 Open Image Denoise gets linear radiance with `hdr`, and albedo and normals: noisy ones, such that it has
 denoised first, or such that are declared clean. Its result is linear, and is clipped and sRGB-encoded before
-it is judged, as ours are. A network of one set may be judged on another one's frames: `shipped` is that of all
-that the web page moves.
+it is judged, as ours are. A network of one set may be judged on another one's frames: `shipped` is that of
+all that the web page moves.
 """
 
 from __future__ import annotations

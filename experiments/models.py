@@ -80,7 +80,7 @@ def shipped(bench: Bench, ours: str) -> Model:
     plan = bench.plan
     frames = f"{plan.test} unseen frames, {plan.size}x{plan.size}, references of {plan.test_spp} samples"
     facts: dict[str, Any] = {"made_by": MADE_BY, "scored_on": frames}
-    facts |= {"scores": json.dumps(scored(bench, ours)), "trained_on_frames": str(plan.train)}
+    facts |= {"scores": json.dumps(scored(bench, ours)), "trained_on_frames": str(bench.counts.train)}
     facts[f"trained_on_{RANGES}"] = SETS[bench.name].ranges.to_json()
     kept = {name: text for name, text in model.info.items() if ", " not in text or "trained_on" not in name}
     drawn = ("time", "yaw_deg", "pitch_deg", "distance", "lights", "scene_digest", "seed")

@@ -68,15 +68,10 @@ class Plan:
     ladder: tuple[int, ...]
     steps: int | None = None
 
-    @property
-    def counts(self) -> Counts:
-        """Return the numbers of frames."""
-        return Counts(self.train, self.test, self.outside)
-
 
 PLANS: Mapping[str, Plan] = {
     "toy": Plan(16, train=2, train_spp=4, test=2, outside=2, test_spp=32, ladder=(1, 4), steps=8),
-    "small": Plan(256, 160, 64, test=8, outside=4, test_spp=1024, ladder=(1, 16, 64, 128, 256)),
+    "small": Plan(256, 320, 64, test=8, outside=4, test_spp=1024, ladder=(1, 16, 64, 128, 256)),
     "paper": Plan(1024, 64, 256, test=8, outside=4, test_spp=4096, ladder=(1, 16, 64, 128, 256)),
 }
 """Sizes by the name of a scale."""
@@ -159,9 +154,14 @@ class Bench:
         """Return the scene of the set."""
         return SETS[self.name].scene
 
+    @property
+    def counts(self) -> Counts:
+        """Return the numbers of frames."""
+        return SETS[self.name].counts(self.plan.train, self.plan.test, self.plan.outside)
+
     def _shots(self, split: str, rays: int, noise: int = 0) -> list[Shot]:
         """Return the shots of a split with the noise of a seed."""
-        return SETS[self.name].shots(split, self.plan.counts, self.plan.size, rays if rays > 1 else 0, noise)
+        return SETS[self.name].shots(split, self.counts, self.plan.size, rays if rays > 1 else 0, noise)
 
     def training(self, rays: int) -> list[Pair]:
         """Return the training frames, with features of so many camera rays, and their targets' colours."""
@@ -366,8 +366,8 @@ def work(options: argparse.Namespace) -> None:
     kept = Results.open(options.output / "quality.json", "quality", settings)
     clock = Results.open(options.output / "times.json", "quality-times", settings)
     for name in options.sets:
-        nearest(name, plan, kept)
         bench = Bench(name, plan, options.cache, options.executor)
+        nearest(bench, kept)
         ladder = climbed(bench, kept)
         ways = {
             configuration(name, split, row): partial(
@@ -386,11 +386,11 @@ def work(options: argparse.Namespace) -> None:
     print(text)
 
 
-def nearest(name: str, plan: Plan, kept: Results) -> None:
+def nearest(bench: Bench, kept: Results) -> None:
     """Compare what the frames of a set show, and keep how far the nearest training frames are."""
-    key = f"{name}: nearest training frame"
+    key = f"{bench.name}: nearest training frame"
     if kept.get(key, 0) is None:
-        found = compared(SETS[name], plan.counts)
+        found = compared(SETS[bench.name], bench.counts)
         kept.put(key, 0, {split: comparison.as_data() for split, comparison in found.items()})
 
 

@@ -45,10 +45,15 @@ class Counts:
 
 @dataclass(frozen=True)
 class FrameSet:
-    """A scene and the ranges of its frames."""
+    """A scene, the ranges of its frames, and how many of them training may have at most."""
 
     scene: str
     ranges: Ranges
+    most: int = 320
+
+    def counts(self, train: int, test: int, outside: int) -> Counts:
+        """Return the numbers of frames of a set of this size."""
+        return Counts(min(train, self.most), test, outside)
 
     def draws(self, split: str, counts: Counts) -> list[Draw]:
         """Return the draws of a split; those of tests continue the sequence of training."""
@@ -91,7 +96,7 @@ def compared(chosen: FrameSet, counts: Counts) -> dict[str, Comparison]:
 SETS: Mapping[str, FrameSet] = {
     "minicubes": FrameSet("minicubes", WIDE),
     "minicubes-lamps": FrameSet("minicubes", replace(WIDE, saturation=(0.0, 0.7))),
-    "cornell": FrameSet("cornell", NARROW),
-    "glossy": FrameSet("glossy", NARROW),
+    "cornell": FrameSet("cornell", NARROW, most=96),
+    "glossy": FrameSet("glossy", NARROW, most=96),
 }
 """The sets by name."""

@@ -28,7 +28,7 @@ NOISE_SEEDS_APART = 100_000
 """Frames of one seed of noise: that of another one begins so many later."""
 
 WIDE = Ranges(yaw_deg=(-45.0, 45.0), pitch_deg=(-10.0, 10.0), distance=(0.9, 1.15))
-"""A camera that a visitor drags around: it stays between the floor and the ceiling, whose lamp has no thickness
+"""A camera that a visitor drags around: it stays between the floor and the ceiling, whose lamp has no depth
 and is a line of broken pixels from above."""
 
 NARROW = Ranges(yaw_deg=(-24.0, 24.0), pitch_deg=(-8.0, 8.0), distance=(0.9, 1.1))

@@ -15,9 +15,8 @@ Percentages are those of means over seeds and test frames.
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -48,12 +47,12 @@ SMALL = {"toy": (64, 2, 1), "small": (FRAME_PX, TIMED_STEPS, 5), "paper": (FRAME
 def needed(options: argparse.Namespace) -> tuple[Results, list[str]]:
     """Return Table 1's records and the rows of the claims, after making those without a record."""
     scale = table1.SCALES[options.scale]
-    settings = {"scale": json.loads(json.dumps(asdict(scale))), "executor": options.executor}
+    settings = table1.settings_of(scale, options.executor)
     found = Results.open(options.table / "table1.json", "table1", settings)
     wanted = table1.available(ROWS)
     left = [row for row in wanted if any(found.get(row, seed) is None for seed in options.seeds)]
     if left:
-        shared = {"output": options.table, "only": left, "no_times": True, "rounds": 0}
+        shared = {"output": options.table, "only": left, "no_times": True, "rounds": 0, "plan": False}
         table1.run(argparse.Namespace(**{**vars(options), **shared}))
     return found, wanted
 

@@ -1,52 +1,63 @@
 """Table 1 of the paper, with what its readers would ask for today: every denoiser on the same frames.
 
     python experiments/table1.py
-    python experiments/table1.py --only input wamnet-short oidn-noisy --seeds 0
+    python experiments/table1.py --scale paper --plan
+    python experiments/table1.py --scale paper --only wamnet wamnet-own --seeds 0 1 2
 
-1. Frames of `minicubes` over one turn are rendered and kept: training frames, and test frames at times
-   between them that nothing was trained on [`baselines/rows.py`].
-2. Each row is trained, tuned or opened for each seed, which is that of the noise too, and judged on the test
-   frames [`judged`]. A row without its packages is left out, and said so.
-3. Times of a frame and of a step of training are taken in turns, when everything else is done [`timed`].
-   "training" is the steps times that.
-4. The folder gets `table1.json`, `times.json`, `table1.md`, the pictures of the first test frame, and
-   `crops.png`: a crop around a corner of pix2pix's patches [`drawn`].
+1. Frames of `minicubes` at times of the golden-ratio sequence are rendered and kept, each of another
+   geometry: to train on, to look at while training, and to judge by [`baselines/rows.py`].
+2. How long what is missing will take is said first [`forecast`].
+3. Each row is trained, tuned or opened for each seed, which is that of the noise too, and judged on the test
+   frames [`judged`]. A row without its packages is left out, and said so. DnCNN and pix2pix are trained until
+   their error on the validation frames is flat [`baselines/fitting.py`].
+4. Times of a frame, of its input and of a step of training are taken in turns, on the same cores, when
+   everything else is done [`timed`].
+5. The folder gets `table1.json`, `times.json`, `table1.md` with a table of qualities and one of costs, the
+   pictures of the first test frame, `curves.png` with the validation errors, and `crops.png`: a crop around a
+   corner of pix2pix's patches [`drawn`].
 
-Every step is kept, so an interrupted run goes on. Numbers are means over seeds, with the standard deviation
-of one. "worth" is the number of samples per pixel whose render has the same error. "blocks" is how much the
-error jumps at borders of patches, against elsewhere [`baselines/blocks.py`]. "MSE modulo 256" is that of
-arithmetic of 8 bits, which the paper's own figures look like [`lab/scores.py`].
+Every step is kept, so an interrupted run goes on. Numbers are means over test frames and seeds; records keep
+those of each frame. "worth" is the number of samples per pixel whose render has the same error. "blocks" is
+how much the error jumps at borders of patches, against elsewhere [`baselines/blocks.py`]. "MSE modulo 256" is
+that of arithmetic of 8 bits, which the paper's own figures look like [`lab/scores.py`].
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from baselines.blocks import blockiness
-from baselines.rows import ROWS, Bench, Case, Ready, Scale
+from baselines.rows import ROWS, Bench, Case, Ready, Row, Scale, compared
 from lab import command, figures, results, scores, tables
-from lab.results import Results, Summary, Values
+from lab.frames import Shot
+from lab.results import PER_FRAME, Results, Summary, Values
 
 from wamnet.cli import exr
 from wamnet.cli.images import write_png
 from wamnet.cli.outputs import write_text
+from wamnet.cli.terminal import hint_on_interrupt
 from wamnet.kernels import open_executor
 from wamnet.kernels.measure import in_turns
+from wamnet.kernels.render_frame import render_frame
 from wamnet.refimpl.encoding import to_display
+from wamnet.refimpl.errors import InputError
 
 SCALES: Mapping[str, Scale] = {
     "toy": Scale(
         size=128,
         train=3,
-        test=1,
+        validation=1,
+        test=2,
         train_spp=2,
+        validation_spp=2,
         test_spp=16,
         ladder=(1, 4),
         short_frames=2,
@@ -59,101 +70,162 @@ SCALES: Mapping[str, Scale] = {
     "small": Scale(
         size=256,
         train=24,
-        test=4,
+        validation=2,
+        test=8,
         train_spp=256,
+        validation_spp=256,
         test_spp=1024,
         ladder=(1, 2, 4, 8, 16, 32, 64, 128, 256),
         short_frames=24,
-        paper={"steps": 4000},
-        dncnn={"steps": 600, "batch": 8, "crop": 40, "half": True},
-        shrunk={"steps": 200, "batch": 8, "crop": 40, "half": True, "shrink": 4},
-        pix2pix={"steps": 1500, "batch": 1, "crop": 128, "width": 32},
+        dncnn={"steps": 6000, "batch": 16, "crop": 40, "half": True},
+        shrunk={"steps": 6000, "batch": 8, "crop": 40, "half": True, "shrink": 4},
+        pix2pix={"steps": 12_000, "batch": 1, "crop": 128, "width": 32, "every": 200},
     ),
     "paper": Scale(
         size=1024,
-        train=1000,
-        test=100,
+        train=8,
+        validation=2,
+        test=4,
         train_spp=1024,
+        validation_spp=256,
         test_spp=1024,
         ladder=(1, 2, 4, 8, 16, 32, 64, 128, 256),
-        short_frames=32,
-        dncnn={"steps": 50_000, "batch": 128, "crop": 40},
-        shrunk={"steps": 6_250, "batch": 8, "crop": 256, "shrink": 4},
-        pix2pix={"steps": 200_000, "batch": 1, "crop": 128, "width": 64},
+        short_frames=8,
+        few=(0,),
+        dncnn={"steps": 6000, "batch": 16, "crop": 40, "half": True},
+        shrunk={"steps": 6000, "batch": 8, "crop": 40, "half": True, "shrink": 4},
+        pix2pix={"steps": 12_000, "batch": 1, "crop": 128, "width": 32, "every": 200},
     ),
 }
-"""Sizes by name; see the chapter beside the experiments for what the small ones leave out."""
+"""Sizes by name. `paper` has the paper's pictures, references and training of WAMnet, and fewer frames: the
+paper had 1,000 to train on and 100 to test by."""
+
+OWN_LADDER = (1, 2, 4, 8, 16, 32, 64)
+"""Samples of the renders of a frame that a network was trained on."""
 
 CROP_PX = 96
 """Side of the crop that is shown."""
 
-SHOWN = ("input", "dncnn", "wamnet", "wamnet-best", "pix2pix", "oidn-noisy", "render30")
+SHOWN = ("input", "dncnn", "wamnet", "wamnet-best", "pix2pix", "oidn-prefiltered", "render30")
 """Rows of which a crop is shown."""
 
 ROUNDS = 5
 """Rounds of the times."""
 
+LADDER = "ladder"
+"""Configuration of the renders of test frames; with `-own` those of the frames trained on."""
 
-def judged(row: str, bench: Bench, ladder: scores.Ladder, pictures: Path, seed: int) -> Values:
-    """Return the mean scores of a row over the test frames, and what else is known of it."""
+
+def settings_of(scale: Scale, executor: str) -> dict[str, Any]:
+    """Return what all records of a file have in common: the frames, and what renders them."""
+    shared = ("size", "train", "validation", "test", "train_spp", "validation_spp", "test_spp", "ladder")
+    return {**{name: getattr(scale, name) for name in (*shared, "short_frames")}, "executor": executor}
+
+
+def trained_with(row: Row, scale: Scale) -> dict[str, Any]:
+    """Return a row's own settings of the scale, as JSON has them."""
+    found: dict[str, Any] = json.loads(json.dumps(dict(getattr(scale, row.trains) if row.trains else {})))
+    return found
+
+
+def judged(row: str, bench: Bench, kept: Results, pictures: Path, seed: int) -> Values:
+    """Return the scores of a row, means and those of each frame, and what else is known of it."""
     ready = ROWS[row].make(bench, seed)
-    own = ready.facts.get("case")
     found, pairs = [], []
-    for case in bench.cases(seed, ready.rays) if own is None else [own]:
+    for case in ready.cases or bench.cases(seed, ready.rays, ready.spp):
         picture, linear = ready.picture(case)
         found.append(scores.score(picture, case.reference["color"], linear))
         pairs.append((picture, to_display(case.reference["color"])))
-        if seed == 0 and case.index == 0:
+        if seed == 0 and case.index == 0 and not ready.cases:
             write_png(pictures / f"{row}.png", picture)
             write_png(pictures / "reference.png", pairs[0][1])
-    values: dict[str, Any] = scores.mean_scores(found)
-    facts = {name: value for name, value in ready.facts.items() if name != "case"}
-    values |= {"blocks": blockiness(pairs, bench.scale.pix2pix["crop"]), **facts}
-    if own is None:
-        values["worth"] = ladder.spp_of(values["mse"])
+    per_frame = {name: [each[name] for each in found] for name in found[0]}
+    values: dict[str, Any] = {**scores.mean_scores(found), **ready.facts, PER_FRAME: per_frame}
+    values["settings"] = trained_with(ROWS[row], bench.scale)
+    if (patch := bench.scale.pix2pix["crop"]) < min(pairs[0][0].shape[:2]):
+        values["blocks"] = blockiness(pairs, patch)
+    if not ready.cases or ready.ladder is not None:
+        values["worth"] = climbed(bench, kept, ready.ladder, seed).spp_of(values["mse"])
     return values
 
 
-def climbed(bench: Bench, kept: Results) -> scores.Ladder:
-    """Return the errors of renders of the test frames, by samples per pixel; they are kept too."""
-    name = "ladder"
-    if (found := kept.get(name, 0)) is None:
-        references = [case.reference["color"] for case in bench.cases(0)]
-        renders = {
-            spp: [
-                (exr.read_frame(path)["color"], reference)
-                for path, reference in zip(bench.renders(spp, 0), references, strict=True)
-            ]
-            for spp in bench.scale.ladder
-        }
-        ladder = scores.ladder(renders)
-        found = {"spp": list(ladder.spp), "mse": list(ladder.mse)}
-        kept.put(name, 0, found)
+def climbed(bench: Bench, kept: Results, own: Shot | None = None, seed: int = 0) -> scores.Ladder:
+    """Return the errors of renders of the test frames, or of a seed's own frame; they are kept too."""
+    name, number = (LADDER, 0) if own is None else (f"{LADDER}-own", seed)
+    if (found := kept.get(name, number)) is None:
+        found = _renders(bench, own, number)
+        kept.put(name, number, found)
     return scores.Ladder(tuple(found["spp"]), tuple(found["mse"]))
 
 
+def _renders(bench: Bench, own: Shot | None, seed: int) -> dict[str, Any]:
+    """Return samples, mean errors and PSNR of renders, and the errors of each frame."""
+    scale, shots = bench.scale, bench.split.test if own is None else (own,)
+    target = scale.test_spp if own is None else scale.train_spp
+    references = [exr.read_frame(clean)["color"] for _, clean in bench.files(shots, target, seed)]
+    rungs = scale.ladder if own is None else [n for n in OWN_LADDER if n <= scale.ladder[-1]]
+    renders = {
+        spp: [
+            (exr.read_frame(path)["color"], reference)
+            for path, reference in zip(bench.renders(shots, spp, seed), references, strict=True)
+        ]
+        for spp in rungs
+    }
+    ladder = scores.ladder(renders)
+    each = {
+        spp: [scores.metrics.mse(to_display(image), to_display(target)) for image, target in pairs]
+        for spp, pairs in renders.items()
+    }
+    psnr = [float(np.mean(-10.0 * np.log10(each[spp]))) for spp in ladder.spp]
+    frames_mse = [each[spp] for spp in ladder.spp]
+    return {"spp": list(ladder.spp), "mse": list(ladder.mse), "psnr": psnr, "frames_mse": frames_mse}
+
+
+# ---- times and costs ---------------------------------------------------------------------------------------
+
+
 def timed(rows: Sequence[str], bench: Bench, kept: Results, rounds: int) -> None:
-    """Take the times of a frame, all rows in turns; a render's is that of its samples."""
-    left = [row for row in rows if kept.get(row, 0) is None and row not in ("input", "wamnet-own")]
+    """Take the times of a frame and of its input, all rows in turns."""
+    left = [row for row in rows if kept.get(row, 0) is None and ROWS[row].timed]
     if not left:
         return
     made = {row: ROWS[row].make(bench, 0) for row in left}
-    cases = {rays: next(iter(bench.cases(0, rays))) for rays in {ready.rays for ready in made.values()}}
-    ways = {row: _way(row, ready, bench, cases[ready.rays]) for row, ready in made.items()}
+    inputs = {(ready.rays, ready.spp) for ready in made.values()}
+    cases = {(rays, spp): next(iter(bench.cases(0, rays, spp))) for rays, spp in inputs}
+    ways = {row: _way(row, ready, bench, cases[ready.rays, ready.spp]) for row, ready in made.items()}
+    costs = {cost for ready in made.values() if (cost := ready.cost) != (0, 0)} | {(1, 0), (30, 0)}
+    ways |= {_input(cost): partial(_render, bench, *cost) for cost in costs}
     times = in_turns(ways, rounds)
     steps = in_turns({row: ready.step for row, ready in made.items() if ready.step is not None}, rounds)
-    for row, found in times.items():
-        values = {"ms": 1e3 * found.median, "spread": found.spread, "device": bench.device.device}
+    first, thirty = (1e3 * times[_input((spp, 0))].median for spp in (1, 30))
+    for row, ready in made.items():
+        paid = 1e3 * times[_input(ready.cost)].median if ready.cost != (0, 0) else 0.0
+        values = {"ms": 1e3 * times[row].median, "spread": times[row].spread, "input_ms": paid}
+        values |= {"render1_ms": first, "sample_ms": (thirty - first) / 29.0}
+        values |= {"device": bench.device.device, "threads": _threads(ROWS[row])}
         if row in steps:
             values["step_ms"] = 1e3 * steps[row].median
-            values["training_s"] = steps[row].median * made[row].facts["steps"]
         kept.put(row, 0, values)
+
+
+def _input(cost: tuple[int, int]) -> str:
+    """Return the name of a way to render an input of so many samples and rays."""
+    return f"input of {cost[0]} spp and {cost[1]} rays"
+
+
+def _threads(row: Row) -> int:
+    """Return the number of threads of a row's package, which is that of the cores."""
+    if "torch" in row.packages:
+        from baselines.fitting import use_all_cores
+
+        return use_all_cores()
+    return int(results.machine.describe()["cores"])
 
 
 def _way(row: str, ready: Ready, bench: Bench, case: Case) -> Callable[[], float | None]:
     """Return what makes a row's picture of a case once."""
     if row == "render30":
-        return partial(_render, bench)
+        return partial(_render, bench, 30, 0)
     if ready.seconds is not None:
         return partial(ready.seconds, case)
 
@@ -163,14 +235,46 @@ def _way(row: str, ready: Ready, bench: Bench, case: Case) -> Callable[[], float
     return make
 
 
-def _render(bench: Bench) -> None:
-    """Render a test frame with 30 samples."""
-    from lab.frames import Shot
-
-    from wamnet.kernels.render_frame import render_frame
-
-    shot = Shot(bench.scene, bench.times()[1][0], bench.scale.size, spp=30, seed=0)
+def _render(bench: Bench, spp: int, rays: int) -> None:
+    """Render a test frame with so many samples, and features of so many rays."""
+    shot = bench.noisy(bench.split.test[0], 0, rays, spp)
     render_frame(bench.executor, shot.build(), shot.job)
+
+
+def priced(row: str, kept: Results, times: Results) -> dict[str, float] | None:
+    """Return what a row costs, and the renders of equal time and of equal error.
+
+    Milliseconds of a frame: its input, its denoising, both; samples and PSNR of the render of that time; the
+    milliseconds of the render of its error; seconds of training, and of rendering what is trained on; the
+    number of frames from which on all of that pays, against that render.
+    """
+    time, found, ladder = times.get(row, 0), kept.get(row, 0), kept.get(LADDER, 0)
+    if time is None or found is None or ladder is None:
+        return None
+
+    def render_ms(spp: float) -> float:
+        return time["render1_ms"] + (spp - 1.0) * time["sample_ms"]
+
+    total = time["input_ms"] + time["ms"]
+    spp = max(1.0, 1.0 + (total - time["render1_ms"]) / time["sample_ms"])
+    each = [scores.Ladder(ladder["spp"], mse).mse_of(spp) for mse in zip(*ladder["frames_mse"], strict=True)]
+    training_s = found.get("training_s", 0.0)
+    frames_s = found.get("training_samples", 0) * time["sample_ms"] / 1e3
+    gain = (render_ms(found["worth"]) - total) / 1e3
+    return {
+        "input_ms": time["input_ms"],
+        "ms": time["ms"],
+        "total_ms": total,
+        "equal_time_spp": spp,
+        "equal_time_psnr": float(np.mean(-10.0 * np.log10(each))),
+        "equal_error_ms": render_ms(found["worth"]),
+        "frames_s": frames_s,
+        "training_s": training_s,
+        "pays_after": math.ceil((frames_s + training_s) / gain) if gain > 0.0 else math.inf,
+    }
+
+
+# ---- tables and figures ----------------------------------------------------------------------------------
 
 
 def count(found: Summary) -> str:
@@ -180,37 +284,59 @@ def count(found: Summary) -> str:
 
 COLUMNS = (
     tables.Column("mse255", "MSE", 1),
-    tables.Column("psnr", "PSNR, dB", 2),
+    tables.Column("psnr", "PSNR, dB", 2, interval=True),
     tables.Column("paper", "10 ln(255²/MSE)", 2),
     tables.Column("wrapped", "MSE modulo 256", 1),
-    tables.Column("ssim", "SSIM", 3),
-    tables.Column("flip", "FLIP", 3),
+    tables.Column("ssim", "SSIM", 3, interval=True),
+    tables.Column("flip", "FLIP", 3, interval=True),
     tables.Column(
         "worth", "worth, spp", write=lambda s: f"{s.mean:.1f}" if s.mean < 100 else f"{s.mean:.0f}"
     ),
     tables.Column("blocks", "blocks", 2),
     tables.Column("parameters", "parameters", write=count),
 )
-"""The columns of the table that have one number for each seed; MSE is that of 0 .. 255."""
+"""The columns of the table of qualities; MSE is that of 0 .. 255."""
 
-TIMES = (
-    tables.Column("ms", "ms a frame", write=lambda s: f"{s.mean:.1f}" if s.mean < 100 else count(s)),
-    tables.Column("training_s", "training, s", write=lambda s: f"{s.mean:.1f}" if s.mean < 10 else count(s)),
+COSTS = (
+    ("input_ms", "input, ms"),
+    ("ms", "denoising, ms"),
+    ("total_ms", "both, ms"),
+    ("equal_time_spp", "render of equal time, spp"),
+    ("equal_time_psnr", "its PSNR, dB"),
+    ("equal_error_ms", "render of equal error, ms"),
+    ("frames_s", "training frames, s"),
+    ("training_s", "training, s"),
+    ("pays_after", "pays after, frames"),
 )
-"""The columns of times."""
+"""The columns of the table of costs."""
 
 
 def written(kept: Results, times: Results) -> str:
-    """Return the table."""
-    rows = [row for row in ROWS if kept.summary(row, "mse") is not None]
-    clocks = TIMES if times.configurations() else ()
-    cells = []
-    for row in rows:
-        shown = [column.cell(kept.summary(row, column.value)) for column in COLUMNS]
-        cells.append(
-            [ROWS[row].text, *shown, *(column.cell(times.summary(row, column.value)) for column in clocks)]
-        )
-    return tables.markdown(["", *(column.heading for column in (*COLUMNS, *clocks))], cells)
+    """Return the table of qualities, and that of costs where there are times."""
+    names = {row: ROWS[row].text for row in ROWS if kept.summary(row, "mse") is not None}
+    text = tables.table(kept, COLUMNS, names) if names else ""
+    prices = {row: price for row in names if (price := priced(row, kept, times)) is not None}
+    lines = [[names[row], *(_short(price[name]) for name, _ in COSTS)] for row, price in prices.items()]
+    return text + ("\n" + tables.markdown(["", *(head for _, head in COSTS)], lines) if lines else "")
+
+
+def _short(value: float) -> str:
+    """Return a number with as many digits as matter."""
+    if not math.isfinite(value):
+        return "never"
+    return f"{value:,.0f}" if value >= 100 else f"{value:.1f}" if value else ""
+
+
+def curves(folder: Path, kept: Results) -> None:
+    """Draw the validation errors of the rows that have some, over the steps of their training."""
+    lines = {}
+    for row in ROWS:
+        looks = [(seed, curve) for seed, curve in enumerate(kept.of(row, "curve")) if ROWS[row].timed]
+        for number, curve in looks:
+            name = ROWS[row].text if len(looks) == 1 else f"{ROWS[row].text}, run {number}"
+            lines[name] = [(look["step"], [look["psnr"]]) for look in curve]
+    if lines:
+        figures.curves(folder / "curves.png", lines, ("steps", "PSNR of the validation frames, dB"))
 
 
 def drawn(folder: Path, pictures: Path, size: int, patch: int) -> None:
@@ -240,10 +366,54 @@ def available(rows: Sequence[str]) -> list[str]:
     return kept
 
 
+def forecast(bench: Bench, rows: Sequence[tuple[str, int]]) -> None:
+    """Say on standard error how long what is missing will take."""
+    from baselines import forecast as probes
+
+    parts = {"rendering": probes.rendering(bench, probes.wanted(bench, rows))}
+    for row in dict.fromkeys(row for row, _ in rows):
+        runs = sum(name == row for name, _ in rows)
+        if seconds := runs * probes.training(bench, row):
+            parts[f"training {row}, {runs} x"] = seconds
+    parts["judging"] = probes.judging(bench, rows)
+    total = sum(parts.values())
+    sys.stderr.write(f"table1: {_span(total)} at most, without times of frames\n")
+    sys.stderr.write("".join(f"  {name}: {_span(seconds)}\n" for name, seconds in parts.items()))
+
+
+def _span(seconds: float) -> str:
+    """Return seconds or minutes."""
+    return f"{seconds / 60:.0f} minutes" if seconds >= 100 else f"{math.ceil(seconds)} seconds"
+
+
+def left(
+    kept: Results, rows: Sequence[str], seeds: Sequence[int] | None, scale: Scale
+) -> Iterator[tuple[str, int]]:
+    """Yield rows and seeds without a record; refuse records of other settings."""
+    for row in rows:
+        mine = seeds if seeds is not None else scale.few if ROWS[row].few else command.SEEDS
+        for seed in mine:
+            found, now = kept.get(row, seed), trained_with(ROWS[row], scale)
+            if found is None or _may_go_on(found, now):
+                yield row, seed
+            elif found.get("settings") != now:
+                rule = f"it was made with {json.dumps(found.get('settings'))}, not {json.dumps(now)}"
+                raise InputError(f"record of {row}, seed {seed}", str(kept.path), rule, results.WAY_OUT)
+
+
+def _may_go_on(found: Values, settings: Mapping[str, Any]) -> bool:
+    """Tell whether a training met its number of steps before it was flat, and may now do more."""
+    before = found.get("settings", {})
+    return not found.get("flat", True) and {**before, "steps": settings.get("steps")} == settings != before
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Render, train, judge, time, and print the table."""
     parser = command.parser(__doc__ or "", "table1")
+    # Costly rows have fewer seeds than others, unless seeds are asked for.
+    parser.set_defaults(seeds=None)
     parser.add_argument("--only", nargs="+", choices=list(ROWS), default=list(ROWS), help="rows")
+    parser.add_argument("--plan", action="store_true", help="say how long it will take, and stop")
     parser.add_argument("--no-times", action="store_true", help="leave the times of frames for later")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="rounds of the times")
     options = parser.parse_args(arguments)
@@ -254,21 +424,32 @@ def run(options: argparse.Namespace) -> None:
     """Do all that the options ask for."""
     scale = SCALES[options.scale]
     folder: Path = options.output
-    settings = {"scale": json.loads(json.dumps(asdict(scale))), "executor": options.executor}
+    settings = settings_of(scale, options.executor)
     kept = Results.open(folder / "table1.json", "table1", settings)
     times = Results.open(folder / "times.json", "table1-times", settings)
     pictures = folder / "pictures"
     pictures.mkdir(exist_ok=True)
     rows = available(options.only)
+    if any("torch" in ROWS[row].packages for row in rows):
+        _threads(ROWS["dncnn"])
     with open_executor(options.executor) as device:
-        bench = Bench(scale, options.cache, device)
-        ladder = climbed(bench, kept)
-        work = {row: partial(judged, row, bench, ladder, pictures) for row in rows}
-        results.fill(kept, work, options.seeds)
+        bench = Bench.of(scale, options.cache, device)
+        if kept.get("frames", 0) is None:
+            kept.put("frames", 0, compared(bench.split))
+        missing = list(left(kept, rows, options.seeds, scale))
+        if missing:
+            forecast(bench, missing)
+        if options.plan:
+            return
+        with hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"):
+            for row, seed in missing:
+                sys.stderr.write(f"table1: {row}, seed {seed}\n")
+                kept.put(row, seed, judged(row, bench, kept, pictures, seed))
         if not options.no_times:
             timed(rows, bench, times, options.rounds)
-    if 0 in options.seeds and any((pictures / f"{row}.png").exists() for row in SHOWN):
+    if any((pictures / f"{row}.png").exists() for row in SHOWN):
         drawn(folder, pictures, scale.size, scale.pix2pix["crop"])
+    curves(folder, kept)
     text = written(kept, times)
     write_text(folder / "table1.md", text)
     print(text, end="")

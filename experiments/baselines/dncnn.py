@@ -10,8 +10,9 @@ Denoising", IEEE Transactions on Image Processing 26(7), 2017 (sections III.A an
 for Image Denoising*, section 4.4, for the depth of 16 and for the loss, its equation 2.
 
 Decisions: the paper does not say more. Colour is display-encoded. Weights begin as in He et al. 2015, as
-Zhang et al. have it; Adam follows the gradient, at a rate that falls along a cosine. The paper's pictures
-were resized from 1024x1024 to 256x256; [`fitting.Recipe.shrink`] does that by means of squares of pixels.
+Zhang et al. have it; Adam follows the gradient, at a rate that falls to a tenth where progress ends. The
+paper's pictures were resized from 1024x1024 to 256x256; [`fitting.Recipe.shrink`] does that by means of
+squares of pixels.
 """
 
 from __future__ import annotations
@@ -74,10 +75,13 @@ class DnCNN:
         follow(self.optimizers["adam"], loss, share * self.recipe.learning_rate)
         return loss.item()
 
+    def denoised(self, noisy: torch.Tensor) -> torch.Tensor:
+        """Return what is left of pictures (N, 3, H, W) without their noise."""
+        self.network.eval()
+        return (noisy - self.network(noisy)).clamp(0.0, 1.0)
+
     @torch.no_grad()
     def picture(self, frame: Frame) -> Floats:
         """Return the denoised, display-encoded picture (H, W, 3) of a frame."""
-        self.network.eval()
-        noisy = planes(frame, self.recipe.features)
-        clean = (noisy - self.network(noisy)).clamp(0.0, 1.0)
+        clean = self.denoised(planes(frame, self.recipe.features))
         return np.moveaxis(clean[0].numpy(), 0, -1)

@@ -1,24 +1,31 @@
-"""Training a baseline in PyTorch: one loop for all, which can be stopped after any step and gone on with.
+"""Training a baseline in PyTorch until its validation error is flat; it can be stopped after any step.
 
 1. Examples are crops of display-encoded pictures, or tiles of them [`Examples`], drawn for each step as a
    function of the seed and the step alone [`draw`]; so is all other noise [`generator_of`].
 2. A step is the method's own [`Method.step`]: losses, gradients, optimisers.
-3. A checkpoint holds the networks and the optimisers [`fit`]; the finished networks are safetensors, with
-   their recipe and the seconds of their training as JSON beside them. Neither is committed.
+3. Every so many steps the network denoises validation pictures, which are neither trained on nor reported
+   [`validated`]. Where the best PSNR of the last third of these looks is less than [`FLAT_DB`] above the best
+   one before, the curve is flat [`flat`]: the learning rate falls to its next share in [`RATES`], and the
+   training ends after the last one. The network that is kept is the best of all looks.
+4. A checkpoint holds networks, optimisers and the curve [`fit`]; the finished networks are safetensors, with
+   their recipe, the curve and the seconds of their training as JSON beside them. Neither is committed. A
+   training that met its largest number of steps before the curve was flat says so: `flat` is false.
 
-Sources: those of the methods. Sampling is that of refimpl/dataset.py.
+Sources: those of the methods. Sampling is that of refimpl/dataset.py. Rates that fall where progress ends are
+those of He, Zhang, Ren, Sun, "Deep Residual Learning for Image Recognition", CVPR 2016, section 3.4.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
 import signal
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -31,7 +38,7 @@ from safetensors.torch import load_file, save_file
 from wamnet.cli.exr import read_frame
 from wamnet.cli.outputs import replacing, write_text
 from wamnet.cli.terminal import hint_on_interrupt, progress
-from wamnet.refimpl import dataset
+from wamnet.refimpl import dataset, metrics
 from wamnet.refimpl.dataset import Normalization
 from wamnet.refimpl.errors import InputError, TrainingError
 from wamnet.refimpl.frame import Frame
@@ -48,13 +55,25 @@ NOISE_TAG = 0x4E4F4953
 CHECKPOINT_S = 30.0
 """Seconds between two checkpoints."""
 
+RATES = (1.0, 0.1)
+"""Shares of the recipe's learning rate, one after another."""
+
+FLAT_DB = 0.05
+"""A curve whose last third gains less than this is flat: a tenth of the differences that the table shows."""
+
+FEWEST_LOOKS = 12
+"""Looks at one rate before it can be called flat: the last third then has four."""
+
+VALIDATION_PX = 512
+"""Largest side of a validation picture; of a larger one its middle is taken, since a look costs time."""
+
 HALF = torch.bfloat16
 """Type of the products and sums of training where a recipe says `half`; parameters and losses are float32."""
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """All choices of a baseline's training.
+    """All choices of a baseline's training; `steps` is the largest number, `every` those between two looks.
 
     `crop` and `batch`: what a step sees; `shrink` averages squares of so many pixels first; `tiles` takes
     crops from a grid, else from anywhere; `half`: see [`HALF`]. `features`: what the network is given.
@@ -71,6 +90,7 @@ class Recipe:
     half: bool = False
     width: int = 64
     seed: int = 0
+    every: int = 100
 
 
 class Method(Protocol):
@@ -82,10 +102,42 @@ class Method(Protocol):
     def step(self, noisy: Tensor, clean: Tensor, generator: torch.Generator, share: float) -> float:
         """Do one step, at this share of the recipe's learning rate; return its loss."""
 
+    def denoised(self, noisy: Tensor) -> Tensor:
+        """Return the pictures (N, 3, H, W) in [0, 1] of feature images (N, C, H, W)."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """The mean PSNR of the validation pictures after so many steps, and the share of the rate before it."""
+
+    step: int
+    psnr: float
+    share: float
+    seconds: float
+
+
+@dataclass
+class Progress:
+    """How far a training is: steps, seconds, losses, looks, and the networks of the best look."""
+
+    done: int = 0
+    seconds: float = 0.0
+    history: list[float] = field(default_factory=list)
+    curve: list[Look] = field(default_factory=list)
+    best: dict[str, Tensor] = field(default_factory=dict)
+
+    @property
+    def stage(self) -> int:
+        """Return the number of rates after which the curve was flat."""
+        found = 0
+        while found < len(RATES) and flat([look.psnr for look in self.curve if look.share == RATES[found]]):
+            found += 1
+        return found
+
 
 @dataclass(frozen=True)
 class Examples:
-    """Pictures that are trained on: noisy (F, C, H, W) and clean (F, 3, H, W), display-encoded.
+    """Pictures that are trained on, or looked at: noisy (F, C, H, W) and clean (F, 3, H, W), display-encoded.
 
     They may lie in files: a thousand large ones do not fit into memory.
     """
@@ -173,61 +225,129 @@ def generator_of(seed: int, step: int) -> torch.Generator:
     return torch.Generator().manual_seed(high << 32 | low)
 
 
-def path_of(folder: Path, recipe: Recipe, data: Examples) -> Path:
-    """Return the file of the finished networks."""
-    text = json.dumps([asdict(recipe), data.digest, torch.__version__])
+def flat(psnr: Sequence[float]) -> bool:
+    """Tell whether the best of the last third is less than [`FLAT_DB`] above the best one before."""
+    if len(psnr) < FEWEST_LOOKS:
+        return False
+    last = len(psnr) - len(psnr) // 3
+    return max(psnr[last:]) - max(psnr[:last]) < FLAT_DB
+
+
+def validated(method: Method, recipe: Recipe, data: Examples) -> float:
+    """Return the mean PSNR, in dB, of what the networks make of the middles of validation pictures."""
+    found = []
+    for noisy, clean in zip(data.noisy, data.clean, strict=True):
+        size = min(VALIDATION_PX, *noisy.shape[1:])
+        # The measure of pix2pix's patches: the middle is one of a whole number of them.
+        size -= size % recipe.crop if recipe.tiles else 0
+        y, x = ((side - size) // 2 for side in noisy.shape[1:])
+        part = slice(None), slice(y, y + size), slice(x, x + size)
+        with torch.no_grad(), torch.autocast("cpu", dtype=HALF, enabled=recipe.half):
+            made = method.denoised(torch.from_numpy(np.array(noisy[part]))[None])
+        found.append(metrics.psnr(made[0].float().clamp(0.0, 1.0).numpy(), np.array(clean[part])))
+    return float(np.mean(found))
+
+
+def use_all_cores() -> int:
+    """Let PyTorch use every processor that this process may use, as all else does; return their number."""
+    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    torch.set_num_threads(count)
+    return count
+
+
+def path_of(folder: Path, recipe: Recipe, data: Examples, validation: Examples) -> Path:
+    """Return the file of the finished networks; a larger number of steps is no other training."""
+    text = json.dumps(
+        [asdict(replace(recipe, steps=0)), data.digest, validation.digest, torch.__version__, RATES]
+    )
     return folder / f"{recipe.method}-{hashlib.sha256(text.encode()).hexdigest()[:DIGITS]}.safetensors"
 
 
 def fit(
-    method: Method, recipe: Recipe, data: Examples, folder: Path, until: int | None = None
+    method: Method,
+    recipe: Recipe,
+    data: Examples,
+    validation: Examples,
+    folder: Path,
+    until: int | None = None,
 ) -> dict[str, Any]:
-    """Train the method's networks in place, up to step `until` (all by default); return the facts of the run.
+    """Train the method's networks in place until they are flat; return the facts of the run.
 
-    Networks that are finished are read, a run that was interrupted goes on.
+    `until`: stop after so many steps, to go on later. Networks that are finished are read; a run that was
+    interrupted goes on, and so does one that may do more steps than it did and was not flat.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    path = path_of(folder, recipe, data)
+    path = path_of(folder, recipe, data, validation)
     if path.exists() and path.with_suffix(".json").exists():
-        _put(method, load_file(path))
         facts: dict[str, Any] = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
-        return facts
+        if facts["flat"] or facts["steps_done"] >= recipe.steps:
+            _put(method, load_file(path))
+            return facts
     checkpoint = path.with_suffix(".checkpoint")
-    done, seconds, history = _load(method, checkpoint)
+    run = _load(method, checkpoint)
+    with hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"):
+        _advance(method, recipe, (data, validation), run, checkpoint, until)
+    found = _facts(method, recipe, (data, validation), run)
+    if run.done == recipe.steps or found["flat"]:
+        _put(method, run.best)
+        with replacing(path) as new:
+            save_file(_parts(method), new)
+        write_text(path.with_suffix(".json"), json.dumps(found) + "\n")
+    if found["flat"]:
+        checkpoint.unlink(missing_ok=True)
+    return found
+
+
+def _advance(
+    method: Method,
+    recipe: Recipe,
+    data: tuple[Examples, Examples],
+    run: Progress,
+    checkpoint: Path,
+    until: int | None,
+) -> None:
+    """Do steps until the curve is flat, or there are enough of them; keep a checkpoint now and then."""
     end = recipe.steps if until is None else min(until, recipe.steps)
-    begun = kept = time.perf_counter()
-
-    def spent() -> float:
-        return seconds + time.perf_counter() - begun
-
-    with (
-        hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"),
-        progress(f"training {recipe.method}", end - done) as advance,
-    ):
-        for step in range(done, end):
+    begun, before, kept = time.perf_counter(), run.seconds, time.perf_counter()
+    stage = run.stage
+    with progress(f"training {recipe.method}, at most", end - run.done) as advance:
+        while run.done < end and stage < len(RATES):
             with whole_steps() as interrupted:
-                history.append(_one(method, recipe, data, step))
-            done = step + 1
+                run.history.append(_one(method, recipe, data[0], run.done, RATES[stage]))
+                run.done += 1
+                run.seconds = before + time.perf_counter() - begun
+                if run.done % recipe.every == 0 or run.done == recipe.steps:
+                    _look(method, recipe, data[1], run, RATES[stage])
+                    stage = run.stage
             advance(1)
-            if interrupted or done == end < recipe.steps or time.perf_counter() - kept > CHECKPOINT_S:
-                _save(method, checkpoint, done, spent(), history)
+            over = run.done == end or stage == len(RATES)
+            if interrupted or over or time.perf_counter() - kept > CHECKPOINT_S:
+                _save(method, checkpoint, run)
                 kept = time.perf_counter()
             if interrupted:
                 raise KeyboardInterrupt
-    facts = {"recipe": asdict(recipe), "seconds": spent(), "steps_done": done, "history": history}
-    facts |= {"parameters": sizes(method), "torch": torch.__version__, "data_digest": data.digest}
-    if done == recipe.steps:
-        with replacing(path) as new:
-            save_file(_parts(method), new)
-        write_text(path.with_suffix(".json"), json.dumps(facts) + "\n")
-        checkpoint.unlink(missing_ok=True)
-    return facts
+
+
+def _look(method: Method, recipe: Recipe, validation: Examples, run: Progress, share: float) -> None:
+    """Add a look to the curve; keep the networks if it is the best one."""
+    psnr = validated(method, recipe, validation)
+    if not run.curve or psnr > max(look.psnr for look in run.curve):
+        run.best = {name: tensor.clone() for name, tensor in _parts(method).items()}
+    run.curve.append(Look(run.done, psnr, share, run.seconds))
+
+
+def _facts(method: Method, recipe: Recipe, data: tuple[Examples, Examples], run: Progress) -> dict[str, Any]:
+    """Return what is kept beside the networks."""
+    facts = {"recipe": asdict(recipe), "seconds": run.seconds, "steps_done": run.done}
+    facts |= {"flat": run.stage == len(RATES), "curve": [asdict(look) for look in run.curve]}
+    facts |= {"history": run.history, "parameters": sizes(method), "torch": torch.__version__}
+    return {**facts, "threads": torch.get_num_threads(), "digests": [each.digest for each in data]}
 
 
 def seconds_a_step(method: Method, recipe: Recipe, data: Examples) -> float:
     """Do a step of a method that nothing else uses; return its seconds."""
     begun = time.perf_counter()
-    _one(method, recipe, data, 0)
+    _one(method, recipe, data, 0, RATES[0])
     return time.perf_counter() - begun
 
 
@@ -245,10 +365,9 @@ def whole_steps() -> Iterator[list[int]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _one(method: Method, recipe: Recipe, data: Examples, step: int) -> float:
-    """Do a step, or say that its loss is not finite."""
+def _one(method: Method, recipe: Recipe, data: Examples, step: int, share: float) -> float:
+    """Do a step at a share of the learning rate, or say that its loss is not finite."""
     noisy, clean = draw(recipe, step, data)
-    share = 0.5 * (1.0 + float(np.cos(np.pi * step / recipe.steps)))
     with torch.autocast("cpu", dtype=HALF, enabled=recipe.half):
         loss = method.step(noisy, clean, generator_of(recipe.seed, step), share)
     if not np.isfinite(loss):
@@ -289,24 +408,24 @@ def _put(method: Method, tensors: Mapping[str, Tensor]) -> None:
         net.load_state_dict(mine)
 
 
-def _save(method: Method, path: Path, done: int, seconds: float, history: list[float]) -> None:
+def _save(method: Method, path: Path, run: Progress) -> None:
     """Write a checkpoint, all of it or nothing."""
     optimizers = {name: found.state_dict() for name, found in method.optimizers.items()}
     state = {"networks": _parts(method), "optimizers": optimizers}
     with replacing(path) as new:
-        torch.save({**state, "done": done, "seconds": seconds, "history": history}, new)
+        torch.save({**state, **vars(run), "curve": [asdict(look) for look in run.curve]}, new)
 
 
-def _load(method: Method, path: Path) -> tuple[int, float, list[float]]:
-    """Set networks and optimisers from a checkpoint, if there is one; return its steps, seconds, losses."""
+def _load(method: Method, path: Path) -> Progress:
+    """Set networks and optimisers from a checkpoint, if there is one; return how far it is."""
     if not path.exists():
-        return 0, 0.0, []
+        return Progress()
     try:
         state = torch.load(path, weights_only=True)
     except Exception as error:  # noqa: BLE001 - the package's errors for damaged files vary
         rule = f"it cannot be read ({type(error).__name__})"
-        raise InputError("checkpoint", str(path), rule, "remove it: training starts anew") from None
-    _put(method, state["networks"])
-    for name, optimizer in method.optimizers.items():
-        optimizer.load_state_dict(state["optimizers"][name])
-    return state["done"], state["seconds"], state["history"]
+        raise InputError("checkpoint", str(path), rule, "remove it: training starts again") from None
+    _put(method, state.pop("networks"))
+    for name, found in state.pop("optimizers").items():
+        method.optimizers[name].load_state_dict(found)
+    return Progress(**{**state, "curve": [Look(**look) for look in state["curve"]]})

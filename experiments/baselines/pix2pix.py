@@ -163,20 +163,25 @@ class Pix2pix:
         follow(self.optimizers["generator"], loss, rate)
         return loss.item()
 
+    def denoised(self, noisy: torch.Tensor) -> torch.Tensor:
+        """Return the pictures (N, 3, H, W) of feature images whose sides are multiples of a patch's."""
+        size = self.recipe.crop
+        made = torch.zeros(len(noisy), 3, *noisy.shape[2:])
+        noise = generator_of(self.recipe.seed, DRAWN_FOR_PICTURES)
+        for y in range(0, noisy.shape[2], size):
+            for x in range(0, noisy.shape[3], size):
+                rows, columns = slice(y, y + size), slice(x, x + size)
+                made[:, :, rows, columns] = self.make(noisy[:, :, rows, columns], noise)
+        return made
+
     @torch.no_grad()
     def picture(self, frame: Frame) -> Floats:
         """Return the denoised, display-encoded picture (H, W, 3) of a frame, patch by patch.
 
         A picture whose side is no multiple of the patch's is continued by its last pixels.
         """
-        noisy, size = planes(frame, self.recipe.features), self.recipe.crop
-        height, width = frame.height, frame.width
+        height, width, size = frame.height, frame.width, self.recipe.crop
         margins = (0, -width % size, 0, -height % size)
-        padded = nn.functional.pad(noisy, margins, mode="replicate")
-        made = torch.zeros(3, *padded.shape[2:])
-        noise = generator_of(self.recipe.seed, DRAWN_FOR_PICTURES)
-        for y in range(0, height, size):
-            for x in range(0, width, size):
-                rows, columns = slice(y, y + size), slice(x, x + size)
-                made[:, rows, columns] = self.make(padded[:, :, rows, columns], noise)[0]
-        return np.moveaxis(made[:, :height, :width].numpy(), 0, -1)
+        padded = nn.functional.pad(planes(frame, self.recipe.features), margins, mode="replicate")
+        made = self.denoised(padded)[0, :, :height, :width]
+        return np.moveaxis(made.numpy(), 0, -1)

@@ -1,8 +1,11 @@
 """The rows of Table 1: every way to denoise, made ready for one seed, on common frames.
 
-1. A bench renders and keeps what all rows share: training frames, and cases to be judged on [`Bench`].
-2. A row is made ready for a seed: trained, or tuned on a training frame, or opened [`ROWS`].
-3. What is ready turns a case into a picture, display-encoded, and its radiance where it has one [`Ready`].
+1. Training, validation and test frames are shots of one scene, each with a geometry of its own [`split_of`],
+   which is checked [`compared`].
+2. A bench renders and keeps what all rows share: training frames, and cases to be judged on [`Bench`].
+3. A row is made ready for a seed: trained, or tuned on a training frame, or opened [`ROWS`].
+4. What is ready turns a case into a picture, display-encoded, and its radiance where it has one, and says
+   what the rendering of its input costs [`Ready`].
 
 A new row is a function and a line in [`ROWS`]. PyTorch and Open Image Denoise are imported by the rows that
 use them; without them these rows say so.
@@ -17,7 +20,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from lab import frames, training
@@ -25,20 +28,27 @@ from lab.frames import Shot
 
 from wamnet.cli import exr
 from wamnet.cli.packages import need
-from wamnet.kernels import denoise_on
+from wamnet.kernels import denoise_on, draws, geometry
 from wamnet.kernels.denoise_on import images_of
 from wamnet.kernels.executor import Executor
+from wamnet.kernels.geometry import Shown
 from wamnet.refimpl import metrics
 from wamnet.refimpl.denoise import Model, denoise
-from wamnet.refimpl.encoding import to_display
+from wamnet.refimpl.encoding import from_display, to_display
 from wamnet.refimpl.frame import Floats, Frame
 from wamnet.refimpl.scenes import TURN_SECONDS
 from wamnet.refimpl.train import BEST, PAPER, SHORT, Recipe
 
 from . import atrous
 
+if TYPE_CHECKING:
+    from .fitting import Method
+
+VALIDATION_SEED = 500_000
+"""Seeds of validation frames begin here, those of training frames at 0: none is used twice."""
+
 TEST_SEED = 1_000_000
-"""Seeds of test frames begin here, those of training frames at 0: none is used twice."""
+"""Seeds of test frames begin here."""
 
 RENDER_SEED = 2_000_000
 """Seeds of renders of more samples begin here."""
@@ -46,26 +56,70 @@ RENDER_SEED = 2_000_000
 SEEDS_APART = 10_000
 """Frames of one seed: the noise of another one begins so many seeds later."""
 
+TIMES_SEED = 1
+"""Where the sequence of times begins."""
+
+EQUAL_RAYS, EQUAL_SPP = 16, 3
+"""Camera rays of one sample's features, and the samples whose rendering costs no less than both together."""
+
+TUNED_PX = 256
+"""Largest side of the middle of a training frame that a filter is tuned on."""
+
 Picture = tuple[Floats, Floats | None]
 """Display-encoded colour (H, W, 3) in [0, 1], and linear radiance where it is known."""
 
 
 @dataclass(frozen=True)
 class Scale:
-    """Sizes: pixels, frames, samples, and the length of each training."""
+    """Sizes: pixels, frames, samples, and the length of each training; `few`: seeds of the costly rows."""
 
     size: int
     train: int
+    validation: int
     test: int
     train_spp: int
+    validation_spp: int
     test_spp: int
     ladder: tuple[int, ...]
     short_frames: int
+    few: tuple[int, ...] = (0, 1, 2)
     paper: Mapping[str, Any] = field(default_factory=dict)
     short: Mapping[str, Any] = field(default_factory=dict)
     dncnn: Mapping[str, Any] = field(default_factory=dict)
     shrunk: Mapping[str, Any] = field(default_factory=dict)
     pix2pix: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Split:
+    """Shots to train on, to look at while training, and to judge by."""
+
+    train: tuple[Shot, ...]
+    validation: tuple[Shot, ...]
+    test: tuple[Shot, ...]
+
+
+def split_of(scale: Scale, scene: str = "minicubes") -> Split:
+    """Return shots at times of the golden-ratio sequence over a turn, one kind after another."""
+    kinds = ((scale.train, 0), (scale.validation, VALIDATION_SEED), (scale.test, TEST_SEED))
+    found, first = [], 0
+    for count, seed in kinds:
+        times = draws.times(TIMES_SEED, 0.0, TURN_SECONDS, first, count)
+        found.append(tuple(Shot(scene, t, scale.size, seed=seed + k) for k, t in enumerate(times)))
+        first += count
+    return Split(*found)
+
+
+def compared(split: Split) -> dict[str, Any]:
+    """Return times, and how far the nearest training shot is; refuse shots that look alike."""
+    kinds = {"training": split.train, "validation": split.validation, "test": split.test}
+    shown = {
+        kind: [Shown(f"{kind} frame {n}", shot.time, shot.build()) for n, shot in enumerate(shots)]
+        for kind, shots in kinds.items()
+    }
+    train = shown.pop("training")
+    nearest = {kind: found.as_data() for kind, found in geometry.compare(train, shown).items()}
+    return {"times_s": {kind: [s.time for s in shots] for kind, shots in kinds.items()}, "nearest": nearest}
 
 
 @dataclass(frozen=True)
@@ -83,7 +137,9 @@ class Ready:
     """A way that is made ready: `picture` of a case, and facts: parameters, seconds of training, choices.
 
     `seconds`: how long a picture takes, if calling `picture` says something else; `step`: how long a step of
-    its training takes; `rays`: the camera rays that the features of its cases are means over, if not one.
+    its training takes; `rays`: the camera rays that the features of its cases are means over, if not those of
+    the colour's `spp`; `paid`: the samples and rays that its input costs, if not these. `cases`: those that
+    it is judged on in place of the test frames; `ladder`: the shot whose renders it is compared with then.
     """
 
     picture: Callable[[Case], Picture]
@@ -91,59 +147,74 @@ class Ready:
     seconds: Callable[[Case], float] | None = None
     step: Callable[[], float] | None = None
     rays: int = 0
+    spp: int = frames.NOISY_SPP
+    paid: tuple[int, int] | None = None
+    cases: Sequence[Case] = ()
+    ladder: Shot | None = None
+
+    @property
+    def cost(self) -> tuple[int, int]:
+        """Return samples and further camera rays a pixel that are rendered for its input."""
+        return (self.spp, self.rays) if self.paid is None else self.paid
 
 
 @dataclass(frozen=True)
 class Bench:
-    """What all rows share: the scale, the folder of frames and networks, what renders and denoises."""
+    """What all rows share: the scale, the shots, the folder of frames and networks, what renders them."""
 
     scale: Scale
     cache: Path
     device: Executor
-    scene: str = "minicubes"
+    split: Split
+
+    @classmethod
+    def of(cls, scale: Scale, cache: Path, device: Executor) -> Bench:
+        """Return the bench of a scale."""
+        return cls(scale, cache, device, split_of(scale))
 
     @property
     def executor(self) -> str:
         """Return the executor's name."""
         return self.device.name
 
-    def times(self) -> tuple[list[float], list[float]]:
-        """Return the times of training and of test frames."""
-        return frames.split_times(self.scale.train, self.scale.test, TURN_SECONDS)
+    def files(
+        self, shots: Sequence[Shot], target_spp: int, seed: int, rays: int = 0, spp: int = frames.NOISY_SPP
+    ) -> list[tuple[Path, Path]]:
+        """Return noisy frame and reference of each shot; noise is the seed's, the reference is not."""
+        noisy = self._files([self.noisy(shot, seed, rays, spp) for shot in shots])
+        return list(zip(noisy, self._files([frames.reference(s, target_spp) for s in shots]), strict=True))
 
-    def train_files(self, seed: int, every: int = 1, rays: int = 0) -> list[tuple[Path, Path]]:
-        """Return noisy frame and reference of every so many of the training times; noise is the seed's."""
-        shots = self._shots(self.times()[0], 0)[::every]
-        noisy = [self._noisy(shot, seed, rays) for shot in shots]
-        clean = [frames.reference(s, self.scale.train_spp) for s in shots]
-        return list(zip(self._files(noisy), self._files(clean), strict=True))
+    def train_files(self, seed: int) -> list[tuple[Path, Path]]:
+        """Return noisy frame and reference of each training shot."""
+        return self.files(self.split.train, self.scale.train_spp, seed)
 
-    def train_pairs(self, seed: int, count: int, rays: int = 0) -> list[frames.Pair]:
-        """Return about so many training pairs, evenly over the animation: the first one first."""
-        every = -(-self.scale.train // count)
-        return [(exr.read_frame(n), exr.read_frame(c)) for n, c in self.train_files(seed, every, rays)]
+    def validation_files(self, seed: int) -> list[tuple[Path, Path]]:
+        """Return noisy frame and reference of each validation shot."""
+        return self.files(self.split.validation, self.scale.validation_spp, seed)
 
-    def cases(self, seed: int, rays: int = 0) -> Iterator[Case]:
+    def own(self, seed: int) -> Shot:
+        """Return the training shot that a network of one frame has for this seed."""
+        return self.split.train[seed % len(self.split.train)]
+
+    def pairs(self, shots: Sequence[Shot], seed: int, rays: int = 0) -> list[frames.Pair]:
+        """Return the pairs of training shots."""
+        found = self.files(shots, self.scale.train_spp, seed, rays)
+        return [(exr.read_frame(noisy), exr.read_frame(clean)) for noisy, clean in found]
+
+    def cases(self, seed: int, rays: int = 0, spp: int = frames.NOISY_SPP) -> Iterator[Case]:
         """Yield the test frames with the seed's noise, one after another: all may be too many to keep."""
-        shots = self._shots(self.times()[1], TEST_SEED)
-        noisy = [self._noisy(shot, seed, rays) for shot in shots]
-        clean = [frames.reference(s, self.scale.test_spp) for s in shots]
-        found = zip(self._files(noisy), self._files(clean), strict=True)
-        for index, (dirty, reference) in enumerate(found):
-            yield Case(exr.read_frame(dirty), exr.read_frame(reference), index, seed)
+        found = self.files(self.split.test, self.scale.test_spp, seed, rays, spp)
+        for index, (noisy, reference) in enumerate(found):
+            yield Case(exr.read_frame(noisy), exr.read_frame(reference), index, seed)
 
-    def renders(self, spp: int, seed: int) -> list[Path]:
-        """Return the files of renders of the test frames with so many samples."""
-        shots = self._shots(self.times()[1], RENDER_SEED + SEEDS_APART * seed)
-        return self._files([replace(shot, spp=spp, seed=2 * shot.seed) for shot in shots])
+    def renders(self, shots: Sequence[Shot], spp: int, seed: int) -> list[Path]:
+        """Return the files of renders of shots with so many samples."""
+        apart = RENDER_SEED + SEEDS_APART * seed
+        return self._files([replace(shot, spp=spp, seed=2 * (shot.seed + apart)) for shot in shots])
 
-    def _noisy(self, shot: Shot, seed: int, rays: int) -> Shot:
+    def noisy(self, shot: Shot, seed: int, rays: int = 0, spp: int = frames.NOISY_SPP) -> Shot:
         """Return a shot's noisy one, with the seed's noise and features of so many camera rays."""
-        return replace(frames.noisy(shot), seed=2 * (shot.seed + SEEDS_APART * seed), feature_spp=rays)
-
-    def _shots(self, times: Sequence[float], first: int) -> list[Shot]:
-        """Return a shot of each time, with seeds from `first` on."""
-        return [Shot(self.scene, t, self.scale.size, seed=first + n) for n, t in enumerate(times)]
+        return replace(shot, seed=2 * (shot.seed + SEEDS_APART * seed), feature_spp=rays, spp=spp)
 
     def _files(self, shots: Sequence[Shot]) -> list[Path]:
         """Return the files of shots."""
@@ -158,15 +229,24 @@ def as_it_is(bench: Bench, seed: int) -> Ready:
     return Ready(lambda case: (to_display(case.noisy["color"]), case.noisy["color"]))
 
 
-def more_samples(spp: int, bench: Bench, seed: int) -> Ready:
-    """Show a render of more samples."""
-    files = bench.renders(spp, seed)
+def more_samples(spp: int, own: bool, bench: Bench, seed: int) -> Ready:
+    """Show a render of more samples: of the test frames, or of the one that a network is trained on."""
+    shots = (bench.own(seed),) if own else bench.split.test
+    files = bench.renders(shots, spp, seed)
 
     def picture(case: Case) -> Picture:
         color = exr.read_frame(files[case.index])["color"]
         return to_display(color), color
 
-    return Ready(picture)
+    return _on_own(bench, seed, Ready(picture, paid=(0, 0))) if own else Ready(picture, paid=(0, 0))
+
+
+def _on_own(bench: Bench, seed: int, ready: Ready) -> Ready:
+    """Return what is judged on the seed's training frame, with that frame's noise."""
+    shot = bench.own(seed)
+    ((noisy, clean),) = bench.pairs([shot], seed)
+    facts = {name: value for name, value in ready.facts.items() if name != "training_s"}
+    return replace(ready, facts=facts, cases=(Case(noisy, clean, 0, seed),), ladder=shot, step=None)
 
 
 # ---- WAMnet ----------------------------------------------------------------------------------------------
@@ -174,12 +254,13 @@ def more_samples(spp: int, bench: Bench, seed: int) -> Ready:
 
 def wamnet(base: Recipe, kind: str, bench: Bench, seed: int, rays: int = 0) -> Ready:
     """Train WAMnet: the paper's recipe on one pair, the project's on more; features of so many rays."""
-    count = 1 if kind == "paper" else bench.scale.short_frames
-    pairs = bench.train_pairs(seed, count, rays)[:count]
+    shots = [bench.own(seed)] if kind == "paper" else bench.split.train[: bench.scale.short_frames]
+    pairs = bench.pairs(shots, seed, rays)
     recipe = replace(base, seed=seed, **getattr(bench.scale, kind))
     model, spent = training.trained(recipe, pairs, bench.cache / "networks", bench.executor)
     facts = {"parameters": parameters(model), "training_s": spent, "steps": recipe.steps}
-    facts |= {"training_frames": len(pairs)}
+    facts |= {"training_frames": len(pairs), "training_samples": len(pairs) * (1 + bench.scale.train_spp)}
+    facts |= {"training_rays": len(pairs) * rays}
     step = partial(training.seconds_a_step, recipe, pairs, bench.device)
     seconds = partial(_network_seconds, bench, model)
     return Ready(partial(_by_network, bench, model), facts, seconds, step, rays)
@@ -205,69 +286,121 @@ def parameters(model: Model) -> int:
     return sum(array.size for array in (*model.siren.weights, *model.siren.biases))
 
 
-def on_its_own_frame(bench: Bench, seed: int) -> Ready:
+def on_its_own_frame(base: Recipe, bench: Bench, seed: int) -> Ready:
     """Show what the paper's recipe makes of the frame that it was trained on, with that frame's noise."""
-    ready = wamnet(PAPER, "paper", bench, seed)
-    ((noisy, clean),) = bench.train_pairs(seed, 1)[:1]
-    own = Case(noisy, clean, -1, seed)
-    return Ready(ready.picture, {**ready.facts, "case": own})
+    return _on_own(bench, seed, wamnet(base, "paper", bench, seed))
 
 
 # ---- the paper's baselines -------------------------------------------------------------------------------
 
 
-def dncnn(kind: str, bench: Bench, seed: int) -> Ready:
-    """Train DnCNN on all training frames."""
-    need("torch", "for DnCNN", "baselines")
-    from . import dncnn as module
+def fitted(recipe_of: Mapping[str, Any], bench: Bench, seed: int) -> tuple[Method, Ready]:
+    """Train a network in PyTorch on all training frames until its error on the validation frames is flat."""
+    from . import dncnn, pix2pix
     from .fitting import Recipe, examples, fit, seconds_a_step
 
-    recipe = Recipe("dncnn", learning_rate=1e-3, seed=seed, **getattr(bench.scale, kind))
-    data = examples(recipe, bench.train_files(seed), bench.cache / "networks")
-    made = module.DnCNN(recipe)
-    run = fit(made, recipe, data, bench.cache / "networks")
-    facts = {"parameters": run["parameters"]["dncnn"], "training_s": run["seconds"], "steps": recipe.steps}
-    step = partial(seconds_a_step, module.DnCNN(recipe), recipe, data)
-    return Ready(lambda case: (made.picture(case.noisy), None), facts, step=step)
+    recipe = Recipe(seed=seed, **recipe_of)
+    make = {"dncnn": dncnn.DnCNN, "pix2pix": pix2pix.Pix2pix}[recipe.method]
+    folder = bench.cache / "networks"
+    data = examples(recipe, bench.train_files(seed), folder)
+    method = make(recipe)
+    run = fit(method, recipe, data, examples(recipe, bench.validation_files(seed), folder), folder)
+    facts = {"training_s": run["seconds"], "steps": run["steps_done"], "flat": run["flat"]}
+    facts |= {"curve": run["curve"], "threads": run["threads"], "recipe": run["recipe"]}
+    facts |= {"parameters": next(iter(run["parameters"].values())), "training_frames": bench.scale.train}
+    s = bench.scale
+    facts["training_samples"] = s.train * (1 + s.train_spp) + s.validation * (1 + s.validation_spp)
+    step = partial(seconds_a_step, make(recipe), recipe, data)
+    return method, Ready(lambda case: (method.picture(case.noisy), None), facts, step=step)
+
+
+def dncnn(bench: Bench, seed: int) -> Ready:
+    """Train DnCNN."""
+    return fitted({"method": "dncnn", "learning_rate": 1e-3, **bench.scale.dncnn}, bench, seed)[1]
 
 
 def pix2pix(bench: Bench, seed: int) -> Ready:
-    """Train pix2pix on patches of all training frames; its parameters are those of the generator."""
-    need("torch", "for pix2pix", "baselines")
-    from . import pix2pix as module
-    from .fitting import Recipe, examples, fit, seconds_a_step
+    """Train pix2pix on patches; its parameters are those of the generator."""
+    chosen = {"method": "pix2pix", "learning_rate": 2e-4, "features": ("color", "normal"), "tiles": True}
+    return fitted({**chosen, **bench.scale.pix2pix}, bench, seed)[1]
 
-    chosen = {"features": ("color", "normal"), "tiles": True, **bench.scale.pix2pix}
-    recipe = Recipe("pix2pix", learning_rate=2e-4, seed=seed, **chosen)
-    data = examples(recipe, bench.train_files(seed), bench.cache / "networks")
-    made = module.Pix2pix(recipe)
-    run = fit(made, recipe, data, bench.cache / "networks")
-    facts = {"parameters": run["parameters"]["generator"], "training_s": run["seconds"]}
-    facts |= {"parameters_of_discriminator": run["parameters"]["discriminator"], "steps": recipe.steps}
-    step = partial(seconds_a_step, module.Pix2pix(recipe), recipe, data)
-    return Ready(lambda case: (made.picture(case.noisy), None), facts, step=step)
+
+def shrunk_dncnn(at_its_size: bool, bench: Bench, seed: int) -> Ready:
+    """Train DnCNN on resized frames, as the paper did; judge it at their size, or enlarged again.
+
+    Pictures are enlarged by cubic interpolation.
+    """
+    chosen = {"method": "dncnn", "learning_rate": 1e-3, **bench.scale.shrunk}
+    method, ready = fitted(chosen, bench, seed)
+    factor = bench.scale.shrunk["shrink"]
+    if at_its_size:
+        cases = [
+            replace(c, noisy=smaller(c.noisy, factor), reference=smaller(c.reference, factor))
+            for c in bench.cases(seed)
+        ]
+        return replace(ready, cases=cases)
+    return replace(
+        ready, picture=lambda case: (larger(method.picture(smaller(case.noisy, factor)), factor), None)
+    )
+
+
+def smaller(frame: Frame, factor: int) -> Frame:
+    """Return a frame whose display-encoded colours are means of squares of so many pixels a side."""
+    shown = to_display(frame["color"])
+    height, width = (side // factor for side in shown.shape[:2])
+    squares = shown[: height * factor, : width * factor].reshape(height, factor, width, factor, 3)
+    return Frame({"color": from_display(squares.mean(axis=(1, 3))).astype(np.float32)}, frame.info)
+
+
+def larger(picture: Floats, factor: int) -> Floats:
+    """Return a picture (H, W, 3) with so many times the pixels a side, in [0, 1]."""
+    import torch
+
+    image = torch.from_numpy(np.ascontiguousarray(np.moveaxis(picture, -1, 0)))[None]
+    found = torch.nn.functional.interpolate(image, scale_factor=factor, mode="bicubic")
+    return np.moveaxis(found[0].clamp(0.0, 1.0).numpy(), 0, -1)
 
 
 # ---- what today's users would ask for ---------------------------------------------------------------------
 
 
-def open_image_denoise(aux: str, bench: Bench, seed: int) -> Ready:
-    """Open Intel's denoiser: without albedo and normal, with those of the noisy frame, or with clean ones."""
-    need("pyoidn", "for Open Image Denoise", "baselines")
-    from wamnet.kernels.bench.peer_oidn import filtered
+def open_image_denoise(
+    aux: str, bench: Bench, seed: int, rays: int = 0, spp: int = frames.NOISY_SPP
+) -> Ready:
+    """Open Intel's denoiser without albedo and normal, or with noisy, prefiltered or clean ones.
+
+    Clean ones are those of the reference, whose camera rays are counted as its cost.
+    """
+    from wamnet.kernels.bench.peer_oidn import filtered, prefiltered
+
+    guides: Mapping[str, Callable[[Case], Frame | None]] = {
+        "none": lambda _: None,
+        "noisy": lambda case: case.noisy,
+        "prefiltered": lambda case: prefiltered(case.noisy),
+        "clean": lambda case: case.reference,
+    }
 
     def picture(case: Case) -> Picture:
-        guide = {"none": None, "noisy": case.noisy, "clean": case.reference}[aux]
-        color = filtered(case.noisy, guide, clean=aux == "clean")
+        color = filtered(case.noisy, guides[aux](case), clean=aux in ("prefiltered", "clean"))
         return to_display(color), color
 
-    return Ready(picture)
+    paid = (spp, bench.scale.test_spp) if aux == "clean" else None
+    return Ready(picture, rays=rays, spp=spp, paid=paid)
+
+
+def _to_tune(bench: Bench, seed: int) -> tuple[Frame, Floats]:
+    """Return the middle of a noisy training frame, and its display-encoded reference."""
+    ((noisy, clean),) = bench.pairs(bench.split.train[:1], seed)
+    size = min(TUNED_PX, noisy.height, noisy.width)
+    y, x = (noisy.height - size) // 2, (noisy.width - size) // 2
+    part = slice(y, y + size), slice(x, x + size)
+    middle = Frame({name: values[part] for name, values in noisy.layers.items()}, noisy.info)
+    return middle, to_display(clean["color"][part])
 
 
 def svgf(bench: Bench, seed: int) -> Ready:
     """Open the a-trous filter, with the settings that suit a training frame best."""
-    ((noisy, clean),) = bench.train_pairs(seed, 1)[:1]
-    target = to_display(clean["color"])
+    noisy, target = _to_tune(bench, seed)
     choices = [
         atrous.Settings(sigma_luminance=luminance, sigma_normal=normal)
         for luminance, normal in itertools.product((1.0, 2.0, 4.0, 8.0), (8.0, 32.0, 128.0))
@@ -293,8 +426,7 @@ def non_local_means(bench: Bench, seed: int) -> Ready:
         clipped: Floats = np.clip(found, 0.0, 1.0)
         return clipped
 
-    ((noisy, clean),) = bench.train_pairs(seed, 1)[:1]
-    target = to_display(clean["color"])
+    noisy, target = _to_tune(bench, seed)
     best = min((0.1, 0.2, 0.3, 0.4, 0.6), key=lambda h: metrics.mse(filtered(noisy, h), target))
     return Ready(lambda case: (filtered(case.noisy, best), None), {"chosen": {"h": best}})
 
@@ -304,11 +436,18 @@ def non_local_means(bench: Bench, seed: int) -> Ready:
 
 @dataclass(frozen=True)
 class Row:
-    """A row: what it is called in the table, how it is made ready, which packages it needs."""
+    """A row: what it is called in the table, how it is made ready, which packages it needs.
+
+    `trains`: which of the scale's settings it is trained with; `few`: it has the seeds of the costly rows.
+    `timed`: it is a way of its own, not another one judged on other frames.
+    """
 
     text: str
     make: Callable[[Bench, int], Ready]
     packages: tuple[str, ...] = ()
+    trains: str = ""
+    few: bool = False
+    timed: bool = True
 
     @property
     def missing(self) -> list[str]:
@@ -316,26 +455,63 @@ class Row:
         return [name for name in self.packages if find_spec(name) is None]
 
 
+COLOR = replace(PAPER, features=("color",))
+"""The paper's recipe without normals."""
+
+TORCH, OIDN = ("torch",), ("pyoidn",)
+"""Packages of rows."""
+
 ROWS: Mapping[str, Row] = {
-    "input": Row("input, 1 spp", as_it_is),
-    "dncnn": Row("DnCNN", partial(dncnn, "dncnn"), ("torch",)),
-    "dncnn-shrunk": Row("DnCNN, trained on frames a quarter as large", partial(dncnn, "shrunk"), ("torch",)),
+    "input": Row("input, 1 spp", as_it_is, timed=False),
+    "dncnn": Row("DnCNN", dncnn, TORCH, "dncnn", few=True),
+    "dncnn-shrunk": Row(
+        "DnCNN on frames a quarter as large, enlarged", partial(shrunk_dncnn, False), TORCH, "shrunk", True
+    ),
+    "dncnn-shrunk-own": Row(
+        "the same, judged at that size", partial(shrunk_dncnn, True), TORCH, "shrunk", True, timed=False
+    ),
     "wamnet-color": Row(
-        "WAMnet without normals, preset `paper`",
-        partial(wamnet, replace(PAPER, features=("color",)), "paper"),
+        "WAMnet without normals, preset `paper`", partial(wamnet, COLOR, "paper"), trains="paper"
     ),
-    "wamnet": Row("WAMnet, preset `paper`", partial(wamnet, PAPER, "paper")),
-    "wamnet-own": Row("the same, on the frame it was trained on", on_its_own_frame),
-    "wamnet-short": Row("WAMnet, preset `short`", partial(wamnet, SHORT, "short")),
+    "wamnet-color-own": Row(
+        "the same, on the frame it was trained on",
+        partial(on_its_own_frame, COLOR),
+        trains="paper",
+        timed=False,
+    ),
+    "wamnet": Row("WAMnet, preset `paper`", partial(wamnet, PAPER, "paper"), trains="paper"),
+    "wamnet-own": Row(
+        "the same, on the frame it was trained on",
+        partial(on_its_own_frame, PAPER),
+        trains="paper",
+        timed=False,
+    ),
+    "wamnet-short": Row("WAMnet, preset `short`", partial(wamnet, SHORT, "short"), trains="short"),
     "wamnet-best": Row(
-        "WAMnet, preset `best`, features of 16 camera rays", partial(wamnet, BEST, "short", rays=16)
+        "WAMnet, preset `best`, features of 16 camera rays",
+        partial(wamnet, BEST, "short", rays=EQUAL_RAYS),
+        trains="short",
     ),
-    "pix2pix": Row("pix2pix", pix2pix, ("torch",)),
-    "oidn": Row("Open Image Denoise", partial(open_image_denoise, "none"), ("pyoidn",)),
-    "oidn-noisy": Row("the same, with albedo and normal", partial(open_image_denoise, "noisy"), ("pyoidn",)),
-    "oidn-clean": Row("the same, with clean ones", partial(open_image_denoise, "clean"), ("pyoidn",)),
-    "svgf": Row("SVGF's spatial filter (a-trous)", svgf),
-    "nlm": Row("non-local means", non_local_means, ("skimage",)),
-    "render30": Row("render, 30 spp", partial(more_samples, 30)),
+    "pix2pix": Row("pix2pix", pix2pix, TORCH, "pix2pix", few=True),
+    "oidn": Row("Open Image Denoise, colour only", partial(open_image_denoise, "none"), OIDN),
+    "oidn-noisy": Row("the same, with albedo and normal", partial(open_image_denoise, "noisy"), OIDN),
+    "oidn-prefiltered": Row(
+        "the same, with prefiltered ones", partial(open_image_denoise, "prefiltered"), OIDN
+    ),
+    "oidn-rays": Row(
+        "the same, with prefiltered ones of 16 camera rays",
+        partial(open_image_denoise, "prefiltered", rays=EQUAL_RAYS),
+        OIDN,
+    ),
+    "oidn-spp": Row(
+        "the same, with prefiltered ones, 3 spp",
+        partial(open_image_denoise, "prefiltered", spp=EQUAL_SPP),
+        OIDN,
+    ),
+    "oidn-clean": Row("the same, with clean ones", partial(open_image_denoise, "clean"), OIDN),
+    "svgf": Row("SVGF's spatial filter (a-trous)", svgf, few=True),
+    "nlm": Row("non-local means", non_local_means, ("skimage",), few=True),
+    "render30": Row("render, 30 spp", partial(more_samples, 30, False)),
+    "render30-own": Row("the same, of the frames trained on", partial(more_samples, 30, True), timed=False),
 }
 """All rows by name, in the order of the table: a new one is a function and a line here."""

@@ -8,7 +8,7 @@
    degree: Andersson, Nilsson, Akenine-Moeller, Oskarsson, Astrom, Fairchild, "FLIP: A Difference Evaluator
    for Alternating Images", Proceedings of the ACM on Computer Graphics and Interactive Techniques 3(2), 2020.
 4. Beside a score stands the number of samples per pixel whose render has the same error: the noise of a mean
-   falls with their number, and what display-encoding adds is measured [`Ladder.spp_of`].
+   falls with their number, and what display-encoding adds is measured [`Ladder.spp_of`], [`Ladder.mse_of`].
 
 *WAMnet for Image Denoising* prints MSE on 0 .. 255 and, as PSNR, ten times the natural logarithm of
 255^2 / MSE; so does [`paper_figure`]. No picture of 1 spp has its MSE of 82.93, which is 28.9 dB: squares of
@@ -116,6 +116,13 @@ class Ladder:
         if wanted >= y[0]:
             return float(self.spp[0] * math.exp(y[0] - wanted))
         return float(np.exp(np.interp(-wanted, -y, x)))
+
+    def mse_of(self, spp: float) -> float:
+        """Return the error of a render of so many samples per pixel; between and beyond rungs as above."""
+        if not self.spp[0] <= spp <= self.spp[-1]:
+            nearest = 0 if spp < self.spp[0] else -1
+            return self.mse[nearest] * self.spp[nearest] / spp
+        return float(np.exp(np.interp(math.log(spp), np.log(self.spp), np.log(self.mse))))
 
 
 def ladder(renders: Mapping[int, Sequence[tuple[Floats, Floats]]], exposure_stops: float = 0.0) -> Ladder:

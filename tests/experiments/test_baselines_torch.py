@@ -7,6 +7,7 @@ out.
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +22,8 @@ from baselines.pix2pix import Pix2pix  # noqa: E402
 from lab import frames  # noqa: E402
 from lab.frames import Shot  # noqa: E402
 
+from wamnet.refimpl import metrics  # noqa: E402
+from wamnet.refimpl.encoding import to_display  # noqa: E402
 from wamnet.refimpl.errors import InputError, TrainingError  # noqa: E402
 
 DNCNN = Recipe("dncnn", steps=4, batch=2, crop=8, learning_rate=1e-3, width=4)
@@ -147,33 +150,39 @@ def test_a_side_that_is_no_multiple_is_continued(files, monkeypatch):
 def test_an_interrupted_training_goes_on_to_the_same_weights(tmp_path, files, recipe):
     data = fitting.examples(recipe, files, tmp_path)
     whole = make(recipe)
-    facts = fitting.fit(whole, recipe, data, tmp_path / "whole")
-    first = fitting.fit(make(recipe), recipe, data, tmp_path / "parts", until=1)
+    facts = fitting.fit(whole, recipe, data, data, tmp_path / "whole")
+    first = fitting.fit(make(recipe), recipe, data, data, tmp_path / "parts", until=1)
     assert first["steps_done"] == 1
     spent = torch.load(next((tmp_path / "parts").glob("*.checkpoint")))["seconds"]
     later = make(replace(recipe, seed=9))  # other weights, which the checkpoint replaces
-    again = fitting.fit(later, recipe, data, tmp_path / "parts")
+    again = fitting.fit(later, recipe, data, data, tmp_path / "parts")
     assert again["history"] == facts["history"]
     assert again["seconds"] > spent > 0.0
     for key, value in fitting._parts(whole).items():
         assert torch.equal(value, fitting._parts(later)[key]), key
-    assert not list((tmp_path / "parts").glob("*.checkpoint"))
+    # It was not flat, so it may go on: two steps more are those of a training that had them from the start.
+    longer = replace(recipe, steps=recipe.steps + 2)
+    on = fitting.fit(later, longer, data, data, tmp_path / "parts")
+    straight = fitting.fit(make(longer), longer, data, data, tmp_path / "straight")
+    assert on["history"] == straight["history"]
+    assert len(on["history"]) == len(facts["history"]) + 2
 
 
 def test_finished_networks_are_read(tmp_path, files, monkeypatch):
     data = fitting.examples(DNCNN, files, tmp_path)
     trained, other = make(DNCNN), make(replace(DNCNN, seed=5))
-    facts = fitting.fit(trained, DNCNN, data, tmp_path)
-    recipe = json.loads(fitting.path_of(tmp_path, DNCNN, data).with_suffix(".json").read_text())["recipe"]
+    facts = fitting.fit(trained, DNCNN, data, data, tmp_path)
+    recipe = json.loads(fitting.path_of(tmp_path, DNCNN, data, data).with_suffix(".json").read_text())[
+        "recipe"
+    ]
     assert Recipe(**{**recipe, "features": tuple(recipe["features"])}) == DNCNN
     monkeypatch.setattr(fitting, "_one", None)  # another step would fail
-    assert fitting.fit(other, DNCNN, data, tmp_path) == json.loads(json.dumps(facts))
+    assert fitting.fit(other, DNCNN, data, data, tmp_path) == json.loads(json.dumps(facts))
     for key, value in fitting._parts(trained).items():
         assert torch.equal(value, fitting._parts(other)[key]), key
 
 
 def test_ctrl_c_waits_for_the_end_of_a_step(tmp_path, files, monkeypatch):
-    import os
     import signal
 
     data, made = fitting.examples(DNCNN, files, tmp_path), make(DNCNN)
@@ -185,32 +194,111 @@ def test_ctrl_c_waits_for_the_end_of_a_step(tmp_path, files, monkeypatch):
 
     monkeypatch.setattr(fitting, "_one", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        fitting.fit(made, DNCNN, data, tmp_path / "parts")
+        fitting.fit(made, DNCNN, data, data, tmp_path / "parts")
     monkeypatch.setattr(fitting, "_one", real)
-    facts = fitting.fit(make(DNCNN), DNCNN, data, tmp_path / "parts")
-    assert facts["history"] == fitting.fit(make(DNCNN), DNCNN, data, tmp_path / "whole")["history"]
+    facts = fitting.fit(make(DNCNN), DNCNN, data, data, tmp_path / "parts")
+    assert facts["history"] == fitting.fit(make(DNCNN), DNCNN, data, data, tmp_path / "whole")["history"]
 
 
 def test_training_learns(tmp_path, files):
     """The loss on one crop that repeats falls: gradients have the right sign."""
     recipe = replace(DNCNN, steps=24, batch=1, crop=32, learning_rate=1e-2, tiles=True)
-    facts = fitting.fit(make(recipe), recipe, fitting.examples(recipe, files[:1], tmp_path), tmp_path)
+    data = fitting.examples(recipe, files[:1], tmp_path)
+    facts = fitting.fit(make(recipe), recipe, data, data, tmp_path)
     assert facts["history"][-1] < 0.5 * facts["history"][0]
+
+
+def test_a_curve_is_flat_where_its_last_third_gains_nothing():
+    rising = [0.1 * n for n in range(30)]
+    assert not fitting.flat(rising)
+    assert not fitting.flat([20.0] * (fitting.FEWEST_LOOKS - 1))
+    assert fitting.flat([20.0] * fitting.FEWEST_LOOKS)
+    # Twelve looks: eight before, four in the last third. A step of twice the gain is exact in binary.
+    gain = 2.0**-5
+    assert gain < fitting.FLAT_DB < 2 * gain
+    assert fitting.flat([20.0] * 11 + [20.0 + gain])
+    assert not fitting.flat([20.0] * 11 + [20.0 + 2 * gain])
+    # A peak of the first part counts: what comes later does not gain on it.
+    assert fitting.flat([20.0, 25.0, *rising[:16]])
+
+
+def test_training_stops_where_both_rates_are_flat(tmp_path, files, monkeypatch):
+    """A network that cannot improve takes the fewest looks at each rate, then at a tenth of it."""
+    recipe = replace(DNCNN, steps=200, every=2)
+    data, shares = fitting.examples(recipe, files, tmp_path), []
+    real = fitting._one
+    monkeypatch.setattr(fitting, "_one", lambda *given: shares.append(given[-1]) or real(*given))
+    monkeypatch.setattr(fitting, "validated", lambda *_: 20.0)
+    facts = fitting.fit(make(recipe), recipe, data, data, tmp_path)
+    stage = 2 * fitting.FEWEST_LOOKS
+    assert facts["flat"]
+    assert not list(tmp_path.glob("*.checkpoint"))
+    assert facts["steps_done"] == 2 * stage
+    assert shares == [1.0] * stage + [0.1] * stage
+    assert [look["step"] for look in facts["curve"]] == list(range(2, 2 * stage + 1, 2))
+
+
+def test_the_network_of_the_best_look_is_kept(tmp_path, files, monkeypatch):
+    recipe, found = replace(DNCNN, every=1), iter([20.0, 23.0, 22.0, 21.0])
+    data, seen = fitting.examples(recipe, files, tmp_path), []
+
+    def look(method, *_):
+        seen.append({name: tensor.clone() for name, tensor in fitting._parts(method).items()})
+        return next(found)
+
+    monkeypatch.setattr(fitting, "validated", look)
+    made = make(recipe)
+    facts = fitting.fit(made, recipe, data, data, tmp_path)
+    assert not facts["flat"]  # four steps are all it may do
+    for key, value in fitting._parts(made).items():
+        assert torch.equal(value, seen[1][key]), key
+    assert any(not torch.equal(seen[1][key], seen[3][key]) for key in seen[1])
+
+
+def test_an_interrupted_training_has_the_same_curve(tmp_path, files):
+    recipe = replace(DNCNN, every=1)
+    data = fitting.examples(recipe, files, tmp_path)
+    whole = fitting.fit(make(recipe), recipe, data, data, tmp_path / "whole")
+    fitting.fit(make(recipe), recipe, data, data, tmp_path / "parts", until=3)
+    parts = fitting.fit(make(replace(recipe, seed=9)), recipe, data, data, tmp_path / "parts")
+    assert [look["psnr"] for look in parts["curve"]] == [look["psnr"] for look in whole["curve"]]
+    assert len(whole["curve"]) == recipe.steps
+
+
+@pytest.mark.parametrize("recipe", [DNCNN, PIX2PIX], ids=["dncnn", "gan"])
+def test_validation_is_the_error_of_the_pictures(tmp_path, files, recipe):
+    """Of pictures that are no larger than its part, it is the mean PSNR of what `picture` gives."""
+    data, made = fitting.examples(recipe, files, tmp_path), make(recipe)
+    expected = [
+        metrics.psnr(made.picture(fitting.read_frame(noisy)), to_display(fitting.read_frame(clean)["color"]))
+        for noisy, clean in files
+    ]
+    # The same float32 operations on the same numbers.
+    assert abs(fitting.validated(made, recipe, data) - np.mean(expected)) <= 1e-5
+
+
+def test_pytorch_uses_every_core():
+    before = torch.get_num_threads()
+    try:
+        torch.set_num_threads(1)
+        assert fitting.use_all_cores() == torch.get_num_threads() == len(os.sched_getaffinity(0))
+    finally:
+        torch.set_num_threads(before)
 
 
 def test_a_loss_that_is_not_finite_is_told(tmp_path, files):
     made, data = make(DNCNN), fitting.examples(DNCNN, files, tmp_path)
     torch.nn.init.constant_(made.network[0].bias, float("nan"))
     with pytest.raises(TrainingError, match="loss of dncnn at step 0 is nan: it must stay finite"):
-        fitting.fit(made, DNCNN, data, tmp_path)
+        fitting.fit(made, DNCNN, data, data, tmp_path)
 
 
 def test_a_damaged_checkpoint_is_told(tmp_path, files):
     data = fitting.examples(DNCNN, files, tmp_path)
-    path = fitting.path_of(tmp_path, DNCNN, data).with_suffix(".checkpoint")
+    path = fitting.path_of(tmp_path, DNCNN, data, data).with_suffix(".checkpoint")
     path.write_bytes(b"nothing")
     with pytest.raises(InputError, match=r"checkpoint is .*: it cannot be read .* remove it"):
-        fitting.fit(make(DNCNN), DNCNN, data, tmp_path)
+        fitting.fit(make(DNCNN), DNCNN, data, data, tmp_path)
 
 
 # ---- examples --------------------------------------------------------------------------------------------

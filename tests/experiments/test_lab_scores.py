@@ -148,6 +148,13 @@ def test_a_ladder_of_one_over_n_is_exact():
     assert ladder.spp_of(0.0) == math.inf
 
 
+def test_a_ladder_gives_back_the_errors_that_it_was_asked_for():
+    ladder = scores.Ladder((1, 4, 32), (0.5, 0.2, 0.01))
+    for mse in (2.0, 0.5, 0.3, 0.2, 0.05, 0.01, 0.001):
+        # Logarithms of numbers below 10 and an exponential: a few roundings each.
+        assert abs(ladder.mse_of(ladder.spp_of(mse)) - mse) <= 64 * 2.0**-52 * mse
+
+
 def test_a_ladder_is_measured_and_must_fall():
     clean = np.full((4, 4, 3), 0.5)
     renders = {spp: [(clean + 0.4 / spp, clean)] for spp in (2, 8)}

@@ -48,7 +48,7 @@ from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Floats, Frame
 from wamnet.refimpl.train import BEST, SHORT, Recipe
 
-SHIPPED_SET = "minicubes-lamps"
+SHIPPED_SET = "minicubes-page"
 """The set that the network of the web page learns from: everything that the page can move."""
 
 RAYS = 16
@@ -71,7 +71,7 @@ class Plan:
 
 PLANS: Mapping[str, Plan] = {
     "toy": Plan(16, train=2, train_spp=4, test=2, outside=2, test_spp=32, ladder=(1, 4), steps=8),
-    "small": Plan(256, 320, 64, test=8, outside=4, test_spp=1024, ladder=(1, 16, 64, 128, 256)),
+    "small": Plan(256, 240, 64, test=8, outside=4, test_spp=1024, ladder=(1, 16, 64, 128, 256)),
     "paper": Plan(1024, 64, 256, test=8, outside=4, test_spp=4096, ladder=(1, 16, 64, 128, 256)),
 }
 """Sizes by the name of a scale."""

@@ -5,7 +5,7 @@
    [`FrameSet.draws`], and become shots with seeds of their own [`FrameSet.shots`].
 3. Before a set is used, what its frames show is compared: frames that are alike are refused [`compared`].
 
-The ranges of `minicubes` are those that the web page's camera and lamps have for the model that ships.
+The ranges of `minicubes-page` are those that the model which ships has learned for the web page.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class FrameSet:
 
     scene: str
     ranges: Ranges
-    most: int = 320
+    most: int = 240
 
     def counts(self, train: int, test: int, outside: int) -> Counts:
         """Return the numbers of frames of a set of this size."""
@@ -95,8 +95,8 @@ def compared(chosen: FrameSet, counts: Counts) -> dict[str, Comparison]:
 
 
 SETS: Mapping[str, FrameSet] = {
-    "minicubes": FrameSet("minicubes", WIDE),
-    "minicubes-lamps": FrameSet("minicubes", replace(WIDE, saturation=(0.0, 0.7))),
+    "minicubes": FrameSet("minicubes", NARROW),
+    "minicubes-page": FrameSet("minicubes", replace(WIDE, saturation=(0.0, 0.7))),
     "cornell": FrameSet("cornell", NARROW, most=96),
     "glossy": FrameSet("glossy", NARROW, most=96),
 }

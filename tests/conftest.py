@@ -8,6 +8,7 @@
    way the summary says what was missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
 3. The user's cache folder is never touched: tests have one of their own, which their commands inherit.
 4. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
+5. Tests that take a minute are marked [`COSTLY`], and skipped unless a run wants them; the summary says so.
 """
 
 from __future__ import annotations
@@ -34,6 +35,12 @@ hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, data
 hypothesis.settings.register_profile("long", hypothesis.settings.get_profile("ci"), max_examples=2000)
 hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
+COSTLY = {
+    "slow": "it takes a minute: pytest --slow runs it, as .ci/run does",
+    "nightly": "it takes a minute, and the slow tests hold one of its kind: make long runs it",
+}
+"""Markers of tests that take long, with what is said where they are left out."""
+
 _state_key = pytest.StashKey[dict[str, str]]()
 """Where a run keeps "ok (device)" or "MISSING: reason" of each executor that it has asked for, by name."""
 
@@ -51,11 +58,25 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update-golden", action="store_true", help="write tests/golden instead of comparing with it"
     )
+    parser.addoption("--slow", action="store_true", help="run tests marked slow too")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     required_executors()
     config.stash[_state_key] = {}
+    for marker, reason in COSTLY.items():
+        config.addinivalue_line("markers", f"{marker}: {reason}")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out tests that take long, loudly, unless this run wants them."""
+    if os.environ.get("HYPOTHESIS_PROFILE") == "long":
+        return
+    left_out = [marker for marker in COSTLY if marker == "nightly" or not config.getoption("--slow")]
+    for item in items:
+        for marker in left_out:
+            if item.get_closest_marker(marker):
+                item.add_marker(pytest.mark.skip(reason=f"{marker}: {COSTLY[marker]}"))
 
 
 # ---- executors ------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The executor policy of tests/conftest.py: missing and required fails, missing and not required is told."""
+"""Policies of tests/conftest.py: what is missing fails or is reported; what takes long is left out loudly."""
 
 from __future__ import annotations
 
@@ -75,3 +75,32 @@ def test_unknown_name_is_refused(run):
     result = run("opencl,metal")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines(["*WAMNET_REQUIRE names ?'metal'?: it may list only numpy, opencl*"])
+
+
+COSTLY = """
+import pytest
+
+@pytest.mark.slow
+def test_slow():
+    assert True
+
+@pytest.mark.nightly
+def test_nightly():
+    assert True
+"""
+
+
+@pytest.mark.parametrize(
+    ("profile", "options", "passed"), [("ci", (), 0), ("ci", ("--slow",), 1), ("long", (), 2)]
+)
+def test_tests_that_take_long_are_left_out_loudly(run, pytester, monkeypatch, profile, options, passed):
+    pytester.makepyfile(COSTLY)
+    monkeypatch.setenv("HYPOTHESIS_PROFILE", profile)
+    result = run("", "-ra", *options)
+    result.assert_outcomes(passed=passed, skipped=2 - passed)
+    said = {
+        "slow": "*: slow: it takes a minute: pytest --slow *",
+        "nightly": "*: nightly: *make long runs it",
+    }
+    for text in list(said.values())[passed:]:
+        result.stdout.fnmatch_lines([f"SKIPPED*{text}"])

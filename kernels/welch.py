@@ -88,9 +88,10 @@ def _fraction(a: Array, b: Array, x: Array) -> Array:
     c, d = np.ones_like(x), np.zeros_like(x)
     for step in range(1, FRACTION_STEPS):
         m = step // 2
-        even = m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m))
-        odd = -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1))
-        term = even if step % 2 == 0 else odd
+        if step % 2 == 0:
+            term = m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m))
+        else:
+            term = -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1))
         d = 1 / _not_zero(1 + term * d)
         c = _not_zero(1 + term / c)
         value = value * c * d

@@ -1,7 +1,8 @@
 """What all tests share: repeatable Hypothesis runs, executors as a fixture, golden files.
 
 1. Hypothesis draws the same examples on every run, without a deadline: a test's result is a function of the
-   code. HYPOTHESIS_PROFILE=long draws twenty times as many.
+   code. HYPOTHESIS_PROFILE=long draws others on each run, HYPOTHESIS_EXAMPLES (2,000) in place of 100;
+   --hypothesis-seed repeats them, as `.ci/long` says.
 2. `executor` runs one test body on every executor of whole pipelines [`PIPELINES`], `denoiser` on those that
    denoise alone too [`EXECUTORS`], `mitsuba` and `chromium` give peers [`PEERS`]. One that
    is missing fails its tests when WAMNET_REQUIRE names it, as `make test` does; else they are skipped. Either
@@ -32,7 +33,12 @@ PEERS = ("mitsuba", "chromium")
 """Other programs that tests compare with or run pages in, under the policy of executors."""
 
 hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, database=None, print_blob=True)
-hypothesis.settings.register_profile("long", hypothesis.settings.get_profile("ci"), max_examples=2000)
+hypothesis.settings.register_profile(
+    "long",
+    hypothesis.settings.get_profile("ci"),
+    derandomize=False,
+    max_examples=int(os.environ.get("HYPOTHESIS_EXAMPLES", "2000")),
+)
 hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 COSTLY = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -104,3 +105,34 @@ def test_tests_that_take_long_are_left_out_loudly(run, pytester, monkeypatch, pr
     }
     for text in list(said.values())[passed:]:
         result.stdout.fnmatch_lines([f"SKIPPED*{text}"])
+
+
+DRAWN = """
+import pytest
+from hypothesis import given, strategies
+
+@pytest.mark.parametrize("number", range(2))
+def test_it(number):
+    drawn = []
+
+    @given(strategies.integers(0, 2**64))
+    def draw(value):
+        drawn.append(value)
+
+    draw()
+    print("DRAWN", len(drawn), drawn[-1])
+"""
+
+
+@pytest.mark.parametrize(
+    ("profile", "options", "examples", "alike"),
+    [("ci", (), "100", True), ("long", (), "30", False), ("long", ("--hypothesis-seed=7",), "30", True)],
+)
+def test_long_runs_draw_other_cases_each_time(run, pytester, monkeypatch, profile, options, examples, alike):
+    """The same property twice; two numbers of 64 bits are the same by chance once in 2^64 runs."""
+    pytester.makepyfile(DRAWN)
+    monkeypatch.setenv("HYPOTHESIS_PROFILE", profile)
+    monkeypatch.setenv("HYPOTHESIS_EXAMPLES", "30")
+    found = re.findall(r"DRAWN (\d+) (\d+)", run("", "-s", *options).stdout.str())
+    assert [count for count, _ in found] == [examples] * 2
+    assert (found[0] == found[1]) == alike

@@ -16,7 +16,7 @@ export VENV PYTHON WAMNET_REQUIRE
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo docs test lint clean distclean
+.PHONY: help setup demo docs test long lint clean distclean
 
 help: ## List the targets
 	@grep -hE '^[a-z]+: .*## ' Makefile | sed -E 's/^([a-z]+):.*## (.*)/  make \1	\2/' | expand -t 20
@@ -34,6 +34,9 @@ docs: ## Build the web site: spec, tutorial, exercises; open out/site/index.html
 
 test: setup ## Run all tests (15 minutes at most on two cores)
 	@$(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS)
+
+long: setup ## Test kernels with other cases each time, many and wide (2 hours on two cores); SEED=n repeats a run
+	@$(ONE_THREAD) PYTEST_OPTIONS="$(PYTEST_OPTIONS)" .ci/long $(TESTS)
 
 lint: setup ## Check style, format, types on the installed wheel, and the house rules
 	@.ci/lint

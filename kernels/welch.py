@@ -55,16 +55,21 @@ def welch_p(mean_a: Any, variance_a: Any, count_a: int, mean_b: Any, variance_b:
 
 def student_p(t: Array, freedom: Array) -> Array:
     """Return the chance (...) that Student's t (...) with degrees of freedom (...) is as far from 0."""
-    return incomplete_beta(freedom / 2, 0.5, freedom / (freedom + t * t))
+    below, above = freedom / (freedom + t * t), t * t / (freedom + t * t)
+    return incomplete_beta(freedom / 2, 0.5, below, above)
 
 
-def incomplete_beta(a: Any, b: float, x: Any) -> Array:
-    """Return the regularised incomplete beta function I_x(a, b) (...): a (...), b > 0, x (...) in [0, 1]."""
+def incomplete_beta(a: Any, b: float, x: Any, rest: Any = None) -> Array:
+    """Return the regularised incomplete beta function I_x(a, b) (...): a (...), b > 0, x (...) in [0, 1].
+
+    `rest` is 1 - x, for callers that know it where x is rounded to 1.
+    """
     a, x = np.broadcast_arrays(np.asarray(a, np.float64), np.asarray(x, np.float64))
+    rest = 1 - x if rest is None else rest
     # The fraction converges quickly below the mean; above it, I_x(a, b) = 1 - I_1-x(b, a).
     below = x <= (a + 1) / (a + b + 2)
     first, second = np.where(below, a, b), np.where(below, b, a)
-    at = np.where(below, x, 1 - x)
+    at = np.where(below, x, rest)
     part = _front(first, second, at) / (first * _fraction(first, second, at))
     return np.where(below, part, 1 - part)
 
@@ -83,9 +88,10 @@ def _fraction(a: Array, b: Array, x: Array) -> Array:
     c, d = np.ones_like(x), np.zeros_like(x)
     for step in range(1, FRACTION_STEPS):
         m = step // 2
-        even = m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m))
-        odd = -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1))
-        term = even if step % 2 == 0 else odd
+        if step % 2 == 0:
+            term = m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m))
+        else:
+            term = -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1))
         d = 1 / _not_zero(1 + term * d)
         c = _not_zero(1 + term / c)
         value = value * c * d

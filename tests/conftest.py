@@ -1,13 +1,15 @@
 """What all tests share: repeatable Hypothesis runs, executors as a fixture, golden files.
 
 1. Hypothesis draws the same examples on every run, without a deadline: a test's result is a function of the
-   code. HYPOTHESIS_PROFILE=long draws twenty times as many.
+   code. HYPOTHESIS_PROFILE=long draws others on each run, HYPOTHESIS_EXAMPLES (2,000) in place of 100;
+   --hypothesis-seed repeats them, as `.ci/long` says.
 2. `executor` runs one test body on every executor of whole pipelines [`PIPELINES`], `denoiser` on those that
    denoise alone too [`EXECUTORS`], `mitsuba` and `chromium` give peers [`PEERS`]. One that
    is missing fails its tests when WAMNET_REQUIRE names it, as `make test` does; else they are skipped. Either
    way the summary says what was missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
 3. The user's cache folder is never touched: tests have one of their own, which their commands inherit.
 4. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
+5. Tests that take a minute are marked [`COSTLY`], and skipped unless a run wants them; the summary says so.
 """
 
 from __future__ import annotations
@@ -31,8 +33,19 @@ PEERS = ("mitsuba", "chromium")
 """Other programs that tests compare with or run pages in, under the policy of executors."""
 
 hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, database=None, print_blob=True)
-hypothesis.settings.register_profile("long", hypothesis.settings.get_profile("ci"), max_examples=2000)
+hypothesis.settings.register_profile(
+    "long",
+    hypothesis.settings.get_profile("ci"),
+    derandomize=False,
+    max_examples=int(os.environ.get("HYPOTHESIS_EXAMPLES", "2000")),
+)
 hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+COSTLY = {
+    "slow": "it takes a minute: pytest --slow runs it, as .ci/run does",
+    "nightly": "it takes a minute, and the slow tests hold one of its kind: make long runs it",
+}
+"""Markers of tests that take long, with what is said where they are left out."""
 
 _state_key = pytest.StashKey[dict[str, str]]()
 """Where a run keeps "ok (device)" or "MISSING: reason" of each executor that it has asked for, by name."""
@@ -51,11 +64,25 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update-golden", action="store_true", help="write tests/golden instead of comparing with it"
     )
+    parser.addoption("--slow", action="store_true", help="run tests marked slow too")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     required_executors()
     config.stash[_state_key] = {}
+    for marker, reason in COSTLY.items():
+        config.addinivalue_line("markers", f"{marker}: {reason}")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out tests that take long, loudly, unless this run wants them."""
+    if os.environ.get("HYPOTHESIS_PROFILE") == "long":
+        return
+    left_out = [marker for marker in COSTLY if marker == "nightly" or not config.getoption("--slow")]
+    for item in items:
+        for marker in left_out:
+            if item.get_closest_marker(marker):
+                item.add_marker(pytest.mark.skip(reason=f"{marker}: {COSTLY[marker]}"))
 
 
 # ---- executors ------------------------------------------------------------------------------------------

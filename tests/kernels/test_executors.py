@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kit import LONG, trained_sizes
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.interpret import interpret
@@ -28,10 +29,12 @@ EXAMPLES = settings.default.max_examples // 10
 
 @st.composite
 def cases(draw):
-    """Draw (widths, omegas, seed, scale, channels, size, border, images)."""
+    """Draw (widths, omegas, seed, scale, channels, size, border, images); in long runs half are wide."""
     channels = draw(st.sampled_from([{"a": 3}, {"a": 3, "b": 1}, {"a": 1, "b": 4, "c": 2}]))
     size = draw(st.integers(1, 12))
     hidden = draw(st.lists(st.integers(1, 9), min_size=0, max_size=4))
+    if LONG and draw(st.booleans()):
+        channels, size, hidden = draw(trained_sizes())
     outputs = draw(st.integers(1, 4))
     shape = draw(st.tuples(st.integers(1, 14), st.integers(1, 14)))
     kind = draw(st.sampled_from(["random", "constant", "extreme"]))

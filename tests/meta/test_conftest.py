@@ -1,7 +1,8 @@
-"""The executor policy of tests/conftest.py: missing and required fails, missing and not required is told."""
+"""Policies of tests/conftest.py: what is missing fails or is reported; what takes long is left out loudly."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -75,3 +76,63 @@ def test_unknown_name_is_refused(run):
     result = run("opencl,metal")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines(["*WAMNET_REQUIRE names ?'metal'?: it may list only numpy, opencl*"])
+
+
+COSTLY = """
+import pytest
+
+@pytest.mark.slow
+def test_slow():
+    assert True
+
+@pytest.mark.nightly
+def test_nightly():
+    assert True
+"""
+
+
+@pytest.mark.parametrize(
+    ("profile", "options", "passed"), [("ci", (), 0), ("ci", ("--slow",), 1), ("long", (), 2)]
+)
+def test_tests_that_take_long_are_left_out_loudly(run, pytester, monkeypatch, profile, options, passed):
+    pytester.makepyfile(COSTLY)
+    monkeypatch.setenv("HYPOTHESIS_PROFILE", profile)
+    result = run("", "-ra", *options)
+    result.assert_outcomes(passed=passed, skipped=2 - passed)
+    said = {
+        "slow": "*: slow: it takes a minute: pytest --slow *",
+        "nightly": "*: nightly: *make long runs it",
+    }
+    for text in list(said.values())[passed:]:
+        result.stdout.fnmatch_lines([f"SKIPPED*{text}"])
+
+
+DRAWN = """
+import pytest
+from hypothesis import given, strategies
+
+@pytest.mark.parametrize("number", range(2))
+def test_it(number):
+    drawn = []
+
+    @given(strategies.integers(0, 2**64))
+    def draw(value):
+        drawn.append(value)
+
+    draw()
+    print("DRAWN", len(drawn), drawn[-1])
+"""
+
+
+@pytest.mark.parametrize(
+    ("profile", "options", "examples", "alike"),
+    [("ci", (), "100", True), ("long", (), "30", False), ("long", ("--hypothesis-seed=7",), "30", True)],
+)
+def test_long_runs_draw_other_cases_each_time(run, pytester, monkeypatch, profile, options, examples, alike):
+    """The same property twice; two numbers of 64 bits are the same by chance once in 2^64 runs."""
+    pytester.makepyfile(DRAWN)
+    monkeypatch.setenv("HYPOTHESIS_PROFILE", profile)
+    monkeypatch.setenv("HYPOTHESIS_EXAMPLES", "30")
+    found = re.findall(r"DRAWN (\d+) (\d+)", run("", "-s", *options).stdout.str())
+    assert [count for count, _ in found] == [examples] * 2
+    assert (found[0] == found[1]) == alike

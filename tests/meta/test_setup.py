@@ -73,11 +73,59 @@ def test_extras_must_be_named(house):
     assert "usage: .ci/setup EXTRAS" in done.stderr
 
 
-@pytest.mark.parametrize("script", ["setup", "lint", "run"])
+@pytest.mark.parametrize("script", ["setup", "lint", "run", "long"])
 def test_scripts_stop_at_the_first_error(house, script):
     path = house.root / ".ci" / script
     assert "\nset -euo pipefail\n" in path.read_text()
     assert os.access(path, os.X_OK)
+
+
+STATISTICS = """
+    - 12 passing, 0 failing, and 3 invalid test cases
+    - 5 passing, 2 failing, and 0 invalid test cases
+"""
+"""What Hypothesis writes of two phases."""
+
+
+def long(house, tmp_path, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run .ci/long with a stand-in for pytest, which writes what it is given, and fails."""
+    (tmp_path / "bin").mkdir()
+    python_that_says(
+        tmp_path / "bin", f"echo $HYPOTHESIS_PROFILE $HYPOTHESIS_EXAMPLES $*\ncat <<'.'{STATISTICS}.\nexit 1"
+    )
+    return subprocess.run(
+        [house.root / ".ci/long", "tests/some.py"],
+        env=os.environ | {"VENV": str(tmp_path), "LOG": str(tmp_path / "log")} | variables,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_a_long_run_counts_its_cases_and_says_how_to_repeat_them(house, tmp_path):
+    done = long(house, tmp_path, SEED="7", EXAMPLES="20")
+    assert done.returncode == 1
+    again = "make long SEED=7 EXAMPLES=20 TESTS='tests/some.py'"
+    first, given, *_, counted, last = done.stdout.splitlines()
+    assert first == f"long: to repeat: {again}"
+    assert given.startswith("long 20 -m pytest --hypothesis-seed=7 --hypothesis-show-statistics")
+    assert given.endswith(" tests/some.py")
+    assert counted == "long: 17 cases passed, 2 failed, in 2 phases of tests"
+    assert last == f"long: exit status 1; to repeat: {again}; the log is {tmp_path / 'log'}"
+
+
+def test_a_long_run_without_a_seed_draws_one(house, tmp_path):
+    seeds = set()
+    for name in "ab":
+        (tmp_path / name).mkdir()
+        seeds.add(re.search(r"SEED=(\d+) EXAMPLES=2000", long(house, tmp_path / name, SEED="").stdout)[1])
+    assert len(seeds) == 2  # alike once in 2^32 runs
+
+
+def test_a_seed_that_is_no_number_is_refused(house, tmp_path):
+    done = long(house, tmp_path, SEED="x")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("long: SEED and EXAMPLES are whole numbers of at most ten digits: 'x'")
 
 
 def test_make_lists_every_target(house):

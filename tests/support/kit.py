@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from hypothesis import strategies as st
 
 from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_program
@@ -15,6 +17,21 @@ from wamnet.compiler.ir import Gather, Image, Program, Type, sha256
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import dataset, siren
 from wamnet.refimpl.denoise import denoise_pixel
+
+LONG = os.environ.get("HYPOTHESIS_PROFILE") == "long"
+"""Whether this run draws other cases each time, and wide networks among them."""
+
+
+@st.composite
+def trained_sizes(draw: st.DrawFn) -> tuple[dict[str, int], int, list[int]]:
+    """Draw (channels by image, window size, hidden layers) of a network as wide as those that are trained."""
+    channels = draw(
+        st.sampled_from(
+            [{"a": 3, "b": 3, "c": 3, "d": 3}, {"a": 3, "b": 1}, {"a": 4, "b": 4, "c": 4, "d": 4}]
+        )
+    )
+    hidden = draw(st.lists(st.sampled_from([32, 64]), min_size=4, max_size=4))
+    return channels, draw(st.integers(8, 12)), hidden
 
 
 class Kit:

@@ -1,0 +1,219 @@
+"""The models that come with the package, on every executor and schedule, on noisy frames of their own scenes.
+
+1. All that is particular to a model is read from its file: scene, times, rays, features. A frame shows the
+   scene at the time farthest from training times [`unseen_time`], in an odd size, with new noise [`shown`].
+2. Each kernel is compared with the float64 reference of the trained weights, under the bound that is computed
+   for each pixel of this frame [`Trained.held`]. Kernels whose sums and sines promise the same share it.
+3. Tests of kernels that Mesa compiles for a minute are marked [`marked`]: `.ci/run` runs some, `make long`
+   all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wamnet.cli.inputs import load_model, shipped_models
+from wamnet.compiler.artifact import Artifact
+from wamnet.compiler.compile import DENOISERS, compile_program, schedule_named, sine_contract
+from wamnet.compiler.expected import Expected, expected
+from wamnet.compiler.ir import Program
+from wamnet.compiler.lower import lower
+from wamnet.compiler.profiles import PROFILES
+from wamnet.compiler.schedules import Schedule
+from wamnet.kernels import denoise_on, registry
+from wamnet.kernels.denoise_on import images_of
+from wamnet.kernels.render_frame import render_frame
+from wamnet.refimpl.denoise import Model, denoise
+from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.render import Job
+from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.transport import Settings
+
+MODELS = shipped_models()
+
+WIDTH, HEIGHT = 40, 27
+"""Size of a frame in pixels: more than one tile of spectra (21 x 21), and no multiple of any tile."""
+
+SEED = 4_000_000_007
+"""Seed of the noise, which no training has."""
+
+LONG_TO_COMPILE = ("inlined", "compute", "compute4")
+"""Schedules in straight code: Mesa compiles one of these for 40 s on a core that has nothing else to do."""
+
+DISPLAY_STEP = 1 / 255
+"""Distance of two neighbouring colours of an 8-bit display."""
+
+NUDGE = 1e-2
+"""A fault in one weight. Measured: 1e-3 exceeds the bound twice to 400 times, 1e-5 only in the last layer."""
+
+
+# ---- models and their frames ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """A model, a noisy frame of its scene, and what kernels may write for it, by what they promise."""
+
+    model: Model
+    frame: Frame
+    program: Program
+    images: Mapping[str, np.ndarray]
+    known: dict[Any, Expected] = field(default_factory=dict)
+
+    def held(self, artifact: Artifact) -> Expected:
+        """Return reference and bound for an artifact of this program, computed once for each promise."""
+        schedule = schedule_named(artifact.target, artifact.manifest["schedule"]["name"])
+        own = "" if shares_bound(schedule) else schedule.name
+        promise = (artifact.profile, sine_contract(artifact.profile, artifact.target), own)
+        if promise not in self.known:
+            self.known[promise] = expected(self.program, artifact, self.images)
+        return self.known[promise]
+
+    def excess(self, executor: Any, artifact: Artifact, promised: Artifact | None = None) -> float:
+        """Return the largest error / bound of a frame, NaN if it has one: at most 1 for a right kernel."""
+        held = self.held(promised or artifact)
+        assert np.isfinite(held.bound).all(), "a bound that is infinite holds for every kernel"
+        found = executor.run(artifact, self.images).astype(np.float64)
+        return float(np.max(np.abs(found - held.value) / held.bound))
+
+
+def shares_bound(schedule: Schedule) -> bool:
+    """Return whether a schedule's sums are those of the common bound."""
+    return type(schedule).enclosures is Schedule.enclosures
+
+
+def first_of(model: Model, name: str, default: str) -> str:
+    """Return the first of the values that training had."""
+    return model.info.get(f"trained_on_{name}", default).split(", ")[0]
+
+
+def unseen_time(model: Model) -> float:
+    """Return the middle of the widest gap between training times, in seconds."""
+    times = np.unique([float(time) for time in model.info["trained_on_time"].split(", ")])
+    gaps = np.diff(times)
+    return float(times[gaps.argmax()] + gaps.max() / 2) if len(gaps) else float(times[0] + 0.1)
+
+
+def shown(model: Model) -> Frame:
+    """Return a noisy frame of the scene that a model is for, rendered as those that it has learned from."""
+    settings = Settings(max_depth=int(first_of(model, "max_depth", str(Settings().max_depth))))
+    spp, rays = (int(first_of(model, name, "1")) for name in ("spp", "feature_spp"))
+    job = Job(WIDTH, HEIGHT, spp, SEED, settings, feature_spp=rays)
+    scene = canonical(first_of(model, "scene", ""), time=unseen_time(model))
+    return render_frame("numpy", scene, job).frame
+
+
+@cache
+def trained(name: str) -> Trained:
+    """Return a model with its frame, once a session."""
+    model = load_model(Path(name))
+    frame = shown(model)
+    return Trained(model, frame, lower(model), images_of(model, frame))
+
+
+# ---- kernels within their bounds -----------------------------------------------------------------------
+
+
+def marked(way: str, schedule: str, profile: str) -> Any:
+    """Return the parameters of a test, marked if its kernel takes long to compile."""
+    marks: tuple[Any, ...] = ()
+    if schedule in LONG_TO_COMPILE:
+        one_of_a_kind = way == "opengl-egl" and profile == "ieee"
+        marks = (pytest.mark.slow if one_of_a_kind else pytest.mark.nightly,)
+    return pytest.param(way, schedule, profile, marks=marks)
+
+
+KERNELS = [
+    marked(way, schedule.name, profile)
+    for way, (target, _) in registry.WAYS.items()
+    for schedule in DENOISERS[target].schedules
+    for profile in PROFILES
+    if sine_contract(profile, target).error is not None
+]
+"""Every executor, schedule and profile that promises a bound."""
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize(("way", "schedule", "profile"), KERNELS)
+def test_error_is_within_the_bound(executor_named, name, way, schedule, profile):
+    executor, case = executor_named(way), trained(name)
+    artifact = compile_program(case.program, executor.name, profile, schedule)
+    if reason := artifact.manifest["schedule"].get("reason"):
+        pytest.skip(f"{schedule} gives way: {reason}")
+    assert case.excess(executor, artifact) <= 1
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_whole_frames_equal_the_definition(denoiser, name):
+    """As users run it: encoding and choice of the schedule included, under the bound of the manifest."""
+    case = trained(name)
+    wanted = denoise(case.model, case.frame, np.float64)
+    bound = compile_program(case.program, denoiser.name).manifest["bound"]["output"]
+    found = denoise_on(denoiser, case.model, case.frame).image
+    assert (np.abs(found - wanted) <= bound).all()
+    assert wanted.std() > 0.05, "the picture is nearly constant: it would hide a wrong kernel"
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("target", DENOISERS)
+def test_certified_bounds_are_below_a_step_of_a_display(name, target):
+    """Over all pictures, of all schedules that share the bound; sums from spectra state a larger one."""
+    for schedule in filter(shares_bound, DENOISERS[target].schedules):
+        for profile in ("ieee", "exact"):
+            artifact = compile_program(trained(name).program, target, profile, schedule.name)
+            assert artifact.certificate is not None
+            assert max(artifact.manifest["bound"]["output"]) < DISPLAY_STEP
+
+
+# ---- frames and faults ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_frames_are_of_the_model_s_scene_at_a_time_that_it_has_not_seen(name):
+    case = trained(name)
+    assert case.frame.info["scene"] == first_of(case.model, "scene", "")
+    assert case.frame.info["time"] not in case.model.info["trained_on_time"].split(", ")
+    assert str(SEED) not in case.model.info["trained_on_seed"].split(", ")
+    for feature, image in case.images.items():
+        assert len(np.unique(image)) > 100, f"{feature} is nearly constant"
+
+
+def nudged(program: Program, weight: str) -> Program:
+    """Return the program with a fault in the largest number of a weight."""
+    wrong = program.parameters[weight].copy()
+    wrong[np.unravel_index(np.abs(wrong).argmax(), wrong.shape)] += np.float32(NUDGE)
+    return replace(program, parameters={**program.parameters, weight: wrong})
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_one_wrong_weight_is_caught(executor_named, name):
+    """In each layer, against the bound of the right one."""
+    executor, case = executor_named("opencl"), trained(name)
+    right = compile_program(case.program, "opencl")
+    assert case.excess(executor, right) <= 1
+    weights = [parameter for parameter, array in case.program.parameters.items() if array.ndim == 2]
+    assert len(weights) == len(case.model.siren.weights)
+    for weight in weights:
+        wrong = compile_program(nudged(case.program, weight), "opencl")
+        assert case.excess(executor, wrong, right) > 1, weight
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_nan_is_caught(name):
+    class Broken:
+        """Writes what is expected, but for one number."""
+
+        def run(self, artifact, images):
+            found = trained(name).held(artifact).value.copy()
+            found[3, 5, 1] = np.nan
+            return found
+
+    artifact = compile_program(trained(name).program, "numpy")
+    assert np.isnan(trained(name).excess(Broken(), artifact))

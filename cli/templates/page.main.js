@@ -65,8 +65,9 @@ class Page {
 
   /** Textures that some pass draws into at once. */
   leastBuffers() {
-    const { path, encoders, variants } = this.data;
-    const counts = [Math.ceil(path.planes.length / 4), ...encoders.map((e) => e.images.length)];
+    const { paths, encoders, variants } = this.data;
+    const textures = paths.map((path) => Math.ceil(path.planes.length / 4));
+    const counts = [...textures, ...encoders.map((e) => e.images.length)];
     return Math.max(...counts, ...variants.flatMap((v) => v.passes.map((pass) => pass.buffers)));
   }
 

@@ -18,6 +18,7 @@ import pytest
 
 from wamnet.cli import webpage
 from wamnet.compiler.encode_kernel import compile_encode, error_at
+from wamnet.compiler.lower_encode import layers_of
 from wamnet.compiler.lower_scene import lower_scene
 from wamnet.compiler.path_kernel import compile_path
 from wamnet.kernels import page as P
@@ -100,21 +101,59 @@ def draw(tab, **options):
 def test_the_paths_are_the_reference_s(still, options):
     """As the kernels of test_paths.py: 99 pixels in 100 have every number to 1e-5 of its layer's size."""
     told = draw(still, **options)
+    expected, scene = traced(told, FEATURES, options.get("seed", 0))
+    at_rest = scenes.canonical("minicubes", time=told["time"]).camera
+    assert (scene.camera == at_rest) == ("turn" not in options)
+    found = np.concatenate([read(still, f"sums_{number}") for number in range(3)], axis=-1)
+    for first, layer in zip((0, 3, 6), FEATURES, strict=True):
+        assert share_alike(found[..., first : first + 3], expected[..., first : first + 3]) >= 0.99, layer
+
+
+def traced(told, features, seed):
+    """Return the reference's sums (H, W, planes) of what a page has drawn, and its scene."""
     scene = scenes.canonical("minicubes", time=told["time"])
     camera = replace(scene.camera, position=tuple(told["camera"]["position"]))
     pairs = zip(scene.lights, told["colors"], strict=True)
     lights = tuple(replace(light, color=tuple(color)) for light, color in pairs)
-    assert (camera == scene.camera) == ("turn" not in options)
-    kernel = compile_path(
-        lower_scene(replace(scene, camera=camera, lights=lights), SETTINGS), "numpy", groups=FEATURES
-    )
-    expected = NumpyExecutor().trace(kernel, Part(SIZE, SIZE, 0, SIZE, 0, 1, options.get("seed", 0)))
-    found = np.concatenate([read(still, f"sums_{number}") for number in range(3)], axis=-1)
-    for first, layer in zip((0, 3, 6), FEATURES, strict=True):
-        held = np.moveaxis(expected[first : first + 3], 0, -1)
-        size = np.abs(held).max(axis=-1, keepdims=True) + np.abs(held).mean()
-        near = np.abs(found[..., first : first + 3] - held) <= 1e-5 * size
-        assert near.all(axis=-1).mean() >= 0.99, layer
+    scene = replace(scene, camera=camera, lights=lights)
+    kernel = compile_path(lower_scene(scene, SETTINGS), "numpy", groups=layers_of(features))
+    sums = NumpyExecutor().trace(kernel, Part(SIZE, SIZE, 0, SIZE, 0, 1, seed))
+    return np.moveaxis(sums, 0, -1), scene
+
+
+def share_alike(found, held):
+    """Return the share of pixels whose numbers (H, W, C) are all those of the reference, to 1e-5."""
+    size = np.abs(held).max(axis=-1, keepdims=True) + np.abs(held).mean()
+    return (np.abs(found - held) <= 1e-5 * size).all(axis=-1).mean()
+
+
+def test_all_features_together_are_the_reference_s(chromium, kit, tmp_path):
+    """They take two kernels of paths; the lamps' light without shadows follows their colours."""
+    features, window = tuple(dataset.FEATURES), dataset.Window(3, "clamp")
+    network = kit.network([dataset.n_inputs(features, window), 6, 3], (3.0, 3.0))
+    animation = P.Animation(TIMES, tuple(scenes.canonical("minicubes", time=time) for time in TIMES))
+    networks = P.networks_of(Model(network, features, window, SCALES), rank=2)[:1]
+    data = P.page_data(animation, networks, SETTINGS)
+    (tmp_path / "page.html").write_text(webpage.render_page(data), encoding="utf-8")
+    with chromium.tab(tmp_path / "page.html", **NO_MOTION) as tab:
+        tab.page.evaluate("wamnet.ready")
+        told = draw(tab, frame=FRAME, seed=SEED, turn=TURN, colors=COLORS)
+        expected, _ = traced(told, features, SEED)
+        planes, first = {}, 0
+        for path in data["paths"]:
+            for number, plane in enumerate(path["planes"]):
+                planes[plane] = read(tab, f"sums_{first + number // 4}")[..., number % 4]
+            first += -(-len(path["planes"]) // 4)
+        names = P.planes_of(features)
+        for name in features:
+            here = [names.index(plane) for plane in P.planes_of((name,))]
+            found = np.stack([planes[names[place]] for place in here], axis=-1)
+            assert share_alike(found, expected[..., here]) >= 0.99, name
+        recoloured = read(tab, "unshadowed")
+        draw(tab, frame=FRAME, seed=SEED, turn=TURN)
+        assert np.any(read(tab, "unshadowed") != recoloured)
+        assert 0 < tab.page.evaluate("wamnet.page.renderer.check('full')")["share"] <= 1
+        assert tab.said == []
 
 
 def test_the_features_keep_the_bound_of_the_encoding(still, model):

@@ -44,7 +44,9 @@ from ..refimpl.errors import InputError
 from ..refimpl.intersection import quad_area_pdf
 from ..refimpl.render import Job, render
 from ..refimpl.scene import Scene
+from ..refimpl.scenes import TURN_SECONDS
 from ..refimpl.transport import Settings
+from ..refimpl.variation import RANGES, ranges_from_json
 from .denoise_on import images_of
 
 SCHEMA = "wamnet-page-2"
@@ -135,8 +137,9 @@ def page_data(
     ]
     images = check(animation, first, shown, settings)
     variants = [variant(network, images, profile) for network in networks]
-    # How far a variant's picture is from the first one's is a fact about the weights, not about a device.
-    for one in variants:
+    for one, network in zip(variants, networks, strict=True):
+        one["ranges"] = learned_ranges(network.model, scene.name)
+        # How far a variant's picture is from the first one's is a fact about the weights, not about a device.
         off = one["picture"] - variants[0]["picture"]
         one["rms_to_first"] = float(np.sqrt(np.mean(off**2)))
     for one in variants:
@@ -145,6 +148,7 @@ def page_data(
         "schema": SCHEMA,
         "scene": scene.name,
         "times": list(animation.times),
+        "turn_s": TURN_SECONDS,
         "camera": asdict(scene.camera),
         "lights": _lights(scene),
         "share": transport.SKY_SHARE if scene.environment is not None else 1.0,
@@ -269,6 +273,13 @@ def variant(network: Network, images: Mapping[str, NDArray[np.float32]], profile
         "check": {"expected": _packed(value, "<f8"), "bound": _packed(_raised(bound))},
         "picture": value,
     }
+
+
+def learned_ranges(model: Model, scene: str) -> dict[str, Any] | None:
+    """Return the ranges of what a model has learned of a scene; None where it does not say."""
+    text = model.info.get(f"trained_on_{RANGES}")
+    scenes = model.info.get("trained_on_scene", scene).split(", ")
+    return None if text is None or scene not in scenes else asdict(ranges_from_json(text))
 
 
 def _products(kernel: Artifact) -> int:

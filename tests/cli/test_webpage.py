@@ -27,6 +27,7 @@ from wamnet.kernels.numpy_executor import NumpyExecutor
 from wamnet.refimpl import dataset, scenes
 from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.variation import Ranges, Variation, outside, saturation_of, varied
 
 SIZE, FRAME, SEED = 40, 3, 5
 SETTINGS = Settings(max_depth=2)
@@ -34,6 +35,7 @@ FEATURES = ("color", "normal", "position")
 SCALES = dataset.Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 TIMES = tuple((number + 0.5) / 4 for number in range(8))
 COLORS = [[0.9, 0.2, 0.1], [0.3, 0.4, 0.8]]
+RANGES = Ranges((0.0, 8.0), (-24.0, 24.0), (-8.0, 8.0), (0.9, 1.1), (0.0, 0.5))
 TURN = {"yaw": 25.0, "pitch": 8.0, "distance": 0.9}
 
 NO_MOTION = {"reduced_motion": "reduce"}
@@ -56,7 +58,7 @@ def model(kit):
     """A network whose pictures lie within 0.5 +- 0.45, of an odd width."""
     window = dataset.Window(5, "zero")
     network = kit.network([dataset.n_inputs(FEATURES, window), 10, 7, 3], (3.0, 3.0))
-    return Model(network, FEATURES, window, SCALES)
+    return Model(network, FEATURES, window, SCALES, {"trained_on_ranges": RANGES.to_json()})
 
 
 @pytest.fixture(scope="module")
@@ -239,7 +241,10 @@ def test_controls_work(still):
     assert still.state("turn")["yaw"] == 40
     page.locator("#camera-reset").click()
     page.locator("#light-0").fill("#ff0000")
-    assert still.state("colors")[0] == [1, 1e-3, 1e-3]
+    (color, other), own = still.state("colors"), scenes.WARM
+    assert np.mean(color) == pytest.approx(np.mean(own), rel=1e-15)  # some roundings of 2**-53
+    assert saturation_of(color) == pytest.approx(1 - 1e-3, rel=1e-15)
+    assert other == list(scenes.COOL)
     page.locator("#lights-reset").click()
     assert still.state("colors")[0] == list(scenes.WARM)
     page.locator("#size").select_option("96")
@@ -252,6 +257,87 @@ def test_controls_work(still):
     page.locator("#variant").select_option("fast-texture")
     still.until("wamnet.page.state.variant === 'fast-texture' && !wamnet.page.preparing")
     assert "within" in still.text("error")
+
+
+FITS = """[...document.querySelectorAll("main, main *")].every((element) =>
+  element.getBoundingClientRect().right <= document.querySelector("header").getBoundingClientRect().right)"""
+"""Nothing reaches over the edge that the title keeps."""
+
+BELOW = """[...document.querySelectorAll("figure > *, .controls, footer")].map((element) =>
+  element.getBoundingClientRect().top + scrollY)"""
+"""Where everything around the sentence is in the document."""
+
+
+def text_when(tab, condition):
+    """Return the sentence about what is outside once it is as it should be."""
+    tab.until(f"(() => {{ const text = document.getElementById('outside').textContent; {condition} }})()")
+    return tab.text("outside")
+
+
+def test_what_was_not_learned_is_said_beside_the_picture(still):
+    """In one sentence, and nothing below it moves; inside of the ranges there is none."""
+    page = still.page
+    page.evaluate("wamnet.go(); wamnet.page.turn(wamnet.parts.REST)")
+    assert text_when(still, "return text === '';") == ""
+    before = page.evaluate(BELOW)
+    page.locator("#yaw").fill("24")
+    page.locator("#yaw").fill("40")
+    said = "Outside of what the network has learned: the camera is 40° to the side (learned: -24° to 24°). "
+    assert text_when(still, "return text !== '';") == f"{said}Expect errors."
+    assert page.locator("#outside").is_visible()
+    page.locator("#pitch").fill("-60")
+    page.locator("#distance").fill("1.5")
+    page.locator("#light-1").fill("#0000ff")
+    text = text_when(still, "return text.includes('light 2');")
+    assert text == (
+        "Outside of what the network has learned: the camera is 40° to the side (learned: -24° to 24°), "
+        "60° down (8° down to 8° up), 1.5 times as far away (0.9 to 1.1), light 2 is 100 % saturated "
+        "(0 % to 50 %). Expect errors."
+    )
+    assert page.evaluate(BELOW) == before
+    page.locator("#lights-reset").click()
+    page.locator("#camera-reset").click()
+    text_when(still, "return text === '';")
+    assert page.locator("#outside").get_attribute("aria-live") == "polite"
+    assert not page.locator("#unknown-ranges").is_visible()
+
+
+@pytest.mark.parametrize("times", [(0.0, 8.0), (1.0, 3.0), (7.0, 9.0)], ids=str)
+@pytest.mark.parametrize("saturation", [None, (0.0, 0.5)], ids=str)
+def test_the_page_says_what_the_reference_says(still, times, saturation):
+    """Cameras and colours inside, at the limits and outside of ranges: as many things in both."""
+    ranges, own = replace(RANGES, time_s=times, saturation=saturation), [list(scenes.WARM), list(scenes.COOL)]
+    lights = [[{"color": color} for color in own]]
+    counts = []
+    for yaw, pitch, distance in ((0, 0, 1), (24, -8, 1.1), (25, 0, 1), (-40, 9, 0.5), (180, -75, 2)):
+        for picked in (own, [[1, 0, 0], [0.5, 1, 0.5]], [[0.2, 0.9, 0.3], own[1]], [[1, 1, 0.499], own[1]]):
+            for time in (0.0, 2.0, 3.5, 7.5):
+                colors = [
+                    color if color in own else still.page.evaluate(f"wamnet.parts.asBright({color}, {lamp})")
+                    for color, lamp in zip(picked, own, strict=True)
+                ]
+                turn = {"yaw": yaw, "pitch": pitch, "distance": distance}
+                moment = {"time": time, "turn": turn, "colors": colors}
+                given = [json.loads(ranges.to_json()), 8.0, moment, *lights]
+                found = still.page.evaluate("given => wamnet.parts.outside(...given)", given)
+                variation = Variation(yaw, pitch, distance, tuple(tuple(color) for color in colors))
+                scene = varied(scenes.canonical("minicubes", time=time), variation)
+                counts.append(len(found))
+                assert counts[-1] == len(outside(ranges, scene.info, own)), moment
+    assert min(counts) == 0
+    assert max(counts) >= 4
+
+
+def test_a_network_that_says_no_ranges_has_a_note(chromium, data, tmp_path):
+    unknown = json.loads(json.dumps(data))
+    for one in unknown["variants"]:
+        one["ranges"] = None
+    (tmp_path / "page.html").write_text(webpage.render_page(unknown), encoding="utf-8")
+    with chromium.tab(tmp_path / "page.html", **NO_MOTION) as tab:
+        tab.page.evaluate("wamnet.ready")
+        assert tab.page.locator("#unknown-ranges").is_visible()
+        assert tab.page.evaluate("wamnet.page.outside({ yaw: 90, pitch: 0, distance: 1 }, [])") == ""
+        assert tab.text("outside-room") == ""
 
 
 def test_the_pointer_turns_the_camera_and_moves_the_line(still):
@@ -292,7 +378,7 @@ def test_it_stands_still_where_motion_is_not(still):
 
 @pytest.mark.parametrize(
     "options",
-    [{}, {"color_scheme": "dark", "viewport": {"width": 400, "height": 800}}],
+    [{}, {"color_scheme": "dark", "viewport": {"width": 390, "height": 800}}],
     ids=["light", "dark"],
 )
 def test_people_who_do_not_see_it_can_use_it(chromium, path, options):
@@ -300,9 +386,16 @@ def test_people_who_do_not_see_it_can_use_it(chromium, path, options):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     with chromium.tab(path, **NO_MOTION, **options) as tab:
         tab.page.evaluate("wamnet.ready")
+        before = tab.page.evaluate(BELOW)
+        tab.page.evaluate("wamnet.page.turn({ yaw: -170, pitch: -75, distance: 2 })")
+        tab.page.locator("#light-0").fill("#ff0000")
+        tab.page.locator("#light-1").fill("#00ff00")
+        text_when(tab, "return text.includes('light 2');")
+        assert tab.page.evaluate(BELOW) == before
         found = axe.Axe().run(tab.page).response["violations"]
         assert [(one["id"], one["impact"]) for one in found] == []
         assert tab.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        assert tab.page.evaluate(FITS)
 
 
 @pytest.mark.parametrize(

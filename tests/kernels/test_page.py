@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.scene import Sphere
 from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.variation import Ranges
 
 SETTINGS = Settings(max_depth=1)
 SCALES = dataset.Normalization(0.0, 12.0, (0.0, 0.0, 0.0), 6.0)
@@ -115,6 +116,26 @@ def test_variants_say_what_they_cost_and_how_far_they_are(model_of):
     for one in (full, fast, texture):
         assert np.array_equal(floats(one["check"]["expected"], "<f8"), one["picture"].ravel())
         assert 0 < floats(one["check"]["bound"]).max() <= one["bound"]
+
+
+def test_ranges_are_those_of_the_scene_that_was_learned(model_of):
+    """A model that says none, or has learned another scene, has none here."""
+    ranges = Ranges(yaw_deg=(-24.0, 24.0), saturation=(0.0, 0.5))
+    said = {"trained_on_ranges": ranges.to_json()}
+    model = model_of("color")
+    for info, found in (
+        ({}, None),
+        (said, asdict(ranges)),
+        ({**said, "trained_on_scene": "empty, cornell"}, asdict(ranges)),
+        ({**said, "trained_on_scene": "minicubes"}, None),
+    ):
+        assert P.learned_ranges(replace(model, info=info), "cornell") == found
+    with pytest.raises(InputError, match="JSON of ranges"):
+        P.learned_ranges(replace(model, info={"trained_on_ranges": "[]"}), "cornell")
+    networks = P.networks_of(model, replace(model, info=said), rank=1)
+    data = P.page_data(animation("cornell", 0.0), networks, SETTINGS)
+    assert [one["ranges"] for one in data["variants"]] == [None, asdict(ranges), asdict(ranges)]
+    assert data["turn_s"] == scenes.TURN_SECONDS
 
 
 def test_the_bound_is_rounded_up():

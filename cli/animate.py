@@ -22,7 +22,7 @@ import typer
 
 from ..refimpl.errors import InputError
 from . import machine, movie, options
-from .inputs import load_model, model_path
+from .inputs import load_model, model_path, unlike_training
 from .options import ExecutorName, Renderer
 from .outputs import TEMPORARY, check_output, check_parent
 from .terminal import hint_on_interrupt, progress, say
@@ -41,6 +41,8 @@ wamnet animate model.safetensors -o turning.mp4
 wamnet animate minicubes --seconds 2 --fps 5 -o turning.gif
 
 wamnet animate model.safetensors --seconds 2 --fps 5 --reference-spp 64 -o turning.gif
+
+wamnet animate minicubes --yaw 20 --light 1=1,0.3,0.3 --seconds 2 -o turning.mp4
 
 wamnet animate small.safetensors --rank 16 --executor opencl --renderer opencl -o turning.mp4"""
 """Shown below the help of `wamnet animate`."""
@@ -87,6 +89,10 @@ def animate(
     seed: options.Seed = 0,
     feature_spp: Rays = None,
     parameters: options.Parameters = None,
+    yaw: options.Yaw = 0.0,
+    pitch: options.Pitch = 0.0,
+    distance: options.Distance = 1.0,
+    light: options.Lights = None,
     executor: options.Executor = ExecutorName.numpy,
     renderer: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
     rank: options.CutRank = 0,
@@ -97,34 +103,28 @@ def animate(
     """
     from ..kernels import open_executor
     from ..kernels.frame_plan import animation_times
-    from ..refimpl.render import feature_job
 
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
     _check_names(output, model, fps)
     model = model_path(model)
     network = load_model(model)
-    chosen = options.parse_parameters(parameters or [])
-    if "time" in chosen:
-        value = chosen["time"]
-        raise InputError("parameter time", value, "each picture has its own", "use --start and --seconds")
-    times = animation_times(start, seconds, fps)
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
     facts += cut_facts(network, rank)
     rays = rays_of(network) if feature_spp is None else feature_spp
-    shots = plan_shots(
-        folder, (scene or scene_of(network), chosen), times, (size, reference_spp, seed, rays), facts
-    )
+    view = options.View(yaw, pitch, distance, tuple(light or ()))
+    named = scene or scene_of(network), _parameters(parameters), view
+    times = animation_times(start, seconds, fps)
+    shots = plan_shots(folder, named, times, (size, reference_spp, seed, rays), facts)
     left = missing(folder, shots)
+    _say_what_is_not_learned(output, shots, network)
     folder.mkdir(exist_ok=True)
     with (
         hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"),
         open_executor(executor.value) as runner,
         progress("drawing", len(left)) as advance,
     ):
-        # A pipeline's features come from the colour's camera rays.
-        one_device = renderer.value == executor.value != "numpy" and feature_job(shots[0].noisy) is None
-        draw = draw_frames if one_device else draw_apart
+        draw = draw_frames if _one_device(executor, renderer, shots[0].noisy) else draw_apart
         for _ in draw(left, network, runner, renderer.value, rank):
             advance(1)
     if is_film:
@@ -141,6 +141,32 @@ def _check_names(output: Path, model: Path, fps: float) -> None:
     elif output.suffix:
         rule = f"a film's name must end in {' or '.join(movie.WRITERS)}, a folder's in none"
         raise InputError("output", str(output), rule, "rename it")
+
+
+def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job) -> bool:
+    """Tell whether a pipeline can draw: one device does both, features come from the colour's camera rays."""
+    from ..refimpl.render import feature_job
+
+    return renderer.value == executor.value != "numpy" and feature_job(noisy) is None
+
+
+def _parameters(assignments: Sequence[str] | None) -> dict[str, Any]:
+    """Return the scene's parameters; refuse a time."""
+    chosen = options.parse_parameters(assignments or [])
+    if "time" in chosen:
+        value = chosen["time"]
+        raise InputError("parameter time", value, "each picture has its own", "use --start and --seconds")
+    return dict(chosen)
+
+
+def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) -> None:
+    """Warn of pictures that are unlike those of the training: how many, and what the first one shows."""
+    from ..refimpl.render import render_info
+
+    found = [unlike_training(model, render_info(shot.scene, shot.noisy)) for shot in shots]
+    unlike = [sentences for sentences in found if sentences]
+    for sentence in unlike[0] if unlike else ():
+        say(f"{output}: {len(unlike)} of {len(shots)} pictures are unlike those of the training: {sentence}")
 
 
 def rays_of(model: Model) -> int:
@@ -171,24 +197,24 @@ def cut_facts(network: Model, rank: int) -> list[str]:
 
 def plan_shots(
     folder: Path,
-    named: tuple[str, dict[str, Any]],
+    named: tuple[str, dict[str, Any], options.View],
     times: Sequence[float],
     numbers: tuple[int, int, int, int],
     facts: Sequence[str],
 ) -> list[Shot]:
     """Return the pictures of an animation at some times.
 
-    `named` are the scene's name and parameters; numbers are size, samples of the reference (or 0), seed and
-    camera rays of the features (or 0).
+    `named` are the scene's name, parameters and view; numbers are size, samples of the reference (or 0), seed
+    and camera rays of the features (or 0).
     """
     from ..refimpl.render import Job
     from ..refimpl.scene import scene_digest
     from ..refimpl.scenes import canonical
 
-    (name, chosen), (size, spp, seed, rays) = named, numbers
+    (name, chosen, view), (size, spp, seed, rays) = named, numbers
     shots = []
     for index, time in enumerate(times):
-        scene = canonical(name, **{**chosen, "time": time})
+        scene = view.of(canonical(name, **{**chosen, "time": time}))
         noisy = Job(size, size, 1, seed + 2 * index, feature_spp=rays)
         reference = Job(size, size, spp, seed + 2 * index + 1) if spp else None
         made_from = [scene_digest(scene), asdict(noisy), reference and asdict(reference), *facts]

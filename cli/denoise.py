@@ -72,7 +72,7 @@ def denoise(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )
     _say_what_is_no_number(frame, noisy, network)
-    for what in unlike_training(network, noisy):
+    for what in unlike_training(network, noisy.info):
         say(f"{frame}: {what}")
     with open_executor(executor.value) as runner:
         result = denoise_on(runner, network, noisy, profile, schedule, rank, variant or FULL)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -61,20 +61,34 @@ def load_model(path: Path) -> Model:
     raise InputError("model file", str(path), "it is a checkpoint of training, not a model", way_out)
 
 
-def unlike_training(model: Model, frame: Frame) -> list[str]:
-    """Return what about a frame a model has not learned from, as sentences; what nobody knows is nothing."""
+def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
+    """Return what about a frame of this info a model has not learned, as sentences; not known is nothing."""
     from ..refimpl.render import FEATURE_SPP
 
     told = []
-    scenes, scene = model.info.get("trained_on_scene", ""), frame.info.get("scene", "")
+    scenes, scene = model.info.get("trained_on_scene", ""), info.get("scene", "")
     if scenes and scene and scene not in scenes.split(", "):
         told.append(f"it shows {scene}, and the model has learned {scenes} alone: expect a poor picture")
-    if scenes and "spp" in frame.info:
-        rays, wanted = frame.info.get(FEATURE_SPP, "1"), model.info.get(f"trained_on_{FEATURE_SPP}", "1")
+    elif beyond := outside_ranges(model, info):
+        told.append(f"outside of what the model has learned: {', '.join(beyond)}; expect errors")
+    if scenes and "spp" in info:
+        rays, wanted = info.get(FEATURE_SPP, "1"), model.info.get(f"trained_on_{FEATURE_SPP}", "1")
         if rays != wanted:
             rule = f"its features are of --feature-spp {rays}, those that the model learned from of {wanted}"
             told.append(f"{rule}: expect worse edges")
     return told
+
+
+def outside_ranges(model: Model, info: Mapping[str, str]) -> list[str]:
+    """Return what of a frame lies outside of the ranges that a model says it has learned."""
+    from ..refimpl.scenes import CANONICAL, canonical
+    from ..refimpl.variation import RANGES, outside, ranges_from_json
+
+    text, scene = model.info.get(f"trained_on_{RANGES}"), info.get("scene", "")
+    if text is None:
+        return []
+    own = canonical(scene).lights if scene in CANONICAL else ()
+    return outside(ranges_from_json(text), info, [light.color for light in own])
 
 
 def need_layers(path: Path, frame: Frame, features: Sequence[str], because: str, way_out: str) -> None:

@@ -5,15 +5,20 @@ Ranges are not repeated here: what a number may be is said by the function of th
 
 from __future__ import annotations
 
+import colorsys
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..refimpl.errors import InputError
+
+if TYPE_CHECKING:
+    from ..refimpl.scene import Scene, Vector
 
 SCENES = "minicubes, glossy, daylight, cornell, furnace, lone_light, empty"
 """Canonical scenes by name, for help texts; equal to the registry in refimpl, which they do not import."""
@@ -242,6 +247,25 @@ FeatureSpp = Annotated[
         show_default="the colour's",
     ),
 ]
+Yaw = Annotated[
+    float,
+    typer.Option("--yaw", metavar="DEG", help="Turn the camera around what it looks at, in degrees."),
+]
+Pitch = Annotated[
+    float, typer.Option("--pitch", metavar="DEG", help="Move the camera up (or down), in degrees.")
+]
+Distance = Annotated[
+    float, typer.Option("--distance", metavar="X", help="Factor of the camera's distance; 2 is farther away.")
+]
+Lights = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--light",
+        metavar="N=R,G,B",
+        help="Hue and saturation of lamp N, from 1, in linear RGB; it keeps its brightness. Repeat for more.",
+        show_default="the lamps' own",
+    ),
+]
 SceneName = Annotated[
     str,
     typer.Argument(
@@ -263,9 +287,9 @@ def parse_parameters(texts: Sequence[str]) -> dict[str, float | tuple[float, ...
             numbers = ()
         if not sign or len(numbers) not in (1, 3):
             rule = "it must be NAME=NUMBER or NAME=NUMBER,NUMBER,NUMBER"
-            raise InputError("--set", text, rule, "for example --set orbit_deg=20")
+            raise InputError("--set", text, rule, "for example --set albedo=0.8")
         if not all(map(math.isfinite, numbers)):
-            raise InputError("--set", text, "all numbers must be finite", "for example --set orbit_deg=20")
+            raise InputError("--set", text, "all numbers must be finite", "for example --set albedo=0.8")
         parameters[name.strip()] = numbers if len(numbers) > 1 else numbers[0]
     return parameters
 
@@ -277,6 +301,58 @@ def parse_limits(option: str, text: str) -> tuple[float, float]:
     except ValueError:
         raise InputError(option, text, "it must be LOW:HIGH", f"for example {option}=-24:24") from None
     return low, high
+
+
+@dataclass(frozen=True)
+class View:
+    """What is asked of camera and lamps: degrees, a factor of the distance, texts like `1=1,0.5,0.2`."""
+
+    yaw_deg: float = 0.0
+    pitch_deg: float = 0.0
+    distance: float = 1.0
+    lights: tuple[str, ...] = ()
+
+    def of(self, scene: Scene) -> Scene:
+        """Return the scene from there and under these lamps; its info says so."""
+        from ..refimpl.variation import Variation, varied
+
+        colors = parse_lights(self.lights, [light.color for light in scene.lights])
+        return varied(scene, Variation(self.yaw_deg, self.pitch_deg, self.distance, colors))
+
+
+def parse_lights(texts: Sequence[str], own: Sequence[Vector]) -> tuple[Vector, ...]:
+    """Return the lamps' colours from texts like `1=1,0.5,0.2`, as bright as their own; none without texts."""
+    from ..refimpl.variation import lamp_color
+
+    colors = dict(enumerate(own, start=1))
+    chosen: set[int] = set()
+    for text in texts:
+        number, color = _parse_light(text)
+        if number not in colors:
+            rule = f"the scene's lamps are 1 to {len(own)}" if own else "the scene has no lamps"
+            raise InputError("--light", text, rule, "choose another" if own else "leave it out")
+        if number in chosen:
+            raise InputError("--light", text, f"lamp {number} has a colour already", "give one for each lamp")
+        chosen.add(number)
+        hue, saturation, _ = colorsys.rgb_to_hsv(*color)
+        colors[number] = lamp_color(own[number - 1], hue, saturation)
+    return tuple(colors.values()) if texts else ()
+
+
+def _parse_light(text: str) -> tuple[int, Vector]:
+    """Return a lamp's number and its colour."""
+    number, _, value = text.partition("=")
+    try:
+        red, green, blue = (float(part) for part in value.split(","))
+        found = int(number)
+    except ValueError:
+        rule = "it must be N=R,G,B: a lamp's number and three numbers"
+        raise InputError("--light", text, rule, "for example --light 1=1,0.4,0.2") from None
+    color = (red, green, blue)
+    if not (all(map(math.isfinite, color)) and min(color) >= 0.0 and max(color) > 0.0):
+        rule = "its channels must be finite, 0 or more, and not all 0"
+        raise InputError("--light", text, rule, "for example --light 1=1,0.4,0.2")
+    return found, color
 
 
 def parse_names(text: str) -> tuple[str, ...]:

@@ -26,6 +26,8 @@ wamnet render minicubes --feature-spp 16 -o noisy.exr
 
 wamnet render minicubes --time 2.5 --spp 64 --width 512 --height 512 -o reference.exr
 
+wamnet render minicubes --yaw 20 --light 1=1,0.3,0.3 --light 2=0.3,0.6,1
+
 wamnet render minicubes --spp 1024 --executor opencl -o reference.exr
 
 wamnet render furnace --set albedo=0.8 --max-depth 20 -o furnace.png"""
@@ -60,6 +62,10 @@ def render(
     seed: options.Seed = 0,
     time: options.Time = None,
     parameters: options.Parameters = None,
+    yaw: options.Yaw = 0.0,
+    pitch: options.Pitch = 0.0,
+    distance: options.Distance = 1.0,
+    light: options.Lights = None,
     max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
     sampler: options.SamplerName = Sampler.pcg4d,
     dtype: Annotated[FloatType, typer.Option(help="Arithmetic; files hold float32.")] = FloatType.float32,
@@ -78,7 +84,8 @@ def render(
     from ..refimpl.render import Job
     from ..refimpl.transport import Settings
 
-    loaded = load_scene(scene, time, parameters or [])
+    view = options.View(yaw, pitch, distance, tuple(light or ()))
+    loaded = load_scene(scene, time, parameters or [], view)
     path = output or Path(f"{Path(scene).stem}.exr")
     check_output(path, (".exr", ".png"), [Path(scene)])
     settings = Settings(max_depth=max_depth, sampler=sampler.value)
@@ -113,11 +120,16 @@ def scene(
     ] = None,
     time: options.Time = None,
     parameters: options.Parameters = None,
+    yaw: options.Yaw = 0.0,
+    pitch: options.Pitch = 0.0,
+    distance: options.Distance = 1.0,
+    light: options.Lights = None,
 ) -> None:
     """Write a scene as JSON text, to be changed and rendered."""
     from ..refimpl.scene import to_json
 
-    text = to_json(load_scene(name, time, parameters or []))
+    view = options.View(yaw, pitch, distance, tuple(light or ()))
+    text = to_json(load_scene(name, time, parameters or [], view))
     if output is None:
         typer.echo(text, nl=False)
         return
@@ -126,8 +138,10 @@ def scene(
     say(str(output))
 
 
-def load_scene(name: str, time: float | None, assignments: Sequence[str]) -> Scene:
-    """Return a canonical scene by name, or the scene in a JSON file."""
+def load_scene(
+    name: str, time: float | None, assignments: Sequence[str], view: options.View | None = None
+) -> Scene:
+    """Return a canonical scene by name, as a view has it, or the scene in a JSON file."""
     from ..refimpl.scene import from_json
     from ..refimpl.scenes import CANONICAL, canonical
 
@@ -137,7 +151,8 @@ def load_scene(name: str, time: float | None, assignments: Sequence[str]) -> Sce
     path = Path(name)
     if path.suffix.lower() != ".json":
         if name in CANONICAL:
-            return canonical(name, **parameters)
+            found = canonical(name, **parameters)
+            return view.of(found) if view else found
         if path.suffix or path.exists():
             rule = "neither a canonical scene nor a scene file, whose name ends in .json"
             raise InputError("scene", name, rule, f"use a .json file or one of {', '.join(CANONICAL)}")
@@ -145,6 +160,9 @@ def load_scene(name: str, time: float | None, assignments: Sequence[str]) -> Sce
     if parameters:
         rule = "a scene file has no parameters"
         raise InputError("option for the scene", ", ".join(parameters), rule, "change the file")
+    if view not in (None, options.View()):
+        rule = "a scene file has its own camera and lamps"
+        raise InputError("camera and lamps", "given", rule, "change the file, or write it with wamnet scene")
     try:
         return from_json(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:

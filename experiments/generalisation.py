@@ -9,7 +9,7 @@
     python experiments/generalisation.py
     python experiments/generalisation.py --scale paper -o out/generalisation-paper
 
-The camera turns about the vertical through the cubes (`orbit_deg` of the scene). The first column of the
+The camera turns about the vertical through the cubes (its yaw). The first column of the
 table is of training times with other noise: what is lost at unseen times is the difference of the first two.
 """
 
@@ -27,6 +27,7 @@ from lab.results import Results, Values, fill
 from lab.tables import Column
 
 from wamnet.refimpl.train import PAPER, SHORT, Recipe
+from wamnet.refimpl.variation import Variation
 
 SEVERAL_DEGREES = (-24.0, -8.0, 8.0, 24.0)
 """Orientations of the camera that the networks of several orientations are trained on."""
@@ -67,7 +68,7 @@ def trained_on(ground: Ground, kind: str) -> list[Pair]:
         return ground.seen()
     degrees = SEVERAL_DEGREES if kind == "several" else (float(kind),)
     shots = [
-        replace(ground.shots([time], seed_of(turned) + 4000 + k)[0], parameters={"orbit_deg": turned})
+        replace(ground.shots([time], seed_of(turned) + 4000 + k)[0], variation=Variation(yaw_deg=turned))
         for k, time in enumerate(times)
         for turned in [degrees[k % len(degrees)]]
     ]
@@ -78,8 +79,9 @@ def tested_on(ground: Ground, degrees: float) -> list[Pair]:
     """Return pairs of an orientation at unseen times; those of 0 are those of the other studies."""
     if degrees == 0.0:
         return ground.unseen()
-    shots = ground.shots(ground.times()[1], seed_of(degrees), orbit_deg=degrees)
-    return ground.pairs(shots, ground.plan.test_spp)
+    shots = ground.shots(ground.times()[1], seed_of(degrees))
+    turned = [replace(shot, variation=Variation(yaw_deg=degrees)) for shot in shots]
+    return ground.pairs(turned, ground.plan.test_spp)
 
 
 def measure(ground: Ground, recipe: Recipe, kind: str, degrees: Sequence[float], seed: int) -> Values:

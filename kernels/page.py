@@ -2,6 +2,8 @@
 
 1. The paths are one kernel for all moments: what differs between the scenes of the animation is read from a
    table of uniforms, a row for each moment; camera and light colours are uniforms too [`moving_numbers`].
+   Features that do not fit into its colour buffers have a kernel of their own, which ends at the first hit
+   [`drawn_together`].
 2. The encoding of the features is split where they are more than colour buffers [`encoders`].
 3. Each variant of the network is one or two passes, with its bound [`variant`].
 4. A page cannot trust its compiler (GLSL ES 3.00 has no `precise`): it carries a small picture's features,
@@ -32,9 +34,9 @@ from ..compiler.glsl_es import MOST_BUFFERS
 from ..compiler.interpret import interpret
 from ..compiler.ir import Program, digest
 from ..compiler.lower import lower
-from ..compiler.lower_encode import layers_of
+from ..compiler.lower_encode import layers_of, planes_of
 from ..compiler.lower_scene import lower_scene
-from ..compiler.path_kernel import compile_path
+from ..compiler.path_kernel import PathArtifact, compile_path
 from ..compiler.scene_inputs import SceneInputs, varying
 from ..refimpl import dataset, factored, rng, transport
 from ..refimpl.denoise import Model, check_model
@@ -42,10 +44,12 @@ from ..refimpl.errors import InputError
 from ..refimpl.intersection import quad_area_pdf
 from ..refimpl.render import Job, render
 from ..refimpl.scene import Scene
+from ..refimpl.scenes import TURN_SECONDS
 from ..refimpl.transport import Settings
+from ..refimpl.variation import RANGES, ranges_from_json
 from .denoise_on import images_of
 
-SCHEMA = "wamnet-page-1"
+SCHEMA = "wamnet-page-2"
 """Name and version of the form of a page's data."""
 
 TARGET = "glsl-es"
@@ -125,12 +129,17 @@ def page_data(
     shown = _features([network.model for network in networks])
     scene, first = animation.scenes[0], networks[0].model
     inputs, numbers = moving_numbers(animation, settings)
-    programs = lower_scene(scene, settings, None, moving=inputs)
-    path = compile_path(programs, TARGET, profile, 1, layers_of(shown))
+    together = drawn_together(shown)
+    paths = [
+        # Whole paths give colour; the other features are those of their first hit, which has no scattering.
+        path_kernel(scene, replace(settings, max_depth=0) if number else settings, inputs, part, profile)
+        for number, part in enumerate(together)
+    ]
     images = check(animation, first, shown, settings)
     variants = [variant(network, images, profile) for network in networks]
-    # How far a variant's picture is from the first one's is a fact about the weights, not about a device.
-    for one in variants:
+    for one, network in zip(variants, networks, strict=True):
+        one["ranges"] = learned_ranges(network.model, scene.name)
+        # How far a variant's picture is from the first one's is a fact about the weights, not about a device.
         off = one["picture"] - variants[0]["picture"]
         one["rms_to_first"] = float(np.sqrt(np.mean(off**2)))
     for one in variants:
@@ -139,12 +148,20 @@ def page_data(
         "schema": SCHEMA,
         "scene": scene.name,
         "times": list(animation.times),
+        "turn_s": TURN_SECONDS,
         "camera": asdict(scene.camera),
         "lights": _lights(scene),
         "share": transport.SKY_SHARE if scene.environment is not None else 1.0,
         "numbers": numbers,
-        "path": {"source": path.source, "planes": list(path.planes), "settings": settings.facts()},
-        "encoders": encoders(shown, first, path.planes, profile),
+        "paths": [
+            {"source": one.source, "planes": list(one.planes), "settings": one.programs.settings.facts()}
+            for one in paths
+        ],
+        "encoders": [
+            {"path": number, **encoder}
+            for number, (part, path) in enumerate(zip(together, paths, strict=True))
+            for encoder in encoders(part, first, path.planes, profile)
+        ],
         "check": {
             "size": CHECK_PX,
             "images": {n: {"channels": a.shape[-1], "values": _packed(a)} for n, a in images.items()},
@@ -162,11 +179,25 @@ def _features(models: Sequence[Model]) -> tuple[str, ...]:
         if model.normalization != first.normalization:
             rule = "its scales are not those of the first model, and one page encodes once"
             raise InputError("second model", model.normalization, rule, "train it from the first (--from)")
-    features = tuple(dict.fromkeys([name for model in models for name in model.features] + [*SHOWN]))
-    if sum(dataset.FEATURES[name].channels for name in features) > 4 * MOST_BUFFERS:
-        rule = f"WebGL 2 draws {4 * MOST_BUFFERS} numbers a pixel"
-        raise InputError("features", ", ".join(features), rule, "train with fewer (--features)")
-    return features
+    return tuple(dict.fromkeys([name for model in models for name in model.features] + [*SHOWN]))
+
+
+def drawn_together(features: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return the features in parts whose planes fit into the colour buffers; colour is in the first part."""
+    parts: list[tuple[str, ...]] = [()]
+    for name in sorted(features, key=lambda name: name != "color"):
+        if len(planes_of((*parts[-1], name))) > 4 * MOST_BUFFERS:
+            parts.append(())
+        parts[-1] = (*parts[-1], name)
+    return parts
+
+
+def path_kernel(
+    scene: Scene, settings: Settings, inputs: SceneInputs, features: Sequence[str], profile: str
+) -> PathArtifact:
+    """Return the kernel that adds up the planes of some features."""
+    programs = lower_scene(scene, settings, None, moving=inputs)
+    return compile_path(programs, TARGET, profile, 1, layers_of(features))
 
 
 def moving_numbers(animation: Animation, settings: Settings) -> tuple[SceneInputs, dict[str, Any]]:
@@ -242,6 +273,13 @@ def variant(network: Network, images: Mapping[str, NDArray[np.float32]], profile
         "check": {"expected": _packed(value, "<f8"), "bound": _packed(_raised(bound))},
         "picture": value,
     }
+
+
+def learned_ranges(model: Model, scene: str) -> dict[str, Any] | None:
+    """Return the ranges of what a model has learned of a scene; None where it does not say."""
+    text = model.info.get(f"trained_on_{RANGES}")
+    scenes = model.info.get("trained_on_scene", scene).split(", ")
+    return None if text is None or scene not in scenes else asdict(ranges_from_json(text))
 
 
 def _products(kernel: Artifact) -> int:

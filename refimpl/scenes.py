@@ -40,24 +40,14 @@ COOL: Vector = (0.45, 0.66, 1.0)
 """Colour of the second light of `minicubes`, linear RGB, relative."""
 
 
-def minicubes(
-    time: float = 0.0,
-    warm: Vector = WARM,
-    cool: Vector = COOL,
-    orbit_deg: float = 0.0,
-) -> Scene:
-    """Return the scene of the mini cubes at a time in seconds; light colours and camera orbit are parameters.
-
-    orbit_deg turns the camera around the vertical through the cubes; 0 looks along -z.
-    """
+def minicubes(time: float = 0.0, warm: Vector = WARM, cool: Vector = COOL) -> Scene:
+    """Return the scene of the mini cubes at a time in seconds; light colours are parameters."""
     white, red, green = (0.74, 0.74, 0.72), (0.70, 0.26, 0.22), (0.26, 0.56, 0.30)
     room = Room((-2.0, -2.0, -2.0), (2.0, 2.0, 2.0), (red, green, white, white, (0.42, 0.46, 0.66), white))
     # The warm light hangs below the ceiling, the cool one stands before the right wall.
     ceiling = Light((-1.1, 1.98, -0.5), (1.2, 0.0, 0.0), (0.0, 0.0, 1.2), warm, 48.0)
     side = Light((1.98, -0.6, -1.2), (0.0, 0.0, 1.0), (0.0, 1.4, 0.0), cool, 30.0)
-    angle = math.radians(orbit_deg)
-    position = (6.6 * math.sin(angle), 0.25, 6.6 * math.cos(angle))
-    camera = Camera(position, (0.0, -0.05, 0.0), vertical_fov_deg=41.0)
+    camera = Camera((0.0, 0.25, 6.6), (0.0, -0.05, 0.0), vertical_fov_deg=41.0)
     return Scene(
         "minicubes", camera, room, boxes=_cubes(time), lights=(ceiling, side), info={"time": repr(time)}
     )

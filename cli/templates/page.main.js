@@ -11,6 +11,7 @@ const REST_MS = 100; // is left this long, at most, to the rest of the page befo
 const GRAB_PX = 18; // how near to the line a pointer takes hold of it
 const DEGREES_PER_PX = 0.4;
 const LABELS = { color: "1 sample per pixel", normal: "Normals", albedo: "Albedo", picture: "Denoised" };
+const TELL_MS = 250; // what is outside is said at most that often: a slider moves in many steps
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 const REST = { yaw: 0, pitch: 0, distance: 1 };
 
@@ -65,8 +66,9 @@ class Page {
 
   /** Textures that some pass draws into at once. */
   leastBuffers() {
-    const { path, encoders, variants } = this.data;
-    const counts = [Math.ceil(path.planes.length / 4), ...encoders.map((e) => e.images.length)];
+    const { paths, encoders, variants } = this.data;
+    const textures = paths.map((path) => Math.ceil(path.planes.length / 4));
+    const counts = [...textures, ...encoders.map((e) => e.images.length)];
     return Math.max(...counts, ...variants.flatMap((v) => v.passes.map((pass) => pass.buffers)));
   }
 
@@ -245,6 +247,7 @@ class Page {
     slider.value = this.frame();
     slider.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds`);
     find("time-value").textContent = `${time.toFixed(2)} s`;
+    this.tellOutside();
   }
 
   tellTurn() {
@@ -270,6 +273,28 @@ class Page {
     find("right-label").style.opacity = this.state.wipe < 0.96 ? 1 : 0;
   }
 
+  /** Say what of the picture the network has not learned, soon. */
+  tellOutside() {
+    this.telling = this.telling || setTimeout(() => {
+      this.telling = null;
+      find("outside").textContent = this.outside(this.state.turn, this.state.colors);
+    }, TELL_MS);
+  }
+
+  /** The sentence for a camera and colours at this time; empty inside, and where the network does not say. */
+  outside(turn, colors, all = false) {
+    const { data, state } = this;
+    const { ranges } = data.variants.find((one) => one.name === state.variant);
+    const moment = { time: data.times[this.frame()], turn, colors };
+    return ranges ? outsideSentence(outside(ranges, data.turn_s, moment, data.lights, all)) : "";
+  }
+
+  /** Keep room for the longest sentence, so that nothing below it moves when it appears. */
+  reserveOutside() {
+    const pure = this.data.lights.map(() => [1, 0, 0]);
+    find("outside-room").textContent = this.outside({ yaw: -179, pitch: -75, distance: 0.45 }, pure, true);
+  }
+
   tellVariant() {
     const facts = this.data.variants.find((one) => one.name === this.state.variant);
     const check = this.checks.get(facts.name);
@@ -278,6 +303,9 @@ class Page {
     find("bound").textContent = facts.bound === null ? "none" : number(facts.bound);
     find("first-difference").textContent =
       facts.name === this.data.variants[0].name ? "it is the full one" : `${(100 * facts.rms_to_first).toFixed(1)} %`;
+    find("unknown-ranges").hidden = facts.ranges !== null;
+    this.reserveOutside();
+    this.tellOutside();
     if (check) {
       const held = check.share <= 1;
       find("error").textContent = `${number(check.error)}, ${held ? "within" : "NOT within"} ${number(check.bound)}`;
@@ -324,8 +352,8 @@ class Page {
     const input = document.createElement("input");
     Object.assign(input, { type: "color", id: `light-${i}`, value: hexFromLinear(light.color) });
     input.addEventListener("input", () => {
-      // Black lights alone could not be picked by their power: a trace of light stays.
-      const color = linearFromHex(input.value).map((c) => Math.max(c, 1e-3));
+      const isOwn = input.value === hexFromLinear(light.color);
+      const color = isOwn ? light.color : asBright(linearFromHex(input.value), light.color);
       this.change({ colors: this.state.colors.map((old, k) => (k === i ? color : old)) });
     });
     row.append(label, input);
@@ -336,6 +364,7 @@ class Page {
   change(values) {
     Object.assign(this.state, values);
     this.dirty = true;
+    this.tellOutside();
   }
 
   turn(values) {
@@ -466,7 +495,7 @@ function hook(page, started) {
   return {
     ready: started,
     page,
-    parts: { Strips, REST, decodeFloats },
+    parts: { Strips, REST, decodeFloats, outside, asBright },
     /** Stop the loop's own pictures, and draw one: {size, frame, seed, turn, colors, variant}. */
     async draw(options) {
       page.held = true;

@@ -124,10 +124,10 @@ class Renderer {
     const { device, data } = this;
     this.size = 0;
     this.shown = null;
-    this.sums = null;
+    this.sums = [];
     this.between = [];
     this.pictures = [];
-    this.path = device.compile(data.path.source);
+    this.paths = data.paths.map((path) => device.compile(path.source));
     this.encoders = data.encoders.map((encoder) => device.compile(encoder.source));
     this.screen = device.compile(SCREEN);
     this.variants = new Map();
@@ -171,7 +171,7 @@ class Renderer {
 
   async prepare(name, report) {
     const variant = this.variant(name);
-    const common = [this.screen, this.path, ...this.encoders];
+    const common = [this.screen, ...this.paths, ...this.encoders];
     const waiting = variant.passes.map((pass) => pass.shader);
     await this.compiled(this.ready ? waiting : [...common, ...waiting], report);
     this.ready = variant.ready = true;
@@ -183,10 +183,9 @@ class Renderer {
       return;
     }
     const { device, data } = this;
-    [this.sums, this.between, ...this.pictures.flatMap((one) => [...one.features, one.result])]
-      .flat()
-      .forEach((target) => target && device.release(target));
-    this.sums = device.target(size, Math.ceil(data.path.planes.length / 4));
+    const drawn = this.pictures.flatMap((one) => [...one.features, one.result]);
+    [...this.sums, ...this.between, ...drawn].forEach((target) => device.release(target));
+    this.sums = data.paths.map((path) => device.target(size, Math.ceil(path.planes.length / 4)));
     this.between = [];
     this.pictures = [0, 1].map(() => ({
       features: data.encoders.map((encoder) => device.target(size, encoder.images.length)),
@@ -227,9 +226,9 @@ class Renderer {
     const picture = this.pictures[this.shown === this.pictures[0] ? 1 : 0];
     const numbers = sceneNumbers(this.data, frame, camera, colors);
     const images = this.images(picture);
-    const tracing = {
-      shader: this.path,
-      target: this.sums,
+    const tracing = this.paths.map((shader, i) => ({
+      shader,
+      target: this.sums[i],
       textures: {},
       set: (place) => {
         for (const [name, value] of Object.entries({ width: size, height: size, first_row: 0, samples: 1 })) {
@@ -239,16 +238,18 @@ class Renderer {
         gl.uniform1ui(place("seed_number"), seed);
         gl.uniform4fv(place("scene_numbers"), numbers);
       },
-    };
-    const sums = Object.fromEntries(this.sums.textures.map((texture, i) => [`sums_${i}`, texture]));
+    }));
+    const sums = this.sums.map((target) =>
+      Object.fromEntries(target.textures.map((texture, i) => [`sums_${i}`, texture])),
+    );
     const encoding = this.encoders.map((shader, i) => ({
       shader,
       target: picture.features[i],
-      textures: sums,
+      textures: sums[this.data.encoders[i].path],
       set: (place) => gl.uniform1i(place("sample_count"), 1),
     }));
     const denoising = this.denoising(this.variant(variant), images, picture.result);
-    const ms = await this.strips.run([tracing, ...encoding, ...denoising]);
+    const ms = await this.strips.run([...tracing, ...encoding, ...denoising]);
     this.shown = picture;
     return ms;
   }
@@ -309,13 +310,14 @@ class Renderer {
     });
   }
 
-  /** Floats of an image of the last picture, or of the path kernel's sums ("sums_0"), for tests. */
+  /** Floats of an image of the last picture, or of the path kernels' sums ("sums_0", ...), for tests. */
   read(name) {
     if (name === "picture") {
       return this.device.read(this.shown.result, 0);
     }
     if (name.startsWith("sums_")) {
-      return this.device.read(this.sums, Number(name.slice(5)));
+      const places = this.sums.flatMap((target) => target.textures.map((_, i) => [target, i]));
+      return this.device.read(...places[Number(name.slice(5))]);
     }
     for (const [i, encoder] of this.data.encoders.entries()) {
       const number = encoder.images.findIndex((image) => image.name === name);

@@ -90,6 +90,67 @@ function sceneNumbers(data, frame, camera, colors) {
   return padded;
 }
 
+/** A colour's hue and saturation with the mean of a lamp's own channels, as refimpl/variation.py. */
+function asBright(color, own) {
+  const sum = (channels) => channels.reduce((total, channel) => total + channel, 0);
+  // A black lamp has no hue: a trace of light makes it grey.
+  const lit = color.map((channel) => Math.max(channel, 1e-3));
+  return lit.map((channel) => (channel * sum(own)) / sum(lit));
+}
+
+const SATURATION_TOLERANCE = 0.005; // by rounding to eight bits, as refimpl/variation.py
+
+/**
+ * What of a picture a network has not learned, as refimpl/variation.py: outside; lamps are as bright as their
+ * own here. Each with its subject and the range; `all`: what could be said, for the longest sentence.
+ */
+function outside(ranges, turnSeconds, { time, turn, colors }, lights, all = false) {
+  const found = [];
+  const number = (x, digits) => String(Number(x.toFixed(digits)));
+  const check = (subject, text, value, [low, high], show, slack = 0) => {
+    if (all || value < low - slack || value > high + slack) {
+      found.push({ subject, text, range: `${show(low)} to ${show(high)}` });
+    }
+  };
+  const [start, end] = ranges.time_s;
+  if (end - start < turnSeconds) {
+    const passed = (((time - start) % turnSeconds) + turnSeconds) % turnSeconds;
+    check("the time is", "another", start + passed, [start, end], (x) => `${number(x, 2)} s`);
+  }
+  const degrees = (x) => `${number(x, 1)}°`;
+  check("the camera is", `${degrees(turn.yaw)} to the side`, turn.yaw, ranges.yaw_deg, degrees);
+  const height = (x) => (x < 0 ? `${degrees(-x)} down` : `${degrees(x)} up`);
+  check("the camera is", height(turn.pitch), turn.pitch, ranges.pitch_deg, height);
+  const factor = (x) => number(x, 2);
+  const away = `${factor(turn.distance)} times as far away`;
+  check("the camera is", away, turn.distance, ranges.distance, factor);
+  colors.forEach((color, i) => {
+    const subject = `light ${i + 1} is`;
+    if (color.every((channel, k) => channel === lights[i].color[k])) {
+      return;
+    }
+    if (!ranges.saturation) {
+      found.push({ subject, text: "of another colour", range: "its own" });
+      return;
+    }
+    const saturation = 1 - Math.min(...color) / Math.max(...color);
+    const percent = (x) => `${Math.round(100 * x)} %`;
+    check(subject, `${percent(saturation)} saturated`, saturation, ranges.saturation, percent, SATURATION_TOLERANCE);
+  });
+  return found;
+}
+
+/** One sentence of what is outside; nothing for nothing. */
+function outsideSentence(found) {
+  const parts = found.map(({ subject, text, range }, i) => {
+    const same = i > 0 && found[i - 1].subject === subject;
+    return `${same ? "" : `${subject} `}${text} (${i ? "" : "learned: "}${range})`;
+  });
+  return parts.length
+    ? `Outside of what the network has learned: ${parts.join(", ")}. Expect errors.`
+    : "";
+}
+
 /** sRGB's curve (IEC 61966-2-1), for colours that are chosen as one sees them. */
 function linearFromHex(hex) {
   return [1, 3, 5].map((start) => {

@@ -18,6 +18,7 @@ from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.scene import Box, Camera, Light, Quad, Scene, Sphere
 from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.variation import Variation, varied
 
 WIDTH, HEIGHT, BLOCK = 16, 12, 4
 BATCHES = 32
@@ -60,7 +61,7 @@ SCENES = {
 """Scenes whose camera is outside no room; no symmetry hides a mirrored picture."""
 
 FROM_OUTSIDE = {
-    "minicubes outside": scenes.minicubes(time=1.3, orbit_deg=20.0),
+    "minicubes outside": varied(scenes.minicubes(time=1.3), Variation(yaw_deg=20.0)),
     "cornell outside": scenes.cornell(),
 }
 """Scenes that are seen through the near walls of their rooms."""

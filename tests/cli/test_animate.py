@@ -17,6 +17,7 @@ from wamnet.refimpl import encoding, factored
 from wamnet.refimpl.denoise import denoise
 from wamnet.refimpl.render import Job, render
 from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.variation import Ranges, Variation, varied
 
 SHORT = ("--seconds", 0.4, "--fps", 5, "--size", 13)
 
@@ -86,6 +87,24 @@ def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:
     assert wamnet("animate", "m.safetensors", *one, "-o", "plain").status == 0
     pictures = [read_png(tmp_path / folder / "00000.png") for folder in ("named", "plain")]
     assert np.array_equal(*pictures)
+
+
+def test_pictures_outside_of_the_ranges_are_told(wamnet, tmp_path) -> None:
+    """How many, and what of the first: here of time, and of all from another side."""
+    network = load_model(tmp_path / "m.safetensors")
+    learned = {"trained_on_scene": "minicubes", "trained_on_ranges": Ranges((0.0, 0.1)).to_json()}
+    save_model(tmp_path / "n.safetensors", replace(network, info=learned))
+    begin, unlike = "outside of what the model has learned: ", "pictures are unlike those of the training: "
+    outcome = wamnet("animate", "n.safetensors", *SHORT, "-o", "a")
+    assert f"a: 1 of 2 {unlike}{begin}the time is 0.2 s (learned: 0 s to 0.1 s); expect" in outcome.out
+    outcome = wamnet("animate", "n.safetensors", *SHORT, "--yaw", 5, "--light", "1=1,0,0", "-o", "b")
+    told = "the camera's yaw is 5° (learned: 0° to 0°), lamp 1 has another colour (learned: its own)"
+    assert f"b: 2 of 2 {unlike}{begin}{told}; expect errors\n" in outcome.out
+    assert "unlike" not in wamnet("animate", "m.safetensors", *SHORT, "--yaw", 5, "-o", "c").out
+    noisy = render(varied(canonical("minicubes"), Variation(yaw_deg=5.0)), Job(13, 13)).frame
+    got = read_png(tmp_path / "c/00000.png")[LABEL_PX:-1, :13]
+    # Half a level of 8 bits, and float32's rounding of sums below 256.
+    assert np.abs(got - encoding.to_display(noisy["color"])).max() <= 0.5 / 255 + 256 * 2.0**-23
 
 
 @pytest.mark.parametrize("name", ["numpy", "opencl", "opengl"])
@@ -178,6 +197,8 @@ def test_what_a_killed_run_leaves_is_removed(wamnet, tmp_path) -> None:
         (["-o", "file"], "output folder is file: it is a file"),
         (["-o", "full"], "output folder is full: it holds something else: x; choose another with -o"),
         (["--set", "time=1"], "parameter time is 1.0: each picture has its own; use --start and --seconds"),
+        (["--yaw", 999], "yaw_deg is 999.0: it must be a number from -180 to 180"),
+        (["--light", "3=1,1,1"], "--light is 3=1,1,1: the scene's lamps are 1 to 2"),
         (["--set", "fps=1"], "parameter fps is 1.0: minicubes has none such; known are time, warm"),
         (["--set", "warm=1"], "parameter warm is 1.0: minicubes wants three numbers"),
         (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +12,10 @@ import pytest
 
 from wamnet.cli import exr, inputs
 from wamnet.compiler.model_file import load_model, save_model
+from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.variation import Ranges, lamp_color
 
 
 @pytest.fixture
@@ -28,8 +31,8 @@ def test_numbers_must_be_finite(refused, here, value) -> None:
     (here / "minicubes.exr").write_text("precious")
     small = ["minicubes", "--width", 4, "--height", 3]
     assert "--time is " in refused("render", *small, f"--time={value}")
-    assert f"--set is orbit_deg={value}: all numbers must be finite" in refused(
-        "render", *small, "--set", f"orbit_deg={value}"
+    assert f"--set is albedo={value}: all numbers must be finite" in refused(
+        "render", *small, "--set", f"albedo={value}"
     )
     assert "all numbers must be finite" in refused("scene", "minicubes", "--set", f"warm=1,{value},1")
     for command in (["render", *small, "-o", "a.png"], ["compare", "noisy.exr", "reference.exr"]):
@@ -151,9 +154,63 @@ def test_frames_unlike_those_of_the_training(samples, trained, shown, told) -> N
     """What is known of both is compared."""
     model = load_model(samples / "model.safetensors")
     model = replace(model, info={f"trained_on_{name}": value for name, value in trained.items()})
-    found = inputs.unlike_training(model, Frame({"color": np.zeros((2, 2, 3))}, shown))
+    found = inputs.unlike_training(model, shown)
     assert len(found) == len(told)
     assert all(text.startswith(begin) for text, begin in zip(found, told, strict=True))
+
+
+RANGES = Ranges((0.0, 6.0), (-24.0, 24.0), (-8.0, 8.0), (0.9, 1.1), (0.0, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("shown", "told"),
+    [
+        ({}, []),
+        ({"yaw_deg": "24.0", "pitch_deg": "-8.0", "distance": "1.1", "time": "13.0"}, []),
+        ({"yaw_deg": "40.0"}, ["the camera's yaw is 40° (learned: -24° to 24°)"]),
+        (
+            {"time": "7.0", "pitch_deg": "-9.0"},
+            ["the time is 7 s (learned: 0 s to 6 s)", "the camera's pitch is -9° (learned: -8° to 8°)"],
+        ),
+        (
+            {"lights": json.dumps([lamp_color(scenes.WARM, 0.3, 0.7), scenes.COOL])},
+            ["the saturation of lamp 1 is 0.70 (learned: 0.00 to 0.50)"],
+        ),
+    ],
+    ids=str,
+)
+def test_frames_outside_of_the_ranges_of_the_training(samples, shown, told) -> None:
+    """One sentence names all; the scene's own lamps are inside, whatever their saturation."""
+    model = load_model(samples / "model.safetensors")
+    learned = {"trained_on_scene": "minicubes", "trained_on_ranges": RANGES.to_json()}
+    own = {"scene": "minicubes", "lights": json.dumps([scenes.WARM, scenes.COOL])}
+    found = inputs.unlike_training(replace(model, info=learned), {**own, **shown})
+    assert found == [f"outside of what the model has learned: {', '.join(told)}; expect errors"][: len(told)]
+    assert inputs.unlike_training(model, {**own, **shown}) == [], "a model without ranges says nothing"
+    other = inputs.unlike_training(replace(model, info=learned), {**own, **shown, "scene": "cornell"})
+    assert [text.split(",")[0] for text in other] == ["it shows cornell"], "ranges are of its own scenes"
+
+
+def test_ranges_that_are_none_are_refused(refused, here) -> None:
+    model = load_model(here / "model.safetensors")
+    save_model(here / "odd.safetensors", replace(model, info={"trained_on_ranges": "{"}))
+    assert "ranges is {: JSON of ranges; make the data set" in refused(
+        "denoise", "odd.safetensors", "noisy.exr"
+    )
+
+
+def test_a_frame_outside_of_the_ranges_is_denoised_with_a_warning(wamnet, here) -> None:
+    model = load_model(here / "model.safetensors")
+    learned = {"trained_on_scene": "minicubes", "trained_on_ranges": RANGES.to_json()}
+    save_model(here / "narrow.safetensors", replace(model, info=learned))
+    small = ("render", "minicubes", "--width", 8, "--height", 8)
+    for yaw, told in ((24, []), (25, ["the camera's yaw is 25° (learned: -24° to 24°)"])):
+        assert wamnet(*small, "--yaw", yaw, "-o", "frame.exr").status == 0
+        outcome = wamnet("denoise", "narrow.safetensors", "frame.exr")
+        assert outcome.status == 0
+        warned = [line for line in outcome.out.splitlines() if "outside of what" in line]
+        wanted = [f"frame.exr: outside of what the model has learned: {text}; expect errors" for text in told]
+        assert warned == wanted
 
 
 def test_a_frame_of_another_scene_is_denoised_with_a_warning(wamnet, here) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import colorsys
+import json
+
 import numpy as np
 import pytest
 
 from wamnet.cli import exr
 from wamnet.cli.images import read_png
-from wamnet.refimpl import encoding
+from wamnet.refimpl import encoding, scenes, variation
 from wamnet.refimpl.render import Job, render
 from wamnet.refimpl.scene import scene_digest
 from wamnet.refimpl.scenes import canonical
@@ -84,6 +87,30 @@ def test_a_picture(wamnet, tmp_path) -> None:
     assert (read_png(tmp_path / "e.png") == want).all()
 
 
+def test_camera_and_lamps_are_options(wamnet, tmp_path) -> None:
+    """The scene is the reference's variation; a lamp takes hue and saturation, and keeps its brightness."""
+    look = ("--yaw", 20, "--pitch", -5, "--distance", 1.25, "--light", "2=0.2,0.5,0.3")
+    assert wamnet("render", "minicubes", "--width", 4, "--height", 3, *look, "-o", "a.exr").status == 0
+    color = variation.lamp_color(scenes.COOL, *colorsys.rgb_to_hsv(0.2, 0.5, 0.3)[:2])
+    seen = variation.Variation(20.0, -5.0, 1.25, (scenes.WARM, color))
+    got, want = exr.read_frame(tmp_path / "a.exr"), variation.varied(canonical("minicubes"), seen)
+    assert (got["color"] == render(want, Job(4, 3)).frame["color"]).all()
+    assert got.info["yaw_deg"] == "20.0"
+    assert json.loads(got.info["lights"]) == [list(scenes.WARM), list(color)]
+    # Two roundings of products and one of a sum, of numbers below 4.
+    assert abs(sum(color) - sum(scenes.COOL)) <= 4 * 3 * 2.0**-53
+    assert np.allclose(np.divide(color, color[1]), [0.4, 1.0, 0.6], rtol=1e-12)
+
+
+def test_a_scene_that_is_written_has_its_camera(wamnet, tmp_path) -> None:
+    assert wamnet("scene", "minicubes", "--yaw", 20, "-o", "mine.json").status == 0
+    assert wamnet("render", "mine.json", "--width", 4, "--height", 3).status == 0
+    assert wamnet("render", "minicubes", "--yaw", 20, "--width", 4, "--height", 3, "-o", "a.exr").status == 0
+    mine, named = (exr.read_frame(tmp_path / name) for name in ("mine.exr", "a.exr"))
+    assert (mine["color"] == named["color"]).all()
+    assert mine.info["yaw_deg"] == named.info["yaw_deg"] == "20.0"
+
+
 def test_a_scene_file_renders_the_same(wamnet, tmp_path) -> None:
     """Written by `wamnet scene`, read by `wamnet render`."""
     assert wamnet("scene", "minicubes", "--time", 2, "-o", "mine.json").out == "mine.json\n"
@@ -105,7 +132,7 @@ def test_a_scene_file_renders_the_same(wamnet, tmp_path) -> None:
             ["minicubes", "--set", "orbit"],
             "--set is orbit: it must be NAME=NUMBER or NAME=NUMBER,NUMBER,NUMBER",
         ),
-        (["minicubes", "--set", "orbit_deg=x"], "--set is orbit_deg=x: it must be"),
+        (["minicubes", "--set", "warm=x"], "--set is warm=x: it must be"),
         (["minicubes", "--set", "warm=1,2"], "--set is warm=1,2: it must be"),
         (
             ["minicubes", "--set", "albedo=1"],
@@ -118,6 +145,27 @@ def test_a_scene_file_renders_the_same(wamnet, tmp_path) -> None:
         (
             ["furnace", "--set", "albedo=1,2,3"],
             "parameter albedo is (1.0, 2.0, 3.0): furnace wants one number",
+        ),
+        (["minicubes", "--yaw", "181"], "yaw_deg is 181.0: it must be a number from -180 to 180; choose"),
+        (["minicubes", "--yaw", "nan"], "yaw_deg is nan: it must be a number from -180 to 180"),
+        (["minicubes", "--pitch", "-86"], "pitch_deg is -86.0: it must be a number from -85 to 85"),
+        (["minicubes", "--distance", "0"], "distance is 0.0: it must be a number from 0.1 to 10"),
+        (["minicubes", "--distance", "inf"], "distance is inf: it must be a number from 0.1 to 10"),
+        (
+            ["minicubes", "--light", "1,1,1"],
+            "--light is 1,1,1: it must be N=R,G,B: a lamp's number and three numbers; for example --light 1=",
+        ),
+        (["minicubes", "--light", "1=1,2"], "--light is 1=1,2: it must be N=R,G,B"),
+        (["minicubes", "--light", "x=1,1,1"], "--light is x=1,1,1: it must be N=R,G,B"),
+        (["minicubes", "--light", "1=0,0,0"], "its channels must be finite, 0 or more, and not all 0"),
+        (["minicubes", "--light", "1=1,-1,0"], "its channels must be finite, 0 or more, and not all 0"),
+        (["minicubes", "--light", "1=1,nan,0"], "its channels must be finite, 0 or more, and not all 0"),
+        (["minicubes", "--light", "3=1,1,1"], "--light is 3=1,1,1: the scene's lamps are 1 to 2; choose"),
+        (["minicubes", "--light", "0=1,1,1"], "--light is 0=1,1,1: the scene's lamps are 1 to 2; choose"),
+        (["daylight", "--light", "1=1,1,1"], "--light is 1=1,1,1: the scene has no lamps; leave it out"),
+        (
+            ["minicubes", "--light", "1=1,1,1", "--light", "1=1,1,0"],
+            "--light is 1=1,1,0: lamp 1 has a colour already; give one for each lamp",
         ),
         (["minicubes", "--width", "0"], "width is 0: it must be an integer from 1 to"),
         (["minicubes", "--spp", "-1"], "spp is -1: it must be an integer from 1 to"),
@@ -143,6 +191,11 @@ def test_refusals_of_scene_files(refused, wamnet, tmp_path) -> None:
     wamnet("scene", "empty", "-o", "b.json")
     text = "option for the scene is time: a scene file has no parameters; change the file"
     assert text in refused("render", "b.json", "--time", 1)
+    text = (
+        "camera and lamps is given: a scene file has its own camera and lamps; change the file, or write it"
+    )
+    for option in (("--yaw", 1), ("--pitch", 1), ("--distance", 2), ("--light", "1=1,1,1")):
+        assert text in refused("render", "b.json", *option)
     assert "output file is b.json: it is an input of this command" in refused(
         "scene", "b.json", "-o", "b.json"
     )

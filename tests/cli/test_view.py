@@ -30,15 +30,15 @@ def data_of(text):
 
 
 def test_a_page_is_written(wamnet, here):
-    outcome = wamnet("view", "model.safetensors", "--scene", "cornell", "-o", "page.html")
+    outcome = wamnet("view", "model.safetensors", "--scene", "lone_light", "-o", "page.html")
     assert outcome.status == 0, outcome.err
     assert outcome.out == "page.html\n"
     text = (here / "page.html").read_text(encoding="utf-8")
     data = data_of(text)
-    assert (data["scene"], data["times"]) == ("cornell", [0.5 / webpage.FPS])
+    assert (data["scene"], data["times"]) == ("lone_light", [0.5 / webpage.FPS])
     assert [one["name"] for one in data["variants"]] == ["full", "fast", "fast-texture"]
     assert not re.search(r"(src|href)=\"(?!data:)", text), "nothing is fetched"
-    assert wamnet("view", "model.safetensors", "--scene", "cornell", "-o", "again.html").status == 0
+    assert wamnet("view", "model.safetensors", "--scene", "lone_light", "-o", "again.html").status == 0
     assert (here / "again.html").read_text(encoding="utf-8") == text, "a page is a function of its inputs"
 
 

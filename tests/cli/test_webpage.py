@@ -18,6 +18,7 @@ import pytest
 
 from wamnet.cli import webpage
 from wamnet.compiler.encode_kernel import compile_encode, error_at
+from wamnet.compiler.lower_encode import layers_of
 from wamnet.compiler.lower_scene import lower_scene
 from wamnet.compiler.path_kernel import compile_path
 from wamnet.kernels import page as P
@@ -26,6 +27,7 @@ from wamnet.kernels.numpy_executor import NumpyExecutor
 from wamnet.refimpl import dataset, scenes
 from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.variation import Ranges, Variation, outside, saturation_of, varied
 
 SIZE, FRAME, SEED = 40, 3, 5
 SETTINGS = Settings(max_depth=2)
@@ -33,6 +35,7 @@ FEATURES = ("color", "normal", "position")
 SCALES = dataset.Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 TIMES = tuple((number + 0.5) / 4 for number in range(8))
 COLORS = [[0.9, 0.2, 0.1], [0.3, 0.4, 0.8]]
+RANGES = Ranges((0.0, 8.0), (-24.0, 24.0), (-8.0, 8.0), (0.9, 1.1), (0.0, 0.5))
 TURN = {"yaw": 25.0, "pitch": 8.0, "distance": 0.9}
 
 NO_MOTION = {"reduced_motion": "reduce"}
@@ -55,7 +58,7 @@ def model(kit):
     """A network whose pictures lie within 0.5 +- 0.45, of an odd width."""
     window = dataset.Window(5, "zero")
     network = kit.network([dataset.n_inputs(FEATURES, window), 10, 7, 3], (3.0, 3.0))
-    return Model(network, FEATURES, window, SCALES)
+    return Model(network, FEATURES, window, SCALES, {"trained_on_ranges": RANGES.to_json()})
 
 
 @pytest.fixture(scope="module")
@@ -100,21 +103,59 @@ def draw(tab, **options):
 def test_the_paths_are_the_reference_s(still, options):
     """As the kernels of test_paths.py: 99 pixels in 100 have every number to 1e-5 of its layer's size."""
     told = draw(still, **options)
+    expected, scene = traced(told, FEATURES, options.get("seed", 0))
+    at_rest = scenes.canonical("minicubes", time=told["time"]).camera
+    assert (scene.camera == at_rest) == ("turn" not in options)
+    found = np.concatenate([read(still, f"sums_{number}") for number in range(3)], axis=-1)
+    for first, layer in zip((0, 3, 6), FEATURES, strict=True):
+        assert share_alike(found[..., first : first + 3], expected[..., first : first + 3]) >= 0.99, layer
+
+
+def traced(told, features, seed):
+    """Return the reference's sums (H, W, planes) of what a page has drawn, and its scene."""
     scene = scenes.canonical("minicubes", time=told["time"])
     camera = replace(scene.camera, position=tuple(told["camera"]["position"]))
     pairs = zip(scene.lights, told["colors"], strict=True)
     lights = tuple(replace(light, color=tuple(color)) for light, color in pairs)
-    assert (camera == scene.camera) == ("turn" not in options)
-    kernel = compile_path(
-        lower_scene(replace(scene, camera=camera, lights=lights), SETTINGS), "numpy", groups=FEATURES
-    )
-    expected = NumpyExecutor().trace(kernel, Part(SIZE, SIZE, 0, SIZE, 0, 1, options.get("seed", 0)))
-    found = np.concatenate([read(still, f"sums_{number}") for number in range(3)], axis=-1)
-    for first, layer in zip((0, 3, 6), FEATURES, strict=True):
-        held = np.moveaxis(expected[first : first + 3], 0, -1)
-        size = np.abs(held).max(axis=-1, keepdims=True) + np.abs(held).mean()
-        near = np.abs(found[..., first : first + 3] - held) <= 1e-5 * size
-        assert near.all(axis=-1).mean() >= 0.99, layer
+    scene = replace(scene, camera=camera, lights=lights)
+    kernel = compile_path(lower_scene(scene, SETTINGS), "numpy", groups=layers_of(features))
+    sums = NumpyExecutor().trace(kernel, Part(SIZE, SIZE, 0, SIZE, 0, 1, seed))
+    return np.moveaxis(sums, 0, -1), scene
+
+
+def share_alike(found, held):
+    """Return the share of pixels whose numbers (H, W, C) are all those of the reference, to 1e-5."""
+    size = np.abs(held).max(axis=-1, keepdims=True) + np.abs(held).mean()
+    return (np.abs(found - held) <= 1e-5 * size).all(axis=-1).mean()
+
+
+def test_all_features_together_are_the_reference_s(chromium, kit, tmp_path):
+    """They take two kernels of paths; the lamps' light without shadows follows their colours."""
+    features, window = tuple(dataset.FEATURES), dataset.Window(3, "clamp")
+    network = kit.network([dataset.n_inputs(features, window), 6, 3], (3.0, 3.0))
+    animation = P.Animation(TIMES, tuple(scenes.canonical("minicubes", time=time) for time in TIMES))
+    networks = P.networks_of(Model(network, features, window, SCALES), rank=2)[:1]
+    data = P.page_data(animation, networks, SETTINGS)
+    (tmp_path / "page.html").write_text(webpage.render_page(data), encoding="utf-8")
+    with chromium.tab(tmp_path / "page.html", **NO_MOTION) as tab:
+        tab.page.evaluate("wamnet.ready")
+        told = draw(tab, frame=FRAME, seed=SEED, turn=TURN, colors=COLORS)
+        expected, _ = traced(told, features, SEED)
+        planes, first = {}, 0
+        for path in data["paths"]:
+            for number, plane in enumerate(path["planes"]):
+                planes[plane] = read(tab, f"sums_{first + number // 4}")[..., number % 4]
+            first += -(-len(path["planes"]) // 4)
+        names = P.planes_of(features)
+        for name in features:
+            here = [names.index(plane) for plane in P.planes_of((name,))]
+            found = np.stack([planes[names[place]] for place in here], axis=-1)
+            assert share_alike(found, expected[..., here]) >= 0.99, name
+        recoloured = read(tab, "unshadowed")
+        draw(tab, frame=FRAME, seed=SEED, turn=TURN)
+        assert np.any(read(tab, "unshadowed") != recoloured)
+        assert 0 < tab.page.evaluate("wamnet.page.renderer.check('full')")["share"] <= 1
+        assert tab.said == []
 
 
 def test_the_features_keep_the_bound_of_the_encoding(still, model):
@@ -200,7 +241,10 @@ def test_controls_work(still):
     assert still.state("turn")["yaw"] == 40
     page.locator("#camera-reset").click()
     page.locator("#light-0").fill("#ff0000")
-    assert still.state("colors")[0] == [1, 1e-3, 1e-3]
+    (color, other), own = still.state("colors"), scenes.WARM
+    assert np.mean(color) == pytest.approx(np.mean(own), rel=1e-15)  # some roundings of 2**-53
+    assert saturation_of(color) == pytest.approx(1 - 1e-3, rel=1e-15)
+    assert other == list(scenes.COOL)
     page.locator("#lights-reset").click()
     assert still.state("colors")[0] == list(scenes.WARM)
     page.locator("#size").select_option("96")
@@ -213,6 +257,87 @@ def test_controls_work(still):
     page.locator("#variant").select_option("fast-texture")
     still.until("wamnet.page.state.variant === 'fast-texture' && !wamnet.page.preparing")
     assert "within" in still.text("error")
+
+
+FITS = """[...document.querySelectorAll("main, main *")].every((element) =>
+  element.getBoundingClientRect().right <= document.querySelector("header").getBoundingClientRect().right)"""
+"""Nothing reaches over the edge that the title keeps."""
+
+BELOW = """[...document.querySelectorAll("figure > *, .controls, footer")].map((element) =>
+  element.getBoundingClientRect().top + scrollY)"""
+"""Where everything around the sentence is in the document."""
+
+
+def text_when(tab, condition):
+    """Return the sentence about what is outside once it is as it should be."""
+    tab.until(f"(() => {{ const text = document.getElementById('outside').textContent; {condition} }})()")
+    return tab.text("outside")
+
+
+def test_what_was_not_learned_is_said_beside_the_picture(still):
+    """In one sentence, and nothing below it moves; inside of the ranges there is none."""
+    page = still.page
+    page.evaluate("wamnet.go(); wamnet.page.turn(wamnet.parts.REST)")
+    assert text_when(still, "return text === '';") == ""
+    before = page.evaluate(BELOW)
+    page.locator("#yaw").fill("24")
+    page.locator("#yaw").fill("40")
+    said = "Outside of what the network has learned: the camera is 40° to the side (learned: -24° to 24°). "
+    assert text_when(still, "return text !== '';") == f"{said}Expect errors."
+    assert page.locator("#outside").is_visible()
+    page.locator("#pitch").fill("-60")
+    page.locator("#distance").fill("1.5")
+    page.locator("#light-1").fill("#0000ff")
+    text = text_when(still, "return text.includes('light 2');")
+    assert text == (
+        "Outside of what the network has learned: the camera is 40° to the side (learned: -24° to 24°), "
+        "60° down (8° down to 8° up), 1.5 times as far away (0.9 to 1.1), light 2 is 100 % saturated "
+        "(0 % to 50 %). Expect errors."
+    )
+    assert page.evaluate(BELOW) == before
+    page.locator("#lights-reset").click()
+    page.locator("#camera-reset").click()
+    text_when(still, "return text === '';")
+    assert page.locator("#outside").get_attribute("aria-live") == "polite"
+    assert not page.locator("#unknown-ranges").is_visible()
+
+
+@pytest.mark.parametrize("times", [(0.0, 8.0), (1.0, 3.0), (7.0, 9.0)], ids=str)
+@pytest.mark.parametrize("saturation", [None, (0.0, 0.5)], ids=str)
+def test_the_page_says_what_the_reference_says(still, times, saturation):
+    """Cameras and colours inside, at the limits and outside of ranges: as many things in both."""
+    ranges, own = replace(RANGES, time_s=times, saturation=saturation), [list(scenes.WARM), list(scenes.COOL)]
+    lights = [[{"color": color} for color in own]]
+    counts = []
+    for yaw, pitch, distance in ((0, 0, 1), (24, -8, 1.1), (25, 0, 1), (-40, 9, 0.5), (180, -75, 2)):
+        for picked in (own, [[1, 0, 0], [0.5, 1, 0.5]], [[0.2, 0.9, 0.3], own[1]], [[1, 1, 0.499], own[1]]):
+            for time in (0.0, 2.0, 3.5, 7.5):
+                colors = [
+                    color if color in own else still.page.evaluate(f"wamnet.parts.asBright({color}, {lamp})")
+                    for color, lamp in zip(picked, own, strict=True)
+                ]
+                turn = {"yaw": yaw, "pitch": pitch, "distance": distance}
+                moment = {"time": time, "turn": turn, "colors": colors}
+                given = [json.loads(ranges.to_json()), 8.0, moment, *lights]
+                found = still.page.evaluate("given => wamnet.parts.outside(...given)", given)
+                variation = Variation(yaw, pitch, distance, tuple(tuple(color) for color in colors))
+                scene = varied(scenes.canonical("minicubes", time=time), variation)
+                counts.append(len(found))
+                assert counts[-1] == len(outside(ranges, scene.info, own)), moment
+    assert min(counts) == 0
+    assert max(counts) >= 4
+
+
+def test_a_network_that_says_no_ranges_has_a_note(chromium, data, tmp_path):
+    unknown = json.loads(json.dumps(data))
+    for one in unknown["variants"]:
+        one["ranges"] = None
+    (tmp_path / "page.html").write_text(webpage.render_page(unknown), encoding="utf-8")
+    with chromium.tab(tmp_path / "page.html", **NO_MOTION) as tab:
+        tab.page.evaluate("wamnet.ready")
+        assert tab.page.locator("#unknown-ranges").is_visible()
+        assert tab.page.evaluate("wamnet.page.outside({ yaw: 90, pitch: 0, distance: 1 }, [])") == ""
+        assert tab.text("outside-room") == ""
 
 
 def test_the_pointer_turns_the_camera_and_moves_the_line(still):
@@ -253,7 +378,7 @@ def test_it_stands_still_where_motion_is_not(still):
 
 @pytest.mark.parametrize(
     "options",
-    [{}, {"color_scheme": "dark", "viewport": {"width": 400, "height": 800}}],
+    [{}, {"color_scheme": "dark", "viewport": {"width": 390, "height": 800}}],
     ids=["light", "dark"],
 )
 def test_people_who_do_not_see_it_can_use_it(chromium, path, options):
@@ -261,9 +386,16 @@ def test_people_who_do_not_see_it_can_use_it(chromium, path, options):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     with chromium.tab(path, **NO_MOTION, **options) as tab:
         tab.page.evaluate("wamnet.ready")
+        before = tab.page.evaluate(BELOW)
+        tab.page.evaluate("wamnet.page.turn({ yaw: -170, pitch: -75, distance: 2 })")
+        tab.page.locator("#light-0").fill("#ff0000")
+        tab.page.locator("#light-1").fill("#00ff00")
+        text_when(tab, "return text.includes('light 2');")
+        assert tab.page.evaluate(BELOW) == before
         found = axe.Axe().run(tab.page).response["violations"]
         assert [(one["id"], one["impact"]) for one in found] == []
         assert tab.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        assert tab.page.evaluate(FITS)
 
 
 @pytest.mark.parametrize(

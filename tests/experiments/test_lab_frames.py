@@ -68,7 +68,7 @@ def test_an_interrupted_run_keeps_what_was_done(tmp_path, monkeypatch):
         {"spp": 3},
         {"seed": 4},
         {"scene": "cornell"},
-        {"parameters": {"orbit_deg": 10.0}},
+        {"parameters": {"cool": (0.5, 0.5, 1.0)}},
         {"parameters": {"warm": (1.0, 0.5, 0.25)}},
     ],
     ids=str,

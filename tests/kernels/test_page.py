@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.scene import Sphere
 from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.variation import Ranges
 
 SETTINGS = Settings(max_depth=1)
 SCALES = dataset.Normalization(0.0, 12.0, (0.0, 0.0, 0.0), 6.0)
@@ -59,23 +60,46 @@ def test_a_still_scene_has_one_row_without_numbers():
     assert floats(numbers["rows"]).size == 0
 
 
-def test_every_feature_that_fits_is_encoded_in_passes_of_four(model_of):
-    """Six features have 16 channels: as many as four buffers hold."""
-    features = [name for name in dataset.FEATURES if name != "unshadowed"]
-    model = model_of(*features)
-    data = P.page_data(animation("cornell", 0.0), P.networks_of(model, rank=2), SETTINGS)
+def test_features_are_encoded_in_passes_of_four(model_of):
+    """These have 15 channels: as many as four buffers hold, in one kernel of paths."""
+    features = ("color", "normal", "albedo", "position", "unshadowed")
+    data = P.page_data(animation("cornell", 0.0), P.networks_of(model_of(*features), rank=2), SETTINGS)
     names = [[image["name"] for image in encoder["images"]] for encoder in data["encoders"]]
-    assert [len(part) for part in names] == [4, 2]
-    assert sorted(names[0] + names[1]) == sorted(features)
-    assert len(data["path"]["planes"]) == 16
+    assert names == [[*features[:4]], ["unshadowed"]]
+    (path,) = data["paths"]
+    assert len(path["planes"]) == 15
     vectors = -(-len(data["numbers"]["names"]) // 4)
-    assert f"uniform vec4 scene_numbers[{vectors}];" in data["path"]["source"]
+    assert f"uniform vec4 scene_numbers[{vectors}];" in path["source"]
     assert data["lights"] == [{"color": [1.0, 0.78, 0.5], "power": 14.0, "area": 0.25}]
+
+
+def test_all_features_take_a_second_kernel_that_ends_at_the_first_hit(model_of):
+    model = model_of(*dataset.FEATURES)
+    data = P.page_data(animation("cornell", 0.0), P.networks_of(model, rank=2), SETTINGS)
+    whole, first_hit = data["paths"]
+    assert len(whole["planes"]) + len(first_hit["planes"]) == 19
+    assert [path["settings"]["max_depth"] for path in data["paths"]] == [SETTINGS.max_depth, 0]
+    assert "color_r" in whole["planes"]
+    encoded = [[image["name"] for image in encoder["images"]] for encoder in data["encoders"]]
+    for encoder, names in zip(data["encoders"], encoded, strict=True):
+        assert set(P.planes_of(names)) <= set(data["paths"][encoder["path"]]["planes"])
+    assert sorted(name for names in encoded for name in names) == sorted(dataset.FEATURES)
+
+
+@pytest.mark.parametrize("start", range(len(dataset.FEATURES)))
+def test_parts_fit_into_the_buffers_and_colour_is_in_the_first(start):
+    """Whatever order a model names its features in, each is in one part."""
+    names = [*dataset.FEATURES]
+    features = [*names[start:], *names[:start]]
+    parts = P.drawn_together(features)
+    assert sorted(name for part in parts for name in part) == sorted(features)
+    assert all(0 < len(P.planes_of(part)) <= 4 * P.MOST_BUFFERS for part in parts)
+    assert "color" in parts[0]
 
 
 def test_what_a_page_shows_is_encoded_though_no_network_reads_it(model_of):
     data = P.page_data(animation("empty", 0.0), P.networks_of(model_of("depth")), SETTINGS)
-    assert [image["name"] for image in data["encoders"][0]["images"]] == ["depth", "color", "normal"]
+    assert [image["name"] for image in data["encoders"][0]["images"]] == ["color", "depth", "normal"]
     assert data["variants"][0]["passes"][0]["reads"] == ["depth"]
     assert set(data["check"]["images"]) == {"depth", "color", "normal"}
 
@@ -94,6 +118,26 @@ def test_variants_say_what_they_cost_and_how_far_they_are(model_of):
         assert 0 < floats(one["check"]["bound"]).max() <= one["bound"]
 
 
+def test_ranges_are_those_of_the_scene_that_was_learned(model_of):
+    """A model that says none, or has learned another scene, has none here."""
+    ranges = Ranges(yaw_deg=(-24.0, 24.0), saturation=(0.0, 0.5))
+    said = {"trained_on_ranges": ranges.to_json()}
+    model = model_of("color")
+    for info, found in (
+        ({}, None),
+        (said, asdict(ranges)),
+        ({**said, "trained_on_scene": "empty, cornell"}, asdict(ranges)),
+        ({**said, "trained_on_scene": "minicubes"}, None),
+    ):
+        assert P.learned_ranges(replace(model, info=info), "cornell") == found
+    with pytest.raises(InputError, match="JSON of ranges"):
+        P.learned_ranges(replace(model, info={"trained_on_ranges": "[]"}), "cornell")
+    networks = P.networks_of(model, replace(model, info=said), rank=1)
+    data = P.page_data(animation("cornell", 0.0), networks, SETTINGS)
+    assert [one["ranges"] for one in data["variants"]] == [None, asdict(ranges), asdict(ranges)]
+    assert data["turn_s"] == scenes.TURN_SECONDS
+
+
 def test_the_bound_is_rounded_up():
     exact = np.array([1e-7, 0.1, 1 / 3])
     assert np.all(P._raised(exact).astype(np.float64) >= exact)
@@ -104,11 +148,6 @@ def test_models_that_need_two_encodings_are_refused(model_of):
     other = replace(model, normalization=replace(SCALES, depth_scale=2.0))
     with pytest.raises(InputError, match="one page encodes once"):
         P.page_data(animation("empty", 0.0), P.networks_of(model, other), SETTINGS)
-
-
-def test_more_numbers_a_pixel_than_buffers_hold_are_refused(model_of):
-    with pytest.raises(InputError, match="WebGL 2 draws 16 numbers a pixel"):
-        P.page_data(animation("empty", 0.0), P.networks_of(model_of(*dataset.FEATURES)), SETTINGS)
 
 
 def test_too_many_moving_numbers_are_refused():

@@ -1,7 +1,7 @@
 """`wamnet demo`: the whole way, from a scene to a report, judged on frames that the network has not seen.
 
 1. Make a data set of the scene's animation: noisy frames and references at training times, and at test times
-   between them [`render_frames`].
+   of other poses [`render_frames`].
 2. Train the network on the training frames [`train_network`].
 3. Compile it for every executor, run each that is there on the first test frame, and the best one on all
    [`run_kernels`].
@@ -79,9 +79,9 @@ _Result = TypeVar("_Result")
 class Plan:
     """All sizes of a demonstration; the defaults take two to four minutes on two cores.
 
-    The frames are those of `wamnet dataset`: test times lie between training times, and the network never
-    sees them. Many targets of `train_spp` samples teach more than few clean ones; what is judged has
-    references of `reference_spp`. `steps` None means the preset's.
+    The frames are those of `wamnet dataset`: the network never sees a test frame's pose. Many targets of
+    `train_spp` samples teach more than few clean ones; what is judged has references of `reference_spp`.
+    `steps` None means the preset's.
     """
 
     scene: str = "minicubes"

@@ -1,6 +1,6 @@
 """What decisions cost or gain that depart from the paper or fill what it leaves open (spec/departures.md).
 
-1. Noisy frames and references of `minicubes` at training times, and at two times between them.
+1. Noisy frames and references of `minicubes` at training times, and at two that continue their sequence.
 2. Each choice differs from the preset `paper` in one thing [`CHOICES`]: in the frames [`encoded`], in how
    minibatches are picked [`picks`], or in the loss [`fit`]. All else is the reference's own.
 3. PSNR of display-encoded colour on the test times, over seeds [`score`]; a Markdown table.
@@ -76,8 +76,8 @@ class Scale:
     recipe: Recipe
 
 
-UNSEEN_TIMES = (2.5, 5.5)
-"""Times of the test frames, in seconds: half way between two of eight training times."""
+UNSEEN = 2
+"""Number of test frames."""
 
 SCALES: Mapping[str, Scale] = {
     "toy": Scale(1, 8, 2, replace(PAPER, window=Window(4), widths=(4, 4), n_windows=32, batch=16, steps=4)),
@@ -169,12 +169,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Measure all choices and write the table."""
     given = command.parser(__doc__ or "", "departures").parse_args(arguments)
     scale = SCALES[given.scale]
-    times = [TURN_SECONDS * i / scale.train for i in range(scale.train)]
-    shots = [Shot(time=time, size=scale.size, seed=i) for i, time in enumerate([*times, *UNSEEN_TIMES])]
+    times, tests = frames.split_times(scale.train, UNSEEN, TURN_SECONDS)
+    shots = [Shot(time=time, size=scale.size, seed=i) for i, time in enumerate([*times, *tests])]
     found = frames.pairs(given.cache, shots, scale.spp, given.executor)
-    learned, tests = found[: len(times)], found[len(times) :]
+    learned, unseen = found[: len(times)], found[len(times) :]
     results = Results.open(given.output / "results.json", "departures", {"scale": given.scale})
-    work = {name: partial(measured, scale, learned, tests, choice) for name, choice in CHOICES.items()}
+    work = {name: partial(measured, scale, learned, unseen, choice) for name, choice in CHOICES.items()}
     fill(results, work, given.seeds)
     text = summed_up(results, given.seeds)
     write_text(given.output / "departures.md", text)

@@ -1,7 +1,7 @@
 """Which recipe to train with: the paper's protocol and candidates for the short preset, on unseen frames.
 
 1. Render noisy frames and references of `minicubes` over one turn, and at two times that no recipe is trained
-   on, each half way between two training times [`frames`]. They are kept in a folder for the next run.
+   on, which continue their golden sequence [`frames`]. They are kept in a folder for the next run.
 2. Train each recipe, the paper's on one pair, all others on all pairs, and compare pictures [`score`].
 3. Print a Markdown table [`main`]: seconds, and PSNR and SSIM of display-encoded colour.
 
@@ -30,8 +30,8 @@ from wamnet.refimpl.denoise import denoise
 from wamnet.refimpl.scenes import TURN_SECONDS
 from wamnet.refimpl.train import PAPER, SHORT, Recipe, model_of, train
 
-UNSEEN_TIMES = (2.5, 5.5)
-"""Times of the test frames, in seconds; both lie half way between training times if their number is 8 n."""
+UNSEEN = 2
+"""Number of test frames."""
 
 CANDIDATES: dict[str, Recipe] = {
     "paper": PAPER,
@@ -111,10 +111,9 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", default=["paper", "short"], help="names, or key=value,...")
     parser.add_argument("--executor", default="numpy", choices=["numpy", "opencl"], help="what trains")
     options = parser.parse_args()
-    unseen = frames(options.frames, options.size, UNSEEN_TIMES, options.unseen_spp)
-    step = TURN_SECONDS / options.training_frames
-    times = [(UNSEEN_TIMES[0] + (k + 0.5) * step) % TURN_SECONDS for k in range(options.training_frames)]
+    times, tests = lab.frames.split_times(options.training_frames, UNSEEN, TURN_SECONDS)
     trained = frames(options.frames, options.size, times, options.reference_spp)
+    unseen = frames(options.frames, options.size, tests, options.unseen_spp)
     tested = [trained[0], *unseen]
     print("| recipe | s | PSNR dB: a training frame, unseen frames | SSIM |\n|---|---|---|---|", flush=True)
     row("input, 1 spp", 0.0, [_targets(pair) for pair in tested])

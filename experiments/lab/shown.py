@@ -62,38 +62,34 @@ QUALITY = (
 """Columns of the scores of pictures."""
 
 
-def quality(scene: str) -> TableOf:
-    """Return the rows of a scene, named as the experiment names them."""
+def quality(name: str, split: str = "test", only: Sequence[str] = ()) -> TableOf:
+    """Return the rows of a set's frames, inside of its ranges or outside; all rows unless some are named."""
 
     def made(records: Records) -> str:
-        rows = importlib.import_module("quality").ROWS
-        found = records["quality"]
-        names = {f"{scene}: {row}": rows[row].text for row in rows}
-        shown = {name: text for name, text in names.items() if name in found.configurations()}
-        return tables.table(found, intervals(found, QUALITY), shown)
+        module, found = importlib.import_module("quality"), records["quality"]
+        texts = {module.configuration(name, split, row): module.ROWS[row].text for row in only or module.ROWS}
+        shown = {key: text for key, text in texts.items() if found.summary(key, "psnr")}
+        columns = [column for column in QUALITY if any(found.summary(key, column.value) for key in shown)]
+        return tables.table(found, intervals(found, columns), shown)
 
     return made
 
 
-def ahead(one: str, other: str, value: str = "psnr") -> Callable[[Records], str]:
-    """Return by how much one configuration of `quality` is ahead of another, with its interval."""
+def ahead(name: str, split: str = "test", ours: str = "best-16", value: str = "psnr") -> TableOf:
+    """Return by how much a row of `quality` is ahead of Open Image Denoise with the same clean features."""
 
     def made(records: Records) -> str:
-        found = records["quality"]
-        return paired(found.per_pose(one, value), found.per_pose(other, value)).text(1)
+        module, found = importlib.import_module("quality"), records["quality"]
+        one, other = (
+            found.per_pose(module.configuration(name, split, row), value) for row in (ours, "oidn-clean16")
+        )
+        return paired(one, other).text(1)
 
     return made
 
 
 README_ROWS = ("input", "oidn-1", "best-1", "oidn-clean16", "best-16")
 """Rows of `quality` that the README shows: the same features for both denoisers."""
-
-
-def quality_readme(records: Records) -> str:
-    """Return the README's rows of the mini cubes."""
-    rows = importlib.import_module("quality").ROWS
-    names = {f"minicubes: {row}": rows[row].text for row in README_ROWS}
-    return tables.table(records["quality"], intervals(records["quality"], QUALITY), names)
 
 
 def frame_ms(row: str) -> Callable[[Records], str]:
@@ -340,14 +336,17 @@ def demo_runs(records: Records) -> str:
 
 
 def draw_quality(records: Records) -> Any:
-    """Draw the PSNR of each row on the mini cubes."""
-    rows, found = importlib.import_module("quality").ROWS, records["quality"]
-    shown = {}
-    for row in rows:
-        if (at := found.interval(f"minicubes: {row}", "psnr")) is not None:
-            shown[rows[row].text] = (at.mean, at.low, at.high)
-    figure, (axis,) = plots.axes(1, (7.5, 0.35 * len(shown) + 0.8))
-    plots.bars(axis, shown, "PSNR on unseen frames of the mini cubes, dB")
+    """Draw the PSNR of each row on the mini cubes, inside of the ranges and outside."""
+    module, found = importlib.import_module("quality"), records["quality"]
+    figure, axes = plots.axes(2, (10.0, 3.6))
+    for axis, (split, text) in zip(axes, module.SPLITS.items(), strict=True):
+        shown = {}
+        for row, kind in module.ROWS.items():
+            at = found.interval(module.configuration("minicubes", split, row), "psnr")
+            if at is not None:
+                shown[kind.text] = (at.mean, at.low, at.high)
+        plots.bars(axis, shown, f"PSNR {text}, dB")
+    axes[1].set_yticklabels([])
     return figure
 
 
@@ -417,9 +416,11 @@ PLOTS: Mapping[str, Plot] = {
 """The plots by the names of their files."""
 
 FIGURES: Mapping[str, Callable[[Records], str]] = {
-    "ahead-of-oidn": ahead("minicubes: best-16", "minicubes: oidn-clean16"),
-    "ahead-of-oidn-cornell": ahead("cornell: best-16", "cornell: oidn-clean16"),
-    "ahead-of-oidn-glossy": ahead("glossy: best-16", "glossy: oidn-clean16"),
+    "ahead-of-oidn": ahead("minicubes"),
+    "ahead-of-oidn-cornell": ahead("cornell"),
+    "ahead-of-oidn-glossy": ahead("glossy"),
+    "ahead-of-oidn-lamps": ahead("minicubes-lamps", ours="shipped"),
+    "ahead-of-oidn-outside": ahead("minicubes", "outside"),
     "best-ms": frame_ms("best-16"),
     "departures-clip": departure("unclipped", -1.0),
     "departures-loss": departure("summed"),
@@ -453,8 +454,10 @@ TABLES: Mapping[str, TableOf] = {
     "presets": as_printed("presets"),
     "quality-cornell": quality("cornell"),
     "quality-glossy": quality("glossy"),
+    "quality-lamps": quality("minicubes-lamps"),
     "quality-minicubes": quality("minicubes"),
-    "quality-readme": quality_readme,
+    "quality-outside": quality("minicubes", "outside"),
+    "quality-readme": quality("minicubes", only=README_ROWS),
     "quality-times": quality_times,
     "ranks": as_printed("ranks"),
     "savings": as_printed("savings"),

@@ -15,6 +15,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from wamnet.refimpl.errors import InputError
+
 from . import plots, printed, tables
 from .intervals import paired
 from .plots import Plot
@@ -69,6 +71,10 @@ def quality(name: str, split: str = "test", only: Sequence[str] = ()) -> TableOf
         module, found = importlib.import_module("quality"), records["quality"]
         texts = {module.configuration(name, split, row): module.ROWS[row].text for row in only or module.ROWS}
         shown = {key: text for key, text in texts.items() if found.summary(key, "psnr")}
+        if not shown:
+            raise InputError(
+                "record quality", f"{name}, {split}", "it has no rows of these frames", "make them"
+            )
         columns = [column for column in QUALITY if any(found.summary(key, column.value) for key in shown)]
         return tables.table(found, intervals(found, columns), shown)
 
@@ -338,7 +344,7 @@ def demo_runs(records: Records) -> str:
 def draw_quality(records: Records) -> Any:
     """Draw the PSNR of each row on the mini cubes, inside of the ranges and outside."""
     module, found = importlib.import_module("quality"), records["quality"]
-    figure, axes = plots.axes(2, (10.0, 3.6))
+    figure, axes = plots.axes(2, (11.0, 3.6))
     for axis, (split, text) in zip(axes, module.SPLITS.items(), strict=True):
         shown = {}
         for row, kind in module.ROWS.items():
@@ -346,8 +352,16 @@ def draw_quality(records: Records) -> Any:
             if at is not None:
                 shown[kind.text] = (at.mean, at.low, at.high)
         plots.bars(axis, shown, f"PSNR {text}, dB")
-    axes[1].set_yticklabels([])
+    low, high = (choose(end[at] for end in map(_ends, axes)) for at, choose in ((0, min), (1, max)))
+    for axis in axes:
+        axis.set_xlim(low, high)
     return figure
+
+
+def _ends(axis: Any) -> tuple[float, float]:
+    """Return the ends of an axis of x."""
+    low, high = axis.get_xlim()
+    return float(low), float(high)
 
 
 def draw_ablations(records: Records) -> Any:

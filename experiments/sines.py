@@ -213,6 +213,7 @@ def every(executor: Any, cosine: bool, share: float, least: float = 0.0) -> bool
                 largest[degree], at[degree] = float(off[worst]), float(both[worst])
     name = "cosine" if cosine else "sine"
     print(f"{name}: {count} numbers on {executor.device}, {time.perf_counter() - begin:.0f} s", flush=True)
+    print(f"\n| degree | {name} | at | proven |\n|---|---|---|---|")
     holds = True
     for degree, polynomial in sine.POLYNOMIALS.items():
         bound = polynomial.cosine_error if cosine else polynomial.error

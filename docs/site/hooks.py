@@ -67,6 +67,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         "index.md",
         {"Tutorial": pages("tutorial")},
         {"Exercises": pages("exercises")},
+        "results.md",
         "listing.md",
         {"Spec": parts},
     ]

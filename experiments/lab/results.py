@@ -15,6 +15,7 @@ from __future__ import annotations
 import fcntl
 import json
 import math
+import re
 import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -78,6 +79,15 @@ def _data(path: Path) -> dict[str, Any]:
         rule = f"it is no file of results ({type(error).__name__})"
         raise InputError("file of results", str(path), rule, WAY_OUT) from None
     return data
+
+
+def number(value: Any) -> float:
+    """Return a number, or the one that a text begins with: `1,024 spp` is 1024."""
+    if isinstance(value, int | float):
+        return float(value)
+    if found := re.match(r"[-+]?[\d,]*\.?\d+(?:e[-+]?\d+)?", value.strip("* ")):
+        return float(found[0].replace(",", ""))
+    raise InputError("value", value, "it does not begin with a number", "show another value")
 
 
 def written(data: Mapping[str, Any]) -> str:
@@ -169,7 +179,7 @@ class Results:
         """Return a number's values (seeds, poses): of each pose where they are kept, else the means."""
         kept = [frames[name] for frames in self.of(configuration, PER_FRAME) if name in frames]
         rows = kept or [value for value in self.of(configuration, name) if value is not None]
-        return [list(map(float, row)) if isinstance(row, list) else [float(row)] for row in rows]
+        return [list(map(number, row)) if isinstance(row, list) else [number(row)] for row in rows]
 
     def interval(self, configuration: str, name: str) -> Interval | None:
         """Return mean and interval of a number over seeds and poses, or None without a record of it."""

@@ -1,0 +1,131 @@
+"""Plots in git: SVG drawn from records, the same bytes wherever the same versions draw them.
+
+1. A plot is a function of the records that returns a figure of matplotlib [`shown.PLOTS`]; its file is
+   docs/images/NAME.svg.
+2. Its last line has a digest of the records behind it and of the text of these functions [`digest`]: a plot
+   of other records or by other code is seen without drawing it again, whatever version of matplotlib drew it
+   [`stale`].
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from .figures import MARKERS, STYLES
+from .records import FOLDER, ROOT, Records, pending
+from .results import Results
+
+IMAGES = "docs/images"
+"""The folder of the plots."""
+
+LINE = "<!-- records and code: {} -->\n"
+"""The last line of a plot."""
+
+Line = Sequence[tuple[float, float, float, float]]
+"""Points (x, mean, low, high)."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """What draws a plot, the records that it shows, and what a reader is told under it."""
+
+    draw: Callable[[Records], Any]
+    records: Sequence[str]
+    caption: str
+
+
+def digest(plot: Plot, records: Records) -> str:
+    """Return the SHA-256 of the records behind a plot and of the code that draws it."""
+    made = hashlib.sha256()
+    for path in (records.folder / f"{name}.json" for name in plot.records):
+        made.update(path.read_bytes())
+    for path in (Path(__file__), Path(__file__).with_name("shown.py")):
+        made.update(path.read_bytes())
+    return made.hexdigest()
+
+
+def drawn_from(path: Path) -> str:
+    """Return the digest that a plot's file has, or nothing."""
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    found = re.findall(LINE.strip().format(r"([0-9a-f]{64})"), text[-200:])
+    return found[-1] if found else ""
+
+
+def ready(plot: Plot, records: Records, folder: Path = FOLDER) -> bool:
+    """Return whether all of a plot's records are there; one that is not must be in `pending.txt`."""
+    left = [name for name in plot.records if name not in records]
+    for name in left:
+        if name not in pending(folder):
+            records[name]  # says that it is missing
+    return not left
+
+
+def stale(records: Records, plots: Mapping[str, Plot], root: Path = ROOT) -> Iterator[tuple[Path, bytes]]:
+    """Yield the plots that are not of these records and this code, each with its new file."""
+    for name, plot in plots.items():
+        path = root / IMAGES / f"{name}.svg"
+        if ready(plot, records) and drawn_from(path) != (made := digest(plot, records)):
+            yield path, svg(plot.draw(records)) + LINE.format(made).encode()
+
+
+def svg(figure: Any) -> bytes:
+    """Return a figure as SVG without a date and with names that do not change from run to run."""
+    import matplotlib as mpl
+
+    held = BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "wamnet", "svg.fonttype": "none"}):
+        figure.savefig(held, format="svg", metadata={"Date": None, "Creator": None})
+    lines = held.getvalue().decode().splitlines()
+    return ("\n".join(line.rstrip() for line in lines) + "\n").encode()
+
+
+def axes(columns: int, inches: tuple[float, float]) -> tuple[Any, Sequence[Any]]:
+    """Return a white figure, and its axes side by side."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=inches, layout="constrained", facecolor="white")
+    return figure, figure.subplots(1, columns, squeeze=False)[0]
+
+
+def points(found: Results, names: Mapping[float, str], value: str) -> Line:
+    """Return the points of a line: by x the configuration whose mean and interval are there."""
+    made = []
+    for x, name in names.items():
+        if (at := found.interval(name, value)) is not None:
+            made.append((x, at.mean, at.low, at.high))
+    return made
+
+
+def lines(axis: Any, found: Mapping[str, Line], labels: tuple[str, str], log: bool = False) -> None:
+    """Draw lines of means with bands of their intervals."""
+    for number, (name, points) in enumerate(found.items()):
+        if not points:
+            continue
+        x, mean, low, high = zip(*points, strict=True)
+        style, marker = STYLES[number % len(STYLES)], MARKERS[number % len(MARKERS)]
+        (line,) = axis.plot(x, mean, style, marker=marker, markersize=4, linewidth=1.3, label=name)
+        axis.fill_between(x, low, high, color=line.get_color(), alpha=0.18, linewidth=0)
+    axis.set_xlabel(labels[0])
+    axis.set_ylabel(labels[1])
+    axis.grid(visible=True, alpha=0.2, linewidth=0.6)
+    if log:
+        axis.set_xscale("log")
+    if len(found) > 1:
+        axis.legend(frameon=False, fontsize=8)
+
+
+def bars(axis: Any, found: Mapping[str, tuple[float, float, float]], label: str) -> None:
+    """Draw a mean (mean, low, high) for each name, with its interval, the first on top."""
+    names = list(found)[::-1]
+    for at, name in enumerate(names):
+        mean, low, high = found[name]
+        axis.errorbar(mean, at, xerr=[[mean - low], [high - mean]], fmt="o", capsize=3, color="#b4530a")
+    axis.set_yticks(range(len(names)), names)
+    axis.set_xlabel(label)
+    axis.grid(visible=True, alpha=0.2, linewidth=0.6)

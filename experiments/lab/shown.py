@@ -1,0 +1,487 @@
+"""What texts show of the records: tables, figures in sentences, and plots, by name.
+
+1. A table is a function of the records in `TABLES` [`lab/texts.py`]; most are made by [`study`], from the
+   columns that the experiment itself prints, or by [`as_printed`], from what a program has printed.
+2. A figure that is computed from several values is a function in `FIGURES`; one that is a value needs none.
+3. A plot is a [`plots.Plot`] in `PLOTS`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import statistics
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from wamnet.refimpl.errors import InputError
+
+from . import plots, printed, tables
+from .intervals import paired
+from .plots import Plot
+from .records import Records
+from .results import PER_FRAME, Results, number
+from .tables import Column
+
+TableOf = Callable[[Records], str]
+
+
+def study(name: str, first: str = "", columns: str = "COLUMNS") -> TableOf:
+    """Return the table of a study: all its configurations, under the columns of its module [`intervals`]."""
+
+    def made(records: Records) -> str:
+        shown = getattr(importlib.import_module(name), columns)
+        return tables.table(records[name], intervals(records[name], shown), first=first)
+
+    return made
+
+
+def intervals(found: Results, columns: Sequence[Column]) -> list[Column]:
+    """Return columns with intervals in place of deviations where the numbers of each pose were kept."""
+    kept = {value for record in found.records() for value in record["values"].get(PER_FRAME, {})}
+    return [replace(column, interval=True) if column.value in kept else column for column in columns]
+
+
+def as_printed(record: str, number: int | None = None) -> TableOf:
+    """Return a table as a program has printed it; all of them as one without a number."""
+    return lambda records: printed.table(records[record], number)
+
+
+def chosen(record: str, columns: Sequence[Column], rows: Mapping[str, str], first: str = "") -> TableOf:
+    """Return a table of some configurations, by what a reader calls them, and some values."""
+    return lambda records: tables.table(records[record], columns, rows, first)
+
+
+# ---- the presets beside Open Image Denoise --------------------------------------------------------------
+
+QUALITY = (
+    Column("psnr", "PSNR, dB", 2),
+    Column("ssim", "SSIM", 3),
+    Column("flip", "FLIP", 3),
+    Column("spp", "worth, spp", 0),
+)
+"""Columns of the scores of pictures."""
+
+
+def quality(name: str, split: str = "test", only: Sequence[str] = ()) -> TableOf:
+    """Return the rows of a set's frames, inside of its ranges or outside; all rows unless some are named."""
+
+    def made(records: Records) -> str:
+        module, found = importlib.import_module("quality"), records["quality"]
+        texts = {module.configuration(name, split, row): module.ROWS[row].text for row in only or module.ROWS}
+        shown = {key: text for key, text in texts.items() if found.summary(key, "psnr")}
+        if not shown:
+            raise InputError(
+                "record quality", f"{name}, {split}", "it has no rows of these frames", "make them"
+            )
+        columns = [column for column in QUALITY if any(found.summary(key, column.value) for key in shown)]
+        return tables.table(found, intervals(found, columns), shown)
+
+    return made
+
+
+def ahead(name: str, split: str = "test", ours: str = "best-16", value: str = "psnr") -> TableOf:
+    """Return by how much a row of `quality` is ahead of Open Image Denoise with the same clean features."""
+
+    def made(records: Records) -> str:
+        module, found = importlib.import_module("quality"), records["quality"]
+        one, other = (
+            found.per_pose(module.configuration(name, split, row), value) for row in (ours, "oidn-clean16")
+        )
+        return paired(one, other).text(1)
+
+    return made
+
+
+README_ROWS = ("input", "oidn-1", "best-1", "oidn-clean16", "best-16")
+"""Rows of `quality` that the README shows: the same features for both denoisers."""
+
+
+def frame_ms(row: str) -> Callable[[Records], str]:
+    """Return the median milliseconds of a frame by a row of `quality`."""
+
+    def made(records: Records) -> str:
+        times = records["quality-times"].of("times", "seconds")[0]
+        return f"{1000.0 * statistics.median(times[row]):.0f}"
+
+    return made
+
+
+def quality_times(records: Records) -> str:
+    """Return the times of a frame, medians and ranges of turns."""
+    seconds = records["quality-times"].of("times", "seconds")[0]
+    cells = [
+        [name, f"{1000 * statistics.median(s):.1f}", f"{1000 * min(s):.1f} - {1000 * max(s):.1f}"]
+        for name, s in seconds.items()
+    ]
+    return tables.markdown(["a frame, in turns", "ms, median", "ms, range"], cells)
+
+
+# ---- the paper's table and claims -----------------------------------------------------------------------
+
+
+def table1(records: Records) -> str:
+    """Return the table as the experiment prints it."""
+    times = records["table1-times"]
+    made: str = importlib.import_module("table1").written(records["table1"], times)
+    return made
+
+
+PRINTED: Mapping[str, tuple[str, str]] = {
+    "input": ("82.93", "0.21"),
+    "dncnn": ("79.03", "0.44"),
+    "wamnet": ("48.04", "0.68"),
+    "pix2pix": ("39.28", "0.70"),
+}
+"""MSE and SSIM of the paper's Table 1."""
+
+PAPER_ROWS = ("input", "dncnn", "wamnet-color", "wamnet", "pix2pix", "svgf", "nlm", "render30")
+"""Rows of Table 1 that the README shows."""
+
+
+def table1_readme(records: Records) -> str:
+    """Return the README's rows of Table 1, beside what the paper prints."""
+    found, rows = records["table1"], importlib.import_module("baselines.rows").ROWS
+    cells = []
+    for row in (row for row in PAPER_ROWS if row in found.configurations()):
+        mse, ssim = (f"; {text}" if text else "" for text in PRINTED.get(row, ("", "")))
+        cells.append(
+            [
+                rows[row].text,
+                found.text(row, "psnr", 2),
+                f"{_mean(found, row, 'paper'):.2f}",
+                f"{_mean(found, row, 'wrapped'):.1f}{mse}",
+                f"{_mean(found, row, 'ssim'):.3f}{ssim}",
+                f"{_mean(found, row, 'flip'):.3f}",
+                f"{_mean(found, row, 'worth'):.0f}",
+            ]
+        )
+    heads = [
+        "",
+        "PSNR, dB",
+        'the paper\'s "PSNR"',
+        "MSE modulo 256; the paper",
+        "SSIM; the paper",
+        "FLIP",
+        "worth",
+    ]
+    return tables.markdown(heads, cells)
+
+
+def _mean(found: Results, configuration: str, value: str) -> float:
+    """Return the mean of a number over the seeds; NaN without one."""
+    summary = found.summary(configuration, value)
+    return summary.mean if summary else math.nan
+
+
+def departures(records: Records) -> str:
+    """Return the PSNR of each choice that the paper leaves open."""
+    choices = importlib.import_module("departures").CHOICES
+    names = {name: choice.text for name, choice in choices.items()}
+    return tables.table(records["departures"], [Column("psnr", "PSNR, dB")], names, "choice")
+
+
+def departure(name: str, sign: float = 1.0) -> Callable[[Records], str]:
+    """Return how many decibels a choice has more than that of the spec, or, with sign -1, less."""
+
+    def made(records: Records) -> str:
+        found = records["departures"]
+        first = found.configurations()[0]
+        return f"{sign * (_mean(found, name, 'psnr') - _mean(found, first, 'psnr')):.2f}"
+
+    return made
+
+
+def learning_curve(records: Records) -> str:
+    """Return the quality after so many seconds."""
+    module = importlib.import_module("learning_curve")
+    found = records["learning_curve"]
+    heads = ["preset", *(f"after {mark:g} s" for mark in module.MARKS_S), "at the end, dB", "s"]
+    rows = []
+    for name in found.configurations():
+        curves = found.of(name, "curve")
+        cells = [
+            module._cell([module.at(curve, mark, "psnr") for curve in curves]) for mark in module.MARKS_S
+        ]
+        ends = [module._cell([c[-1][what] for c in curves], n) for what, n in (("psnr", 2), ("seconds", 0))]
+        rows.append([name, *cells, *ends])
+    return tables.markdown(heads, rows)
+
+
+def generalisation(records: Records) -> str:
+    """Return the PSNR by the orientation of the camera."""
+    found = records["generalisation"]
+    values = dict.fromkeys(key for record in found.records() for key in record["values"])
+    shown = [value for value in values if value.startswith("psnr at ")]
+    columns = [Column(value, value.removeprefix("psnr at "), 2) for value in shown]
+    return tables.table(found, intervals(found, columns), first="trained on orientations: PSNR, dB; degrees")
+
+
+# ---- speed ----------------------------------------------------------------------------------------------
+
+
+def bench(record: str) -> TableOf:
+    """Return the contenders of `wamnet bench` that were measured, the fastest first."""
+
+    def made(records: Records) -> str:
+        found = records[record]
+        rows = [r["values"] for r in found.records() if r["values"].get("ms.median") is not None]
+        rows = [row for row in rows if row.get("kind")]
+        return tables.markdown(
+            [
+                "by",
+                "ms, median",
+                "frames/s",
+                "compile, s",
+                "largest error",
+                "bound of rounding",
+                "PSNR lost, dB",
+            ],
+            [
+                [
+                    row["text"],
+                    _short(row, "ms.median", ",.0f" if row["ms.median"] >= 100 else ".1f"),
+                    _short(row, "frames_per_s", ".1f"),
+                    _short(row, "compile_s", ".1f"),
+                    _short(row, "error.max", ".1e"),
+                    _short(row, "rounding.bound", ".1e"),
+                    _short(row, "quality.psnr_loss_db", ".2f"),
+                ]
+                for row in sorted(rows, key=lambda row: row["ms.median"])
+            ],
+        )
+
+    return made
+
+
+def _short(row: Mapping[str, Any], key: str, form: str) -> str:
+    """Return a number of a row, or a dash."""
+    return "-" if row.get(key) is None else format(row[key], form)
+
+
+def train_speed(records: Records) -> str:
+    """Return the time of a step and of all steps by each trainer, both presets side by side."""
+    found, names = (
+        records["bench-train"],
+        {"numpy": "the reference, NumPy", "torch": "PyTorch", "opencl": "compiled"},
+    )
+    rows: dict[str, list[str]] = {}
+    heads = ["by"]
+    for at, preset in ((1, "paper"), (2, "short")):
+        mine = [r["values"] for r in found.records() if r["values"]["table"] == at]
+        steps = list(mine[0])[-1]
+        heads += [f"`{preset}`, ms a step", f"all {steps}"]
+        for row in mine:
+            rows.setdefault(names[row["by"]], []).extend([row["ms a step"], row[steps]])
+    return tables.markdown(heads, [[name, *row] for name, row in rows.items()])
+
+
+def paper_hours(records: Records) -> str:
+    """Return the hours of the paper's data set, 1,100 frames of 2^20 pixels and 1,024 samples, by OpenCL."""
+    rows = [r["values"] for r in records["bench-render-kernels"].records()]
+    (speed,) = (number(row["samples/s"]) for row in rows if row["by"].startswith("opencl"))
+    return f"{1100 * 2**20 * 1024 / speed / 3600:.0f}"
+
+
+# ---- the sine -------------------------------------------------------------------------------------------
+
+
+def sines(records: Records) -> str:
+    """Return the errors of all sines; the emitted ones once, where all executors print the same digits."""
+    found = [r["values"] for r in records["sines"].records() if r["values"]["table"] == 1]
+    rows: dict[tuple[str, ...], list[str]] = {}
+    for values in found:
+        place, *cells = [text for head, text in values.items() if head != "table"]
+        rows.setdefault(tuple(cells), []).append(place)
+    heads = [head for head in found[0] if head != "table"]
+    return tables.markdown(heads, [[", ".join(places), *cells] for cells, places in rows.items()])
+
+
+def sines_every(records: Records) -> str:
+    """Return the largest errors of sine and cosine over all numbers, side by side."""
+    found = [r["values"] for r in records["sines-every"].records()]
+    sine, cosine = ([row for row in found if row["table"] == number] for number in (1, 2))
+    cells = [
+        [a["degree"], a["sine"], a["at"], b["cosine"], b["at"], a["proven"]]
+        for a, b in zip(sine, cosine, strict=True)
+    ]
+    return tables.markdown(["degree", "sine", "at", "cosine", "at", "proven"], cells)
+
+
+# ---- the demonstration ----------------------------------------------------------------------------------
+
+
+def demo_pictures(records: Records) -> str:
+    """Return the scores of the demonstration's unseen frames."""
+    columns = [
+        Column("mse", "MSE", 5),
+        Column("psnr", "PSNR, dB", 1),
+        Column("ssim", "SSIM", 3),
+        Column("relmse", "relMSE", 4),
+        Column("smape", "SMAPE", 3),
+    ]
+    found = records["demo"]
+    names = {name: name for name in found.configurations() if name.endswith(" s")}
+    return tables.table(found, columns, names, "`make demo`")
+
+
+def demo_runs(records: Records) -> str:
+    """Return the executors of the demonstration."""
+    columns = [
+        Column("seconds_run", "time, s", 3),
+        Column("error", "largest error against float64", write=lambda s: f"{s.mean:.1e}"),
+        Column("bound_frame", "proven bound, this frame", write=lambda s: f"{s.mean:.1e}"),
+    ]
+    found = records["demo"]
+    names = {name: name for name in found.configurations() if found.summary(name, "seconds_run")}
+    return tables.table(found, columns, names, "executor")
+
+
+# ---- plots ----------------------------------------------------------------------------------------------
+
+
+def draw_quality(records: Records) -> Any:
+    """Draw the PSNR of each row on the mini cubes, inside of the ranges and outside."""
+    module, found = importlib.import_module("quality"), records["quality"]
+    figure, axes = plots.axes(2, (11.0, 3.6))
+    for axis, (split, text) in zip(axes, module.SPLITS.items(), strict=True):
+        shown = {}
+        for row, kind in module.ROWS.items():
+            at = found.interval(module.configuration("minicubes", split, row), "psnr")
+            if at is not None:
+                shown[kind.text] = (at.mean, at.low, at.high)
+        plots.bars(axis, shown, f"PSNR {text}, dB")
+    low, high = (choose(end[at] for end in map(_ends, axes)) for at, choose in ((0, min), (1, max)))
+    for axis in axes:
+        axis.set_xlim(low, high)
+    return figure
+
+
+def _ends(axis: Any) -> tuple[float, float]:
+    """Return the ends of an axis of x."""
+    low, high = axis.get_xlim()
+    return float(low), float(high)
+
+
+def draw_ablations(records: Records) -> Any:
+    """Draw the PSNR against window, width, depth and training frames."""
+    factors = ("window", "width", "depth", "frames")
+    found = records["ablations"]
+    figure, axes = plots.axes(len(factors), (10.0, 2.8))
+    for axis, factor in zip(axes, factors, strict=True):
+        names = {
+            float(name.partition(" = ")[2]): name
+            for name in found.configurations()
+            if name.startswith(f"{factor} = ")
+        }
+        line = plots.points(found, dict(sorted(names.items())), "psnr")
+        plots.lines(axis, {factor: line}, (factor, "PSNR, dB"), log=True)
+    return figure
+
+
+def draw_learning_curve(records: Records) -> Any:
+    """Draw the PSNR against the seconds of training."""
+    found, shown = records["learning_curve"], {}
+    for name in found.configurations():
+        curves = zip(*found.of(name, "curve"), strict=False)
+        shown[name] = [
+            (
+                sum(p["seconds"] for p in at) / len(at),
+                sum(p["psnr"] for p in at) / len(at),
+                min(p["psnr"] for p in at),
+                max(p["psnr"] for p in at),
+            )
+            for at in curves
+        ]
+    figure, (axis,) = plots.axes(1, (6.0, 3.5))
+    plots.lines(axis, shown, ("seconds of training", "PSNR on unseen times, dB"), log=True)
+    return figure
+
+
+def pictures(records: Records) -> str:
+    """Return all plots, and pictures of frames, that are there, as the page of the results shows them."""
+    made = []
+    for name, plot in PLOTS.items():
+        if plots.ready(plot, records):
+            made.append(f"![{plot.caption}](images/{name}.svg)\n\n*{plot.caption}*\n")
+    for name in records.names():
+        for path in records[name].data().get("pictures", {}):
+            command = records[name].data()["commands"][0]
+            made.append(f"![Pictures of `{name}`]({path.removeprefix('docs/')})\n\n*`{command}`*\n")
+    return "\n".join(made) or "None of the records in git has a picture yet.\n"
+
+
+PLOTS: Mapping[str, Plot] = {
+    "quality": Plot(
+        draw_quality,
+        ("quality",),
+        "The presets beside Open Image Denoise: means over poses and seeds, and 95 % intervals.",
+    ),
+    "ablations": Plot(
+        draw_ablations,
+        ("ablations",),
+        "What quality depends on: means over poses and seeds, and 95 % intervals.",
+    ),
+    "learning-curve": Plot(
+        draw_learning_curve, ("learning_curve",), "Learning curves: means of three seeds, least and largest."
+    ),
+}
+"""The plots by the names of their files."""
+
+FIGURES: Mapping[str, Callable[[Records], str]] = {
+    "ahead-of-oidn": ahead("minicubes"),
+    "ahead-of-oidn-cornell": ahead("cornell"),
+    "ahead-of-oidn-glossy": ahead("glossy"),
+    "ahead-of-oidn-lamps": ahead("minicubes-lamps", ours="shipped"),
+    "ahead-of-oidn-outside": ahead("minicubes", "outside"),
+    "best-ms": frame_ms("best-16"),
+    "departures-clip": departure("unclipped", -1.0),
+    "departures-loss": departure("summed"),
+    "departures-replacement": departure("without replacement"),
+    "oidn-fast-ms": frame_ms("oidn-fast16"),
+    "oidn-high-ms": frame_ms("oidn-clean16"),
+    "paper-hours": paper_hours,
+}
+"""Figures in sentences that are computed from several values."""
+
+TABLES: Mapping[str, TableOf] = {
+    "ablations": study("ablations", "all else as `short`"),
+    "bench-paper": bench("bench-paper"),
+    "bench-primitives": as_printed("bench-primitives"),
+    "bench-render": as_printed("bench-render"),
+    "bench-render-kernels": as_printed("bench-render-kernels"),
+    "bench-train-paper": as_printed("bench-train", 1),
+    "bench-train-short": as_printed("bench-train", 2),
+    "claims": as_printed("claims"),
+    "demo-pictures": demo_pictures,
+    "demo-runs": demo_runs,
+    "departures": departures,
+    "exports": as_printed("exports"),
+    "fig-prediction": study("fig_prediction"),
+    "flicker": study("flicker"),
+    "generalisation": generalisation,
+    "learning-curve": learning_curve,
+    "lights": study("lights"),
+    "losses": study("losses", "loss"),
+    "pictures": pictures,
+    "presets": as_printed("presets"),
+    "quality-cornell": quality("cornell"),
+    "quality-glossy": quality("glossy"),
+    "quality-lamps": quality("minicubes-lamps"),
+    "quality-minicubes": quality("minicubes"),
+    "quality-outside": quality("minicubes", "outside"),
+    "quality-readme": quality("minicubes", only=README_ROWS),
+    "quality-times": quality_times,
+    "ranks": as_printed("ranks"),
+    "savings": as_printed("savings"),
+    "sines": sines,
+    "sines-every": sines_every,
+    "sines-octaves": as_printed("sines", 2),
+    "sines-speed": as_printed("sines-speed"),
+    "table1": table1,
+    "table1-readme": table1_readme,
+    "train-speed": train_speed,
+    "variants": as_printed("variants"),
+}
+"""The tables by name."""

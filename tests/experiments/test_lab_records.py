@@ -1,0 +1,139 @@
+"""Nothing becomes a record that cannot be trusted; what does keeps what was found."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+
+import publish
+import pytest
+from lab import printed, texts
+from lab.records import Records, checked, flat, of_bench, of_demo
+from lab.results import Results
+from results_of import data_of
+
+from wamnet.refimpl.errors import InputError
+
+
+@pytest.mark.parametrize(
+    ("changes", "match"),
+    [
+        ({"records": []}, "a record needs at least one"),
+        ({"commands": []}, "a record says what made it"),
+        ({"settings": {"scale": "toy"}}, "its numbers mean nothing"),
+        ({"records": [{"configuration": "a", "seed": 0, "values": {"psnr": math.inf}}]}, "must be finite"),
+        (
+            {"records": [{"configuration": "a", "seed": 0, "values": {"x": [1.0, math.nan]}}]},
+            "must be finite",
+        ),
+        (
+            {
+                "records": [
+                    {"configuration": c, "seed": s, "values": {}} for c, s in (("a", 0), ("a", 1), ("b", 0))
+                ]
+            },
+            "it lacks seeds",
+        ),
+        ({"settings": {"folder": "/" + "home/me/out"}}, "no place of one machine"),
+    ],
+)
+def test_what_cannot_be_trusted_is_no_record(changes, match):
+    row = {"configuration": "a", "seed": 0, "values": {"psnr": 30.0}}
+    assert checked(data_of([row]))["records"] == [row]
+    with pytest.raises(InputError, match=match):
+        checked(data_of([row], **changes))
+
+
+def test_numbers_have_six_digits():
+    row = {
+        "configuration": "a",
+        "seed": 0,
+        "values": {"psnr": 1.0 / 3.0, "list": [1e-9 / 3.0], "count": 1234567},
+    }
+    values = checked(data_of([row]))["records"][0]["values"]
+    assert values == {"psnr": 0.333333, "list": [3.33333e-10], "count": 1234567}
+
+
+def test_a_result_becomes_a_record(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(publish, "FOLDER", tmp_path)
+    results = Results(tmp_path / "found.json", "study", {"scale": "small"}, "python experiments/study.py")
+    results._write([])
+    results.put("a", 0, {"psnr": 30.123456789})
+    publish.main([str(results.path), "--name", "kept"])
+    assert "kept.json: 1 records" in capsys.readouterr().out
+    assert Records(tmp_path)["kept"].of("a", "psnr") == [30.1235]
+    with pytest.raises(InputError, match="give a file, or --run"):
+        publish.main([])
+    with pytest.raises(InputError, match="it must be python bench"):
+        publish.main(["--run", "x", "rm", "-r", "x"])
+    (tmp_path / "broken.json").write_text("{")
+    with pytest.raises(InputError, match="it cannot be read"):
+        publish.main([str(tmp_path / "broken.json")])
+
+
+def test_what_a_program_prints_becomes_a_record(tmp_path, monkeypatch):
+    monkeypatch.setattr(publish, "FOLDER", tmp_path)
+    monkeypatch.setattr(publish, "ROOT", tmp_path)
+    (tmp_path / "bench").mkdir()
+    text = "| by | ms | ms |\\n|---|---|---|\\n| a/b | **1,024** | 2.50 |\\n| a/b | 3 | - |"
+    (tmp_path / "bench/x.py").write_text(f'print("""{text}""")')
+    publish.main(["--run", "speed", "python", "bench/x.py"])
+    found = Records(tmp_path)["speed"]
+    assert printed.table(found).splitlines()[0::2] == ["| by | ms | ms |", "| a/b | **1,024** | 2.50 |"]
+    assert found.data()["commands"] == ["python bench/x.py"]
+    assert texts.figure(Records(tmp_path), "speed/a,b/ms:.0f", {}) == "1024"
+    assert texts.figure(Records(tmp_path), "speed/a,b #2/ms:.1f", {}) == "3.0"
+    with pytest.raises(InputError, match="does not begin with a number"):
+        texts.figure(Records(tmp_path), "speed/a,b #2/ms #2:.1f", {})
+    (tmp_path / "bench/x.py").write_text("raise SystemExit(3)")
+    with pytest.raises(InputError, match="it must end with status 0"):
+        publish.main(["--run", "speed", "python", "bench/x.py"])
+
+
+def test_a_benchmark_becomes_a_record():
+    row = {"name": "opencl:plain", "text": "plain", "kind": "kernel", "ms": {"median": 2.0}, "error": None}
+    data = {
+        "schema": "wamnet-bench-1",
+        "size_px": [64, 64],
+        "contenders": [row],
+        "sizes": [{"size_px": [32, 32], "contenders": [row]}],
+        "limits": {"flops_per_s": 1e9},
+    }
+    found = of_bench(data, "wamnet bench")
+    names = [record["configuration"] for record in found["records"]]
+    assert names == ["opencl:plain", "opencl:plain@32", "machine"]
+    assert found["records"][0]["values"] == {"text": "plain", "kind": "kernel", "ms.median": 2.0}
+    assert checked(found)["commands"] == ["wamnet bench"]
+    assert flat({"a": {"b": {"c": 1}, "d": None}}) == {"a.b.c": 1}
+
+
+def test_a_demonstration_becomes_a_record():
+    scores = {"metrics": {"PSNR": 30.0}, "notes": {}}
+    found = of_demo(
+        {
+            "command": "wamnet demo",
+            "plan": {"size": 8},
+            "unseen": [{"time_s": 0.08, "input": scores, "denoised": scores}],
+            "runs": [{"executor": "numpy", "seconds_run": 0.5}, {"executor": "opengl", "seconds_run": None}],
+            "seconds": {"rendering": 2.0, "training": 3.0},
+            "machine": {},
+            "versions": {},
+        }
+    )
+    names = [record["configuration"] for record in checked(found)["records"]]
+    assert names == ["input, 0.08 s", "denoised, 0.08 s", "numpy", "seconds"]
+    assert found["records"][-1]["values"]["all"] == 5.0
+
+
+def test_pictures_of_frames_are_made_small(tmp_path, monkeypatch):
+    image = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
+    monkeypatch.setattr(publish, "ROOT", tmp_path)
+    (tmp_path / publish.IMAGES).mkdir(parents=True)
+    (tmp_path / "study").mkdir()
+    image.new("RGB", (2400, 100), "red").save(tmp_path / "study/sheet.png")
+    place, digest = publish.shrunk(tmp_path / "study/sheet.png")
+    path = tmp_path / place
+    assert place == "docs/images/study-sheet.jpg"
+    assert digest == hashlib.sha256(path.read_bytes()).hexdigest()
+    with image.open(path) as small:
+        assert small.size == (1200, 50)

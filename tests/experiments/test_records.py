@@ -1,0 +1,107 @@
+"""Texts and plots of the repository are what the records in git give."""
+
+from __future__ import annotations
+
+import hashlib
+
+import pytest
+import rewrite
+from lab import plots, records, shown, texts
+from lab.records import Records, checked
+
+pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+
+PICTURES = (".png", ".jpg", ".jpeg", ".svg", ".webp", ".gif")
+"""Endings of pictures."""
+
+LARGEST_BYTES = 2_000_000
+"""All pictures in git together."""
+
+OTHERS = ("web-page", "page-")
+"""Beginnings of the names of pictures that docs/site takes of the web page: no record is behind them."""
+
+
+def test_texts_are_what_the_records_give():
+    filler = texts.Filler(Records(), shown.TABLES, shown.FIGURES)
+    stale = [path.relative_to(records.ROOT).as_posix() for path, _ in texts.stale(filler)]
+    assert not stale, f"{stale}: run python experiments/rewrite.py, and read the difference"
+    unused = sorted((set(shown.TABLES) | set(shown.FIGURES)) - filler.shown)
+    assert not unused, f"lab/shown.py: no text shows {unused}"
+
+
+def test_plots_are_what_the_records_give():
+    stale = [path.name for path, _ in plots.stale(Records(), shown.PLOTS)]
+    assert not stale, f"{stale}: run python experiments/rewrite.py, and look at them"
+
+
+def test_records_can_be_trusted():
+    for name in Records().names():
+        data = Records()[name].data()
+        assert checked(data, partial=True) == {**data}, f"{name}: publish it again"
+
+
+def test_what_is_pending_is_not_there_and_is_waited_for():
+    """An entry goes when its record comes, and when no text waits for it any more."""
+    kept, waiting = Records(), records.pending()
+    there = sorted(name for name in waiting if name in kept)
+    assert not there, f"pending.txt: {there} are there; remove the lines"
+    filler = texts.Filler(kept, shown.TABLES, shown.FIGURES)
+    assert not list(texts.stale(filler))
+    drawn = {name for plot in shown.PLOTS.values() for name in plot.records}
+    idle = sorted(set(waiting) - filler.missing - drawn)
+    assert not idle, f"pending.txt: no text waits for {idle}; remove the lines"
+
+
+def test_every_record_is_shown():
+    kept = Records()
+    filler = texts.Filler(Counting(kept.folder), shown.TABLES, shown.FIGURES)
+    list(texts.stale(filler))
+    drawn = {name for plot in shown.PLOTS.values() for name in plot.records}
+    idle = sorted(set(kept.names()) - Counting.asked - drawn)
+    assert not idle, f"no text shows the records {idle}: show them or remove them"
+
+
+class Counting(Records):
+    """Records that remember what was asked for by a table or a figure."""
+
+    asked: set[str] = set()
+
+    def __getitem__(self, name):
+        self.asked.add(name)
+        return super().__getitem__(name)
+
+    def names(self):
+        """Hide the names: a page that lists all pictures asks for all records."""
+        return []
+
+
+def test_pictures_are_small_and_come_from_records():
+    images = records.ROOT / plots.IMAGES
+    found = [path for path in sorted(images.rglob("*")) if path.suffix in PICTURES]
+    total = sum(path.stat().st_size for path in found)
+    assert total <= LARGEST_BYTES, f"pictures in git: {total:,} bytes of {LARGEST_BYTES:,}"
+    named = records.pictures(Records())
+    for path in found:
+        place = path.relative_to(records.ROOT).as_posix()
+        if path.suffix == ".svg":
+            assert path.stem in shown.PLOTS, f"{place}: no function of lab/shown.py draws it"
+        elif not path.name.startswith(OTHERS):
+            digest = hashlib.sha256(path.read_bytes()).hexdigest()
+            assert named.get(place) == digest, f"{place}: no record names it; publish it with --picture"
+    assert not [place for place in named if not (records.ROOT / place).exists()]
+
+
+def test_the_command_names_what_differs(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(texts, "documents", lambda root: [tmp_path / "README.md"])
+    monkeypatch.setattr(texts, "ROOT", tmp_path)
+    monkeypatch.setattr(rewrite, "ROOT", tmp_path)
+    monkeypatch.setattr(texts.stale, "__defaults__", (tmp_path,))
+    monkeypatch.setattr(rewrite, "PLOTS", {})
+    monkeypatch.setattr(rewrite, "TABLES", {"all": lambda found: "made\n"})
+    (tmp_path / "README.md").write_text("<!-- table: all -->\n<!-- end -->\n")
+    with pytest.raises(SystemExit) as left:
+        rewrite.main(["--check"])
+    assert (left.value.code, "differs: README.md" in capsys.readouterr().out) == (1, True)
+    rewrite.main([])
+    assert (tmp_path / "README.md").read_text() == "<!-- table: all -->\n\nmade\n\n<!-- end -->\n"
+    rewrite.main(["--check"])

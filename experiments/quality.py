@@ -127,10 +127,10 @@ SHOWN = ("input", "oidn-clean16", "best-16")
 """Rows that are shown beside the reference."""
 
 COLUMNS = (
-    tables.Column("psnr", "PSNR, dB"),
-    tables.Column("ssim", "SSIM", 4),
-    tables.Column("flip", "FLIP", 4),
-    tables.Column("relmse", "relMSE", 4),
+    tables.Column("psnr", "PSNR, dB", interval=True),
+    tables.Column("ssim", "SSIM", 3, interval=True),
+    tables.Column("flip", "FLIP", 3, interval=True),
+    tables.Column("relmse", "relMSE", 4, interval=True),
     tables.Column("spp", "worth, spp", 0),
     tables.Column("seconds", "training, s", 0),
 )

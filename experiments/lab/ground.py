@@ -3,8 +3,11 @@
 1. A plan says how large and how many the frames are, and how long a network is trained [`Plan`], [`PLANS`].
 2. Pairs of noisy frames and references come from the kept frames [`Ground.pairs`]; training and test times
    lie over one turn of the animation, each test time amid two training times [`Ground.times`].
-3. A network is trained on some pairs, looked at on others, and scored [`Ground.train`], [`Ground.judge`].
-4. Tables are written beside the results, and printed [`write_table`].
+3. A network is trained on some pairs, looked at on others, and scored [`Ground.train`], [`Ground.judge`]: its
+   means, and the scores of each frame [`judged`]. Scores of several kinds of frames stand side by side
+   [`told`], [`together`].
+4. Before a study begins it says what is left to be rendered and trained, and about how long that takes
+   [`measure_all`]. Tables are written beside the results, and printed [`write_table`].
 
 All seeds share the frames: the spread is that of first weights and minibatches.
 """
@@ -13,7 +16,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +30,10 @@ from wamnet.refimpl.train import Recipe
 
 from . import frames, scores, training
 from .frames import Pair, Shot
-from .results import Results
+from .results import PER_FRAME, Results, Values, fill
+
+KEPT = ("psnr", "ssim", "flip")
+"""Scores that are kept of every frame."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +108,8 @@ class Ground:
         """Return what the network makes of the noisy frames."""
         return training.denoised(model, [noisy for noisy, _ in pairs], self.executor)
 
-    def judge(self, model: Model, pairs: Sequence[Pair]) -> dict[str, float]:
-        """Return the mean scores of a network on pairs."""
+    def judge(self, model: Model, pairs: Sequence[Pair]) -> dict[str, Any]:
+        """Return the scores of a network on pairs."""
         return judged(self.pictures(model, pairs), pairs)
 
 
@@ -111,12 +117,26 @@ TEST_SEED = 500
 """Seed of the first test frame: training frames have smaller ones."""
 
 
-def judged(pictures: Sequence[Floats], pairs: Sequence[Pair]) -> dict[str, float]:
-    """Return the mean scores of display-encoded pictures against the references of pairs."""
+def judged(pictures: Sequence[Floats], pairs: Sequence[Pair]) -> dict[str, Any]:
+    """Return the scores of display-encoded pictures against references: their means, and those of each."""
     found = [
         scores.score(picture, clean["color"]) for picture, (_, clean) in zip(pictures, pairs, strict=True)
     ]
-    return scores.mean_scores(found)
+    each = {name: [round(values[name], 5) for values in found] for name in KEPT}
+    return {**scores.mean_scores(found), PER_FRAME: each}
+
+
+def told(found: Values, where: str = "", names: Sequence[str] = KEPT) -> dict[str, Any]:
+    """Return some scores under names that say on which frames they are: `psnr at 4`."""
+    renamed = {name: f"{name} {where}".rstrip() for name in names}
+    each = {renamed[name]: found[PER_FRAME][name] for name in names if name in found[PER_FRAME]}
+    return {**{renamed[name]: found[name] for name in names}, PER_FRAME: each}
+
+
+def together(*parts: Values) -> dict[str, Any]:
+    """Return the scores of several parts, and those of each frame, side by side."""
+    each = {name: row for part in parts for name, row in part.get(PER_FRAME, {}).items()}
+    return {**{name: value for part in parts for name, value in part.items()}, PER_FRAME: each}
 
 
 def inputs(pairs: Sequence[Pair]) -> list[Floats]:
@@ -138,6 +158,78 @@ def start(
     settings = {**asdict(plan), "executor": options.executor}
     results = Results.open(options.output / "results.json", name, settings)
     return options, Ground(plan, options.cache, options.executor), results
+
+
+SAMPLES_PER_S = 1.0e7
+"""Camera paths of `minicubes` that two quiet cores trace in a second, roughly."""
+
+WINDOWS_PER_S = 3.0e5
+"""Windows that the preset `short` trains on in a second there, by the compiled step."""
+
+JUDGED_PER_S = 4.0
+"""Pictures of 256x256 pixels that are denoised and scored in a second there."""
+
+Needed = tuple[Sequence[Shot], int]
+"""Shots, and the samples of their references."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a study needs: shots, and for each configuration and seed a training and scores of pictures.
+
+    `windows` are those of a training, in units of the preset `short`; None: of the plan's.
+    """
+
+    needed: Sequence[Needed]
+    pictures: int
+    windows: float | None = None
+
+
+def left_to_render(ground: Ground, needed: Sequence[Needed]) -> tuple[int, int]:
+    """Return how many frames are not there yet, and their samples."""
+    wanted = [
+        shot
+        for shots, spp in needed
+        for each in shots
+        for shot in (frames.noisy(each), frames.reference(each, spp))
+    ]
+    folder = ground.cache / "frames"
+    missing = {
+        path: shot.job.samples
+        for shot in wanted
+        for path in [frames.path_of(folder, shot, ground.executor)]
+        if not any(folder.glob(f"{path.name}.*.exr"))
+    }
+    return len(missing), sum(missing.values())
+
+
+def estimate(ground: Ground, cost: Cost, measures: int) -> str:
+    """Return in one line what is left to be done for so many configurations and seeds, and how long it takes.
+
+    Networks that are kept already are counted again: the line says the most that it can be.
+    """
+    count, samples = left_to_render(ground, cost.needed)
+    windows = ground.plan.steps * ground.plan.batch if cost.windows is None else cost.windows
+    pixels = (ground.plan.size / 256) ** 2
+    each = windows / WINDOWS_PER_S + cost.pictures * pixels / JUDGED_PER_S
+    minutes = (samples / SAMPLES_PER_S / 60.0, measures * each / 60.0)
+    return (
+        f"{count} frames to render, about {minutes[0]:.1f} min; {measures} networks to train and judge, "
+        f"at most {minutes[1]:.1f} min: on two quiet cores\n"
+    )
+
+
+def measure_all(
+    ground: Ground,
+    results: Results,
+    work: Mapping[str, Callable[[int], Values]],
+    seeds: Sequence[int],
+    cost: Cost,
+) -> None:
+    """Say what a study will cost, then measure whatever has no record."""
+    left = sum(results.get(name, seed) is None for name in work for seed in seeds)
+    sys.stderr.write(f"{results.experiment}: {estimate(ground, cost, left)}")
+    fill(results, work, seeds, "measuring")
 
 
 def write_table(path: Path, text: str) -> None:

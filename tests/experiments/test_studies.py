@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lab import frames, training
-from lab.ground import PLANS, Ground
+from lab.ground import PLANS, Ground, together, told
 from lab.results import Results
 
 from wamnet.refimpl.errors import InputError
@@ -206,3 +206,17 @@ def test_training_and_test_times_differ(tmp_path):
     train, test = ground.times()
     assert not set(train) & set(test)
     assert importlib.import_module("flicker").BEGIN_S not in train
+
+
+# ---- what is kept, and what is said beforehand ------------------------------------------------------------
+
+
+def test_scores_of_several_kinds_of_frames_stand_side_by_side():
+    found = {"psnr": 2.0, "mse": 9.0, "per_frame": {"psnr": [1.0, 3.0]}}
+    one, other = told(found, "at 4", ["psnr"]), told(found, "", ["psnr"])
+    assert together(one, other, {"seconds": 5.0}) == {
+        "psnr at 4": 2.0,
+        "psnr": 2.0,
+        "seconds": 5.0,
+        "per_frame": {"psnr at 4": [1.0, 3.0], "psnr": [1.0, 3.0]},
+    }

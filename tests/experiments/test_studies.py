@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -102,7 +103,7 @@ def test_every_factor_changes_its_own_number_alone():
     ablations = importlib.import_module("ablations")
     changed = {}
     for factor in ablations.FACTORS:
-        recipe = factor.change(SHORT, 7)
+        recipe = factor.change(SHORT, 3)
         names = [name for name in vars(recipe) if getattr(recipe, name) != getattr(SHORT, name)]
         changed[factor.name] = names
     assert changed == {
@@ -113,6 +114,7 @@ def test_every_factor_changes_its_own_number_alone():
         "omega_0, first layer": ["omega_0_first"],
         "windows": ["n_windows"],
         "frames": [],
+        "features": ["features"],
     }
     assert ablations._depth(SHORT, 2).widths == (32, 32)
     assert ablations._width(SHORT, 8).widths == (8, 8, 8, 8)
@@ -233,11 +235,13 @@ def noise_seeds(shots):
 @pytest.mark.parametrize("scale", ["small", "paper"])
 def test_kinds_of_frames_share_no_noise(scale, tmp_path):
     """All training and test shots of all studies have seeds of their own, below those of flicker."""
-    generalisation, lights = map(importlib.import_module, ("generalisation", "lights"))
+    generalisation, lights, ablations = map(
+        importlib.import_module, ("generalisation", "lights", "ablations")
+    )
     ground = Ground(PLANS[scale], tmp_path, "numpy")
     kinds = [generalisation.learned(ground, kind) for kind in ("one", "a range", generalisation.SOME_POSES)]
     kinds += generalisation.tests(ground, scale).values()
-    kinds.append(lights.trained_on(ground, 4))
+    kinds += [lights.trained_on(ground, 4), *ablations.glossy_shots(ground)]
     found = [noise_seeds(shots) for shots in kinds]
     assert sum(map(len, found)) == len(set().union(*found))
     assert max(set().union(*found)) < importlib.import_module("flicker").FIRST_SEED
@@ -273,7 +277,7 @@ def test_poses_held_out_are_in_no_quarter_of_the_training(tmp_path):
 
 def test_frames_of_all_tests_are_different_ones(tmp_path):
     """No test frame shows what a training frame or another test does, also not under other lamps."""
-    generalisation = importlib.import_module("generalisation")
+    generalisation, ablations = map(importlib.import_module, ("generalisation", "ablations"))
     ground = Ground(PLANS["small"], tmp_path, "numpy")
     tests = {
         where: shown(where, shots)
@@ -283,6 +287,8 @@ def test_frames_of_all_tests_are_different_ones(tmp_path):
     for kind in (generalisation.SEVERAL, generalisation.SOME_POSES):
         compare(shown(kind, generalisation.learned(ground, kind)), tests)
     compare(shown("train", ground.training_shots()), {"at 0": tests["at 0"]})
+    train, test = ablations.glossy_shots(ground)
+    compare(shown("glossy", train), {"test": shown("glossy test", test)})
 
 
 def shown(name, shots):
@@ -313,10 +319,25 @@ def test_scores_of_several_kinds_of_frames_stand_side_by_side():
     }
 
 
-def test_a_study_says_what_is_left_before_it_begins(tmp_path):
+def test_a_study_says_what_is_left_before_it_begins(tmp_path, cache, capsys):
     """Frames that are there are not counted, nor those that are asked for twice."""
     fresh = Ground(PLANS["toy"], tmp_path, "numpy")
     shots = fresh.training_shots()
     assert left_to_render(fresh, [(shots, 2), (shots[:1], 2)]) == (4, 2 * 16 * 16 * (1 + 2))
     fresh.learned(shots)
     assert left_to_render(fresh, [(shots, 2)]) == (0, 0)
+    run("losses", tmp_path / "losses", cache)
+    assert "4 networks to train and judge" in capsys.readouterr().err
+    run("losses", tmp_path / "losses", cache)
+    assert "losses: 0 frames to render, about 0.0 min; 0 networks" in capsys.readouterr().err
+
+
+def test_every_table_has_intervals_over_frames(tmp_path, cache):
+    """Frames of one seed already give one: `mean [low, high]`."""
+    run("losses", tmp_path, cache)
+    row = (tmp_path / "table.md").read_text().splitlines()[2]
+    assert re.fullmatch(r"\| MSE (\| \S+ \[\S+, \S+\] ){3}\| \S+ \|", row)
+    record = json.loads((tmp_path / "results.json").read_text())["records"][0]
+    each = record["values"]["per_frame"]
+    assert {len(values) for values in each.values()} == {PLANS["toy"].test_frames}
+    assert set(each) == {"psnr", "ssim", "flip"}

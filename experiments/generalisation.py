@@ -1,16 +1,19 @@
-"""Unseen times and unseen camera orientations: the paper says that pictures are as good there; is that so?
+"""Unseen poses and unseen camera orientations: the paper says that pictures are as good there; is that so?
 
-1. Networks are trained on frames of one orientation of the camera, or of several; frames are as many in both
-   cases [`trained_on`]. Times of the tests lie amid training times.
-2. All are scored at orientations that were trained on, between them, and beyond them [`TEST_DEGREES`];
-   beside them stand a network of that very orientation, and the noisy input.
-3. A table, a curve of PSNR against orientation with its spread, and pictures [`report`].
+1. Networks are trained on frames of one orientation of the camera, or of a range of them, where each frame
+   draws its orientation and its time independently [`RANGE`]; frames are as many in both cases [`learned`].
+2. The cubes repeat their pose each quarter of the turn, so an arc of the turn is no new geometry. A third
+   kind of network learns from times of all quarters whose pose is in the first part of the quarter only, and
+   is tested on poses of its rest, beside a network that has learned from all poses [`posed`].
+3. All are scored at several orientations, from that of the networks of one to beyond the range, and on the
+   poses held out [`TEST_DEGREES`], [`tests`]; each test frame has a pose of its own, at each orientation.
+4. A table, a curve of PSNR against orientation with its spread, and pictures [`report`].
 
     python experiments/generalisation.py
     python experiments/generalisation.py --scale paper -o out/generalisation-paper
 
-The camera turns about the vertical through the cubes (its yaw). The first column of the
-table is of training times with other noise: what is lost at unseen times is the difference of the first two.
+The camera turns about the vertical through what it looks at. Three inputs are compared: the paper's, the same
+with the ray's direction, which the paper plans for its camera, and those of the preset `short`.
 """
 
 from __future__ import annotations
@@ -21,133 +24,151 @@ from functools import partial
 from pathlib import Path
 
 from lab import command, figures, tables
-from lab.frames import Pair
-from lab.ground import Ground, inputs, judged, start, targets, write_table
-from lab.results import Results, Values, fill
+from lab.frames import TIMES_SEED, Pair, Shot
+from lab.ground import (
+    Cost,
+    Ground,
+    inputs,
+    judged,
+    measure_all,
+    start,
+    targets,
+    together,
+    told,
+    write_table,
+)
+from lab.results import Results, Values
 from lab.tables import Column
 
+from wamnet.kernels.draws import Draw, times
+from wamnet.refimpl.scenes import TURN_SECONDS
 from wamnet.refimpl.train import PAPER, SHORT, Recipe
-from wamnet.refimpl.variation import Variation
+from wamnet.refimpl.variation import Ranges
 
-SEVERAL_DEGREES = (-24.0, -8.0, 8.0, 24.0)
-"""Orientations of the camera that the networks of several orientations are trained on."""
+RANGE = Ranges(yaw_deg=(-24.0, 24.0))
+"""Orientations that the networks of a range are trained on; the width is that of the set `cornell`."""
 
 TEST_DEGREES: Mapping[str, Sequence[float]] = {
     "toy": (0.0, 40.0),
-    "small": (0.0, 4.0, 16.0, 40.0, 90.0),
-    "paper": (0.0, 2.0, 4.0, 8.0, 16.0, 24.0, 40.0, 90.0, 180.0),
+    "small": (0.0, 4.0, 10.0, 16.0, 24.0, 40.0),
+    "paper": (0.0, 2.0, 4.0, 10.0, 16.0, 24.0, 40.0, 90.0),
 }
 """Orientations of the tests, by scale; 0 is that of the networks of one orientation."""
 
 RECIPES: Mapping[str, Recipe] = {
     "paper's features": replace(SHORT, features=PAPER.features),
+    "paper's features, direction": replace(SHORT, features=(*PAPER.features, "direction")),
     "short": SHORT,
 }
-"""Recipes: the preset `short`, and the same with colour and normal alone."""
+"""Recipes: all else is as in the preset `short`."""
 
-OWN_DEGREES: Mapping[str, Sequence[float]] = {
-    "toy": (40.0,),
-    "small": (16.0, 90.0),
-    "paper": TEST_DEGREES["paper"][1:],
-}
-"""Orientations that have a network of their own, by scale; that of 0 is there anyway."""
+PERIOD_S = TURN_SECONDS / 4.0
+"""Seconds after which the lattice of cubes shows the same pose again: a quarter turn."""
 
-DEGREES_PER_SEED = 10
-"""Apart for each degree are the seeds of frames of other orientations: their noise is not the same."""
+LEARNED_S = 0.75 * PERIOD_S
+"""Poses of the first seconds of a period are learned by the networks that miss some; the rest is held out."""
 
+ONE, SEVERAL, SOME_POSES = "one", "a range", "one, a quarter of the poses left out"
+"""What networks are trained on."""
 
-def seed_of(degrees: float) -> int:
-    """Return the seed of the first frame of an orientation."""
-    return 1000 + DEGREES_PER_SEED * round(degrees + 180.0)
+HELD_OUT = "poses held out"
+"""Name of the tests with poses that some networks have never seen; their orientation is 0."""
 
+SEEDS = {ONE: 0, SEVERAL: 1000, SOME_POSES: 2000, HELD_OUT: 2500}
+"""Seeds of the first frame of each kind: none share their noise."""
 
-def trained_on(ground: Ground, kind: str) -> list[Pair]:
-    """Return as many pairs at the training times of `one` orientation, of `several`, or of `<degrees>`."""
-    times = ground.times()[0]
-    if kind == "one":
-        return ground.seen()
-    degrees = SEVERAL_DEGREES if kind == "several" else (float(kind),)
-    shots = [
-        replace(ground.shots([time], seed_of(turned) + 4000 + k)[0], variation=Variation(yaw_deg=turned))
-        for k, time in enumerate(times)
-        for turned in [degrees[k % len(degrees)]]
-    ]
-    return ground.pairs(shots, ground.plan.train_spp)
+TEST_SEEDS_FROM, TEST_SEEDS_APART = 3000, 100
+"""Seeds of the first frames at the orientations that are tested."""
 
 
-def tested_on(ground: Ground, degrees: float) -> list[Pair]:
-    """Return pairs of an orientation at unseen times; those of 0 are those of the other studies."""
+def posed(first: int, count: int, held_out: bool) -> list[float]:
+    """Return times, in seconds, over all four quarters: with a learned pose, or with one that is held out.
+
+    They follow the golden-ratio sequence over the seconds that remain when the others are cut out.
+    """
+    begin, seconds = (LEARNED_S, PERIOD_S - LEARNED_S) if held_out else (0.0, LEARNED_S)
+    found = times(TIMES_SEED, 0.0, 4.0 * seconds, first, count)
+    return [PERIOD_S * (time // seconds) + begin + time % seconds for time in found]
+
+
+def learned(ground: Ground, kind: str) -> list[Shot]:
+    """Return as many shots to train on for each kind."""
+    if kind == SOME_POSES:
+        found = posed(0, ground.plan.train_frames, held_out=False)
+        return ground.shots([Draw(time) for time in found], SEEDS[kind])
+    return ground.training_shots(RANGE if kind == SEVERAL else Ranges(), SEEDS[kind])
+
+
+def turned(ground: Ground, degrees: float, number: int) -> list[Shot]:
+    """Return the test shots of an orientation, the `number`th; those of 0 are those of the other studies."""
     if degrees == 0.0:
-        return ground.unseen()
-    shots = ground.shots(ground.times()[1], seed_of(degrees))
-    turned = [replace(shot, variation=Variation(yaw_deg=degrees)) for shot in shots]
-    return ground.pairs(turned, ground.plan.test_spp)
+        return ground.test_shots()
+    count = ground.plan.test_frames
+    # Further draws of the sequence: poses that no training frame and no other orientation has.
+    draws = ground.draws(Ranges(yaw_deg=(degrees, degrees)), ground.plan.train_frames + number * count, count)
+    return ground.shots(draws, TEST_SEEDS_FROM + TEST_SEEDS_APART * number)
 
 
-def measure(ground: Ground, recipe: Recipe, kind: str, degrees: Sequence[float], seed: int) -> Values:
-    """Return the scores of a network by orientation, and on its training frames for one orientation."""
-    pairs = trained_on(ground, kind)
-    model, _ = ground.train(ground.plan.adapt(recipe, seed=seed), pairs)
-    found = {f"psnr at {turned:g}": ground.judge(model, tested_on(ground, turned)) for turned in degrees}
-    values = {name: scores["psnr"] for name, scores in found.items()}
-    values |= {name.replace("psnr", "ssim"): scores["ssim"] for name, scores in found.items()}
-    if kind == "one":
-        again = _again(ground)
-        values["psnr at training times"] = ground.judge(model, again)["psnr"]
-    return values
+def tests(ground: Ground, scale: str) -> dict[str, list[Shot]]:
+    """Return the shots of all tests, by name."""
+    found = {f"at {d:g}": turned(ground, d, number) for number, d in enumerate(TEST_DEGREES[scale])}
+    times_of = posed(ground.plan.train_frames, ground.plan.test_frames, held_out=True)
+    return {**found, f"at {HELD_OUT}": ground.shots([Draw(time) for time in times_of], SEEDS[HELD_OUT])}
 
 
-def _again(ground: Ground) -> list[Pair]:
-    """Return pairs at some training times, with noise that was not trained on."""
-    times = ground.times()[0][:: max(1, ground.plan.train_frames // ground.plan.test_frames)]
-    shots = ground.shots(times[: ground.plan.test_frames], 700)
-    return ground.pairs(shots, ground.plan.test_spp)
+def measure(ground: Ground, recipe: Recipe, kind: str, found: Mapping[str, list[Shot]], seed: int) -> Values:
+    """Return the scores of a network on each test."""
+    model, _ = ground.train(ground.plan.adapt(recipe, seed=seed), ground.learned(learned(ground, kind)))
+    return together(
+        *(told(ground.judge(model, ground.tested(shots)), where) for where, shots in found.items())
+    )
 
 
-def of_input(ground: Ground, degrees: Sequence[float], seed: int) -> Values:
+def of_input(ground: Ground, found: Mapping[str, list[Shot]], seed: int) -> Values:
     """Return the scores of the noisy frames."""
-    values = {}
-    for turned in degrees:
-        pairs = tested_on(ground, turned)
-        scores = judged(inputs(pairs), pairs)
-        values |= {f"{name} at {turned:g}": scores[name] for name in ("psnr", "ssim")}
-    return {**values, "psnr at training times": judged(inputs(_again(ground)), _again(ground))["psnr"]}
+    pairs: dict[str, list[Pair]] = {where: ground.tested(shots) for where, shots in found.items()}
+    return together(*(told(judged(inputs(of), of), where) for where, of in pairs.items()))
 
 
 def works(ground: Ground, scale: str) -> dict[str, partial[Values]]:
     """Return what measures each configuration for a seed."""
-    degrees = TEST_DEGREES[scale]
-    found = {"input": partial(of_input, ground, degrees)}
+    found = tests(ground, scale)
+    work = {"input": partial(of_input, ground, found)}
     for name, recipe in RECIPES.items():
-        for kind in ("one", "several"):
-            found[f"{name}, {kind}"] = partial(measure, ground, recipe, kind, degrees)
-    for turned in OWN_DEGREES[scale]:
-        found[f"short, own {turned:g}"] = partial(measure, ground, SHORT, f"{turned:g}", (turned,))
-    return found
+        for kind in (ONE, SEVERAL):
+            work[f"{name}: {kind}"] = partial(measure, ground, recipe, kind, found)
+    # Their orientation is that of the networks of one: only the poses held out are of interest.
+    held_out = {where: shots for where, shots in found.items() if where.endswith(HELD_OUT)}
+    for name, recipe in RECIPES.items():
+        work[f"{name}: {SOME_POSES}"] = partial(measure, ground, recipe, SOME_POSES, held_out)
+    return work
+
+
+def cost(ground: Ground, scale: str) -> Cost:
+    """Return what the study needs."""
+    plan, found = ground.plan, tests(ground, scale)
+    needed = [(learned(ground, kind), plan.train_spp) for kind in (ONE, SEVERAL, SOME_POSES)]
+    needed += [(shots, plan.test_spp) for shots in found.values()]
+    return Cost(needed, len(found) * plan.test_frames)
+
+
+def columns(scale: str) -> list[Column]:
+    """Return the columns of the table: PSNR at each orientation, and on the poses held out."""
+    found = [Column(f"psnr at {d:g}", f"{d:g} degrees", 2, interval=True) for d in TEST_DEGREES[scale]]
+    return [*found, Column(f"psnr at {HELD_OUT}", HELD_OUT, 2, interval=True)]
 
 
 def report(ground: Ground, results: Results, scale: str, seed: int, folder: Path) -> None:
     """Write the table, the curve, and pictures of one seed."""
-    degrees = TEST_DEGREES[scale]
-    heads = {
-        "psnr at training times": "training times",
-        **{f"psnr at {d:g}": f"{d:g} degrees" for d in degrees},
-    }
-    shown = ["input", *(f"{name}, {kind}" for name in RECIPES for kind in ("one", "several"))]
-    names = {name: name for name in shown}
-    columns = [Column(value, head, 2) for value, head in heads.items()]
-    rows = tables.table(results, columns, names, "trained on orientations: PSNR, dB")
-    own = ["short, that orientation alone", ""]
-    own += [results.text("short, one" if d == 0 else f"short, own {d:g}", f"psnr at {d:g}") for d in degrees]
-    write_table(folder / "table.md", rows + "| " + " | ".join(own) + " |\n")
+    names = {name: name for name in works(ground, scale)}
+    rows = tables.table(results, columns(scale), names, "inputs: trained on orientations; PSNR, dB")
+    write_table(folder / "table.md", rows)
     lines = {
-        name: [(d, results.of(name, f"psnr at {d:g}")) for d in degrees] for name in shown if name != "input"
+        f"{name}: {kind}": [(d, results.of(f"{name}: {kind}", f"psnr at {d:g}")) for d in TEST_DEGREES[scale]]
+        for name in RECIPES
+        for kind in (ONE, SEVERAL)
     }
-    lines["short, that orientation alone"] = [
-        (d, results.of("short, one" if d == 0 else f"short, own {d:g}", f"psnr at {d:g}"))
-        for d in (0.0, *OWN_DEGREES[scale])
-    ]
-    labels = ("orientation of the camera, degrees", "PSNR on unseen times, dB")
+    labels = ("orientation of the camera, degrees", "PSNR on unseen poses, dB")
     figures.curves(folder / "orientations.png", lines, labels)
     _pictures(ground, scale, seed, folder / "pictures.png")
 
@@ -155,22 +176,23 @@ def report(ground: Ground, results: Results, scale: str, seed: int, folder: Path
 def _pictures(ground: Ground, scale: str, seed: int, path: Path) -> None:
     """Write what the preset's two networks make of each orientation."""
     models = {
-        kind: ground.train(ground.plan.adapt(SHORT, seed=seed), trained_on(ground, kind))[0]
-        for kind in ("one", "several")
+        kind: ground.train(ground.plan.adapt(SHORT, seed=seed), ground.learned(learned(ground, kind)))[0]
+        for kind in (ONE, SEVERAL)
     }
     rows: list[figures.Row] = []
-    for turned in TEST_DEGREES[scale]:
-        pairs = tested_on(ground, turned)[:1]
+    for number, degrees in enumerate(TEST_DEGREES[scale]):
+        pairs = ground.tested(turned(ground, degrees, number))[:1]
         pictures = [("input", inputs(pairs)[0])]
         pictures += [(f"trained on {kind}", ground.pictures(m, pairs)[0]) for kind, m in models.items()]
-        rows.append((f"{turned:g} degrees", [*pictures, ("reference", targets(pairs)[0])]))
+        rows.append((f"{degrees:g} degrees", [*pictures, ("reference", targets(pairs)[0])]))
     figures.sheet(path, rows)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure whatever is missing, then report."""
     options, ground, results = start(command.parser(__doc__, "generalisation"), "generalisation", arguments)
-    fill(results, works(ground, options.scale), options.seeds, "measuring orientations")
+    needed = cost(ground, options.scale)
+    measure_all(ground, results, works(ground, options.scale), options.seeds, needed)
     report(ground, results, options.scale, options.seeds[0], options.output)
 
 

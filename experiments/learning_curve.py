@@ -1,7 +1,7 @@
 """Error on unseen frames against seconds of training, for the paper's protocol and the preset `short`.
 
 1. A training is stopped at some steps, closer together at its beginning [`stops`]; its clock stands still
-   while the network of that moment is scored on unseen times [`follow`].
+   while the network of that moment is scored on unseen poses [`follow`].
 2. The paper trains on one frame, the preset on all of them; nothing else is done meanwhile.
 3. A table of PSNR after some seconds, and a figure of curves with their spread [`report`].
 
@@ -23,8 +23,8 @@ from typing import Any
 
 from lab import command, figures, tables
 from lab.frames import Pair
-from lab.ground import Ground, start, write_table
-from lab.results import Results, Values, fill, summary
+from lab.ground import Cost, Ground, measure_all, start, write_table
+from lab.results import Results, Values, summary
 
 from wamnet.kernels import open_executor, train_on
 from wamnet.refimpl.train import PRESETS, Recipe, TrainState, model_of, train
@@ -46,6 +46,12 @@ def stops(steps: int) -> list[int]:
         found.append(min(steps, round(found[-1] * GROWTH)))
     return [min(stop, steps) for stop in found] if steps < FIRST_STOP else found
 
+
+LOOKS = 9
+"""Looks at a training, roughly."""
+
+WINDOWS = 1.5e7
+"""Windows of the preset `short` that take as long as one of the two trainings, on average and roughly."""
 
 Trainer = Callable[..., TrainState]
 """What trains on pairs and hands out its states: [`refimpl.train.train`], or on a device [`train_on`]."""
@@ -125,7 +131,7 @@ def report(results: Results, names: Sequence[str], folder: Path) -> None:
         ]
         for name, found in curves.items()
     }
-    labels = ("seconds of training", "PSNR on unseen times, dB")
+    labels = ("seconds of training", "PSNR on unseen poses, dB")
     figures.curves(folder / "curve.png", lines, labels, (True, False))
 
 
@@ -139,7 +145,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Measure whatever is missing, then report."""
     options, ground, results = start(command.parser(__doc__, "learning_curve"), "learning_curve", arguments)
     found = works(ground, options.scale)
-    fill(results, found, options.seeds, "training")
+    plan = ground.plan
+    needed = [(ground.training_shots(), plan.train_spp), (ground.test_shots(), plan.test_spp)]
+    measure_all(ground, results, found, options.seeds, Cost(needed, LOOKS * plan.test_frames, WINDOWS))
     report(results, list(found), options.output)
 
 

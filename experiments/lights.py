@@ -1,22 +1,25 @@
 """Lights of other colours: where the paper's network fails (its sections 6.1 and 6.2), and what mends it.
 
-1. A set of lights is the colours of both lamps of `minicubes` [`light_set`]: A is the scene's own; those of
-   the tests were never trained on.
-2. Networks are trained on A alone, on several sets, or on one of the tests' sets alone, which is as good as
-   it can get. Frames are as many in all cases [`trained_on`].
-3. Four inputs are compared [`INPUTS`]: the paper's colour and normal; the preset `short`; the lamps' light
-   without shadows in place of its albedo (spec/transport.md, LTR-11), which tells their colours; and both.
-4. Pictures of unseen sets at unseen times are scored, and their error of colour is told [`lab/colors.py`].
+1. A set of lights is the colours of both lamps of `minicubes`: A is the scene's own; others have hues and
+   saturations drawn within a range, and keep the lamps' brightness [`light_set`].
+2. Networks are trained on A only, on several sets, of which every frame draws one independently of its time,
+   or on frames that each have colours of their own [`numbers`]. Frames and their times are the same in all
+   cases, and so many that each of a few sets is seen in many poses [`trained_on`].
+3. Inputs are compared [`INPUTS`]: the paper's colour and normal, also with the ray's direction; the preset
+   `short`; the lamps' light without shadows in place of its albedo (spec/transport.md, LTR-11), which tells
+   their colours; and both.
+4. Every test frame has colours of its own, within the range and never trained on, at an unseen time; scores
+   and the error of colour [`lab/colors.py`] are those of these frames, and of the same times under A.
 
     python experiments/lights.py
     python experiments/lights.py --scale paper -o out/lights-paper
 
-The paper shows pictures and no numbers here; it says that colours are not reproduced, in both cases.
+The paper shows pictures and no numbers here; it says that colours are not reproduced, in both cases. The
+camera does not move, so that the ray's direction only says the place in the picture.
 """
 
 from __future__ import annotations
 
-import colorsys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -26,186 +29,219 @@ from typing import Any
 import numpy as np
 from lab import colors, command, figures, tables
 from lab.frames import Pair, Shot
-from lab.ground import TEST_SEED, Ground, inputs, judged, start, targets, write_table
-from lab.results import Results, Values, fill
+from lab.ground import (
+    AS_IT_IS,
+    KEPT,
+    SCENE,
+    TEST_SEED,
+    Cost,
+    Ground,
+    inputs,
+    judged,
+    measure_all,
+    start,
+    targets,
+    together,
+    told,
+    write_table,
+)
+from lab.results import PER_FRAME, Results, Values
 from lab.tables import Column
 
-from wamnet.refimpl.scenes import COOL, WARM
+from wamnet.kernels.draws import variation_of
+from wamnet.refimpl.scenes import canonical
 from wamnet.refimpl.train import PAPER, SHORT
+from wamnet.refimpl.variation import AT_REST, Ranges, Variation
 
-COUNTS: Mapping[str, Sequence[int]] = {"toy": (1, 2), "small": (1, 4, 16), "paper": (1, 2, 4, 8, 16, 32)}
+EACH = 0
+"""Number of light sets that stands for colours of its own in each frame."""
+
+COUNTS: Mapping[str, Sequence[int]] = {
+    "toy": (1, 2, EACH),
+    "small": (1, 4, 16, EACH),
+    "paper": (1, 2, 4, 8, 16, 32, EACH),
+}
 """Numbers of light sets that are trained on, by scale."""
 
-TESTS: Mapping[str, Sequence[int]] = {"toy": (-1,), "small": (-1, -2), "paper": (-1, -2, -3, -4, -5, -6)}
-"""Light sets of the tests, by scale; -1 is the one that stands for the paper's B."""
+FRAMES = 2
+"""Times the plan's training frames: each of 4 sets is seen in about twelve poses."""
 
 INPUTS: Mapping[str, tuple[str, ...]] = {
     "paper": PAPER.features,
+    "paper, direction": (*PAPER.features, "direction"),
     "short": SHORT.features,
     "unshadowed": ("color", "normal", "unshadowed", "position"),
     "both": (*SHORT.features, "unshadowed"),
 }
 """What the networks see. `short` and `unshadowed` have as many parameters, `both` a quarter more."""
 
+ENDS_ONLY = ("paper, direction",)
+"""Inputs that are trained on A and on colours of each frame only."""
+
 SET_SEED = 61
-"""Seed of the light sets' colours."""
+"""Seed of the light sets' colours, and of which set a frame has."""
 
-LEAST_SATURATION, MOST_SATURATION = 0.3, 0.9
-"""Range of the saturation of light colours; A's are 0.58 and 0.55."""
+COLORS = Ranges(saturation=(0.3, 0.9))
+"""Range of the colours of trained and tested sets; A's saturations lie amid it."""
 
-B = {"warm": (0.30, 1.0, 0.45), "cool": (1.0, 0.35, 0.80)}
-"""The set -1: green and pink, far from A and from each other."""
+FIRST_OF_FRAMES, FIRST_OF_TESTS = 1000, 5000
+"""Numbers of the first set of frames with colours of their own, and of tests."""
+
+NOISE_SEED = 4000
+"""Seed of the first training frame here."""
 
 
-def light_set(number: int) -> dict[str, tuple[float, ...]]:
-    """Return the light colours of a set: 0 is A, positive ones are trained on, negative ones are tested.
+def light_set(number: int) -> Variation:
+    """Return the lamps of a set: 0 is A; the others' hues are uniform, and so is saturation in its range."""
+    lights = canonical(SCENE).lights
+    return AT_REST if number == 0 else variation_of(SET_SEED, number, COLORS, lights)
 
-    Hues are uniform, and each lamp keeps the mean of its channels, so that pictures stay as bright.
+
+def numbers(count: int, frames: int) -> list[int]:
+    """Return the set of each training frame: one of `count`, A among them, or one of its own."""
+    if count == EACH:
+        return [FIRST_OF_FRAMES + k for k in range(frames)]
+    return [int(number) for number in np.random.default_rng([SET_SEED, count]).integers(count, size=frames)]
+
+
+def under(shots: Sequence[Shot], sets: Sequence[int]) -> list[Shot]:
+    """Return shots under a set of lights each."""
+    return [replace(shot, variation=light_set(n)) for shot, n in zip(shots, sets, strict=True)]
+
+
+def trained_on(ground: Ground, count: int) -> list[Shot]:
+    """Return as many training shots, at the same times, for any number of sets.
+
+    They are draws after those of the tests, so that no more of them changes the tests.
     """
-    if number == 0:
-        return {"warm": WARM, "cool": COOL}
-    draw = np.random.default_rng([SET_SEED, abs(number), number < 0])
-    found = {}
-    for name, own in (("warm", WARM), ("cool", COOL)):
-        saturation = draw.uniform(LEAST_SATURATION, MOST_SATURATION)
-        drawn = np.array(colorsys.hsv_to_rgb(draw.uniform(), saturation, 1.0) if number != -1 else B[name])
-        red, green, blue = (drawn * (sum(own) / drawn.sum())).tolist()
-        found[name] = (red, green, blue)
-    return found
+    plan = ground.plan
+    frames = FRAMES * plan.train_frames
+    draws = ground.draws(AS_IT_IS, plan.train_frames + plan.test_frames, frames)
+    return under(ground.shots(draws, NOISE_SEED), numbers(count, frames))
 
 
-def shots_of(ground: Ground, times: Sequence[float], sets: Sequence[int], seed: int) -> list[Shot]:
-    """Return shots at times, under the sets in turn."""
-    plain = ground.shots(times, seed)
-    return [
-        replace(shot, parameters=light_set(number) if number else {})
-        for shot, number in zip(plain, (sets[k % len(sets)] for k in range(len(times))), strict=True)
-    ]
+def recoloured(ground: Ground) -> list[Shot]:
+    """Return the test shots, each under colours of its own that no network has seen."""
+    shots = ground.test_shots(seed=TEST_SEED)
+    return under(shots, [FIRST_OF_TESTS + k for k in range(len(shots))])
 
 
-def trained_on(ground: Ground, sets: Sequence[int]) -> list[Pair]:
-    """Return as many training pairs for any number of sets."""
-    times = ground.times()[0]
-    return ground.pairs(shots_of(ground, times, sets, 0), ground.plan.train_spp)
-
-
-def tested_on(ground: Ground, number: int) -> list[Pair]:
-    """Return the test pairs of a set."""
-    times = ground.times()[1]
-    return ground.pairs(shots_of(ground, times, [number], TEST_SEED), ground.plan.test_spp)
-
-
-def seen_colors(pictures: Sequence[Any], pairs: Sequence[Pair]) -> dict[str, float]:
-    """Return scores and the mean colour error of pictures."""
+def seen_colors(pictures: Sequence[Any], pairs: Sequence[Pair]) -> dict[str, Any]:
+    """Return scores and the mean colour error of pictures, and those of each."""
     errors = [colors.color_error(p, t) for p, t in zip(pictures, targets(pairs), strict=True)]
-    return {**judged(pictures, pairs), "color": float(np.mean(errors))}
+    each = {PER_FRAME: {"color": [round(error, 5) for error in errors]}, "color": float(np.mean(errors))}
+    return together(judged(pictures, pairs), each)
 
 
-NAMES = ("psnr", "ssim", "flip", "color")
+NAMES = (*KEPT, "color")
 """The scores that are kept."""
 
 
-def measure(
-    ground: Ground, features: tuple[str, ...], sets: Sequence[int], tests: Sequence[int], seed: int
-) -> Values:
-    """Return the mean scores of a network on the test sets, and on A."""
+def measure(ground: Ground, features: tuple[str, ...], count: int, seed: int) -> Values:
+    """Return the scores of a network on unseen colours, and on A."""
     recipe = ground.plan.adapt(SHORT, features=features, seed=seed)
-    model, _ = ground.train(recipe, trained_on(ground, sets))
-    found = []
-    for number in tests:
-        pairs = tested_on(ground, number)
-        found.append(seen_colors(ground.pictures(model, pairs), pairs))
-    own = tested_on(ground, 0)
-    on_a = seen_colors(ground.pictures(model, own), own)
-    values = {name: float(np.mean([scores[name] for scores in found])) for name in NAMES}
-    return {**values, **{f"{name} on A": on_a[name] for name in NAMES}}
+    model, _ = ground.train(recipe, ground.learned(trained_on(ground, count)))
+    parts = []
+    for shots, where in ((recoloured(ground), ""), (ground.test_shots(), "on A")):
+        pairs = ground.tested(shots)
+        parts.append(told(seen_colors(ground.pictures(model, pairs), pairs), where, NAMES))
+    return together(*parts)
 
 
-def measure_own(ground: Ground, features: tuple[str, ...], tests: Sequence[int], seed: int) -> Values:
-    """Return the mean scores of networks that are each trained on the very set of their test."""
-    found = [measure(ground, features, [number], [number], seed) for number in tests]
-    return {name: float(np.mean([values[name] for values in found])) for name in NAMES}
+def measure_input(ground: Ground, seed: int) -> Values:
+    """Return the scores of the noisy frames."""
+    found = [(ground.tested(recoloured(ground)), ""), (ground.unseen(), "on A")]
+    return together(*(told(seen_colors(inputs(pairs), pairs), where, NAMES) for pairs, where in found))
 
 
-def measure_input(ground: Ground, tests: Sequence[int], seed: int) -> Values:
-    """Return the mean scores of the noisy frames."""
-    found = [seen_colors(inputs(pairs), pairs) for number in tests for pairs in [tested_on(ground, number)]]
-    return {name: float(np.mean([scores[name] for scores in found])) for name in NAMES}
-
-
-def sets_of(count: int) -> list[int]:
-    """Return the sets that are trained on: A first."""
-    return list(range(count))
+def rows(scale: str) -> dict[str, tuple[str, int]]:
+    """Return the inputs and the number of sets of every network, by the configuration's name."""
+    counts = COUNTS[scale]
+    words = {1: "A only", EACH: "colours of each frame"}
+    return {
+        f"{name}: {words.get(count, f'{count} sets')}": (name, count)
+        for count in counts
+        for name in INPUTS
+        if name not in ENDS_ONLY or count in (1, EACH)
+    }
 
 
 def works(ground: Ground, scale: str) -> dict[str, partial[Values]]:
     """Return what measures each configuration for a seed."""
-    tests = TESTS[scale]
-    found = {"input": partial(measure_input, ground, tests)}
-    for count in COUNTS[scale]:
-        for name, features in INPUTS.items():
-            found[f"{name}, {count}"] = partial(measure, ground, features, sets_of(count), tests)
-    for name, features in INPUTS.items():
-        found[f"{name}, own"] = partial(measure_own, ground, features, tests)
-    return found
+    found = {"input": partial(measure_input, ground)}
+    return found | {
+        text: partial(measure, ground, INPUTS[name], count) for text, (name, count) in rows(scale).items()
+    }
+
+
+def cost(ground: Ground, scale: str) -> Cost:
+    """Return what the study needs."""
+    plan = ground.plan
+    needed = [(trained_on(ground, count), plan.train_spp) for count in COUNTS[scale]]
+    needed += [(recoloured(ground), plan.test_spp), (ground.test_shots(), plan.test_spp)]
+    return Cost(needed, 2 * plan.test_frames)
 
 
 COLUMNS = (
-    Column("psnr", "unseen colours: PSNR, dB", 2),
-    Column("ssim", "SSIM", 3),
-    Column("flip", "FLIP", 3),
-    Column("color", "colour error", 4),
-    Column("psnr on A", "A's colours: PSNR, dB", 2),
-    Column("color on A", "colour error", 4),
+    Column("psnr", "unseen colours: PSNR, dB", 2, interval=True),
+    Column("ssim", "SSIM", 3, interval=True),
+    Column("flip", "FLIP", 3, interval=True),
+    Column("color", "colour error", 4, interval=True),
+    Column("psnr on A", "A's colours: PSNR, dB", 2, interval=True),
+    Column("color on A", "colour error", 4, interval=True),
 )
 """The columns of the table."""
 
 
 def report(ground: Ground, results: Results, scale: str, seed: int, folder: Path) -> None:
     """Write the table, two curves, and pictures of one seed."""
-    names = {"input": "input"}
-    for count in COUNTS[scale]:
-        told = "A alone" if count == 1 else f"{count} sets"
-        names |= {f"{name}, {count}": f"{name}, trained on {told}" for name in INPUTS}
-    names |= {f"{name}, own": f"{name}, trained on the test's colours" for name in INPUTS}
-    write_table(folder / "table.md", tables.table(results, COLUMNS, names))
+    found = rows(scale)
+    names = {name: name for name in ("input", *found)}
+    write_table(folder / "table.md", tables.table(results, COLUMNS, names, "inputs: trained on"))
     for value, label in (("psnr", "PSNR, dB"), ("color", "colour error")):
         lines: dict[str, Any] = {
-            name: [(count, results.of(f"{name}, {count}", value)) for count in COUNTS[scale]]
+            name: [
+                (count or FRAMES * ground.plan.train_frames, results.of(text, value))
+                for text, (of, count) in found.items()
+                if of == name
+            ]
             for name in INPUTS
         }
-        ends = (COUNTS[scale][0], COUNTS[scale][-1])
-        own = {f"{name}, the test's colours": results.of(f"{name}, own", value) for name in INPUTS}
-        lines |= {name: [(count, values) for count in ends] for name, values in own.items()}
-        labels = ("light sets trained on", f"unseen colours: {label}")
+        labels = ("light sets trained on; the last: colours of each frame", f"unseen colours: {label}")
         figures.curves(folder / f"{value}.png", lines, labels, (True, False))
-    _pictures(ground, scale, seed, folder)
+    _pictures(ground, seed, folder)
 
 
-def _pictures(ground: Ground, scale: str, seed: int, folder: Path) -> None:
-    """Write what the networks of A and of all sets make of A's colours and of unseen ones."""
-    most = COUNTS[scale][-1]
-    for path, count in (("a-on-b.png", 1), (f"{most}-sets.png", most)):
-        rows: list[figures.Row] = []
+def _pictures(ground: Ground, seed: int, folder: Path) -> None:
+    """Write what the networks of A and of each frame's colours make of A's colours and of unseen ones."""
+    for path, count in (("a-on-b.png", 1), ("each-frame.png", EACH)):
+        pictures_of: list[figures.Row] = []
         models = {
             name: ground.train(
-                ground.plan.adapt(SHORT, features=features, seed=seed), trained_on(ground, sets_of(count))
+                ground.plan.adapt(SHORT, features=features, seed=seed),
+                ground.learned(trained_on(ground, count)),
             )[0]
             for name, features in INPUTS.items()
         }
-        for number in (0, *TESTS[scale]):
-            pairs = tested_on(ground, number)[:1]
+        shown = [("colours A", ground.test_shots()[:1])]
+        shown += [(f"unseen colours {k + 1}", [shot]) for k, shot in enumerate(recoloured(ground)[:SHOWN])]
+        for label, shots in shown:
+            pairs = ground.tested(shots)
             pictures = [("input", inputs(pairs)[0])]
             pictures += [(name, ground.pictures(model, pairs)[0]) for name, model in models.items()]
-            label = "colours A" if number == 0 else f"unseen colours {-number}"
-            rows.append((label, [*pictures, ("reference", targets(pairs)[0])]))
-        figures.sheet(folder / path, rows)
+            pictures_of.append((label, [*pictures, ("reference", targets(pairs)[0])]))
+        figures.sheet(folder / path, pictures_of)
+
+
+SHOWN = 2
+"""Unseen colours that the sheets of pictures show."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure whatever is missing, then report."""
     options, ground, results = start(command.parser(__doc__, "lights"), "lights", arguments)
-    fill(results, works(ground, options.scale), options.seeds, "measuring lights")
+    needed = cost(ground, options.scale)
+    measure_all(ground, results, works(ground, options.scale), options.seeds, needed)
     report(ground, results, options.scale, options.seeds[0], options.output)
 
 

@@ -8,16 +8,20 @@ from __future__ import annotations
 
 import importlib
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from lab import frames, training
-from lab.ground import PLANS, Ground
+from lab.ground import PLANS, Ground, left_to_render, together, told
 from lab.results import Results
 
+from wamnet.kernels.geometry import Shown, compare
 from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.scenes import TURN_SECONDS, canonical
 from wamnet.refimpl.train import PAPER, SHORT
+from wamnet.refimpl.variation import AT_REST, saturation_of
 
 pytest.importorskip("flip_evaluator", reason="flip-evaluator is not installed")
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
@@ -29,7 +33,7 @@ FIGURES = {
     "generalisation": {"orientations.png", "pictures.png"},
     "learning_curve": {"curve.png"},
     "losses": set(),
-    "lights": {"psnr.png", "color.png", "a-on-b.png", "2-sets.png"},
+    "lights": {"psnr.png", "color.png", "a-on-b.png", "each-frame.png"},
 }
 """The experiments, and figures that each must leave."""
 
@@ -99,7 +103,7 @@ def test_every_factor_changes_its_own_number_alone():
     ablations = importlib.import_module("ablations")
     changed = {}
     for factor in ablations.FACTORS:
-        recipe = factor.change(SHORT, 7)
+        recipe = factor.change(SHORT, 3)
         names = [name for name in vars(recipe) if getattr(recipe, name) != getattr(SHORT, name)]
         changed[factor.name] = names
     assert changed == {
@@ -110,6 +114,7 @@ def test_every_factor_changes_its_own_number_alone():
         "omega_0, first layer": ["omega_0_first"],
         "windows": ["n_windows"],
         "frames": [],
+        "features": ["features"],
     }
     assert ablations._depth(SHORT, 2).widths == (32, 32)
     assert ablations._width(SHORT, 8).widths == (8, 8, 8, 8)
@@ -128,17 +133,47 @@ def test_every_factor_has_the_preset_among_its_values(scale):
 
 def test_light_sets_keep_the_brightness_and_differ():
     lights = importlib.import_module("lights")
-    own = lights.light_set(0)
-    found = [lights.light_set(number) for number in (*range(-6, 0), *range(1, 32))]
+    own = [light.color for light in canonical("minicubes").lights]
+    assert lights.light_set(0) == AT_REST
+    found = [lights.light_set(number).lights for number in (*range(1, 32), *range(1000, 1032), 5000, 5001)]
+    low, high = lights.COLORS.saturation
     for colors in found:
-        for name, values in colors.items():
+        for color, before in zip(colors, own, strict=True):
             # A scaling and a sum of three: some roundings of numbers of that size.
-            assert abs(sum(values) - sum(own[name])) <= 8 * np.finfo(float).eps * sum(own[name])
-            assert min(values) >= 0.0
-    assert len({tuple(colors["warm"]) for colors in (own, *found)}) == len(found) + 1
-    # The tests' sets are those of no training, also at the largest scale.
-    assert lights.light_set(1) != lights.light_set(-1)
-    assert all(count > 0 for counts in lights.COUNTS.values() for count in counts)
+            assert abs(sum(color) - sum(before)) <= 8 * np.finfo(float).eps * sum(before)
+            assert low - 1e-12 <= saturation_of(color) <= high + 1e-12
+    assert len(set(found)) == len(found)
+
+
+@pytest.mark.parametrize("scale", ["small", "paper"])
+def test_light_sets_of_tests_are_those_of_no_training(scale, tmp_path):
+    lights = importlib.import_module("lights")
+    ground = Ground(PLANS[scale], tmp_path, "numpy")
+    tests = {shot.variation for shot in lights.recoloured(ground)}
+    assert len(tests) == PLANS[scale].test_frames
+    for count in lights.COUNTS[scale]:
+        train = [shot.variation for shot in lights.trained_on(ground, count)]
+        assert not tests & set(train)
+        assert len(set(train)) <= (count or len(train))
+    assert len(set(train)) == len(train), "each frame has colours of its own"
+
+
+@pytest.mark.parametrize("count", [4, 16])
+def test_light_sets_follow_no_pose(count):
+    """Taken in turns, every set was seen in a few poses only: the turn's and theirs had a common factor.
+
+    Drawn one by one, hardly a frame has the set that the turns would give it.
+    """
+    lights = importlib.import_module("lights")
+    frames_each = lights.FRAMES * PLANS["small"].train_frames
+    found = lights.numbers(count, frames_each)
+    assert set(found) <= set(range(count))
+    turns = sum(number == k % count for k, number in enumerate(found))
+    # Binomial of 48 frames: 28 of 48 have a probability below 1e-6 for 4 sets, and far less for 16.
+    assert turns < 28
+    if count == 4:
+        # A set that is seen fewer than 3 times has a probability below 1e-3 for all sets together.
+        assert min(found.count(number) for number in range(count)) >= 3
 
 
 def test_the_networks_of_lights_are_of_one_size():
@@ -190,19 +225,119 @@ class State:
         self.step = step
 
 
-def test_orientations_share_no_noise():
-    """Shots of all orientations and kinds have seeds of their own."""
-    module = importlib.import_module("generalisation")
-    degrees = sorted({*module.SEVERAL_DEGREES, *module.TEST_DEGREES["paper"]})
-    seeds = [module.seed_of(turned) for turned in degrees]
-    frames_each = max(PLANS["paper"].test_frames, PLANS["paper"].train_frames)
-    assert min(seeds) >= 500 + PLANS["paper"].test_frames
+def noise_seeds(shots):
+    """Return the seeds of shots, or fail if two are the same."""
+    seeds = [shot.seed for shot in shots]
     assert len(set(seeds)) == len(seeds)
-    assert max(seeds) + frames_each < 10_000
+    return set(seeds)
+
+
+@pytest.mark.parametrize("scale", ["small", "paper"])
+def test_kinds_of_frames_share_no_noise(scale, tmp_path):
+    """All training and test shots of all studies have seeds of their own, below those of flicker."""
+    generalisation, lights, ablations = map(
+        importlib.import_module, ("generalisation", "lights", "ablations")
+    )
+    ground = Ground(PLANS[scale], tmp_path, "numpy")
+    kinds = [generalisation.learned(ground, kind) for kind in ("one", "a range", generalisation.SOME_POSES)]
+    kinds += generalisation.tests(ground, scale).values()
+    kinds += [lights.trained_on(ground, 4), *ablations.glossy_shots(ground)]
+    found = [noise_seeds(shots) for shots in kinds]
+    assert sum(map(len, found)) == len(set().union(*found))
+    assert max(set().union(*found)) < importlib.import_module("flicker").FIRST_SEED
+
+
+def test_a_range_of_orientations_follows_no_pose(tmp_path):
+    """Each frame draws its yaw independently: neither it nor the pose tells the other.
+
+    Yaw and pose of n independent frames have a correlation of deviation 1 / sqrt(n - 1); at the significance
+    of 1 % it stays below 2.58 of these.
+    """
+    generalisation = importlib.import_module("generalisation")
+    ground = Ground(PLANS["small"], tmp_path, "numpy")
+    shots = generalisation.learned(ground, generalisation.SEVERAL)
+    yaws = [shot.variation.yaw_deg for shot in shots]
+    low, high = generalisation.RANGE.yaw_deg
+    assert len(set(yaws)) == len(shots)
+    assert low <= min(yaws) < low / 2
+    assert high / 2 < max(yaws) <= high
+    poses = [shot.time % generalisation.PERIOD_S for shot in shots]
+    assert abs(np.corrcoef(yaws, poses)[0, 1]) <= 2.58 / np.sqrt(len(shots) - 1)
+
+
+def test_poses_held_out_are_in_no_quarter_of_the_training(tmp_path):
+    generalisation = importlib.import_module("generalisation")
+    period, learned = generalisation.PERIOD_S, generalisation.LEARNED_S
+    train, test = generalisation.posed(0, 24, held_out=False), generalisation.posed(24, 6, held_out=True)
+    assert {int(time // period) for time in train} == {0, 1, 2, 3}
+    assert max(time % period for time in train) < learned
+    assert learned <= min(time % period for time in test)
+    assert all(0.0 <= time < TURN_SECONDS for time in (*train, *test))
+
+
+def test_frames_of_all_tests_are_different_ones(tmp_path):
+    """No test frame shows what a training frame or another test does, also not under other lamps."""
+    generalisation, ablations = map(importlib.import_module, ("generalisation", "ablations"))
+    ground = Ground(PLANS["small"], tmp_path, "numpy")
+    tests = {
+        where: shown(where, shots)
+        for where, shots in generalisation.tests(ground, "small").items()
+        if where in ("at 0", "at 24", f"at {generalisation.HELD_OUT}")
+    }
+    for kind in (generalisation.SEVERAL, generalisation.SOME_POSES):
+        compare(shown(kind, generalisation.learned(ground, kind)), tests)
+    compare(shown("train", ground.training_shots()), {"at 0": tests["at 0"]})
+    train, test = ablations.glossy_shots(ground)
+    compare(shown("glossy", train), {"test": shown("glossy test", test)})
+
+
+def shown(name, shots):
+    """Return shots as they are compared."""
+    return [Shown(f"{name} {k}", shot.time, shot.build()) for k, shot in enumerate(shots)]
 
 
 def test_training_and_test_times_differ(tmp_path):
     ground = Ground(PLANS["small"], tmp_path, "numpy")
     train, test = ground.times()
+    assert [shot.time for shot in ground.training_shots()] == train
+    assert [shot.time for shot in ground.test_shots()] == test
     assert not set(train) & set(test)
     assert importlib.import_module("flicker").BEGIN_S not in train
+
+
+# ---- what is kept, and what is said beforehand ------------------------------------------------------------
+
+
+def test_scores_of_several_kinds_of_frames_stand_side_by_side():
+    found = {"psnr": 2.0, "mse": 9.0, "per_frame": {"psnr": [1.0, 3.0]}}
+    one, other = told(found, "at 4", ["psnr"]), told(found, "", ["psnr"])
+    assert together(one, other, {"seconds": 5.0}) == {
+        "psnr at 4": 2.0,
+        "psnr": 2.0,
+        "seconds": 5.0,
+        "per_frame": {"psnr at 4": [1.0, 3.0], "psnr": [1.0, 3.0]},
+    }
+
+
+def test_a_study_says_what_is_left_before_it_begins(tmp_path, cache, capsys):
+    """Frames that are there are not counted, nor those that are asked for twice."""
+    fresh = Ground(PLANS["toy"], tmp_path, "numpy")
+    shots = fresh.training_shots()
+    assert left_to_render(fresh, [(shots, 2), (shots[:1], 2)]) == (4, 2 * 16 * 16 * (1 + 2))
+    fresh.learned(shots)
+    assert left_to_render(fresh, [(shots, 2)]) == (0, 0)
+    run("losses", tmp_path / "losses", cache)
+    assert "4 networks to train and judge" in capsys.readouterr().err
+    run("losses", tmp_path / "losses", cache)
+    assert "losses: 0 frames to render, about 0.0 min; 0 networks" in capsys.readouterr().err
+
+
+def test_every_table_has_intervals_over_frames(tmp_path, cache):
+    """Frames of one seed already give one: `mean [low, high]`."""
+    run("losses", tmp_path, cache)
+    row = (tmp_path / "table.md").read_text().splitlines()[2]
+    assert re.fullmatch(r"\| MSE (\| \S+ \[\S+, \S+\] ){3}\| \S+ \|", row)
+    record = json.loads((tmp_path / "results.json").read_text())["records"][0]
+    each = record["values"]["per_frame"]
+    assert {len(values) for values in each.values()} == {PLANS["toy"].test_frames}
+    assert set(each) == {"psnr", "ssim", "flip"}

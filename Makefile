@@ -4,11 +4,13 @@
 # PYTHON=python3   the Python that makes it, 3.10 or newer
 # WAMNET_REQUIRE=  executors whose absence fails `make test`; empty: skip, and say so, what is not there;
 #                  c is among them where $(CC) finds the C library
+# ALSO=            what must be there besides, as torch,pyoidn after `make baselines`
 
 VENV ?= .venv
 PYTHON ?= python3
 comma := ,
 WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba,chromium$(if $(shell $(CC) -E -include math.h -x c /dev/null >/dev/null 2>&1 && echo yes),$(comma)c)
+override WAMNET_REQUIRE := $(WAMNET_REQUIRE)$(if $(ALSO),$(comma)$(ALSO))
 PYTEST_OPTIONS ?= -n 2
 export VENV PYTHON WAMNET_REQUIRE
 
@@ -16,13 +18,16 @@ export VENV PYTHON WAMNET_REQUIRE
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo docs test long lint clean distclean
+.PHONY: help setup baselines demo docs test long lint clean distclean
 
 help: ## List the targets
 	@grep -hE '^[a-z]+: .*## ' Makefile | sed -E 's/^([a-z]+):.*## (.*)/  make \1	\2/' | expand -t 20
 
 setup: ## Make the environment with everything in it
 	@.ci/setup all
+
+baselines: setup ## Add PyTorch and Open Image Denoise, with which all tests of the paper's baselines run
+	@.ci/setup baselines
 
 demo: ## Render, train, compile, run and compare; results in out/demo (5 minutes on two cores)
 	@.ci/setup opencl,opengl,cli,report

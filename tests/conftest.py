@@ -4,9 +4,10 @@
    code. HYPOTHESIS_PROFILE=long draws others on each run, HYPOTHESIS_EXAMPLES (2,000) in place of 100;
    --hypothesis-seed repeats them, as `.ci/long` says.
 2. `executor` runs one test body on every executor of whole pipelines [`PIPELINES`], `denoiser` on those that
-   denoise alone too [`EXECUTORS`], `mitsuba` and `chromium` give peers [`PEERS`]. One that
-   is missing fails its tests when WAMNET_REQUIRE names it, as `make test` does; else they are skipped. Either
-   way the summary says what was missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
+   denoise alone too [`EXECUTORS`]; `mitsuba` and `chromium` give peers [`PEERS`]; some tests need packages
+   that the usual set-up leaves out [`packages.needed`]. What is missing fails its tests when WAMNET_REQUIRE
+   names it, as with `make test` and `.ci/run`; else they are skipped. Either way the summary says what was
+   missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
 3. The user's cache folder is never touched: tests have one of their own, which their commands inherit.
 4. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
 5. Tests that take a minute are marked [`COSTLY`], and skipped unless a run wants them; the summary says so.
@@ -22,6 +23,7 @@ from typing import Any
 
 import hypothesis
 import pytest
+from packages import FOUND, PACKAGES, required
 
 PIPELINES = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
 """Executors of kernels of all kinds; an OpenGL executor is named with the kind of its context."""
@@ -52,9 +54,9 @@ _state_key = pytest.StashKey[dict[str, str]]()
 
 
 def required_executors() -> frozenset[str]:
-    """Return the executors that WAMNET_REQUIRE lists, separated by commas; numpy needs no naming."""
-    names = frozenset(name.strip() for name in os.environ.get("WAMNET_REQUIRE", "").split(",")) - {""}
-    known = (*EXECUTORS, *PEERS)
+    """Return the executors, peers and packages that WAMNET_REQUIRE lists; numpy needs no naming."""
+    names = required()
+    known = (*EXECUTORS, *PEERS, *PACKAGES)
     if unknown := sorted(names - set(known)):
         raise pytest.UsageError(f"WAMNET_REQUIRE names {unknown}: it may list only {', '.join(known)}")
     return names
@@ -185,7 +187,7 @@ def _open(name: str) -> tuple[Any, str]:
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Hand what a worker process has found to the process that writes the summary."""
     if hasattr(session.config, "workeroutput"):
-        session.config.workeroutput["executors"] = session.config.stash[_state_key]
+        session.config.workeroutput["executors"] = session.config.stash[_state_key] | FOUND
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -196,11 +198,11 @@ def pytest_testnodedown(node: Any) -> None:
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """Say of each executor whether it ran; loudly when it did not."""
-    state = config.stash[_state_key]
+    state = config.stash[_state_key] | FOUND
     if not state:
         return
     terminalreporter.section("executors")
-    for name in (*EXECUTORS, *PEERS):
+    for name in (*EXECUTORS, *PEERS, *PACKAGES):
         text = state.get(name, "not asked for by any test that ran")
         colour = {"ok": {"green": True}, "MISSING": {"red": True, "bold": True}}.get(
             text.partition(" ")[0].rstrip(":"), {}

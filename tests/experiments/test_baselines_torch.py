@@ -1,7 +1,6 @@
 """The paper's baselines in PyTorch: architectures, losses by hand, and training that can be resumed.
 
-They skip, loudly, where PyTorch is missing: it comes with the extra `baselines`, which `make setup` leaves
-out.
+Without PyTorch they are skipped, and the summary says so; `.ci/run` installs and requires it.
 """
 
 from __future__ import annotations
@@ -12,8 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from packages import needed
 
-torch = pytest.importorskip("torch", reason="PyTorch is missing: pip install 'wamnet[baselines]'")
+torch = needed("torch")
 
 from baselines import dncnn, fitting, pix2pix  # noqa: E402
 from baselines.dncnn import DnCNN  # noqa: E402

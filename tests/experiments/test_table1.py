@@ -14,6 +14,7 @@ import table1
 from baselines import rows
 from lab import scores
 from lab.results import Results
+from packages import needed
 
 from wamnet.cli import exr
 from wamnet.cli.images import read_png
@@ -217,7 +218,7 @@ def test_renders_of_equal_time_and_of_equal_error_by_hand(tmp_path):
 
 @pytest.mark.parametrize("row", ["dncnn", "dncnn-shrunk", "dncnn-shrunk-own", "pix2pix"])
 def test_rows_in_pytorch(row, tmp_path, executor_named, capsys, monkeypatch):
-    pytest.importorskip("torch", reason="PyTorch is missing: pip install 'wamnet[baselines]'")
+    needed("torch")
     executor_named("opencl")
     monkeypatch.setitem(table1.SCALES, "toy", SMALLEST if row == "pix2pix" else TINY)
     arguments = ["--scale", "toy", "-o", str(tmp_path / "out"), "--cache", str(tmp_path / "cache")]
@@ -230,7 +231,7 @@ OIDN = [row for row in rows.ROWS if row.startswith("oidn")]
 
 @pytest.mark.parametrize("row", OIDN)
 def test_rows_of_open_image_denoise(row, made):
-    pytest.importorskip("pyoidn", reason="Open Image Denoise is missing: pip install 'wamnet[baselines]'")
+    needed("pyoidn")
     folder, _ = made
     with open_executor("opencl") as device:
         bench = rows.Bench.of(TINY, folder / "cache", device)

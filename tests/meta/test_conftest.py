@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -36,6 +37,8 @@ def run(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch):
     """Give a function that runs STUB, or the file made since, under a given WAMNET_REQUIRE."""
     pytester.makeconftest((Path(__file__).parents[1] / "conftest.py").read_text())
     pytester.makepyfile(STUB)
+    tests = Path(__file__).parents[1]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(map(str, (tests / "support", tests.parent / "bench"))))
 
     def run_with(require: str, *options: str) -> pytest.RunResult:
         monkeypatch.setenv("WAMNET_REQUIRE", require)
@@ -45,8 +48,7 @@ def run(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch):
 
 
 @pytest.mark.parametrize(("require", "outcome"), [("", "skipped"), ("mitsuba", "errors")])
-def test_missing_peer_has_the_same_policy(run, pytester, monkeypatch, require, outcome):
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2] / "bench"))
+def test_missing_peer_has_the_same_policy(run, pytester, require, outcome):
     pytester.makepyfile(
         'import sys\nsys.modules["mitsuba"] = None\ndef test_it(mitsuba):\n    assert mitsuba\n'
     )
@@ -55,6 +57,32 @@ def test_missing_peer_has_the_same_policy(run, pytester, monkeypatch, require, o
     result.stdout.fnmatch_lines(["mitsuba: MISSING: mitsuba: the package is not installed; pip install *"])
     if require:
         result.stdout.fnmatch_lines(["peer mitsuba is required and MISSING: mitsuba: the package *"])
+
+
+NEEDED = """
+import sys
+
+sys.modules["torch"] = None
+from packages import needed
+
+{}
+
+def test_it():
+    assert {}
+"""
+"""A file that needs a package that cannot be imported, from the start or in its test."""
+
+
+@pytest.mark.parametrize(("before", "asserted"), [("needed('torch')", "True"), ("", "needed('torch')")])
+@pytest.mark.parametrize(("require", "outcome"), [("", "skipped"), ("pyoidn,torch", None)])
+def test_missing_package_has_the_same_policy(run, pytester, before, asserted, require, outcome):
+    pytester.makepyfile(NEEDED.format(before, asserted))
+    result = run(require)
+    result.assert_outcomes(**{outcome or ("errors" if before else "failed"): 1})
+    missing = "MISSING: PyTorch cannot be imported (*); pip install 'wamnet?baselines?'"
+    result.stdout.fnmatch_lines([f"torch: {missing}", "pyoidn: not asked for by any test that ran"])
+    if require:
+        result.stdout.fnmatch_lines([f"*package torch is required and {missing}"])
 
 
 @pytest.mark.parametrize("options", [(), ("-n", "1")])

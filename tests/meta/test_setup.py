@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import os
 import re
 import shutil
@@ -65,6 +66,58 @@ def test_folder_that_is_no_environment(house, tmp_path):
     assert (done.returncode, done.stdout) == (1, "")
     assert "is a folder that holds something else" in done.stderr
     assert (tmp_path / "precious").read_text() == "kept"
+
+
+def test_all_stands_for_its_extras_and_not_for_the_baselines(house, tmp_path):
+    """With a stand-in for Python that notes what pip is asked for."""
+    (tmp_path / "bin").mkdir()
+    python_that_says(tmp_path / "bin", f'case "$*" in *"pip install"*) echo "$*" >>{tmp_path}/asked;; esac')
+    (tmp_path / ".wamnet").mkdir()
+    (tmp_path / ".wamnet/tools-tried").touch()  # nothing is installed through apt
+    for extras in ("all", "all", "cli,report", "baselines", "baselines"):
+        done = setup(house, extras, VENV=str(tmp_path))
+        assert done.returncode == 0, done.stderr
+    asked = (tmp_path / "asked").read_text().splitlines()
+    assert [line.partition("--constraint .ci/constraints.txt ")[2] for line in asked] == [
+        "--editable .[all]",
+        "--editable .[baselines]",
+    ]
+
+
+def test_pytorch_has_one_version_in_one_place(house):
+    pinned = [
+        line
+        for path in house.files()
+        if path.suffix in {"", ".txt", ".toml"}
+        for line in path.read_text(errors="ignore").splitlines()
+        if line.startswith("torch==")
+    ]
+    assert len(pinned) == 1
+
+
+@pytest.mark.parametrize(
+    ("given", "required"),
+    [
+        ("WAMNET_REQUIRE=c", "c"),
+        ("WAMNET_REQUIRE=c ALSO=torch", "c,torch"),
+        ("ALSO=torch,pyoidn", "opencl,*,pyoidn"),
+    ],
+)
+def test_what_make_requires(house, given, required):
+    """A rule of its own prints what tests are given."""
+    command = ["make", "-C", house.root, "--no-print-directory", *given.split()]
+    rule = "--eval=shown: ; @echo $$WAMNET_REQUIRE"
+    done = subprocess.run([*command, rule, "shown"], capture_output=True, text=True, check=True)
+    assert fnmatch.fnmatch(done.stdout.strip(), required)
+
+
+def test_ci_requires_the_baselines_that_it_installs(house):
+    steps = (house.root / ".ci/run").read_text().splitlines()
+    first, second = (
+        n for n, step in enumerate(steps) if " baselines" in step or "ALSO=" in step if step[0] != "#"
+    )
+    assert steps[first].endswith(" baselines")
+    assert "ALSO=torch,pyoidn" in steps[second]
 
 
 def test_extras_must_be_named(house):

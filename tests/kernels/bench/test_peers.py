@@ -1,12 +1,14 @@
 """Peers compute the network's function, within what float32 may do to it; those that are absent say so.
 
-A peer that is not installed is skipped, with the text that the benchmark prints.
+A peer that is not installed is skipped, with the text that the benchmark prints; PyTorch and Open Image
+Denoise fail where they are required.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from packages import PACKAGES, needed
 
 from wamnet.compiler import bounds
 from wamnet.compiler.compile import analysed
@@ -32,6 +34,8 @@ SAME_FUNCTION = [peer for peer in contenders.PEERS if peer.variant]
 
 def opened(peer, model, size):
     """Return the open peer with its tools, or skip."""
+    for package in PACKAGES.keys() & peer.packages:
+        needed(package)
     tools = Tools()
     try:
         peer.prepare(tools)

@@ -91,13 +91,15 @@ def _limits(name: str) -> tuple[float, float]:
 def ranges_from_json(text: str) -> Ranges:
     """Return the ranges that a frame or a model says, or refuse what is none."""
     try:
-        data = json.loads(text)
-        found = Ranges(**{k: v if v is None else (float(v[0]), float(v[1])) for k, v in data.items()})
+        pairs: dict[str, Any] = {
+            name: None if pair is None else (float(pair[0]), float(pair[1]))
+            for name, pair in json.loads(text).items()
+        }
+        found = Ranges(**pairs)
         check_ranges(found)
     except (TypeError, ValueError, KeyError, IndexError, AttributeError, RecursionError):
-        raise InputError(
-            "ranges", text[:80], "JSON of ranges", "make the data set or the model again"
-        ) from None
+        way_out = "make the data set or the model again"
+        raise InputError("ranges", text[:80], "JSON of ranges", way_out) from None
     return found
 
 

@@ -82,7 +82,8 @@ LAMPS = ("color", "normal", "albedo", "position", "unshadowed")
 RECIPES: Mapping[str, Recipe] = {
     "short": SHORT,
     "best": BEST,
-    "page": replace(BEST, features=LAMPS),
+    "page": replace(BEST, features=LAMPS, steps=60_000),
+    "page48": replace(BEST, features=LAMPS, steps=60_000, widths=(48,) * 4),
 }
 """Recipes of the rows by name."""
 
@@ -116,14 +117,16 @@ ROWS: Mapping[str, Row] = {
     "short-1": Row("wamnet, short, features of 1 ray", 1, "short"),
     "best-1": Row("wamnet, best, features of 1 ray", 1, "best"),
     "best-16": Row(f"wamnet, best, {RAYS} rays", RAYS, "best"),
+    "page-16": Row(f"wamnet, the page's inputs and steps, {RAYS} rays", RAYS, "page"),
+    "page48-16": Row(f"the same with 48 neurons a layer, {RAYS} rays", RAYS, "page48"),
     "shipped": Row(f"wamnet, the network of the page, {RAYS} rays", RAYS, "page", of=SHIPPED_SET),
 }
 """The rows by name."""
 
-TIMED = ("oidn-fast16", "oidn-clean16", "best-16")
+TIMED = ("oidn-fast16", "oidn-clean16", "page-16")
 """Rows whose time is taken."""
 
-SHOWN = ("input", "oidn-clean16", "best-16")
+SHOWN = ("input", "oidn-clean16", "page-16")
 """Rows that are shown beside the reference."""
 
 COLUMNS = (
@@ -251,7 +254,7 @@ def timed(bench: Bench, kept: Results, rounds: int) -> None:
     if kept.get("times", 0) is not None:
         return
     frame = bench.tests(0, RAYS)[0][0]
-    model, _ = bench.model(ROWS["best-16"], 0)
+    model, _ = bench.model(ROWS["page-16"], 0)
     with open_executor(bench.executor) as device:
         size = (frame.height, frame.width)
         schedule = tune.choose(device, model, size, "ieee", 0, rounds).schedule
@@ -261,8 +264,8 @@ def timed(bench: Bench, kept: Results, rounds: int) -> None:
         ways: dict[str, Callable[[], Any]] = {
             row: partial(lambda row: to_display(oidn(ROWS[row], frame)), row) for row in TIMED[:-1]
         }
-        ways["best-16"] = lambda: device.run(kernel, images_of(model, frame))
-        ways["best-16, encoded features given"] = lambda: device.run(kernel, images)
+        ways["page-16"] = lambda: device.run(kernel, images_of(model, frame))
+        ways["page-16, encoded features given"] = lambda: device.run(kernel, images)
         found = in_turns({name: _done(way) for name, way in ways.items()}, rounds)
     values = {name: list(times.seconds) for name, times in found.items()}
     kept.put("times", 0, {"device": device.device, "schedule": schedule, "seconds": values})
@@ -310,7 +313,7 @@ def configuration(name: str, split: str, row: str) -> str:
     return f"{name}, {split}: {row}"
 
 
-OURS = {"best-1": (1,), "best-16": (1, RAYS), "shipped": (1, RAYS)}
+OURS = {"best-1": (1,), **dict.fromkeys(("best-16", "page-16", "page48-16", "shipped"), (1, RAYS))}
 """Rows of ours that are compared with Open Image Denoise, and the rays of what it may be given then."""
 
 

@@ -5,7 +5,7 @@
     python experiments/publish.py --run bench-train python bench/train.py
 
 1. A file of results, of `wamnet bench` or of `wamnet demo` (report.json) is checked and becomes
-   experiments/records/NAME.json [`lab/records.py`]. Its name is the experiment's, or `--name`.
+   experiments/records/<name>.json [`lab/records.py`]. Its name is the experiment's, or `--name`.
 2. `--run NAME COMMAND...` runs a program of bench/ or experiments/, or `wamnet`, that prints Markdown tables;
    their rows are the records [`lab/printed.py`]. It must end with status 0.
 3. `--picture FILE` adds a picture of frames, made smaller, to docs/images and its digest to the record.

@@ -1,7 +1,7 @@
 """Plots in git: SVG drawn from records, the same bytes wherever the same versions draw them.
 
 1. A plot is a function of the records that returns a figure of matplotlib [`shown.PLOTS`]; its file is
-   docs/images/NAME.svg.
+   docs/images/<name>.svg.
 2. Its last line has a digest of the records behind it and of the text of these functions [`digest`]: a plot
    of other records or by other code is seen without drawing it again, whatever version of matplotlib drew it
    [`stale`].

@@ -500,7 +500,9 @@ def decided() -> list[tuple[str, str, str]]:
 
 def opening(text: str) -> str:
     """Return a text's first sentences, so many that they say something, as a cell of a table."""
-    sentences = re.split(r"(?<=\.) ", text)
+    # What is written from records, a table or a figure between marks, is the chapter's.
+    before = re.sub(r"<!--.*?-->", "", text.partition("<!-- table:")[0]).strip()
+    sentences = re.split(r"(?<=\.) ", before)
     count = next((n for n in range(1, len(sentences)) if len(" ".join(sentences[:n])) >= 60), len(sentences))
     return " ".join(sentences[:count]).removesuffix(":").replace("|", "\\|")
 

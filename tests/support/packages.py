@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import os
+from importlib.metadata import version
 from typing import Any
 
 import pytest
@@ -35,5 +36,5 @@ def needed(name: str) -> Any:
         if name in required():
             pytest.fail(f"package {name} is required and {FOUND[name]}", pytrace=False)
         pytest.skip(f"package {name} is {FOUND[name]}", allow_module_level=True)
-    FOUND[name] = f"ok (version {getattr(module, '__version__', 'unknown')})"
+    FOUND[name] = f"ok (version {version(name)})"
     return module

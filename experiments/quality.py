@@ -119,7 +119,7 @@ ROWS: Mapping[str, Row] = {
     "best-16": Row(f"wamnet, best, {RAYS} rays", RAYS, "best"),
     "page-16": Row(f"wamnet, the page's inputs and steps, {RAYS} rays", RAYS, "page"),
     "page48-16": Row(f"the same with 48 neurons a layer, {RAYS} rays", RAYS, "page48"),
-    "shipped": Row(f"wamnet, the network of the page, {RAYS} rays", RAYS, "page48", of=SHIPPED_SET),
+    "shipped": Row(f"wamnet, the network of the page, {RAYS} rays", RAYS, "page", of=SHIPPED_SET),
 }
 """The rows by name."""
 

@@ -19,7 +19,7 @@
 Every step is kept, so an interrupted run goes on. Numbers are means over test frames and seeds; records keep
 those of each frame. "worth" is the number of samples per pixel whose render has the same error. "blocks" is
 how much the error jumps at borders of patches, against elsewhere [`baselines/blocks.py`]. "MSE modulo 256" is
-that of arithmetic of 8 bits, which the paper's own figures look like [`lab/scores.py`].
+that of arithmetic of 8 bits; that the paper's was so is a conjecture [`experiments/claims.py`].
 """
 
 from __future__ import annotations
@@ -144,6 +144,7 @@ def judged(row: str, bench: Bench, kept: Results, pictures: Path, seed: int) -> 
     values["settings"] = trained_with(ROWS[row], bench.scale)
     if (patch := bench.scale.pix2pix["crop"]) < min(pairs[0][0].shape[:2]):
         values["blocks"] = blockiness(pairs, patch)
+        per_frame["blocks"] = [blockiness([pair], patch) for pair in pairs]
     if not ready.cases or ready.ladder is not None:
         values["worth"] = climbed(bench, kept, ready.ladder, seed).spp_of(values["mse"])
     return values

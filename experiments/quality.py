@@ -109,16 +109,16 @@ ROWS: Mapping[str, Row] = {
     "oidn-color": Row("Open Image Denoise, high, colour only", 1, quality="high"),
     "oidn-1": Row("Open Image Denoise, high, features of 1 ray", 1, quality="high", aux="noisy"),
     "oidn-prefiltered1": Row(
-        "Open Image Denoise, high, the same, prefiltered", 1, quality="high", aux="prefiltered"
+        "Open Image Denoise, high, 1 ray, prefiltered", 1, quality="high", aux="prefiltered"
     ),
-    "oidn-clean1": Row("Open Image Denoise, high, the same, declared clean", 1, quality="high", aux="clean"),
+    "oidn-clean1": Row("Open Image Denoise, high, 1 ray, declared clean", 1, quality="high", aux="clean"),
     "oidn-clean16": Row(f"Open Image Denoise, high, clean, {RAYS} rays", RAYS, quality="high", aux="clean"),
     "oidn-fast16": Row(f"Open Image Denoise, fast, clean, {RAYS} rays", RAYS, quality="fast", aux="clean"),
     "short-1": Row("wamnet, short, features of 1 ray", 1, "short"),
     "best-1": Row("wamnet, best, features of 1 ray", 1, "best"),
     "best-16": Row(f"wamnet, best, {RAYS} rays", RAYS, "best"),
     "page-16": Row(f"wamnet, the page's inputs and steps, {RAYS} rays", RAYS, "page"),
-    "page48-16": Row(f"the same with 48 neurons a layer, {RAYS} rays", RAYS, "page48"),
+    "page48-16": Row(f"wamnet, the same with 48 neurons a layer, {RAYS} rays", RAYS, "page48"),
     "shipped": Row(f"wamnet, the network of the page, {RAYS} rays", RAYS, "page", of=SHIPPED_SET),
 }
 """The rows by name."""

@@ -110,7 +110,6 @@ AHEAD = (
         "camera moves all around the front, lamps of any hue: the network that ships",
     ),
     ("cornell", "best-16", "`cornell`, camera moves"),
-    ("glossy", "best-16", "`glossy`, camera moves"),
 )
 """Sets and rows whose differences to Open Image Denoise with the same clean features the README shows."""
 
@@ -497,7 +496,6 @@ TABLES: Mapping[str, TableOf] = {
     "presets": as_printed("presets"),
     "quality-ahead": differences,
     "quality-cornell": quality("cornell"),
-    "quality-glossy": quality("glossy"),
     "quality-lamps": quality("minicubes-page"),
     "quality-minicubes": quality("minicubes"),
     "quality-outside": quality("minicubes", "outside"),

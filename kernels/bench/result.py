@@ -12,7 +12,7 @@ from typing import Any
 
 from ..measure import Times
 
-SCHEMA = "wamnet-bench-1"
+SCHEMA = "wamnet-bench-2"
 """Name and version of the form of the data."""
 
 MEASURED, MISSING, SKIPPED, FAILED, PENDING = "measured", "missing", "skipped", "failed", "pending"

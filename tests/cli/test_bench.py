@@ -43,11 +43,11 @@ def found(wamnet, here):
 
 def test_the_result_is_written_in_all_forms(found, here) -> None:
     data, outcome = found
-    assert data["schema"] == "wamnet-bench-1"
+    assert data["schema"] == "wamnet-bench-2"
     assert data["interrupted"] is False
     assert data["command"].split()[0] == "wamnet"
     assert [row["name"] for row in data["contenders"]] == ["numpy:plain"]
-    assert data["front"] == {"error": ["numpy:plain"], "quality": []}
+    assert data["front"] == {"error": ["numpy:plain"], "quality": [], "rounding": ["numpy:plain"]}
     assert [entry["size_px"] for entry in data["sizes"]] == [8]
     folder = here / "made/speed"
     assert sorted(p.name for p in folder.iterdir()) == [
@@ -160,7 +160,7 @@ def test_quality_comes_from_a_data_set(wamnet, here) -> None:
     made = wamnet("dataset", "cornell", "--frames", 1, "--test", 1, "--size", 16, "--spp", 4, "-o", "set")
     assert made.status == 0, made.err
     outcome = wamnet(
-        *("bench", "model.safetensors", "--dataset", "set", "--only", "numpy:plain,opencl:*:rank8"),
+        *("bench", "model.safetensors", "--dataset", "set", "--only", "numpy:plain,opencl:*:exact"),
         *("--executor", "numpy", "--size", 16, "--repeats", 1, "-o", "speed"),
     )
     assert outcome.status == 0, outcome.err

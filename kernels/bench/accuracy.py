@@ -24,7 +24,8 @@ from ...compiler.factor import at_images, factor, product
 from ...compiler.interpret import interpret
 from ...compiler.ir import Program
 from ...compiler.lower import lower
-from ...compiler.schedules import PLAIN, windows
+from ...compiler.profiles import SineContract
+from ...compiler.schedules import PLAIN, Schedule, windows
 from ...refimpl import dataset, metrics
 from ...refimpl.denoise import Model, denoise
 from ...refimpl.frame import Frame
@@ -56,7 +57,7 @@ class Crop:
             for name, image in images.items()
         }
         self.full = self.interpreted(lower(model))
-        self._rounding: dict[tuple[str, str, str], tuple[Array, float]] = {}
+        self._rounding: dict[tuple[Any, ...], tuple[Array, float]] = {}
 
     def interpreted(self, program: Program) -> Array:
         """Return the output (rows, columns, 3) of a program of one window, in float64."""
@@ -70,24 +71,35 @@ class Crop:
 
         `schedule` of `target`: whose sums; a peer without a target is held to those of the interpreter.
         """
-        key = variant.name, target or "numpy", schedule or PLAIN
+        chosen = schedule_named(target or "numpy", schedule or PLAIN)
+        contract = sine_contract(variant.profile, target or "numpy")
+        # Most schedules of all targets share one bound, which takes seconds to compute.
+        key = variant.name, contract, type(chosen).enclosures
         if key not in self._rounding:
-            self._rounding[key] = self._rounded(variant, *key[1:])
+            self._rounding[key] = self._rounded(variant, contract, chosen)
         return self._rounding[key]
 
-    def _rounded(self, variant: Variant, target: str, schedule: str) -> tuple[Array, float]:
+    def _rounded(self, variant: Variant, contract: SineContract, chosen: Schedule) -> tuple[Array, float]:
         """Compute both in the variant's profile; the bound is infinite where a sine promises nothing."""
         program = analysed(variant.program(self.model), variant.profile)
-        contract = sine_contract(variant.profile, target)
         if variant.rank:
             whole = factor(program, variant.rank)
-            found = bounds.output_errors(program, at_images(whole, contract, self.images, of_cut=False))
+            near = self._near(program)
+            found = bounds.output_errors(program, at_images(whole, contract, near, of_cut=False))
             program = product(whole)
         else:
-            chosen = schedule_named(target, schedule)
-            found = bounds.output_errors(program, chosen.enclosures(program, contract, self.images))
+            direct = type(chosen).enclosures is Schedule.enclosures
+            near = self._near(program) if direct else self.images
+            rows = slice(0, self.rows)
+            found = bounds.output_errors(program, chosen.enclosures(program, contract, near, rows))
         (bound,) = found.values()
         return self.interpreted(program), float(self.cut(bound).max())
+
+    def _near(self, program: Program) -> Images:
+        """Return the crop's images with no more around it than its windows see: bounds take seconds."""
+        gather = kernel_gather(program)
+        rows, columns = self.rows + gather.rows, self.columns + gather.columns
+        return {name: image[:rows, :columns] for name, image in self.images.items()}
 
     def cut(self, picture: NDArray[Any]) -> Any:
         """Return the crop of a picture (H, W, C)."""

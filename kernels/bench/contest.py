@@ -74,8 +74,9 @@ GROWTH_ROUNDS = 3
 class Request:
     """What is measured: a model on pictures of `size` pixels in width and height, `repeats` times.
 
-    `pairs` are unseen noisy frames with their references, empty without a data set; `sizes` further sizes;
-    `budget_s` the longest that one contender may take at one size. `quick` halves the machine's measurements,
+    `pairs` are unseen noisy frames with their references, empty where noise is denoised, and `frames` says
+    what is known of them; `name` is the model's, `sizes` are further sizes, `budget_s` is the longest that
+    one contender may take at one size. `quick` halves the machine's measurements,
     `first_runs` measures compilation with empty caches and with those on disk.
     """
 
@@ -84,6 +85,8 @@ class Request:
     repeats: int = 5
     sizes: tuple[int, ...] = ()
     pairs: tuple[tuple[Frame, Frame], ...] = ()
+    frames: Mapping[str, Any] = field(default_factory=dict)
+    name: str = ""
     budget_s: float = 30.0
     quick: bool = False
     first_runs: bool = False
@@ -365,7 +368,7 @@ class Contest:
             if (variant := by_name[name]) and variant.model:
                 continue
             self.told(f"first run of {name}", 0.05)
-            never, later = first_runs(name, self.request.model)
+            never, later = first_runs(name, self.request.model, self.request.size)
             self.rows[name].facts |= {"first_run_s": never, "later_run_s": later}
 
     def as_data(self) -> dict[str, Any]:
@@ -384,7 +387,9 @@ class Contest:
                 "size_px": request.size,
                 "repeats": request.repeats,
                 "budget_s": request.budget_s,
+                "frames": request.frames or None,
                 "network": {
+                    "name": request.name,
                     "widths": model.siren.widths,
                     "features": model.features,
                     "window": model.window.size,

@@ -197,6 +197,8 @@ def notes(data: Data) -> list[str]:
             "a kernel is faster than sgemm: NumPy's OpenBLAS does not know this processor; "
             "OPENBLAS_CORETYPE=SkylakeX may double it where there is AVX-512"
         )
+    if any(draw["time_in_training"] for draw in (data.get("frames") or {}).get("draws", ())):
+        lines.append("a test frame is at a time that training had")
     if data["interrupted"]:
         lines.append("interrupted: this is what was measured until then")
     return lines

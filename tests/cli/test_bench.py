@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from wamnet.cli import bench, bench_report, plots, report
+from wamnet.cli import bench, bench_forms, bench_frames, bench_report, exr, plots, report
+from wamnet.compiler.model_file import load_model, save_checkpoint, save_model
 from wamnet.kernels.bench import contest, rates
 
 SPEC = Path(__file__).resolve().parents[2] / "spec" / "bench.md"
@@ -101,9 +103,16 @@ def test_predicted_stands_beside_measured(found) -> None:
         (["--repeats", "0"], "--repeats is 0: it must be from 1 to 1000"),
         (["--budget", "nan"], "--budget is nan: it must be positive and finite"),
         (["--budget", "0"], "--budget is 0.0: it must be positive and finite"),
-        (["--features", "color,colour"], "feature name is colour"),
-        (["model.safetensors", "--features", "color"], "--features is color: a model says itself"),
-        (["--dataset", "cubes"], "--dataset is cubes: the quality of a network that is not trained"),
+        (["--synthetic", "--features", "color,colour"], "feature name is colour"),
+        (["--features", "color"], "--features is color: a trained model says itself what it sees"),
+        (["model.safetensors", "--features", "color"], "--features is color: a trained model says itself"),
+        (["--synthetic", "--dataset", "cubes"], "--dataset is cubes: noise is measured in its place"),
+        (["paper", "--dataset", "cubes"], "--dataset is cubes: noise is measured in its place"),
+        (["paper", "--train-variants"], "--train-variants is given: forms are trained on frames"),
+        (["model.safetensors", "--train-variants"], "--train-variants is given: forms are trained on frames"),
+        (["--frames", "0"], "--frames is 0: it must be from 1 to 100"),
+        (["--reference-spp", "0"], "--reference-spp is 0: it must be from 1 to"),
+        (["--steps", "0"], "--steps is 0: it must be from 1 to"),
         (["model.safetensors", "--dataset", "cubes"], "data set is cubes: it has no manifest.json"),
         (["none.safetensors"], "none.safetensors"),
     ],
@@ -173,6 +182,125 @@ def test_quality_comes_from_a_data_set(wamnet, here) -> None:
     assert abs(quality["psnr_loss_db"]) <= 1e-4
     assert (here / "speed/bench-quality.png").is_file()
     assert "PSNR loss, dB" in (here / "speed/bench.md").read_text()
+
+
+def small_scene(monkeypatch) -> None:
+    """Let training frames be few and tiny, and NumPy render and train: no device is asked for."""
+    monkeypatch.setattr(bench_frames, "renderer", lambda: "numpy")
+    monkeypatch.setattr(bench, "_trainer", lambda: "numpy")
+    monkeypatch.setattr(bench_frames, "TRAINING_FRAMES", 2)
+    monkeypatch.setattr(bench_frames, "TRAINING_SPP", 2)
+    monkeypatch.setattr(bench_frames, "TRAINING_PX", 12)
+
+
+def of_cubes(path: Path) -> None:
+    """Make the model in a file one that says that it was trained on the mini cubes."""
+    model = load_model(path)
+    info = {"trained_on_scene": "minicubes", "trained_on_feature_spp": "2", "trained_on_time": "0.0, 4.0"}
+    save_model(path, replace(model, info=info))
+
+
+def measured(wamnet, *more: object) -> tuple[dict, str]:
+    """Return the result of a small run on two rendered frames, and what it said."""
+    outcome = wamnet(
+        *("bench", "model.safetensors", "--size", 16, "--frames", 2, "--reference-spp", 2),
+        *("--repeats", 1, "-o", "speed", *more),
+    )
+    assert outcome.status == 0, outcome.err
+    return json.loads(Path("speed/bench.json").read_text()), outcome.out
+
+
+def test_frames_of_the_model_s_scene_are_rendered_once(wamnet, here, monkeypatch) -> None:
+    """With its camera rays; their draws are in the result, and a second run finds them."""
+    small_scene(monkeypatch)
+    of_cubes(here / "model.safetensors")
+    data, said = measured(wamnet, "--only", "numpy:plain")
+    frames = data["frames"]
+    assert (data["unseen_frames"], frames["scene"], frames["feature_spp"]) == (2, "minicubes", 2)
+    assert (frames["reference_spp"], frames["frame_px"], data["network"]["name"]) == (
+        2,
+        16,
+        "model.safetensors",
+    )
+    times = [draw["time_s"] for draw in frames["draws"]]
+    assert len(set(times)) == 2
+    # The second of two test times is 16/3 s, which training had not.
+    assert [draw["time_in_training"] for draw in frames["draws"]] == [False, False]
+    assert min(draw["noisy_seed"] for draw in frames["draws"]) > bench_frames.TEST_SEED
+    assert data["contenders"][0]["quality"]["psnr_loss_db"] is not None
+    assert "6 pictures at 3 times, 6 of them made now" in said
+    assert "6 pictures at 3 times, 0 of them made now" in measured(wamnet, "--only", "numpy:plain")[1]
+
+
+def test_a_time_of_training_is_named(wamnet, here, monkeypatch) -> None:
+    small_scene(monkeypatch)
+    of_cubes(here / "model.safetensors")
+    data, _ = measured(wamnet, "--only", "numpy:plain", "--frames", 1)
+    assert [draw["time_s"] for draw in data["frames"]["draws"]] == [4.0]
+    assert data["frames"]["draws"][0]["time_in_training"] is True
+    assert "a test frame is at a time that training had" in bench_report.notes(data)
+
+
+@pytest.mark.parametrize("executor", ["opencl", "opengl"])
+def test_forms_are_trained_once_and_then_measured(
+    wamnet, here, monkeypatch, executor_named, executor
+) -> None:
+    """Each is a row with the steps of its training; a second run reads them, another number trains again."""
+    executor_named(executor)
+    small_scene(monkeypatch)
+    monkeypatch.setattr(bench_forms, "FORMS", ("full", "rank2", "window3", "window14"))
+    of_cubes(here / "model.safetensors")
+    names = ",".join(f"{executor}:*:{form}" for form in ("further", "rank2", "window3"))
+    data, said = measured(wamnet, "--train-variants", "--steps", 3, "--only", names)
+    steps = {row["name"].split(":")[-1]: row["trained_steps"] for row in data["contenders"]}
+    assert {name: steps[name] for name in ("further", "rank2", "window3")} == dict.fromkeys(
+        ("further", "rank2", "window3"), 3
+    )
+    assert "window14" not in steps
+    assert "form rank2: 3 steps" in said
+    for row in data["contenders"]:
+        assert row["state"] == "measured", row["reason"]
+        if row["rounding"]["bound"] is not None:
+            assert row["rounding"]["max"] <= row["rounding"]["bound"]
+    assert "form " not in measured(wamnet, "--train-variants", "--steps", 3, "--only", names)[1]
+    assert "form rank2: 4 steps" in measured(wamnet, "--train-variants", "--steps", 4, "--only", names)[1]
+
+
+def test_a_form_goes_on_where_an_interrupt_left_it(samples, tmp_path, monkeypatch) -> None:
+    """To the weights of one go, by the checkpoint; the model's own scales stay."""
+    from wamnet.refimpl.train import train as train_steps
+
+    model = load_model(samples / "model.safetensors")
+    pairs = [(exr.read_frame(samples / "noisy.exr"), exr.read_frame(samples / "reference.exr"))]
+    forms = bench_forms.planned(model, ("rank2",), 5)
+    (whole,) = bench_forms.trained(model, forms, pairs, tmp_path / "whole", "numpy")
+    begun = bench_forms.start_of(model, "rank2", 5, pairs)
+    half = train_steps(begun.recipe, pairs, state=begun, until=2)
+    (tmp_path / "cut").mkdir()
+    save_checkpoint(tmp_path / "cut" / "rank2.checkpoint.safetensors", half)
+    (resumed,) = bench_forms.trained(model, forms, pairs, tmp_path / "cut", "numpy")
+    for a, b in zip(whole.model.siren.weights, resumed.model.siren.weights, strict=True):
+        assert (a == b).all()
+    assert resumed.model.normalization == model.normalization
+
+
+@pytest.mark.parametrize("named", [["--synthetic"], ["paper"]])
+def test_noise_is_measured_on_request(wamnet, here, named) -> None:
+    """The paper's network, untrained: no frames, and no quality."""
+    outcome = wamnet("bench", *named, "--only", "numpy:plain", "--size", 8, "--repeats", 1, "-o", "speed")
+    assert outcome.status == 0, outcome.err
+    data = json.loads((here / "speed/bench.json").read_text())
+    assert (data["network"]["name"], data["network"]["widths"][0]) == ("paper", 864)
+    assert (data["unseen_frames"], data["frames"]) == (0, None)
+
+
+def test_the_shipped_model_is_measured_by_default(monkeypatch) -> None:
+    """It names a scene, so that frames of it can be rendered."""
+    wanted = bench.Wanted(None, None, (), synthetic=False, trains=True)
+    name, network = wanted.network()
+    wanted.check(network)
+    assert name == "minicubes"
+    assert bench_frames.scene_of(network) == "minicubes"
 
 
 # ---- texts and plots of planted data -----------------------------------------------------------------------

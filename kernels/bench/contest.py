@@ -66,6 +66,9 @@ MOST_TOLD = 200
 FRONTS = {"error": "max", "quality": "psnr_loss_db", "rounding": "bound"}
 """Parts of a row with a front, and the number of each that is set against time."""
 
+STEPS = {"quality": 0.01}
+"""Differences of a part's number, here in dB, that no front sees: those of rounding."""
+
 GROWTH_ROUNDS = 3
 """Most frames of each contender at another size: what grows is seen from few."""
 
@@ -377,7 +380,7 @@ class Contest:
         rows = [self._with_rates(row.as_data(), request.size) for row in self.rows.values()]
         by_name = {row["name"]: row for row in rows}
         fronts = {
-            part: front({name: of_front(row, part, key) for name, row in by_name.items()})
+            part: front({name: of_front(row, part, key, STEPS.get(part)) for name, row in by_name.items()})
             for part, key in FRONTS.items()
         }
         limits = self.limits

@@ -13,6 +13,7 @@ import pytest
 from wamnet.cli import bench, bench_forms, bench_frames, bench_report, exr, plots, report
 from wamnet.compiler.model_file import load_model, save_checkpoint, save_model
 from wamnet.kernels.bench import contest, rates
+from wamnet.refimpl.errors import InputError
 
 SPEC = Path(__file__).resolve().parents[2] / "spec" / "bench.md"
 """The chapter that documents the keys of the result."""
@@ -180,7 +181,7 @@ def test_quality_comes_from_a_data_set(wamnet, here) -> None:
     # A picture that moves by d moves its PSNR by at most 20 log10(1 + d / rmse) dB: with d below 1e-6 and
     # an rmse above 1e-1 (the network is not trained) that is less than 1e-4.
     assert abs(quality["psnr_loss_db"]) <= 1e-4
-    assert (here / "speed/bench-quality.png").is_file()
+    assert (here / "speed/bench-trade-off.png").is_file()
     assert "PSNR loss, dB" in (here / "speed/bench.md").read_text()
 
 
@@ -356,11 +357,97 @@ def test_plots_of_any_data(theme) -> None:
     assert set(bench_report.draw(planted(), theme)) == {"error", "sizes"}
     assert bench_report.draw(planted(contenders=[], sizes=[]), theme) == {}
     quality = planted(
-        contenders=[row("a", ms={"median": 2.0}, quality={"psnr_loss_db": -0.25})],
+        contenders=[row("a", **TRADED, quality={"psnr_loss_db": -0.25})],
         front={"error": [], "quality": ["a"]},
         sizes=[],
     )
-    assert set(bench_report.draw(quality, theme)) == {"quality"}
+    assert set(bench_report.draw({**quality, "unseen_frames": 1}, theme)) == {"trade-off"}
+    assert bench_report.draw(quality, theme) == {}
+
+
+TRADED = {"ms": {"median": 20.0, "min": 19.0, "max": 25.0, "spread": 0.3, "rounds": [20.0]}}
+"""Times of the rows below."""
+
+
+def traded() -> dict:
+    """Return a result with a trained form, a kernel of another sine, one without a bound, and two peers."""
+    facts = {"executor": "opencl", "schedule": "tile16", "profile": "ieee", "degree": 11, "rank": None}
+    facts |= {"window": 12, "parameters": 58595, **TRADED}
+    bounds = {"max": 2e-7, "bound": 1e-5, "bound_all": 1e-4, "certified": True}
+    loss = {"psnr_db": 35.0, "psnr_loss_db": -0.001}
+    no_bounds = dict.fromkeys(bounds)
+    rows = [
+        row("opencl:tile16", quality=loss, rounding=bounds, **facts),
+        row("opencl:tile16:rank8", quality={"psnr_db": 34.0, "psnr_loss_db": 1.0}, rounding=bounds, **facts)
+        | {"rank": 8, "parameters": 7811},
+        row("opencl:tile16:native", quality=loss, rounding=no_bounds, **facts)
+        | {"profile": "native", "degree": None},
+        row("torch", kind="peer", quality=loss, rounding=no_bounds, **TRADED, window=12),
+        row("oidn:high", kind="peer", quality={"psnr_db": 32.0, "psnr_loss_db": 3.0}, **TRADED),
+    ]
+    network = {"widths": [4, 3], "features": ["color"], "window": 12}
+    draws = [{"time_s": 1.6, "time_in_training": False}]
+    frames = {"scene": "minicubes", "frame_px": 16, "feature_spp": 16, "reference_spp": 2, "draws": draws}
+    front = {"error": [], "quality": ["opencl:tile16"], "rounding": ["opencl:tile16"]}
+    return planted(contenders=rows, network=network, frames=frames, front=front, unseen_frames=1)
+
+
+def test_the_table_has_quality_error_and_bounds_of_every_row() -> None:
+    lines = bench_report.table(traded()).splitlines()
+    start = "| 12 | 58,595 | 20 | 30% |"
+    assert (
+        lines[2]
+        == f"| whole * | opencl tile16 | ieee, 11 | – {start} 35.00 | 0.00 | 2.0e-07 | 1.0e-05 | 1.0e-04 † |"
+    )
+    assert lines[3].startswith(
+        "| rank8 | opencl tile16 | ieee, 11 | 8 | 12 | 7,811 | 20 | 30% | 34.00 | +1.00 |"
+    )
+    assert lines[4] == f"| native | opencl tile16 | native, its own | – {start} 35.00 | 0.00 | – | – | – |"
+    assert lines[6] == "| oidn:high | – | – | – | – | – | 20 | 30% | 32.00 | +3.00 | – | – | – |"
+
+
+def test_the_picture_has_a_panel_of_loss_and_one_of_bounds() -> None:
+    """Markers say the executor, colours the kind; what has no bound is in the second panel without one."""
+    loss, bound = bench_report.panels(traded())
+    assert (loss.is_loss, bound.is_loss) == (True, False)
+    marks = {mark.name: mark for mark in bound.marks}
+    assert list(marks) == ["tile16", "rank8", "native", "torch", "oidn:high"]
+    assert [mark.kind for mark in marks.values()] == ["whole", "rank", "sine", "peer", "peer"]
+    assert [mark.executor for mark in marks.values()] == ["opencl"] * 3 + ["", "other"]
+    assert [mark.y for mark in marks.values()] == [1e-5, 1e-5, None, None, None]
+    assert [mark.y for mark in loss.marks] == [-0.001, 1.0, -0.001, -0.001, 3.0]
+    assert [mark.on_front for mark in loss.marks] == [True, False, False, False, False]
+
+
+def test_the_picture_is_a_function_of_the_data(tmp_path) -> None:
+    """Written whole or not at all; again from the JSON to the same bytes, and refused without numbers."""
+    data = json.loads(json.dumps(traded()))
+    for name in ("a.png", "b.png"):
+        bench_report.picture(data, tmp_path / name)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    with pytest.raises(InputError, match="no row has a time and a loss or a bound"):
+        bench_report.picture(planted(), tmp_path / "c.png")
+    assert not (tmp_path / "c.png").exists()
+
+
+def test_names_in_the_picture_do_not_overlap(monkeypatch) -> None:
+    """Of forty rows in the same place and beside it: names without a free place are left out."""
+    from matplotlib.figure import Figure
+    from matplotlib.text import Annotation, Text
+
+    found = []
+    monkeypatch.setattr(plots, "_png", lambda figure: found.append(figure) or b"")
+    marks = [
+        plots.Mark(f"form {k}", (1.0 + k % 2, 1.0, 9.0), 1e-5, "opencl", "rank", k == 0) for k in range(40)
+    ]
+    plots.trade_off([plots.Panel("bound", marks, is_loss=False)], plots.PAPER)
+    (figure,) = found
+    assert isinstance(figure, Figure)
+    names = [text for text in figure.axes[0].texts if isinstance(text, Annotation)]
+    boxes = [Text.get_window_extent(name) for name in names]
+    assert names[0].get_text() == "form 0"
+    assert 5 <= len(names) < 40
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
 
 
 def page(**facts) -> str:

@@ -1,8 +1,9 @@
-"""The frames on which a benchmark measures: of the model's own scene, at times that it was not trained on.
+"""The frames on which a benchmark measures: of the model's own scene, at draws that it was not trained on.
 
 1. The test frames of a data set, with what its manifest says of each [`of_folder`].
-2. Without a data set they are rendered into a folder, once: the scene, the camera rays of the features and
-   the depth are those that the model names as its training's [`scene_of`, `rendered`].
+2. Without a data set they are rendered into a folder, once: the scene, the ranges of time, camera and lamps,
+   the camera rays of the features and the depth are those that the model names as its training's
+   [`scene_of`, `ranges_of`, `rendered`].
 3. Training frames of the same kind, for forms of the network that are trained on [`for_training`].
 
 An interrupted run goes on where it was, as `wamnet dataset` does.
@@ -11,13 +12,13 @@ An interrupted run goes on where it was, as `wamnet dataset` does.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..refimpl.errors import ExecutorUnavailable, InputError
 from . import dataset, dataset_files
-from .inputs import need_layers
+from .inputs import need_layers, unlike_training
 from .terminal import say
 
 if TYPE_CHECKING:
@@ -42,8 +43,8 @@ TRAINING_SEED = 1 << 30
 TRAINING_PX = 256
 """Width and height of the training frames: those of the models that ship with the package."""
 
-TRAINING_FRAMES = 48
-"""Training frames over the animation; as many as the demonstration has."""
+TRAINING_FRAMES = 96
+"""Training frames: a camera that moves needs more of them than one at rest."""
 
 TRAINING_SPP = 64
 """Samples of a training target: many targets teach more than few clean ones."""
@@ -85,15 +86,20 @@ def of_folder(folder: Path, model: Model, split: str = "test") -> Frames:
         "reference_spp": chosen[0]["target"]["spp"],
         "frame_px": chosen[0]["noisy"]["width"],
     }
-    return Frames(tuple(pairs), tuple(_draw(frame, model) for frame in chosen), facts)
+    draws = (_draw(frame, noisy, model) for frame, (noisy, _) in zip(chosen, pairs, strict=True))
+    return Frames(tuple(pairs), tuple(draws), facts)
 
 
-def _draw(frame: Mapping[str, Any], model: Model) -> dict[str, Any]:
-    """Return what a manifest says of a frame besides its files; whether training had its time is added."""
+def _draw(frame: Mapping[str, Any], noisy: Frame, model: Model) -> dict[str, Any]:
+    """Return what a manifest says of a frame besides its files, and what about it training did not have.
+
+    A frame at a time that training had is named too: it may show what was learned.
+    """
     known = model.info.get("trained_on_time", "").split(", ")
     found = {key: value for key, value in frame.items() if key not in (*PICTURES, "split")}
     seeds = {f"{kind}_seed": frame[kind]["seed"] for kind in PICTURES}
-    return {**found, **seeds, "time_in_training": str(frame["time_s"]) in known}
+    unlike = unlike_training(model, noisy.info)
+    return {**found, **seeds, "time_in_training": str(frame["time_s"]) in known, "unlike_training": unlike}
 
 
 def scene_of(model: Model) -> str | None:
@@ -112,8 +118,20 @@ def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     scene = scene_of(model)
     assert scene is not None, "whoever asks for frames has looked for a scene"
     rays = _first(model, FEATURE_SPP, 1)
-    found = Request(scene, executor=executor, feature_spp=rays if rays > 1 else 0, **numbers)
+    numbers = {**numbers, **ranges_of(model), "feature_spp": rays if rays > 1 else 0}
+    found = Request(scene, executor=executor, **numbers)
     return replace(found, max_depth=_first(model, "max_depth", found.max_depth))
+
+
+def ranges_of(model: Model) -> dict[str, Any]:
+    """Return the ranges that a model has learned, as parts of a request; nothing where it names none."""
+    from ..refimpl.variation import RANGES, ranges_from_json
+
+    if (text := model.info.get(f"trained_on_{RANGES}")) is None:
+        return {}
+    found = asdict(ranges_from_json(text))
+    start, end = found.pop("time_s")
+    return {"start_s": start, "seconds": end - start, **found}
 
 
 def _first(model: Model, name: str, otherwise: int) -> int:

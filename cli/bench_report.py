@@ -200,8 +200,10 @@ def notes(data: Data) -> list[str]:
             "a kernel is faster than sgemm: NumPy's OpenBLAS does not know this processor; "
             "OPENBLAS_CORETYPE=SkylakeX may double it where there is AVX-512"
         )
-    if any(draw["time_in_training"] for draw in (data.get("frames") or {}).get("draws", ())):
+    draws = (data.get("frames") or {}).get("draws", ())
+    if any(draw["time_in_training"] for draw in draws):
         lines.append("a test frame is at a time that training had")
+    lines += dict.fromkeys(f"a test frame: {text}" for draw in draws for text in draw["unlike_training"])
     if data["interrupted"]:
         lines.append("interrupted: this is what was measured until then")
     return lines

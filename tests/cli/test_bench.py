@@ -10,10 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.cli import bench, bench_forms, bench_frames, bench_report, exr, plots, report
+from wamnet.cli import bench, bench_forms, bench_frames, bench_report, exr, plots, report, train
 from wamnet.compiler.model_file import load_model, save_checkpoint, save_model
 from wamnet.kernels.bench import contest, rates
+from wamnet.kernels.frame_plan import frame_draws
 from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.variation import Ranges
 
 SPEC = Path(__file__).resolve().parents[2] / "spec" / "bench.md"
 """The chapter that documents the keys of the result."""
@@ -225,28 +227,52 @@ def test_frames_of_the_model_s_scene_are_rendered_once(wamnet, here, monkeypatch
     )
     times = [draw["time_s"] for draw in frames["draws"]]
     assert len(set(times)) == 2
-    # The second of two test times is 16/3 s, which training had not.
     assert [draw["time_in_training"] for draw in frames["draws"]] == [False, False]
     assert min(draw["noisy_seed"] for draw in frames["draws"]) > bench_frames.TEST_SEED
     assert data["contenders"][0]["quality"]["psnr_loss_db"] is not None
-    assert "6 pictures at 3 times, 6 of them made now" in said
-    assert "6 pictures at 3 times, 0 of them made now" in measured(wamnet, "--only", "numpy:plain")[1]
+    assert re.search(r"6 pictures .*, 6 of them made now", said)
+    assert re.search(r"6 pictures .*, 0 of them made now", measured(wamnet, "--only", "numpy:plain")[1])
 
 
 def test_a_time_of_training_is_named(wamnet, here, monkeypatch) -> None:
     small_scene(monkeypatch)
     of_cubes(here / "model.safetensors")
+    model = load_model(here / "model.safetensors")
+    request = bench_frames.request_for(model, "numpy", frames=1, test_frames=1, seed=bench_frames.TEST_SEED)
+    time = frame_draws(request)[1][1].time_s
+    info = {**model.info, "trained_on_time": f"0.0, {time}", "trained_on_ranges": '{"time_s": [0.0, 8.0]}'}
+    save_model(here / "model.safetensors", replace(model, info=info))
     data, _ = measured(wamnet, "--only", "numpy:plain", "--frames", 1)
-    assert [draw["time_s"] for draw in data["frames"]["draws"]] == [4.0]
+    assert [draw["time_s"] for draw in data["frames"]["draws"]] == [time]
     assert data["frames"]["draws"][0]["time_in_training"] is True
     assert "a test frame is at a time that training had" in bench_report.notes(data)
 
 
+def test_frames_are_drawn_from_the_ranges_that_a_model_has_learned(samples) -> None:
+    """Time, camera and lamps; without ranges the camera is at rest."""
+    model = load_model(samples / "model.safetensors")
+    named = {"trained_on_scene": "minicubes", "trained_on_feature_spp": "16", "trained_on_max_depth": "3"}
+    ranges = Ranges((1.0, 3.0), (-20.0, 30.0), (-5.0, 8.0), (0.9, 1.1), (0.0, 0.5))
+    moving = replace(model, info={**named, "trained_on_ranges": ranges.to_json()})
+    request = bench_frames.request_for(moving, "numpy", frames=1, test_frames=8, seed=3)
+    assert request.ranges == ranges
+    assert (request.scene, request.feature_spp, request.max_depth) == ("minicubes", 16, 3)
+    assert bench_frames.request_for(replace(model, info=named), "numpy").yaw_deg == (0.0, 0.0)
+    for _, draw in frame_draws(request):
+        assert 1.0 <= draw.time_s < 3.0
+        assert -20.0 <= draw.variation.yaw_deg <= 30.0
+        assert len(draw.variation.lights) > 0
+
+
+def test_what_a_model_has_not_learned_is_said() -> None:
+    data = traded()
+    data["frames"]["draws"][0]["unlike_training"] = ["it shows cornell"]
+    assert "a test frame: it shows cornell" in bench_report.notes(data)
+
+
 @pytest.mark.parametrize("executor", ["opencl", "opengl"])
-def test_forms_are_trained_once_and_then_measured(
-    wamnet, here, monkeypatch, executor_named, executor
-) -> None:
-    """Each is a row with the steps of its training; a second run reads them, another number trains again."""
+def test_forms_are_trained_and_then_measured(wamnet, here, monkeypatch, executor_named, executor) -> None:
+    """Each is a row with the steps of its training; one that the model cannot have is none."""
     executor_named(executor)
     small_scene(monkeypatch)
     monkeypatch.setattr(bench_forms, "FORMS", ("full", "rank2", "window3", "window14"))
@@ -263,8 +289,6 @@ def test_forms_are_trained_once_and_then_measured(
         assert row["state"] == "measured", row["reason"]
         if row["rounding"]["bound"] is not None:
             assert row["rounding"]["max"] <= row["rounding"]["bound"]
-    assert "form " not in measured(wamnet, "--train-variants", "--steps", 3, "--only", names)[1]
-    assert "form rank2: 4 steps" in measured(wamnet, "--train-variants", "--steps", 4, "--only", names)[1]
 
 
 def test_a_form_goes_on_where_an_interrupt_left_it(samples, tmp_path, monkeypatch) -> None:
@@ -283,6 +307,24 @@ def test_a_form_goes_on_where_an_interrupt_left_it(samples, tmp_path, monkeypatc
     for a, b in zip(whole.model.siren.weights, resumed.model.siren.weights, strict=True):
         assert (a == b).all()
     assert resumed.model.normalization == model.normalization
+
+
+def test_a_form_is_trained_once(samples, tmp_path, monkeypatch) -> None:
+    """What is finished is read; another number of steps is another training, from the start."""
+    model = load_model(samples / "model.safetensors")
+    pairs = [(exr.read_frame(samples / "noisy.exr"), exr.read_frame(samples / "reference.exr"))]
+    begun, fit = [], train.fit
+
+    def noting(recipe, pairs, path, state, **more):
+        begun.append((recipe.steps, state.step))
+        return fit(recipe, pairs, path, state, **more)
+
+    monkeypatch.setattr(train, "fit", noting)
+    for steps in (3, 3, 4):
+        forms = bench_forms.planned(model, ("full",), steps)
+        (form,) = bench_forms.trained(model, forms, pairs, tmp_path / "forms", "numpy")
+        assert (form.name, form.steps) == ("further", steps)
+    assert begun == [(3, 0), (4, 0)]
 
 
 @pytest.mark.parametrize("named", [["--synthetic"], ["paper"]])
@@ -386,7 +428,7 @@ def traded() -> dict:
         row("oidn:high", kind="peer", quality={"psnr_db": 32.0, "psnr_loss_db": 3.0}, **TRADED),
     ]
     network = {"widths": [4, 3], "features": ["color"], "window": 12}
-    draws = [{"time_s": 1.6, "time_in_training": False}]
+    draws = [{"time_s": 1.6, "time_in_training": False, "unlike_training": []}]
     frames = {"scene": "minicubes", "frame_px": 16, "feature_spp": 16, "reference_spp": 2, "draws": draws}
     front = {"error": [], "quality": ["opencl:tile16"], "rounding": ["opencl:tile16"]}
     return planted(contenders=rows, network=network, frames=frames, front=front, unseen_frames=1)

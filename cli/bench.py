@@ -182,7 +182,7 @@ def bench(
     check_counts(counts)
     what = Wanted(model, dataset, parse_names(features), synthetic, train_variants)
     name, network = what.network()
-    numbers = {
+    numbers: dict[str, Any] = {
         "size": int(usual["size"] if size is None else size),
         "sizes": _sizes(sizes),
         "repeats": int(usual["repeats"] if repeats is None else repeats),

@@ -350,7 +350,7 @@ def measure_speed(plan: Plan, results: Results, output: Path) -> dict[str, Any]:
         wanted = bench_forms.planned(model, bench_forms.QUICK_FORMS, FORM_STEPS)
         pairs = bench_frames.of_folder(output / DATA_SET, model, "train").pairs
         forms = bench_forms.trained(model, wanted, pairs, bench_forms.folder_of(model, output), plan.trainer)
-    facts = {"pairs": shown.pairs, "frames": shown.as_data(), "name": f"demo, {plan.scene}"}
+    facts: dict[str, Any] = {"pairs": shown.pairs, "frames": shown.as_data(), "name": f"demo, {plan.scene}"}
     request = Request(model, plan.size_px, REPEATS, budget_s=BUDGET_S, quick=True, **facts)
     return bench.measure(request, command="wamnet demo", forms=forms)
 

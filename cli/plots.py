@@ -363,11 +363,11 @@ def _legend(figure: Any, marks: Sequence[Mark], theme: Theme) -> None:
 
     forms = {**MARKERS, "": PEER_MARKER, "other": OTHER_MARKER}
     here = {mark.executor for mark in marks}, {mark.kind for mark in marks}
-    grey = {"linestyle": "none", "color": theme.text, "markersize": 6.5}
+    grey: dict[str, Any] = {"linestyle": "none", "color": theme.text, "markersize": 6.5}
     shown = [
         Line2D([], [], marker=m, label=text, **grey) for key, (m, text) in forms.items() if key in here[0]
     ]
-    patch = {"linestyle": "none", "marker": "o", "markersize": 8}
+    patch: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 8}
     shown += [
         Line2D([], [], color=colour, label=text, **patch)
         for key, (colour, text) in COLOURS.items()

@@ -86,7 +86,7 @@ def parameters_of(model: Model, rank: int = 0) -> int:
     others = sum(array.size for array in (*weights[1:], *biases))
     rows, columns = weights[0].shape
     size = model.window.size
-    return others + (rank * (columns // size + size * rows) if rank else rows * columns)
+    return int(others + (rank * (columns // size + size * rows) if rank else rows * columns))
 
 
 FULL = Variant("full", "the whole network")

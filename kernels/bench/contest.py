@@ -211,7 +211,7 @@ class Contest:
             return
         row.facts["error"] = accuracy.errors(crop.cut(picture), crop.full)
         expected, bound = crop.rounding(contender.variant, contender.executor, opened.schedule)
-        found = {"max": accuracy.errors(crop.cut(picture), expected)["max"]}
+        found: dict[str, Any] = {"max": accuracy.errors(crop.cut(picture), expected)["max"]}
         if contender.executor:
             found |= {"bound": bound, "bound_all": opened.bound, "certified": opened.certified}
         row.facts["rounding"] = {"bound": None, "bound_all": None, "certified": False} | found

@@ -277,7 +277,12 @@ class Panel:
 
 
 def trade_off(panels: Sequence[Panel], theme: Theme) -> bytes:
-    """Draw marks over time in panels one above the other, each with its Pareto front, with one legend."""
+    """Draw marks over time in panels one above the other, each with its Pareto front, as PNG."""
+    return _png(trade_off_figure(panels, theme))
+
+
+def trade_off_figure(panels: Sequence[Panel], theme: Theme) -> Any:
+    """Return the figure of these panels, with one axis of time and one legend."""
     from matplotlib.figure import Figure
 
     figure = Figure(
@@ -300,7 +305,7 @@ def trade_off(panels: Sequence[Panel], theme: Theme) -> bytes:
         taken += [text.get_window_extent() for text in axis.texts]
         for mark, at in sorted(shown, key=lambda pair: _rank(pair[0])):
             _place(axis, mark.name, at, theme, mark.on_front, taken, always=False)
-    return _png(figure)
+    return figure
 
 
 def _rank(mark: Mark) -> tuple[bool, bool, float]:
@@ -318,7 +323,7 @@ def _height(panel: Panel, mark: Mark) -> float:
     """Return where a mark is drawn: that without a bound in a band above all others."""
     if mark.y is not None:
         return mark.y
-    return _top(panel)[1] * 10.0 ** (BAND / 2 + 0.2)
+    return float(_top(panel)[1] * 10.0 ** (BAND / 2 + 0.2))
 
 
 def _panel(axis: Any, panel: Panel, theme: Theme) -> None:

@@ -6,42 +6,55 @@ import json
 import shlex
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..refimpl.errors import InputError
-from . import bench_report, machine, packages
-from .inputs import load_model, need_layers
+from ..refimpl.errors import ExecutorUnavailable, InputError
+from . import bench_forms, bench_frames, bench_report, machine, packages
+from .bench_frames import Frames
+from .inputs import load_model
 from .options import ExecutorName, parse_names
 from .outputs import check_output, replacing, unwritable, write_text
 from .terminal import hint_on_interrupt, progress, say, table
 
 if TYPE_CHECKING:
+    from ..kernels.bench.contender import Variant
     from ..kernels.bench.contest import Contest, Request
     from ..refimpl.denoise import Model
-    from ..refimpl.frame import Frame
 
 EXAMPLES = """Examples:
 
 wamnet bench -o speed
 
+wamnet bench --train-variants --size 512 -o speed
+
 wamnet bench model.safetensors --dataset cubes -o speed
 
 wamnet bench --quick --only 'opencl:*,torch.compile' -o speed
 
-wamnet bench --size 512 --sizes 256,512,1024,2048,4096 --repeats 3 -o speed"""
+wamnet bench --synthetic --size 512 --sizes 256,512,1024,2048,4096 --repeats 3 -o speed"""
 """Shown below the help of `wamnet bench`."""
 
 PEER_PACKAGES = ("torch", "onnxruntime", "onnx", "tinygrad", "pyoidn")
 """Packages of peers whose versions the result names."""
 
-QUICK = {"size": 256, "repeats": 3, "budget": 4.0}
+QUICK = {"size": 256, "repeats": 3, "budget": 4.0, "frames": 2, "reference_spp": 64, "steps": 500}
 """What --quick takes for options that are not given: some 25 s on two cores."""
 
-USUAL = {"size": 1024, "repeats": 5, "budget": 30.0}
+USUAL = {"size": 1024, "repeats": 5, "budget": 30.0, "frames": 4, "reference_spp": 256, "steps": 3000}
 """What is taken otherwise: the paper's size of picture."""
+
+SHIPPED = "minicubes"
+"""Model that is measured when none is named."""
+
+PAPER = "paper"
+"""Name of the paper's network with its initial weights; a model of this name is measured on noise."""
+
+MOST_FRAMES = 100
+"""More test frames than anybody waits for."""
 
 MOST_REPEATS = 1000
 """More rounds than anybody waits for; a typing error is told before."""
@@ -54,8 +67,9 @@ ModelFile = Annotated[
     Path | None,
     typer.Argument(
         metavar="MODEL",
-        help="Trained model (.safetensors); without one the paper's network, untrained.",
-        show_default=False,
+        help="Trained model (.safetensors), or the name of one that ships with the package; "
+        "paper: the paper's network, untrained, on noise.",
+        show_default=SHIPPED,
     ),
 ]
 Folder = Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the results.")]
@@ -63,8 +77,8 @@ DataSet = Annotated[
     Path | None,
     typer.Option(
         metavar="FOLDER",
-        help="Data set on whose test frames quality is measured; needs MODEL.",
-        show_default=False,
+        help="Data set on whose test frames all are measured.",
+        show_default="frames of the model's scene, rendered into the output folder",
     ),
 ]
 Size = Annotated[
@@ -89,7 +103,7 @@ Features = Annotated[
     str,
     typer.Option(
         metavar="NAME,...",
-        help="What the network sees that is taken without MODEL.",
+        help="What the untrained network of --synthetic sees.",
         show_default="color,normal: the paper's",
     ),
 ]
@@ -107,6 +121,29 @@ Budget = Annotated[
 FirstRuns = Annotated[
     bool, typer.Option("--first-runs", help="Also measure compilation with empty caches on disk.")
 ]
+Synthetic = Annotated[
+    bool,
+    typer.Option(
+        "--synthetic",
+        help="Noise in place of frames, for times only; without MODEL of the paper's network, untrained.",
+    ),
+]
+TrainVariants = Annotated[
+    bool,
+    typer.Option(
+        "--train-variants",
+        help="Also ranks and windows of the network, each trained first, from the model; kept in the folder.",
+    ),
+]
+Steps = Annotated[int | None, typer.Option(help="Steps of such a training.", show_default="3000; quick: 500")]
+TestFrames = Annotated[
+    int | None,
+    typer.Option("--frames", help="Test frames that are rendered.", show_default="4; quick: 2"),
+]
+ReferenceSpp = Annotated[
+    int | None,
+    typer.Option(help="Paths per pixel of their references.", show_default="256; quick: 64"),
+]
 Quick = Annotated[bool, typer.Option("--quick", help="A reduced run: one schedule a device, few peers.")]
 
 
@@ -121,32 +158,147 @@ def bench(
     features: Features = "",
     repeats: Repeats = None,
     budget: Budget = None,
+    synthetic: Synthetic = False,
+    train_variants: TrainVariants = False,
+    steps: Steps = None,
+    frames: TestFrames = None,
+    reference_spp: ReferenceSpp = None,
     first_runs: FirstRuns = False,
     quick: Quick = False,
 ) -> None:
     r"""Measure speed against error: kernels, schedules, forms of the network, and peers, in turns in one run.
 
-    Peers that are installed take part: PyTorch, ONNX Runtime, tinygrad on the same OpenCL device, and Open
-    Image Denoise, which is another denoiser. [bold]pip install 'wamnet\[peers]'[/] brings them. Errors are
-    against the full network in float64. Predictions come from operations, sines and bytes and the machine's
-    measured rates.
+    The model of the mini cubes that ships with the package is measured on unseen frames of its scene, which
+    are rendered first; another one on those of its own scene, or of a data set. Peers that are installed take
+    part: PyTorch, ONNX Runtime, tinygrad on the same OpenCL device, and Open Image Denoise, which is another
+    denoiser. [bold]pip install 'wamnet\[peers]'[/] brings them. Errors are against float64, PSNR against the
+    references. Predictions come from operations, sines and bytes and the machine's measured rates.
     """
     packages.need("matplotlib", "for the plots", "report")
     check_folder(output)
     usual = QUICK if quick else USUAL
-    request = _request(
-        model,
-        dataset,
-        parse_names(features),
-        size=int(usual["size"] if size is None else size),
-        sizes=_sizes(sizes),
-        repeats=int(usual["repeats"] if repeats is None else repeats),
-        budget_s=usual["budget"] if budget is None else budget,
-        quick=quick,
-        first_runs=first_runs,
-    )
-    data = measure(request, parse_names(only), [name.value for name in executor or []], output)
-    tell(data, output)
+    given = {"frames": frames, "reference_spp": reference_spp, "steps": steps}
+    counts = {name: int(usual[name] if value is None else value) for name, value in given.items()}
+    check_counts(counts)
+    what = Wanted(model, dataset, parse_names(features), synthetic, train_variants)
+    name, network = what.network()
+    numbers: dict[str, Any] = {
+        "size": int(usual["size"] if size is None else size),
+        "sizes": _sizes(sizes),
+        "repeats": int(usual["repeats"] if repeats is None else repeats),
+        "budget_s": usual["budget"] if budget is None else budget,
+    }
+    check_numbers(numbers)
+    what.check(network)
+    executors = [each.value for each in executor or []]
+    taking_part = parse_names(only), executors
+    forms = _forms(network, train_variants, quick, counts["steps"])
+    forms = _needed(forms, *taking_part, size=numbers["size"], quick=quick)
+    make_folder(output)
+    with hint_on_interrupt(lambda: f"the same command goes on with the frames and forms in {output}"):
+        shown = what.frames(network, output, numbers["size"], counts)
+        trained = what.train(network, forms, output)
+    request = _request(name, network, shown, quick=quick, first_runs=first_runs, **numbers)
+    tell(measure(request, *taking_part, output, forms=trained), output)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a caller wants measured: a model or none, a data set or none, and whether forms are trained."""
+
+    model: Path | None
+    dataset: Path | None
+    features: Sequence[str]
+    synthetic: bool
+    trains: bool
+
+    @property
+    def on_noise(self) -> bool:
+        """Return whether noise is denoised."""
+        return self.synthetic or self.is_paper
+
+    @property
+    def is_paper(self) -> bool:
+        """Return whether the network is the paper's, with its initial weights."""
+        return str(self.model) == PAPER or (self.synthetic and self.model is None)
+
+    def network(self) -> tuple[str, Model]:
+        """Return the model and its name, or refuse features that do not go with it."""
+        from ..kernels.bench import workload
+
+        if self.is_paper:
+            return PAPER, workload.paper_model(self.features or workload.FEATURES)
+        if self.features:
+            rule = "a trained model says itself what it sees"
+            raise InputError("--features", ",".join(self.features), rule, "leave it out, or use --synthetic")
+        path = self.model or Path(SHIPPED)
+        return path.name, load_model(path)
+
+    def check(self, network: Model) -> None:
+        """Refuse what needs frames where there are none."""
+        if self.on_noise and self.dataset is not None:
+            rule = "noise is measured in its place"
+            raise InputError("--dataset", str(self.dataset), rule, "leave it out, or name a trained model")
+        if self.trains and (self.on_noise or not self._has_frames(network)):
+            rule = "forms are trained on frames, and there are none"
+            raise InputError("--train-variants", "given", rule, "name a trained model, and its --dataset")
+
+    def _has_frames(self, network: Model) -> bool:
+        """Return whether there is a data set, or a scene to render."""
+        return self.dataset is not None or bench_frames.scene_of(network) is not None
+
+    def frames(self, network: Model, output: Path, size: int, counts: dict[str, int]) -> Frames:
+        """Return the frames that are measured; none where it is noise, which is said."""
+        if self.on_noise:
+            return Frames()
+        if self.dataset is not None:
+            return bench_frames.of_folder(self.dataset, network)
+        if bench_frames.scene_of(network) is None:
+            say("no frames: the model does not name one scene that can be rendered; give --dataset")
+            return Frames()
+        return bench_frames.rendered(network, output, size, counts["frames"], counts["reference_spp"])
+
+    def train(self, network: Model, forms: dict[str, Variant], output: Path) -> list[Variant]:
+        """Return the forms, trained."""
+        if not forms:
+            return []
+        if self.dataset is not None:
+            pairs = bench_frames.of_folder(self.dataset, network, "train").pairs
+        else:
+            pairs = tuple(bench_frames.for_training(network, output))
+        folder = bench_forms.folder_of(network, output)
+        return bench_forms.trained(network, forms, pairs, folder, _trainer())
+
+
+def _trainer() -> str:
+    """Return what trains: OpenCL where it is there, else the reference, which is slow."""
+    from ..kernels import open_executor
+
+    try:
+        open_executor("opencl").close()
+    except ExecutorUnavailable as error:
+        say(f"not trained with opencl, which takes far longer: {error}")
+        return "numpy"
+    return "opencl"
+
+
+def _forms(network: Model, wanted: bool, quick: bool, steps: int) -> dict[str, Variant]:
+    """Return the forms that are to be trained."""
+    names = bench_forms.QUICK_FORMS if quick else bench_forms.FORMS
+    return bench_forms.planned(network, names, steps) if wanted else {}
+
+
+def _needed(
+    forms: dict[str, Variant], only: Sequence[str], executors: Sequence[str], size: int, quick: bool
+) -> dict[str, Variant]:
+    """Return the forms that take part; refuse names that nobody has before anything is rendered."""
+    from ..kernels.bench import contenders
+    from ..kernels.bench.contender import Tools
+
+    with Tools() as tools:
+        everybody = contenders.of_machine(tools, size, quick and not only, list(forms.values()))
+    found = {each.variant for each in contenders.chosen(everybody, only, executors)}
+    return {name: form for name, form in forms.items() if form in found}
 
 
 def measure(
@@ -155,6 +307,7 @@ def measure(
     executors: Sequence[str] = (),
     output: Path | None = None,
     command: str = "",
+    forms: Sequence[Variant] = (),
 ) -> dict[str, Any]:
     """Return what a benchmark finds, and write it into the folder `output`, also after an interrupt."""
     from ..kernels.bench import contenders
@@ -162,7 +315,7 @@ def measure(
     from ..kernels.bench.contest import Contest
 
     with Tools() as tools, progress("measuring", 1.0) as advance:
-        everybody = contenders.of_machine(tools, request.size, request.quick and not only)
+        everybody = contenders.of_machine(tools, request.size, request.quick and not only, forms)
         taking_part = contenders.chosen(everybody, only, executors)
         if output:
             make_folder(output)
@@ -193,34 +346,22 @@ def _finished(contest: Contest, command: str, interrupted: bool) -> dict[str, An
     }
 
 
-def _request(model: Path | None, folder: Path | None, features: Sequence[str], **numbers: Any) -> Request:
-    """Return what is to be measured, or refuse it."""
-    from ..kernels.bench import workload
+def _request(name: str, network: Model, frames: Frames, **numbers: Any) -> Request:
+    """Return what is to be measured."""
     from ..kernels.bench.contest import Request
 
-    check_numbers(numbers)
-    if model is not None and features:
-        rule = "a model says itself what it sees"
-        raise InputError("--features", ",".join(features), rule, "leave it out")
-    network = load_model(model) if model else workload.paper_model(features or workload.FEATURES)
-    return Request(network, pairs=_pairs(model, network, folder), **numbers)
+    facts = frames.as_data() if frames.pairs else {}
+    return Request(network, pairs=frames.pairs, frames=facts, name=name, **numbers)
 
 
-def _pairs(path: Path | None, model: Model, folder: Path | None) -> tuple[tuple[Frame, Frame], ...]:
-    """Return the unseen frames of a data set with their references."""
-    from . import dataset_files
-
-    if folder is None:
-        return ()
-    if path is None:
-        rule = "the quality of a network that is not trained says nothing"
-        raise InputError("--dataset", str(folder), rule, "give MODEL too, or leave it out")
-    pairs = dataset_files.read_pairs(folder, "test")
-    if not pairs:
-        raise InputError("data set", str(folder), "it has no test frames", "make one with --test 1")
-    for noisy, _ in pairs:
-        need_layers(folder, noisy, model.features, "the model was trained with it", "make another data set")
-    return tuple(pairs)
+def check_counts(counts: dict[str, int]) -> None:
+    """Refuse numbers of frames, samples and steps that make none."""
+    most = {"frames": MOST_FRAMES, "reference_spp": 1 << 20, "steps": 1 << 20}
+    for name, value in counts.items():
+        if not 1 <= value <= most[name]:
+            option = f"--{name.replace('_', '-')}"
+            rule = f"it must be from 1 to {most[name]}"
+            raise InputError(option, value, rule, f"for example {option} {USUAL[name]}")
 
 
 def check_numbers(numbers: dict[str, Any]) -> None:

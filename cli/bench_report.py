@@ -6,9 +6,12 @@ The data are those of spec/bench.md; here they are only written down and drawn.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
+from ..refimpl.errors import InputError
 from . import plots
+from .outputs import replacing
 from .plots import Point
 
 Data = Mapping[str, Any]
@@ -28,8 +31,8 @@ NONE = "–"
 LEGEND = """\
 Sorted by time. A star stands on the Pareto front of time and error: nothing here is faster and nearer. Times
 are medians of frames made in turns, copies included. Errors are the largest difference from the full network
-in float64; a rank leaves something out, and is made for networks that were trained with it. Predictions come
-from operations, sines and bytes (spec/bench.md)."""
+in float64: what a form leaves out counts. Predictions come from operations, sines and bytes
+(spec/bench.md)."""
 """What a reader of the first table should know."""
 
 OF_SGEMM_TOO_FAST = 1.05
@@ -197,6 +200,10 @@ def notes(data: Data) -> list[str]:
             "a kernel is faster than sgemm: NumPy's OpenBLAS does not know this processor; "
             "OPENBLAS_CORETYPE=SkylakeX may double it where there is AVX-512"
         )
+    draws = (data.get("frames") or {}).get("draws", ())
+    if any(draw["time_in_training"] for draw in draws):
+        lines.append("a test frame is at a time that training had")
+    lines += dict.fromkeys(f"a test frame: {text}" for draw in draws for text in draw["unlike_training"])
     if data["interrupted"]:
         lines.append("interrupted: this is what was measured until then")
     return lines
@@ -214,6 +221,9 @@ def _lines(data: Data, pictures: Sequence[str]) -> Iterator[str]:
     yield from _table(*speed_table(data))
     yield LEGEND
     yield ""
+    yield from ("## Speed, loss and bounds", "", frames_text(data), "")
+    yield from _table(TABLE_HEADS, [_full_row(data, row) for row in measured(data)])
+    yield from (TABLE_LEGEND, "", "## Details", "")
     yield from _table(*detail_table(data))
     if data["sizes"]:
         yield from ("## How cost grows", "")
@@ -233,6 +243,133 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]
     yield ""
 
 
+# ---- speed against error -----------------------------------------------------------------------------------
+
+
+PANELS = (
+    ("quality", "psnr_loss_db", "PSNR lost against the full network, dB", True),
+    ("rounding", "bound", "bound of the error, this frame", False),
+)
+"""Part and number of each panel of the picture, its label, and whether it is a loss."""
+
+
+def kind_of(row: Data, window: int) -> str:
+    """Return what sets a row apart, by the names of plots.COLOURS; `window` is the full network's."""
+    if row["kind"] != "kernel":
+        return "peer"
+    narrow = (row.get("window") or window) < window
+    if row.get("rank"):
+        return "both" if narrow else "rank"
+    if narrow:
+        return "window"
+    return "sine" if row.get("profile", "ieee") != "ieee" else "whole"
+
+
+def short_name(row: Data) -> str:
+    """Return a row's name without its executor, which the marker says, and without a variant's schedule."""
+    if row["kind"] != "kernel":
+        return str(row["name"])
+    return str(row["name"]).rpartition(":")[2]
+
+
+def panels(data: Data) -> list[plots.Panel]:
+    """Return the panels of the picture that have something to show."""
+    found = []
+    for name, key, label, is_loss in PANELS:
+        marks = [
+            plots.Mark(
+                short_name(row),
+                (row["ms"]["median"], row["ms"]["min"], row["ms"]["max"]),
+                part(row, name, key),
+                row.get("executor") or ("" if row.get("window") else "other"),
+                kind_of(row, data["network"].get("window") or 0),
+                row["name"] in data["front"].get(name, ()),
+            )
+            for row in measured(data)
+            if not (is_loss and part(row, name, key) is None)
+        ]
+        if any(mark.y is not None for mark in marks):
+            found.append(plots.Panel(label, marks, is_loss))
+    return found
+
+
+def picture(data: Data, path: Path, theme: plots.Theme = PRINTED) -> None:
+    """Draw speed against error from a benchmark's data (spec/bench.md) into a PNG file.
+
+    Raises InputError where no row has both a time and a loss or a bound.
+    """
+    shown = panels(data)
+    if not shown:
+        rule = "no row has a time and a loss or a bound"
+        raise InputError("benchmark", str(path), rule, "measure a trained model: wamnet bench")
+    with replacing(path) as new:
+        new.write_bytes(plots.trade_off(shown, theme))
+
+
+TABLE_HEADS = (
+    "form", "executor, schedule", "profile, degree of sine", "rank", "window", "parameters", "ms", "spread",
+    "PSNR, dB", "lost, dB", "largest error", "bound, this frame", "bound, all frames",
+)  # fmt: skip
+"""Columns of the table of speed against error."""
+
+
+def table(data: Data) -> str:
+    """Return the rows of a benchmark's data as a Markdown table of speed, quality, errors and bounds."""
+    return "\n".join(_table(TABLE_HEADS, [_full_row(data, row) for row in measured(data)])).rstrip() + "\n"
+
+
+def _full_row(data: Data, row: Data) -> tuple[str, ...]:
+    """Return the cells of a row; a star is on the front of time and loss, a dagger has a certificate."""
+    front = data["front"].get("quality", ())
+    kernel = row["kind"] == "kernel"
+    form = (row["name"].split(":")[2:] or ["whole"])[0] if kernel else row["name"]
+    certified = " †" if part(row, "rounding", "certified") else ""
+    degree = row.get("degree")
+    return (
+        form + (" *" if row["name"] in front else ""),
+        f"{row.get('executor')} {row.get('schedule')}" if kernel else NONE,
+        f"{row.get('profile')}, {degree or 'its own'}" if kernel else NONE,
+        number(row.get("rank")),
+        number(row.get("window")),
+        number(row.get("parameters")),
+        number(part(row, "ms", "median")),
+        percent(part(row, "ms", "spread")),
+        number(part(row, "quality", "psnr_db"), ".2f"),
+        _loss(part(row, "quality", "psnr_loss_db")),
+        number(part(row, "rounding", "max"), ".1e"),
+        number(part(row, "rounding", "bound"), ".1e"),
+        number(part(row, "rounding", "bound_all"), ".1e") + certified,
+    )
+
+
+def _loss(value: float | None) -> str:
+    """Return a loss in dB with its sign; one that rounds to nothing has none."""
+    text = number(value, "+.2f")
+    return "0.00" if text in ("+0.00", "-0.00") else text
+
+
+TABLE_LEGEND = """\
+Sorted by time: median of frames made in turns, copies included; the spread is (longest - shortest) / median.
+A star is on the Pareto front of time and loss. PSNR is against the references, the mean over the frames; lost
+is that of the full network less it. The error is the largest difference from the form's own network in
+float64; its bound is computed for this frame, and for all frames; a dagger marks a certificate. `further` is
+the whole network after as many more steps as the trained forms."""
+"""What a reader of the table should know."""
+
+
+def frames_text(data: Data) -> str:
+    """Return what was denoised as a sentence."""
+    frames = data.get("frames")
+    if not frames:
+        return "Noise was denoised: there is no quality."
+    times = ", ".join(f"{draw['time_s']:.4g} s" for draw in frames["draws"])
+    return (
+        f"{len(frames['draws'])} frames of {frames['scene']} ({times}), {frames['frame_px']} pixels wide, "
+        f"features of {frames['feature_spp']} camera rays, references of {frames['reference_spp']} paths "
+        "a pixel."
+    )
+
+
 # ---- plots -------------------------------------------------------------------------------------------------
 
 
@@ -250,13 +387,12 @@ def points(data: Data, name: str, key: str) -> list[Point]:
 
 
 def draw(data: Data, theme: plots.Theme) -> dict[str, bytes]:
-    """Return the plots as PNG by name: `error`, `quality` and `sizes`, where there is something to show."""
+    """Return the plots as PNG by name: `error`, `trade-off` and `sizes`, where there is something to show."""
     drawn = {}
     if shown := points(data, "error", "max"):
         drawn["error"] = plots.speed_and_error(shown, "largest error against float64", theme)
-    if shown := points(data, "quality", "psnr_loss_db"):
-        label = "PSNR below the full network's, dB"
-        drawn["quality"] = plots.speed_and_error(shown, label, theme, logarithmic=False)
+    if data["unseen_frames"] and (found := panels(data)):
+        drawn["trade-off"] = plots.trade_off(found, theme)
     if columns := growth(data):
         names = dict.fromkeys(name for cells in columns.values() for name in cells)
         lines = {
@@ -277,6 +413,10 @@ def section(data: Data) -> dict[str, Any]:
         "limits": limits_text(data),
         "heads": heads,
         "rows": rows,
+        "frames": frames_text(data),
+        "trade_heads": TABLE_HEADS,
+        "trade_rows": [_full_row(data, row) for row in measured(data)],
+        "trade_legend": TABLE_LEGEND,
         "notes": notes(data),
         "plots": {name: {theme: by_theme[theme][name] for theme in by_theme} for name in by_theme["light"]},
     }

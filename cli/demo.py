@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from ..refimpl.errors import ExecutorUnavailable, InputError
-from . import bench, dataset, dataset_files, report, train
+from . import bench, bench_forms, bench_frames, dataset, dataset_files, report, train
 from .compare import Score, measure
 from .compile import write_kernel
 from .outputs import unwritable, write_text
@@ -71,6 +71,9 @@ REPEATS = 3
 
 BUDGET_S = 3.0
 """Seconds a picture that a contender of the report may take."""
+
+FORM_STEPS = 1000
+"""Steps of each form of the network that the report compares: a second on a device."""
 
 _Result = TypeVar("_Result")
 
@@ -175,7 +178,9 @@ def demo(
     begin(plan, folder)
     with hint_on_interrupt(lambda: f"go on with the same command: {command}"):
         results = carry_out(plan, folder)
-        speed = None if quick else _timed(results.seconds, "speed", lambda: measure_speed(plan, results))
+        speed = (
+            None if quick else _timed(results.seconds, "speed", lambda: measure_speed(plan, results, folder))
+        )
         report.write(folder, plan, results, command, speed)
     _tell(results, folder)
 
@@ -332,13 +337,22 @@ def run_kernels(
     return [images[by], *others], by, runs
 
 
-def measure_speed(plan: Plan, results: Results) -> dict[str, Any]:
-    """Return what a reduced benchmark finds: schedules and variants, by time, error and quality."""
+def measure_speed(plan: Plan, results: Results, output: Path) -> dict[str, Any]:
+    """Return what a reduced benchmark finds: schedules and trained forms, by time, quality and bound.
+
+    Forms are trained where that is compiled: the reference would take an hour.
+    """
     from ..kernels.bench.contest import Request
 
-    pairs = tuple((frame.noisy, frame.reference) for frame in results.unseen)
-    request = Request(results.model, plan.size_px, REPEATS, pairs=pairs, budget_s=BUDGET_S, quick=True)
-    return bench.measure(request, command="wamnet bench --quick")
+    model, forms = results.model, []
+    shown = bench_frames.of_folder(output / DATA_SET, model)
+    if plan.trainer != "numpy":
+        wanted = bench_forms.planned(model, bench_forms.QUICK_FORMS, FORM_STEPS)
+        pairs = bench_frames.of_folder(output / DATA_SET, model, "train").pairs
+        forms = bench_forms.trained(model, wanted, pairs, bench_forms.folder_of(model, output), plan.trainer)
+    facts: dict[str, Any] = {"pairs": shown.pairs, "frames": shown.as_data(), "name": f"demo, {plan.scene}"}
+    request = Request(model, plan.size_px, REPEATS, budget_s=BUDGET_S, quick=True, **facts)
+    return bench.measure(request, command="wamnet demo", forms=forms)
 
 
 def score(model: Model, noisy: Frame, reference: Frame, denoised: Any) -> dict[str, tuple[Score, ...]]:

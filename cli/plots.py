@@ -33,6 +33,9 @@ PLACES = tuple((x, sign * y) for y in (3, 12, 22, 32, 42, 52, 62) for x in (6, -
 """Where a label may stand from its point, in points of print: the first place that is free; a negative first
 number puts its end there."""
 
+CLOSE = 12
+"""How many of these places a label may take that is left out where none is free: long lines cross others."""
+
 NEAR = 12
 """Heights up to this one, in points of print, need no line from the point to its label."""
 
@@ -168,43 +171,217 @@ def growth(lines: Mapping[str, Sequence[tuple[int, float]]], theme: Theme) -> by
 
 
 def _label(figure: Any, axis: Any, points: Sequence[Point], theme: Theme) -> None:
-    """Write the points' names where nothing else stands, those on the front first."""
-    from matplotlib.text import Text
+    """Write the points' names where nothing else is, those on the front first."""
+    times = [(point.ms, point.y) for point in points]
+    times += [(point.predicted_ms, point.y) for point in points if point.predicted_ms]
+    taken = _taken(figure, axis, times)
+    for point in sorted(points, key=lambda point: (not point.on_front, point.ms)):
+        _place(axis, point.name, (point.ms, point.y), theme, point.on_front, taken, always=True)
+
+
+def _taken(figure: Any, axis: Any, places: Sequence[tuple[float, float]]) -> list[Any]:
+    """Return the boxes that labels leave free: around points at these coordinates, and the legend's."""
     from matplotlib.transforms import Bbox
 
     figure.draw_without_rendering()
-    times = [(point.ms, point.y) for point in points]
-    times += [(point.predicted_ms, point.y) for point in points if point.predicted_ms]
-    centres = axis.transData.transform(times)
-    corners = ((x - MARKER_PX, y - MARKER_PX, x + MARKER_PX, y + MARKER_PX) for x, y in centres)
+    corners = (
+        (x - MARKER_PX, y - MARKER_PX, x + MARKER_PX, y + MARKER_PX)
+        for x, y in axis.transData.transform(places)
+    )
     taken = [Bbox.from_extents(*corner) for corner in corners]
-    if legend := axis.get_legend():
-        taken.append(legend.get_window_extent())
+    legend = axis.get_legend()
+    return [*taken, legend.get_window_extent()] if legend else taken
+
+
+def _place(
+    axis: Any, name: str, at: tuple[float, float], theme: Theme, bold: bool, taken: list[Any], always: bool
+) -> None:
+    """Write a name beside a point in the first place that is free; without one in the last, if `always`."""
+    from matplotlib.text import Text
+
     frame = axis.get_window_extent()
-    for point in sorted(points, key=lambda point: (not point.on_front, point.ms)):
-        for x, y in PLACES:
-            text = axis.annotate(
-                point.name,
-                (point.ms, point.y),
-                (x, y),
-                textcoords="offset points",
-                ha="left" if x > 0 else "right",
-                va="bottom" if y > 0 else "top",
-                fontsize=7.5,
-                color=theme.text,
-                fontweight="bold" if point.on_front else "normal",
-                arrowprops={"arrowstyle": "-", "color": theme.text, "linewidth": 0.4, "alpha": 0.6}
-                if abs(y) > NEAR
-                else None,
-            )
-            # The first call puts the text into its place; its own box has no line to the point.
-            text.get_window_extent()
-            box = Text.get_window_extent(text)
-            inside = frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1
-            if (inside and not any(box.overlaps(other) for other in taken)) or (x, y) == PLACES[-1]:
-                taken.append(box)
-                break
-            text.remove()
+    places = PLACES if always else PLACES[:CLOSE]
+    for x, y in places:
+        text = axis.annotate(
+            name,
+            at,
+            (x, y),
+            textcoords="offset points",
+            ha="left" if x > 0 else "right",
+            va="bottom" if y > 0 else "top",
+            fontsize=7.5,
+            color=theme.text,
+            fontweight="bold" if bold else "normal",
+            arrowprops={"arrowstyle": "-", "color": theme.text, "linewidth": 0.4, "alpha": 0.6}
+            if abs(y) > NEAR
+            else None,
+        )
+        # The first call puts the text into its place; its own box has no line to the point.
+        text.get_window_extent()
+        box = Text.get_window_extent(text)
+        inside = frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1
+        free = inside and not any(box.overlaps(other) for other in taken)
+        if free or (always and (x, y) == places[-1]):
+            taken.append(box)
+            return
+        text.remove()
+
+
+# ---- speed against error -----------------------------------------------------------------------------------
+
+MARKERS = {"opencl": ("o", "OpenCL"), "opengl": ("^", "OpenGL"), "numpy": ("s", "NumPy")}
+"""Marker and name of each executor."""
+
+PEER_MARKER, OTHER_MARKER = ("D", "library"), ("*", "Open Image Denoise")
+"""Marker and name of peers that compute the network, and of another denoiser."""
+
+COLOURS = {
+    "whole": ("#0072B2", "whole network"),
+    "sine": ("#E69F00", "other sine or profile"),
+    "rank": ("#D55E00", "trained rank"),
+    "window": ("#009E73", "trained window"),
+    "both": ("#CC79A7", "trained rank and window"),
+    "peer": ("#7F7F7F", "others"),
+}
+"""Colour and name of each kind: those of M. Okabe and K. Ito, "Color Universal Design" (2008), and grey."""
+
+LINEAR_DB = 0.05
+"""Losses below this, in dB, are on a linear scale: they mean little, and may be negative."""
+
+BAND = 1.8
+"""Part of the logarithmic range of bounds, over its end, where those are drawn that have none."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A row of a benchmark: its time in ms with the extremes, and a number; None where it has none.
+
+    `executor` chooses the marker, `kind` the colour [`MARKERS`, `COLOURS`].
+    """
+
+    name: str
+    ms: tuple[float, float, float]
+    y: float | None
+    executor: str
+    kind: str
+    on_front: bool
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Marks over time; of losses in dB, or of bounds, which are positive and may be missing."""
+
+    label: str
+    marks: Sequence[Mark]
+    is_loss: bool
+
+
+def trade_off(panels: Sequence[Panel], theme: Theme) -> bytes:
+    """Draw marks over time in panels one above the other, each with its Pareto front, as PNG."""
+    return _png(trade_off_figure(panels, theme))
+
+
+def trade_off_figure(panels: Sequence[Panel], theme: Theme) -> Any:
+    """Return the figure of these panels, with one axis of time and one legend."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(
+        figsize=(9.0, 1.2 + 4.4 * len(panels)),
+        dpi=DOTS_PER_INCH,
+        layout="constrained",
+        facecolor=theme.page,
+    )
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    axes[0].set_xscale("log")
+    for axis, panel in zip(axes, panels, strict=True):
+        axis.set_facecolor("none")
+        _panel(axis, panel, theme)
+    axes[-1].set_xlabel("ms a frame, median; the line spans all rounds")
+    _legend(figure, [mark for panel in panels for mark in panel.marks], theme)
+    # Places of labels need the last size of the axes, which the legend takes room from.
+    for axis, panel in zip(axes, panels, strict=True):
+        shown = [(mark, (mark.ms[0], _height(panel, mark))) for mark in panel.marks]
+        taken = _taken(figure, axis, [at for _, at in shown])
+        taken += [text.get_window_extent() for text in axis.texts]
+        for mark, at in sorted(shown, key=lambda pair: _rank(pair[0])):
+            _place(axis, mark.name, at, theme, mark.on_front, taken, always=False)
+    return figure
+
+
+def _rank(mark: Mark) -> tuple[bool, bool, float]:
+    """Return the order in which marks are named: the front, other denoisers, then by time."""
+    return (not mark.on_front, mark.executor in MARKERS, mark.ms[0])
+
+
+def _top(panel: Panel) -> tuple[float, float]:
+    """Return the least and the largest bound of a panel."""
+    known = [mark.y for mark in panel.marks if mark.y]
+    return (min(known), max(known)) if known else (1e-6, 1e-3)
+
+
+def _height(panel: Panel, mark: Mark) -> float:
+    """Return where a mark is drawn: that without a bound in a band above all others."""
+    if mark.y is not None:
+        return mark.y
+    return float(_top(panel)[1] * 10.0 ** (BAND / 2 + 0.2))
+
+
+def _panel(axis: Any, panel: Panel, theme: Theme) -> None:
+    """Draw a panel's marks, front and band."""
+    from matplotlib.ticker import NullLocator
+
+    for mark in panel.marks:
+        marker = {**MARKERS, "": PEER_MARKER, "other": OTHER_MARKER}[mark.executor][0]
+        colour, height = COLOURS[mark.kind][0], _height(panel, mark)
+        colour = theme.text if mark.executor == "other" else colour
+        axis.plot(mark.ms[1:], [height] * 2, color=colour, linewidth=0.9, alpha=0.6)
+        edge = theme.text if mark.on_front else colour
+        size = 11 if marker == OTHER_MARKER[0] else 6.5
+        axis.plot([mark.ms[0]], [height], marker, color=colour, markeredgecolor=edge, markersize=size)
+    if panel.is_loss:
+        axis.set_yscale("symlog", linthresh=LINEAR_DB)
+        axis.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axis.axhline(0.0, color=theme.text, linewidth=0.8, alpha=0.5)
+    else:
+        low, high = _top(panel)
+        axis.set_yscale("log")
+        axis.set_ylim(low / 4, high * 10.0 ** (BAND + 0.2))
+        if any(mark.y is None for mark in panel.marks):
+            axis.axhspan(high * 10.0**0.2, high * 10.0 ** (BAND + 0.2), color=theme.text, alpha=0.07)
+            at = (0.995, high * 10.0 ** (BAND + 0.05))
+            style = {"ha": "right", "va": "top", "fontsize": 8, "color": theme.text}
+            axis.text(*at, "no bound", transform=axis.get_yaxis_transform(), **style)
+            # The band is off the scale.
+            axis.yaxis.set_major_formatter(lambda value, _: f"{value:.0e}" if value <= high else "")
+            axis.yaxis.set_minor_locator(NullLocator())
+    front = sorted((mark for mark in panel.marks if mark.on_front), key=lambda mark: mark.ms[0])
+    line = [mark.ms[0] for mark in front], [mark.y for mark in front]
+    axis.plot(*line, drawstyle="steps-post", color=theme.text, linewidth=1.1, alpha=0.7, zorder=1)
+    axis.margins(0.1, 0.12)
+    axis.set_ylabel(panel.label)
+    _dress(axis, theme)
+
+
+def _legend(figure: Any, marks: Sequence[Mark], theme: Theme) -> None:
+    """Draw a legend of the markers and colours that occur, below the panels."""
+    from matplotlib.lines import Line2D
+
+    forms = {**MARKERS, "": PEER_MARKER, "other": OTHER_MARKER}
+    here = {mark.executor for mark in marks}, {mark.kind for mark in marks}
+    grey: dict[str, Any] = {"linestyle": "none", "color": theme.text, "markersize": 6.5}
+    shown = [
+        Line2D([], [], marker=m, label=text, **grey) for key, (m, text) in forms.items() if key in here[0]
+    ]
+    patch: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 8}
+    shown += [
+        Line2D([], [], color=colour, label=text, **patch)
+        for key, (colour, text) in COLOURS.items()
+        if key in here[1]
+    ]
+    shown.append(Line2D([], [], color=theme.text, linewidth=1.1, alpha=0.7, label="Pareto front"))
+    legend = figure.legend(handles=shown, frameon=False, fontsize=8, ncols=5, loc="outside lower center")
+    for text in legend.get_texts():
+        text.set_color(theme.text)
 
 
 def _dress(axis: Any, theme: Theme) -> None:

@@ -20,6 +20,7 @@ from .outputs import check_output
 from .terminal import hint_on_interrupt, progress, say
 
 if TYPE_CHECKING:
+    from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
     from ..refimpl.siren import Siren
     from ..refimpl.train import Recipe, TrainState
@@ -139,7 +140,7 @@ def train(
         if features is not None or rank is not None:
             option = "--features" if rank is None else "--rank"
             raise InputError("--variant", variant, f"it chooses what {option} does", f"leave out {option}")
-        recipe, network = _varied(recipe, begin, variant)
+        recipe, network = _begin_varied(recipe, begin, variant)
     pairs = read_training(dataset, inputs, targets, recipe.features)
     state = _fit_to_the_end(recipe, pairs, output, state, network, executor.value)
     say(f"{output}: {state.step} steps; checkpoint in {saved}")
@@ -174,30 +175,36 @@ def _first_network(begin: Path | None, state: TrainState | None) -> Siren | None
     return load_model(begin).siren
 
 
-def _varied(recipe: Recipe, begin: Path | None, name: str) -> tuple[Recipe, Siren]:
+def _begin_varied(recipe: Recipe, begin: Path | None, name: str) -> tuple[Recipe, Siren]:
     """Return the recipe and the first network of a variant of the model that a run begins with."""
-    from ..compiler import sine, variants
-    from ..refimpl.train import check_recipe
     from .inputs import load_model
 
     if begin is None:
         raise InputError("--variant", name, "it is cut from a trained model", "name one with --from")
-    varied = variants.vary(variants.parse(name), load_model(begin))
+    return varied(recipe, load_model(begin), name)
+
+
+def varied(recipe: Recipe, model: Model, name: str) -> tuple[Recipe, Siren]:
+    """Return the recipe and the first network with which a variant of a model is trained."""
+    from ..compiler import sine, variants
+    from ..refimpl.train import check_recipe
+
+    varied = variants.vary(variants.parse(name), model)
     if varied.degree != sine.DEGREE:
         rule = "the degree of a sine is chosen when a kernel is compiled, not trained"
         raise InputError("--variant", name, rule, "leave it out of the name here")
-    model = varied.model
+    network = varied.model.siren
     found = replace(
         recipe,
-        features=model.features,
-        window=model.window,
-        widths=model.siren.widths[1:-1],
-        omega_0_first=model.siren.omega_0_first,
-        omega_0_hidden=model.siren.omega_0_hidden,
+        features=varied.model.features,
+        window=varied.model.window,
+        widths=network.widths[1:-1],
+        omega_0_first=network.omega_0_first,
+        omega_0_hidden=network.omega_0_hidden,
         rank=varied.rank,
     )
     check_recipe(found)
-    return found, model.siren
+    return found, network
 
 
 def _fit_to_the_end(

@@ -35,8 +35,11 @@ FOLDER = ROOT / "experiments/records"
 DIGITS = 6
 """Significant digits of a number in a record: more than any measurement here has."""
 
-BENCH = "wamnet-bench-1"
+BENCH = "wamnet-bench-2"
 """The form of a result of `wamnet bench`."""
+
+BENCH_SETTINGS = ("size_px", "repeats", "budget_s", "network", "frames", "unseen_frames", "front")
+"""What of it holds for all contenders."""
 
 DEMO = "wamnet-demo-2"
 """The form of a report of `wamnet demo`."""
@@ -129,17 +132,27 @@ def of_bench(data: Mapping[str, Any], command: str) -> dict[str, Any]:
     further size has its pixels after an @, machine-wide numbers are the configuration `machine`.
     """
     sizes = [("", data["contenders"])]
-    sizes += [(f"@{size['size_px'][0]}", size["contenders"]) for size in data.get("sizes") or []]
+    sizes += [(f"@{size['size_px']}", size["contenders"]) for size in data.get("sizes") or []]
     records = [
         {"configuration": row["name"] + mark, "seed": 0, "values": flat(row)}
         for mark, rows in sizes
         for row in rows
     ]
     records.append({"configuration": "machine", "seed": 0, "values": flat(data.get("limits") or {})})
-    settings = {key: data[key] for key in ("size_px", "repeats", "budget_s", "network") if key in data}
+    settings = {key: data[key] for key in BENCH_SETTINGS if key in data}
     head = {"schema": SCHEMA, "experiment": "bench", "commands": [command] if command else []}
     facts = {key: data.get(key, {}) for key in ("machine", "versions")}
     return {**head, "settings": settings, **facts, "records": records}
+
+
+def bench_of(found: Results) -> dict[str, Any]:
+    """Return the data of `wamnet bench` that a record was made from, as far as tables and plots need it."""
+    rows = []
+    for record in found.records():
+        name, values = record["configuration"], nested(record["values"])
+        if name != "machine" and "@" not in name:
+            rows.append({"name": name, "ms": None, "reason": "", **values})
+    return {**found.data()["settings"], "contenders": rows}
 
 
 def of_demo(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -164,6 +177,18 @@ def flat(values: Mapping[str, Any], before: str = "") -> dict[str, Any]:
             found |= flat(value, f"{before}{key}.")
         elif value is not None and key not in ("name", "reason"):
             found[f"{before}{key}"] = value
+    return found
+
+
+def nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values whose keys are joined by points as nested ones: what [`flat`] was given."""
+    found: dict[str, Any] = {}
+    for key, value in values.items():
+        *outer, last = key.split(".")
+        place = found
+        for part in outer:
+            place = place.setdefault(part, {})
+        place[last] = value
     return found
 
 

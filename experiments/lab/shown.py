@@ -15,12 +15,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from wamnet.cli import bench_report
+from wamnet.cli.plots import PAPER, trade_off_figure
 from wamnet.refimpl.errors import InputError
 
 from . import plots, printed, tables
 from .intervals import paired
 from .plots import Plot
-from .records import Records
+from .records import Records, bench_of
 from .results import PER_FRAME, Results, number
 from .tables import Column
 
@@ -285,6 +287,16 @@ def bench(record: str) -> TableOf:
     return made
 
 
+def speed_against_error(record: str) -> TableOf:
+    """Return time, quality, errors and bounds of all kernels and of Open Image Denoise."""
+    return lambda records: bench_report.table(bench_of(records[record]))
+
+
+def draw_speed(record: str) -> Callable[[Records], Any]:
+    """Return what draws time against loss and against bounds."""
+    return lambda records: trade_off_figure(bench_report.panels(bench_of(records[record])), PAPER)
+
+
 def _short(row: Mapping[str, Any], key: str, form: str) -> str:
     """Return a number of a row, or a dash."""
     return "-" if row.get(key) is None else format(row[key], form)
@@ -456,6 +468,11 @@ PLOTS: Mapping[str, Plot] = {
     "learning-curve": Plot(
         draw_learning_curve, ("learning_curve",), "Learning curves: means of three seeds, least and largest."
     ),
+    "speed-against-error": Plot(
+        draw_speed("bench-minicubes"),
+        ("bench-minicubes",),
+        "Milliseconds a frame against PSNR lost and against the bound of the error: the mini cubes.",
+    ),
 }
 """The plots by the names of their files."""
 
@@ -507,6 +524,7 @@ TABLES: Mapping[str, TableOf] = {
     "sines-every": sines_every,
     "sines-octaves": as_printed("sines", 2),
     "sines-speed": as_printed("sines-speed"),
+    "speed-against-error": speed_against_error("bench-minicubes"),
     "table1": table1,
     "table1-readme": table1_readme,
     "train-speed": train_speed,

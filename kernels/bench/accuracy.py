@@ -18,13 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler import bounds
-from ...compiler.compile import analysed, schedule_named
+from ...compiler.compile import analysed, schedule_named, sine_contract
+from ...compiler.emit import kernel_gather
 from ...compiler.factor import at_images, factor, product
 from ...compiler.interpret import interpret
 from ...compiler.ir import Program
 from ...compiler.lower import lower
-from ...compiler.profiles import EMITTED_SINE
-from ...compiler.schedules import PLAIN
+from ...compiler.profiles import SineContract
+from ...compiler.schedules import PLAIN, Schedule, windows
 from ...refimpl import dataset, metrics
 from ...refimpl.denoise import Model, denoise
 from ...refimpl.frame import Frame
@@ -55,14 +56,13 @@ class Crop:
             name: np.ascontiguousarray(image[: self.rows + MARGIN_PX, : self.columns + MARGIN_PX])
             for name, image in images.items()
         }
-        joined = np.concatenate(list(self.images.values()), axis=-1)
-        self.windows = dataset.all_windows(dataset.pad(joined, model.window), model.window)
         self.full = self.interpreted(lower(model))
-        self._rounding: dict[tuple[Variant, str, str], tuple[Array, float]] = {}
+        self._rounding: dict[tuple[Any, ...], tuple[Array, float]] = {}
 
     def interpreted(self, program: Program) -> Array:
         """Return the output (rows, columns, 3) of a program of one window, in float64."""
-        (found,) = interpret(program, {"window": self.windows}, np.float64).values()
+        seen = windows(kernel_gather(program), self.images)
+        (found,) = interpret(program, {"window": seen}, np.float64).values()
         crop: Array = self.cut(found)
         return crop
 
@@ -71,23 +71,35 @@ class Crop:
 
         `schedule` of `target`: whose sums; a peer without a target is held to those of the interpreter.
         """
-        key = variant, target or "numpy", schedule or PLAIN
+        chosen = schedule_named(target or "numpy", schedule or PLAIN)
+        contract = sine_contract(variant.profile, target or "numpy")
+        # Most schedules of all targets share one bound, which takes seconds to compute.
+        key = variant.name, contract, type(chosen).enclosures
         if key not in self._rounding:
-            self._rounding[key] = self._rounded(*key)
+            self._rounding[key] = self._rounded(variant, contract, chosen)
         return self._rounding[key]
 
-    def _rounded(self, variant: Variant, target: str, schedule: str) -> tuple[Array, float]:
-        """Compute both: profile `ieee` has one sine for all targets."""
-        program, contract = analysed(variant.program(self.model)), EMITTED_SINE
+    def _rounded(self, variant: Variant, contract: SineContract, chosen: Schedule) -> tuple[Array, float]:
+        """Compute both in the variant's profile; the bound is infinite where a sine promises nothing."""
+        program = analysed(variant.program(self.model), variant.profile)
         if variant.rank:
             whole = factor(program, variant.rank)
-            found = bounds.output_errors(program, at_images(whole, contract, self.images, of_cut=False))
+            near = self._near(program)
+            found = bounds.output_errors(program, at_images(whole, contract, near, of_cut=False))
             program = product(whole)
         else:
-            chosen = schedule_named(target, schedule)
-            found = bounds.output_errors(program, chosen.enclosures(program, contract, self.images))
+            direct = type(chosen).enclosures is Schedule.enclosures
+            near = self._near(program) if direct else self.images
+            rows = slice(0, self.rows)
+            found = bounds.output_errors(program, chosen.enclosures(program, contract, near, rows))
         (bound,) = found.values()
         return self.interpreted(program), float(self.cut(bound).max())
+
+    def _near(self, program: Program) -> Images:
+        """Return the crop's images with no more around it than its windows see: bounds take seconds."""
+        gather = kernel_gather(program)
+        rows, columns = self.rows + gather.rows, self.columns + gather.columns
+        return {name: image[:rows, :columns] for name, image in self.images.items()}
 
     def cut(self, picture: NDArray[Any]) -> Any:
         """Return the crop of a picture (H, W, C)."""
@@ -115,13 +127,14 @@ def quality(
     pairs: Sequence[tuple[Frame, Frame]],
     full: Sequence[tuple[float, float]],
     picture_of: Callable[[Frame], NDArray[Any]],
-) -> dict[str, float]:
-    """Return the mean PSNR (dB) and SSIM over the pairs, and what is lost of the full network's."""
+) -> dict[str, Any]:
+    """Return the mean PSNR (dB) and SSIM over the pairs, what is lost of the full ones, and each PSNR."""
     scores = [_scores(model, picture_of(noisy), clean) for noisy, clean in pairs]
     count = len(scores)
     psnr, ssim = (math.fsum(score[k] for score in scores) / count for k in (0, 1))
     full_psnr, full_ssim = (math.fsum(score[k] for score in full) / count for k in (0, 1))
-    return {"psnr_db": psnr, "ssim": ssim, "psnr_loss_db": full_psnr - psnr, "ssim_loss": full_ssim - ssim}
+    found = {"psnr_db": psnr, "ssim": ssim, "psnr_loss_db": full_psnr - psnr, "ssim_loss": full_ssim - ssim}
+    return {**found, "psnr_frames_db": [each for each, _ in scores]}
 
 
 def _scores(model: Model, picture: NDArray[Any], clean: Frame) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler import profiles, sine
 from ...compiler.ir import Program
 from ...compiler.lower import lower
 from ...refimpl.denoise import Model
@@ -30,21 +31,62 @@ Array = NDArray[Any]
 NO_CACHE = "nothing is kept"
 """What stays on disk of code that a contender compiles, if it compiles any."""
 
+IEEE = "ieee"
+"""Profile of kernels, unless a variant has another."""
+
 MACHINE = "machine"
 """Name of the rates of contenders that have none of their own: those of the machine."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Variant:
-    """A form of the network that trades accuracy for speed: the program of a model, and a rank to cut it to.
+    """A form of the network that trades accuracy for speed: a rank, a profile, a model trained as the form.
 
-    A new one is one of these in `contenders.VARIANTS`.
+    `model` None: the benchmark's own; `steps`: how many steps the model was trained on from that one.
     """
 
     name: str
     text: str
-    program: Callable[[Model], Program] = lower
     rank: int = 0
+    profile: str = IEEE
+    model: Model | None = None
+    steps: int = 0
+
+    def of(self, model: Model) -> Model:
+        """Return the network that is run when `model` is the benchmark's."""
+        return self.model or model
+
+    def program(self, model: Model) -> Program:
+        """Return what the form computes when `model` is the benchmark's, without its rank."""
+        return lower(self.of(model))
+
+    def facts(self, model: Model) -> dict[str, Any]:
+        """Return profile, degree of the sine, rank, window, parameters and steps of training."""
+        found = self.of(model)
+        return {
+            "profile": self.profile,
+            "degree": degree_of(self.profile),
+            "rank": self.rank or None,
+            "window": found.window.size,
+            "parameters": parameters_of(found, self.rank),
+            "trained_steps": self.steps or None,
+        }
+
+
+def degree_of(profile: str) -> int | None:
+    """Return the degree of a profile's sine; None for the target's own."""
+    if profiles.profile_named(profile).sine is None:
+        return None
+    return int(profile.partition(profiles.DEGREE_WORD)[2] or sine.DEGREE)
+
+
+def parameters_of(model: Model, rank: int = 0) -> int:
+    """Return how many numbers a network has; of a first layer of a rank those of its two factors."""
+    weights, biases = model.siren.weights, model.siren.biases
+    others = sum(array.size for array in (*weights[1:], *biases))
+    rows, columns = weights[0].shape
+    size = model.window.size
+    return int(others + (rank * (columns // size + size * rows) if rank else rows * columns))
 
 
 FULL = Variant("full", "the whole network")
@@ -57,7 +99,8 @@ class Opened:
 
     `display` turns what `run` returns into display-encoded colours, outside of what is timed. `stages` are
     what it does for a pixel [cost.py], `rates` the name of the rates that it has [`MACHINE` or its own].
-    `kernel_seconds`: the kernel alone, images and result on the device.
+    `kernel_seconds`: the kernel alone, images and result on the device. `schedule`: the one that was picked,
+    `bound`: what is proven for all images, `certified`: whether the proof is written out.
     """
 
     run: Callable[[Given], Array]
@@ -68,6 +111,9 @@ class Opened:
     kernel_seconds: Callable[[Given], float] | None = None
     display: Callable[[Array], Array] = np.asarray
     close: Callable[[], None] = lambda: None
+    schedule: str = ""
+    bound: float | None = None
+    certified: bool = False
 
 
 @dataclass(frozen=True)

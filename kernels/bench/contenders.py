@@ -1,7 +1,8 @@
 """The list of contenders: all executors with all their schedules, all variants of the network, all peers.
 
 1. A kernel is named EXECUTOR:SCHEDULE, with :VARIANT where it is not the whole network [`kernel`].
-2. Variants run with the schedule that suits the device, or the one that stands in for it [`of_machine`].
+2. Variants run with the schedule that suits the device, or the one that takes its place [`of_machine`]: sines
+   and profiles, which need no training [`VARIANTS`], and forms that were trained and are given.
 3. Peers stand in files of their own, `peer_*.py`; a new one is a file and a line in `PEERS`.
 """
 
@@ -11,20 +12,29 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from functools import partial
 
+from ...compiler.artifact import Artifact
 from ...compiler.compile import TARGETS, analysed, compile_program, schedule_named
+from ...compiler.emit import kernel_gather
 from ...compiler.schedules import PLAIN
 from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable, InputError
+from ..executor import Images
 from . import peer_oidn, peer_onnxruntime, peer_tinygrad, peer_torch
-from .contender import FULL, NO_CACHE, Contender, Opened, Tools, Variant
+from .contender import FULL, IEEE, NO_CACHE, Contender, Opened, Tools, Variant
 from .cost import fused, sines_of
+from .workload import Given
+
+EXACT = "exact"
+"""Profile whose sums have one order: spectra cannot have it."""
 
 VARIANTS: tuple[Variant, ...] = (
-    Variant("rank16", "first layer of rank 16, in two passes", rank=16),
-    Variant("rank12", "first layer of rank 12, in two passes", rank=12),
-    Variant("rank8", "first layer of rank 8, in two passes", rank=8),
+    Variant("sine7", "sines of degree 7", profile="ieee-sine7"),
+    Variant("sine9", "sines of degree 9", profile="ieee-sine9"),
+    Variant("sine5", "sines of degree 5", profile="ieee-sine5"),
+    Variant("native", "the target's own sine", profile="native"),
+    Variant("exact", "the same bits on every executor", profile="exact"),
 )
-"""Forms of the network besides the whole one."""
+"""Forms of the network that need no training; what is cut away is trained first [`of_machine`]."""
 
 CACHES = {
     "numpy": NO_CACHE,
@@ -59,25 +69,44 @@ def _open_kernel(
 ) -> Opened:
     """Compile the kernel and build it."""
     runner, program = tools.executor(executor), variant.program(model)
-    artifact = compile_program(program, executor, "ieee", schedule, variant.rank)
+    artifact = compile_program(program, executor, variant.profile, schedule, variant.rank)
     runner.build(artifact, (size, size))
     alone = getattr(runner, "kernel_seconds", None)
     picked = str(artifact.manifest["schedule"]["name"])
+    profile = "" if variant.profile == IEEE else f":{variant.profile}"
     return Opened(
-        run=lambda given: runner.run(artifact, given.images),
+        run=lambda given: runner.run(artifact, _read(artifact, given)),
         device=runner.device,
         stages=fused(artifact, sines_of(analysed(program))),
         source_bytes=sum(len(each.source.encode()) for each in artifact.kernels),
-        rates=f"{executor}:{picked}",
-        kernel_seconds=alone and (lambda given: alone(artifact, given.images)),
+        rates=f"{executor}:{picked}{profile}",
+        kernel_seconds=alone and (lambda given: alone(artifact, _read(artifact, given))),
+        schedule=picked,
+        bound=_bound_of(artifact),
+        certified=artifact.certificate is not None,
     )
 
 
-def of_machine(tools: Tools, size: int, quick: bool = False) -> list[Contender]:
+def _read(artifact: Artifact, given: Given) -> Images:
+    """Return the images that a kernel reads: a form may see fewer features than the network."""
+    first = artifact.kernels[0]
+    return {image.name: given.images[image.name] for image in kernel_gather(first.program).images}
+
+
+def _bound_of(artifact: Artifact) -> float | None:
+    """Return the bound of rounding for all images; of a rank against the product of its factors."""
+    factored = artifact.manifest.get("factored")
+    output = (factored["rounding"] if factored else artifact.manifest["bound"])["output"]
+    return max(output) if output else None
+
+
+def of_machine(
+    tools: Tools, size: int, quick: bool = False, forms: Sequence[Variant] = ()
+) -> list[Contender]:
     """Return all contenders of a machine; those that cannot run here are in the list and say so later.
 
-    `quick`: the kernels with the schedules that suit their devices for pictures of this size, the first
-    variant, and `QUICK`.
+    `forms` are trained; they run on all executors but the interpreter. `quick`: the kernels with the
+    schedules that suit their devices for pictures of this size, the first variant, and `QUICK`.
     """
     found = []
     for name, target in TARGETS.items():
@@ -85,16 +114,27 @@ def of_machine(tools: Tools, size: int, quick: bool = False) -> list[Contender]:
             suits = tools.executor(name).schedule_for((size, size))
         except ExecutorUnavailable:
             suits = target.schedules[0].name
-        chosen = [suits] if quick else [schedule.name for schedule in target.schedules]
-        found += [kernel(name, schedule) for schedule in chosen]
+        schedules = [suits] if quick else [schedule.name for schedule in target.schedules]
+        found += [kernel(name, schedule) for schedule in schedules]
         if name != "numpy":
-            passes = _of_two_passes(name, suits)
-            found += [kernel(name, passes, variant) for variant in (VARIANTS[:1] if quick else VARIANTS)]
+            found += _varied(name, suits, [*(VARIANTS[:1] if quick else VARIANTS), *forms])
     return [*found, *(peer for peer in PEERS if not quick or peer.name in QUICK)]
 
 
+def _varied(executor: str, suits: str, variants: Sequence[Variant]) -> list[Contender]:
+    """Return the kernels of variants: with the schedule that suits, and the direct one where that is another.
+
+    A first layer in two passes, and sums in one order, have the direct one only.
+    """
+    direct, found = _of_two_passes(executor, suits), []
+    for variant in variants:
+        both = not variant.rank and variant.profile != EXACT
+        found += [kernel(executor, each, variant) for each in dict.fromkeys([suits] * both + [direct])]
+    return found
+
+
 def _of_two_passes(target: str, suits: str) -> str:
-    """Return the schedule of a first layer in two passes: spectra hold none and name what stands in."""
+    """Return the schedule of a first layer in two passes: spectra name what takes their place."""
     schedule = schedule_named(target, suits)
     return schedule.name if schedule.instead == PLAIN else schedule.instead
 

@@ -32,7 +32,7 @@ from ...refimpl.frame import Frame
 from ..measure import PAUSE_S, Times, in_turns
 from ..memory import keep_freed_memory
 from . import accuracy, rates
-from .contender import MACHINE, Contender, Opened, Tools
+from .contender import IEEE, MACHINE, Contender, Opened, Tools, parameters_of
 from .cost import Rates, predicted_seconds
 from .first_run import first_runs
 from .result import (
@@ -63,6 +63,12 @@ DOUBT = 4.0
 MOST_TOLD = 200
 """Characters of a peer's error that are repeated."""
 
+FRONTS = {"error": "max", "quality": "psnr_loss_db", "rounding": "bound"}
+"""Parts of a row with a front, and the number of each that is set against time."""
+
+STEPS = {"quality": 0.01}
+"""Differences of a part's number, here in dB, that no front sees: those of rounding."""
+
 GROWTH_ROUNDS = 3
 """Most frames of each contender at another size: what grows is seen from few."""
 
@@ -71,8 +77,9 @@ GROWTH_ROUNDS = 3
 class Request:
     """What is measured: a model on pictures of `size` pixels in width and height, `repeats` times.
 
-    `pairs` are unseen noisy frames with their references, empty without a data set; `sizes` further sizes;
-    `budget_s` the longest that one contender may take at one size. `quick` halves the machine's measurements,
+    `pairs` are unseen noisy frames with their references, empty where noise is denoised, and `frames` says
+    what is known of them; `name` is the model's, `sizes` are further sizes, `budget_s` is the longest that
+    one contender may take at one size. `quick` halves the machine's measurements,
     `first_runs` measures compilation with empty caches and with those on disk.
     """
 
@@ -81,6 +88,8 @@ class Request:
     repeats: int = 5
     sizes: tuple[int, ...] = ()
     pairs: tuple[tuple[Frame, Frame], ...] = ()
+    frames: Mapping[str, Any] = field(default_factory=dict)
+    name: str = ""
     budget_s: float = 30.0
     quick: bool = False
     first_runs: bool = False
@@ -104,7 +113,9 @@ class Contest:
     def __post_init__(self) -> None:
         for each in self.contenders:
             kind = KERNEL if each.executor else PEER
-            self.rows[each.name] = Row(each.name, each.text, kind, facts={"caches": each.caches})
+            facts = {"caches": each.caches, "executor": each.executor}
+            facts |= each.variant.facts(self.request.model) if each.variant else {}
+            self.rows[each.name] = Row(each.name, each.text, kind, facts=facts)
 
     def run(self) -> None:
         """Do all steps."""
@@ -178,6 +189,7 @@ class Contest:
         opened = contender.open(self.tools, self.request.model, self.request.size)
         seconds = time.perf_counter() - start
         row.facts |= {"device": opened.device, "source_bytes": opened.source_bytes}
+        row.facts |= {"schedule": opened.schedule or None}
         self._predict(contender, opened, row)
         needed = row.facts["predicted_ms"]
         if contender.executor and needed is not None and needed > 1e3 * DOUBT * self.request.budget_s:
@@ -188,16 +200,21 @@ class Contest:
         first = time.perf_counter() - start
         row.facts |= {"open_s": seconds, "first_frame_s": first}
         row.state, self.opened[contender.name] = MEASURED, opened
-        self._compare(contender, row, crop, picture)
+        self._compare(contender, opened, crop, picture)
 
-    def _compare(self, contender: Contender, row: Row, crop: accuracy.Crop, picture: NDArray[Any]) -> None:
+    def _compare(
+        self, contender: Contender, opened: Opened, crop: accuracy.Crop, picture: NDArray[Any]
+    ) -> None:
         """Note the error of a picture; another denoiser has none."""
+        row = self.rows[contender.name]
         if contender.variant is None:
             return
         row.facts["error"] = accuracy.errors(crop.cut(picture), crop.full)
-        expected, bound = crop.rounding(contender.variant, contender.executor, contender.schedule)
-        found = accuracy.errors(crop.cut(picture), expected)["max"]
-        row.facts["rounding"] = {"max": found, "bound": bound if contender.executor else None}
+        expected, bound = crop.rounding(contender.variant, contender.executor, opened.schedule)
+        found: dict[str, Any] = {"max": accuracy.errors(crop.cut(picture), expected)["max"]}
+        if contender.executor:
+            found |= {"bound": bound, "bound_all": opened.bound, "certified": opened.certified}
+        row.facts["rounding"] = {"bound": None, "bound_all": None, "certified": False} | found
 
     def _predict(self, contender: Contender, opened: Opened, row: Row) -> None:
         """Note the time that the cost model gives."""
@@ -218,9 +235,9 @@ class Contest:
         if name == MACHINE:
             return limits.rates
         if name not in self.found_rates:
-            executor, _, schedule = name.partition(":")
+            executor, schedule, profile = (*name.split(":"), IEEE)[:3]
             pause_s = min(PROBE_PAUSE_S, self.request.pause_s)
-            times, side = rates.probed(self.tools.executor(executor), schedule, pause_s)
+            times, side = rates.probed(self.tools.executor(executor), schedule, pause_s, profile)
             self.found_rates[name] = rates.rates_of(times, side * side, limits.bytes_per_s)
         return self.found_rates[name]
 
@@ -328,6 +345,7 @@ class Contest:
         """Note the quality of each contender's pictures of unseen frames."""
         model, pairs = self.request.model, self.request.pairs
         full = accuracy.full_quality(model, pairs)
+        images = {id(noisy): given(model, noisy) for noisy, _ in pairs}
         for name, opened in list(self.opened.items()):
             if not pairs:
                 break
@@ -342,14 +360,18 @@ class Contest:
                     model,
                     pairs,
                     full,
-                    lambda frame, o=opened: o.display(o.run(given(model, frame))),  # type: ignore[misc]
+                    lambda frame, o=opened: o.display(o.run(images[id(frame)])),  # type: ignore[misc]
                 )
 
     def _begin_anew(self) -> None:
         """Note how long a first frame takes with empty caches, and with what a process before has left."""
+        # A form that was trained has a kernel of another network: the process would not have it.
+        by_name = {each.name: each.variant for each in self.contenders}
         for name in self.opened:
+            if (variant := by_name[name]) and variant.model:
+                continue
             self.told(f"first run of {name}", 0.05)
-            never, later = first_runs(name, self.request.model)
+            never, later = first_runs(name, self.request.model, self.request.size)
             self.rows[name].facts |= {"first_run_s": never, "later_run_s": later}
 
     def as_data(self) -> dict[str, Any]:
@@ -358,8 +380,8 @@ class Contest:
         rows = [self._with_rates(row.as_data(), request.size) for row in self.rows.values()]
         by_name = {row["name"]: row for row in rows}
         fronts = {
-            part: front({name: of_front(row, part, key) for name, row in by_name.items()})
-            for part, key in (("error", "max"), ("quality", "psnr_loss_db"))
+            part: front({name: of_front(row, part, key, STEPS.get(part)) for name, row in by_name.items()})
+            for part, key in FRONTS.items()
         }
         limits = self.limits
         found: dict[str, Any] = clean(
@@ -368,11 +390,14 @@ class Contest:
                 "size_px": request.size,
                 "repeats": request.repeats,
                 "budget_s": request.budget_s,
+                "frames": request.frames or None,
                 "network": {
+                    "name": request.name,
                     "widths": model.siren.widths,
                     "features": model.features,
                     "window": model.window.size,
                     "border": model.window.border,
+                    "parameters": parameters_of(model),
                     "omega_0": [model.siren.omega_0_first, model.siren.omega_0_hidden],
                 },
                 "unseen_frames": len(request.pairs),

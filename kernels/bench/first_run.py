@@ -41,21 +41,24 @@ SECONDS_AT_MOST = 180
 """When a process counts as hanging."""
 
 
-def first_runs(name: str, model: Model) -> tuple[float | None, float | None]:
-    """Return the seconds to a first frame with empty caches, and in a later process with the same ones."""
+def first_runs(name: str, model: Model, size: int) -> tuple[float | None, float | None]:
+    """Return the seconds to a first frame with empty caches, and in a later process with the same ones.
+
+    `size`: the width of the benchmark's pictures, by which names are given.
+    """
     with tempfile.TemporaryDirectory() as folder:
         places = {variable: str(Path(folder, variable.lower())) for variable in CACHES}
         for place in places.values():
             Path(place).mkdir()
         path = Path(folder, "model.safetensors")
         save_model(path, model)
-        found = [_in_process(name, path, places) for _ in range(2)]
+        found = [_in_process(name, path, size, places) for _ in range(2)]
     return found[0], found[1]
 
 
-def _in_process(name: str, path: Path, places: dict[str, str]) -> float | None:
+def _in_process(name: str, path: Path, size: int, places: dict[str, str]) -> float | None:
     """Return what a process finds; None where it fails."""
-    command = [sys.executable, "-m", __name__, name, str(path)]
+    command = [sys.executable, "-m", __name__, name, str(path), str(size)]
     try:
         done = subprocess.run(
             command,
@@ -72,12 +75,15 @@ def _in_process(name: str, path: Path, places: dict[str, str]) -> float | None:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Open the contender NAME for the model in FILE, make a frame, and print the seconds as JSON."""
-    name, path = arguments
+    """Open the contender NAME for the model in FILE, make a frame, and print the seconds as JSON.
+
+    SIZE is that of the benchmark that names it.
+    """
+    name, path, size = arguments
     model = load_model(path)
     shown = given(model, noise(FRAME_PX))
     with Tools() as tools:
-        (contender,) = chosen(of_machine(tools, FRAME_PX), [name], [])
+        (contender,) = chosen(of_machine(tools, int(size)), [name], [])
         contender.prepare(tools)
         start = time.perf_counter()
         contender.open(tools, model, FRAME_PX).run(shown)

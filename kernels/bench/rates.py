@@ -149,9 +149,11 @@ def probe_images(size: int) -> Images:
     return {"a": ramp, "b": ramp[::-1].copy()}
 
 
-def probed(executor: Executor, schedule: str, pause_s: float) -> tuple[dict[str, Times], int]:
+def probed(
+    executor: Executor, schedule: str, pause_s: float, profile: str = "ieee"
+) -> tuple[dict[str, Times], int]:
     """Return the times of the small programs by name, and the size of the picture on which they ran."""
-    made = {name: compile_program(p, executor.name, "ieee", schedule) for name, p in probes().items()}
+    made = {name: compile_program(p, executor.name, profile, schedule) for name, p in probes().items()}
     for size in PROBE_PX:
         images = probe_images(size)
         for artifact in made.values():

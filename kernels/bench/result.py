@@ -12,7 +12,7 @@ from typing import Any
 
 from ..measure import Times
 
-SCHEMA = "wamnet-bench-1"
+SCHEMA = "wamnet-bench-2"
 """Name and version of the form of the data."""
 
 MEASURED, MISSING, SKIPPED, FAILED, PENDING = "measured", "missing", "skipped", "failed", "pending"
@@ -94,6 +94,9 @@ def median_ms(row: Mapping[str, Any]) -> float | None:
     return found
 
 
-def of_front(row: Mapping[str, Any], part: str, key: str) -> tuple[float | None, float | None]:
-    """Return a row's median time, and a number of one of its parts."""
-    return median_ms(row), (row.get(part) or {}).get(key)
+def of_front(
+    row: Mapping[str, Any], part: str, key: str, step: float | None = None
+) -> tuple[float | None, float | None]:
+    """Return a row's median time, and a number of one of its parts, to the nearest multiple of a step."""
+    found = (row.get(part) or {}).get(key)
+    return median_ms(row), found if step is None or found is None else step * round(found / step)

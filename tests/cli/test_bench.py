@@ -5,12 +5,17 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from wamnet.cli import bench, bench_report, plots, report
+from wamnet.cli import bench, bench_forms, bench_frames, bench_report, exr, plots, report, train
+from wamnet.compiler.model_file import load_model, save_checkpoint, save_model
 from wamnet.kernels.bench import contest, rates
+from wamnet.kernels.frame_plan import frame_draws
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.variation import Ranges
 
 SPEC = Path(__file__).resolve().parents[2] / "spec" / "bench.md"
 """The chapter that documents the keys of the result."""
@@ -43,11 +48,11 @@ def found(wamnet, here):
 
 def test_the_result_is_written_in_all_forms(found, here) -> None:
     data, outcome = found
-    assert data["schema"] == "wamnet-bench-1"
+    assert data["schema"] == "wamnet-bench-2"
     assert data["interrupted"] is False
     assert data["command"].split()[0] == "wamnet"
     assert [row["name"] for row in data["contenders"]] == ["numpy:plain"]
-    assert data["front"] == {"error": ["numpy:plain"], "quality": []}
+    assert data["front"] == {"error": ["numpy:plain"], "quality": [], "rounding": ["numpy:plain"]}
     assert [entry["size_px"] for entry in data["sizes"]] == [8]
     folder = here / "made/speed"
     assert sorted(p.name for p in folder.iterdir()) == [
@@ -101,9 +106,16 @@ def test_predicted_stands_beside_measured(found) -> None:
         (["--repeats", "0"], "--repeats is 0: it must be from 1 to 1000"),
         (["--budget", "nan"], "--budget is nan: it must be positive and finite"),
         (["--budget", "0"], "--budget is 0.0: it must be positive and finite"),
-        (["--features", "color,colour"], "feature name is colour"),
-        (["model.safetensors", "--features", "color"], "--features is color: a model says itself"),
-        (["--dataset", "cubes"], "--dataset is cubes: the quality of a network that is not trained"),
+        (["--synthetic", "--features", "color,colour"], "feature name is colour"),
+        (["--features", "color"], "--features is color: a trained model says itself what it sees"),
+        (["model.safetensors", "--features", "color"], "--features is color: a trained model says itself"),
+        (["--synthetic", "--dataset", "cubes"], "--dataset is cubes: noise is measured in its place"),
+        (["paper", "--dataset", "cubes"], "--dataset is cubes: noise is measured in its place"),
+        (["paper", "--train-variants"], "--train-variants is given: forms are trained on frames"),
+        (["model.safetensors", "--train-variants"], "--train-variants is given: forms are trained on frames"),
+        (["--frames", "0"], "--frames is 0: it must be from 1 to 100"),
+        (["--reference-spp", "0"], "--reference-spp is 0: it must be from 1 to"),
+        (["--steps", "0"], "--steps is 0: it must be from 1 to"),
         (["model.safetensors", "--dataset", "cubes"], "data set is cubes: it has no manifest.json"),
         (["none.safetensors"], "none.safetensors"),
     ],
@@ -160,7 +172,7 @@ def test_quality_comes_from_a_data_set(wamnet, here) -> None:
     made = wamnet("dataset", "cornell", "--frames", 1, "--test", 1, "--size", 16, "--spp", 4, "-o", "set")
     assert made.status == 0, made.err
     outcome = wamnet(
-        *("bench", "model.safetensors", "--dataset", "set", "--only", "numpy:plain,opencl:*:rank8"),
+        *("bench", "model.safetensors", "--dataset", "set", "--only", "numpy:plain,opencl:*:exact"),
         *("--executor", "numpy", "--size", 16, "--repeats", 1, "-o", "speed"),
     )
     assert outcome.status == 0, outcome.err
@@ -171,8 +183,167 @@ def test_quality_comes_from_a_data_set(wamnet, here) -> None:
     # A picture that moves by d moves its PSNR by at most 20 log10(1 + d / rmse) dB: with d below 1e-6 and
     # an rmse above 1e-1 (the network is not trained) that is less than 1e-4.
     assert abs(quality["psnr_loss_db"]) <= 1e-4
-    assert (here / "speed/bench-quality.png").is_file()
+    assert (here / "speed/bench-trade-off.png").is_file()
     assert "PSNR loss, dB" in (here / "speed/bench.md").read_text()
+
+
+def small_scene(monkeypatch) -> None:
+    """Let training frames be few and tiny, and NumPy render and train: no device is asked for."""
+    monkeypatch.setattr(bench_frames, "renderer", lambda: "numpy")
+    monkeypatch.setattr(bench, "_trainer", lambda: "numpy")
+    monkeypatch.setattr(bench_frames, "TRAINING_FRAMES", 2)
+    monkeypatch.setattr(bench_frames, "TRAINING_SPP", 2)
+    monkeypatch.setattr(bench_frames, "TRAINING_PX", 12)
+
+
+def of_cubes(path: Path) -> None:
+    """Make the model in a file one that says that it was trained on the mini cubes."""
+    model = load_model(path)
+    info = {"trained_on_scene": "minicubes", "trained_on_feature_spp": "2", "trained_on_time": "0.0, 4.0"}
+    save_model(path, replace(model, info=info))
+
+
+def measured(wamnet, *more: object) -> tuple[dict, str]:
+    """Return the result of a small run on two rendered frames, and what it said."""
+    outcome = wamnet(
+        *("bench", "model.safetensors", "--size", 16, "--frames", 2, "--reference-spp", 2),
+        *("--repeats", 1, "-o", "speed", *more),
+    )
+    assert outcome.status == 0, outcome.err
+    return json.loads(Path("speed/bench.json").read_text()), outcome.out
+
+
+def test_frames_of_the_model_s_scene_are_rendered_once(wamnet, here, monkeypatch) -> None:
+    """With its camera rays; their draws are in the result, and a second run finds them."""
+    small_scene(monkeypatch)
+    of_cubes(here / "model.safetensors")
+    data, said = measured(wamnet, "--only", "numpy:plain")
+    frames = data["frames"]
+    assert (data["unseen_frames"], frames["scene"], frames["feature_spp"]) == (2, "minicubes", 2)
+    assert (frames["reference_spp"], frames["frame_px"], data["network"]["name"]) == (
+        2,
+        16,
+        "model.safetensors",
+    )
+    times = [draw["time_s"] for draw in frames["draws"]]
+    assert len(set(times)) == 2
+    assert [draw["time_in_training"] for draw in frames["draws"]] == [False, False]
+    assert min(draw["noisy_seed"] for draw in frames["draws"]) > bench_frames.TEST_SEED
+    assert data["contenders"][0]["quality"]["psnr_loss_db"] is not None
+    assert re.search(r"6 pictures .*, 6 of them made now", said)
+    assert re.search(r"6 pictures .*, 0 of them made now", measured(wamnet, "--only", "numpy:plain")[1])
+
+
+def test_a_time_of_training_is_named(wamnet, here, monkeypatch) -> None:
+    small_scene(monkeypatch)
+    of_cubes(here / "model.safetensors")
+    model = load_model(here / "model.safetensors")
+    request = bench_frames.request_for(model, "numpy", frames=1, test_frames=1, seed=bench_frames.TEST_SEED)
+    time = frame_draws(request)[1][1].time_s
+    info = {**model.info, "trained_on_time": f"0.0, {time}", "trained_on_ranges": '{"time_s": [0.0, 8.0]}'}
+    save_model(here / "model.safetensors", replace(model, info=info))
+    data, _ = measured(wamnet, "--only", "numpy:plain", "--frames", 1)
+    assert [draw["time_s"] for draw in data["frames"]["draws"]] == [time]
+    assert data["frames"]["draws"][0]["time_in_training"] is True
+    assert "a test frame is at a time that training had" in bench_report.notes(data)
+
+
+def test_frames_are_drawn_from_the_ranges_that_a_model_has_learned(samples) -> None:
+    """Time, camera and lamps; without ranges the camera is at rest."""
+    model = load_model(samples / "model.safetensors")
+    named = {"trained_on_scene": "minicubes", "trained_on_feature_spp": "16", "trained_on_max_depth": "3"}
+    ranges = Ranges((1.0, 3.0), (-20.0, 30.0), (-5.0, 8.0), (0.9, 1.1), (0.0, 0.5))
+    moving = replace(model, info={**named, "trained_on_ranges": ranges.to_json()})
+    request = bench_frames.request_for(moving, "numpy", frames=1, test_frames=8, seed=3)
+    assert request.ranges == ranges
+    assert (request.scene, request.feature_spp, request.max_depth) == ("minicubes", 16, 3)
+    assert bench_frames.request_for(replace(model, info=named), "numpy").yaw_deg == (0.0, 0.0)
+    for _, draw in frame_draws(request):
+        assert 1.0 <= draw.time_s < 3.0
+        assert -20.0 <= draw.variation.yaw_deg <= 30.0
+        assert len(draw.variation.lights) > 0
+
+
+def test_what_a_model_has_not_learned_is_said() -> None:
+    data = traded()
+    data["frames"]["draws"][0]["unlike_training"] = ["it shows cornell"]
+    assert "a test frame: it shows cornell" in bench_report.notes(data)
+
+
+@pytest.mark.parametrize("executor", ["opencl", "opengl"])
+def test_forms_are_trained_and_then_measured(wamnet, here, monkeypatch, executor_named, executor) -> None:
+    """Each is a row with the steps of its training; one that the model cannot have is none."""
+    executor_named(executor)
+    small_scene(monkeypatch)
+    monkeypatch.setattr(bench_forms, "FORMS", ("full", "rank2", "window3", "window14"))
+    of_cubes(here / "model.safetensors")
+    names = ",".join(f"{executor}:*:{form}" for form in ("further", "rank2", "window3"))
+    data, said = measured(wamnet, "--train-variants", "--steps", 3, "--only", names)
+    steps = {row["name"].split(":")[-1]: row["trained_steps"] for row in data["contenders"]}
+    assert {name: steps[name] for name in ("further", "rank2", "window3")} == dict.fromkeys(
+        ("further", "rank2", "window3"), 3
+    )
+    assert "window14" not in steps
+    assert "form rank2: 3 steps" in said
+    for row in data["contenders"]:
+        assert row["state"] == "measured", row["reason"]
+        if row["rounding"]["bound"] is not None:
+            assert row["rounding"]["max"] <= row["rounding"]["bound"]
+
+
+def test_a_form_goes_on_where_an_interrupt_left_it(samples, tmp_path, monkeypatch) -> None:
+    """To the weights of one go, by the checkpoint; the model's own scales stay."""
+    from wamnet.refimpl.train import train as train_steps
+
+    model = load_model(samples / "model.safetensors")
+    pairs = [(exr.read_frame(samples / "noisy.exr"), exr.read_frame(samples / "reference.exr"))]
+    forms = bench_forms.planned(model, ("rank2",), 5)
+    (whole,) = bench_forms.trained(model, forms, pairs, tmp_path / "whole", "numpy")
+    begun = bench_forms.start_of(model, "rank2", 5, pairs)
+    half = train_steps(begun.recipe, pairs, state=begun, until=2)
+    (tmp_path / "cut").mkdir()
+    save_checkpoint(tmp_path / "cut" / "rank2.checkpoint.safetensors", half)
+    (resumed,) = bench_forms.trained(model, forms, pairs, tmp_path / "cut", "numpy")
+    for a, b in zip(whole.model.siren.weights, resumed.model.siren.weights, strict=True):
+        assert (a == b).all()
+    assert resumed.model.normalization == model.normalization
+
+
+def test_a_form_is_trained_once(samples, tmp_path, monkeypatch) -> None:
+    """What is finished is read; another number of steps is another training, from the start."""
+    model = load_model(samples / "model.safetensors")
+    pairs = [(exr.read_frame(samples / "noisy.exr"), exr.read_frame(samples / "reference.exr"))]
+    begun, fit = [], train.fit
+
+    def noting(recipe, pairs, path, state, **more):
+        begun.append((recipe.steps, state.step))
+        return fit(recipe, pairs, path, state, **more)
+
+    monkeypatch.setattr(train, "fit", noting)
+    for steps in (3, 3, 4):
+        forms = bench_forms.planned(model, ("full",), steps)
+        (form,) = bench_forms.trained(model, forms, pairs, tmp_path / "forms", "numpy")
+        assert (form.name, form.steps) == ("further", steps)
+    assert begun == [(3, 0), (4, 0)]
+
+
+@pytest.mark.parametrize("named", [["--synthetic"], ["paper"]])
+def test_noise_is_measured_on_request(wamnet, here, named) -> None:
+    """The paper's network, untrained: no frames, and no quality."""
+    outcome = wamnet("bench", *named, "--only", "numpy:plain", "--size", 8, "--repeats", 1, "-o", "speed")
+    assert outcome.status == 0, outcome.err
+    data = json.loads((here / "speed/bench.json").read_text())
+    assert (data["network"]["name"], data["network"]["widths"][0]) == ("paper", 864)
+    assert (data["unseen_frames"], data["frames"]) == (0, None)
+
+
+def test_the_shipped_model_is_measured_by_default(monkeypatch) -> None:
+    """It names a scene, so that frames of it can be rendered."""
+    wanted = bench.Wanted(None, None, (), synthetic=False, trains=True)
+    name, network = wanted.network()
+    wanted.check(network)
+    assert name == "minicubes"
+    assert bench_frames.scene_of(network) == "minicubes"
 
 
 # ---- texts and plots of planted data -----------------------------------------------------------------------
@@ -228,11 +399,97 @@ def test_plots_of_any_data(theme) -> None:
     assert set(bench_report.draw(planted(), theme)) == {"error", "sizes"}
     assert bench_report.draw(planted(contenders=[], sizes=[]), theme) == {}
     quality = planted(
-        contenders=[row("a", ms={"median": 2.0}, quality={"psnr_loss_db": -0.25})],
+        contenders=[row("a", **TRADED, quality={"psnr_loss_db": -0.25})],
         front={"error": [], "quality": ["a"]},
         sizes=[],
     )
-    assert set(bench_report.draw(quality, theme)) == {"quality"}
+    assert set(bench_report.draw({**quality, "unseen_frames": 1}, theme)) == {"trade-off"}
+    assert bench_report.draw(quality, theme) == {}
+
+
+TRADED = {"ms": {"median": 20.0, "min": 19.0, "max": 25.0, "spread": 0.3, "rounds": [20.0]}}
+"""Times of the rows below."""
+
+
+def traded() -> dict:
+    """Return a result with a trained form, a kernel of another sine, one without a bound, and two peers."""
+    facts = {"executor": "opencl", "schedule": "tile16", "profile": "ieee", "degree": 11, "rank": None}
+    facts |= {"window": 12, "parameters": 58595, **TRADED}
+    bounds = {"max": 2e-7, "bound": 1e-5, "bound_all": 1e-4, "certified": True}
+    loss = {"psnr_db": 35.0, "psnr_loss_db": -0.001}
+    no_bounds = dict.fromkeys(bounds)
+    rows = [
+        row("opencl:tile16", quality=loss, rounding=bounds, **facts),
+        row("opencl:tile16:rank8", quality={"psnr_db": 34.0, "psnr_loss_db": 1.0}, rounding=bounds, **facts)
+        | {"rank": 8, "parameters": 7811},
+        row("opencl:tile16:native", quality=loss, rounding=no_bounds, **facts)
+        | {"profile": "native", "degree": None},
+        row("torch", kind="peer", quality=loss, rounding=no_bounds, **TRADED, window=12),
+        row("oidn:high", kind="peer", quality={"psnr_db": 32.0, "psnr_loss_db": 3.0}, **TRADED),
+    ]
+    network = {"widths": [4, 3], "features": ["color"], "window": 12}
+    draws = [{"time_s": 1.6, "time_in_training": False, "unlike_training": []}]
+    frames = {"scene": "minicubes", "frame_px": 16, "feature_spp": 16, "reference_spp": 2, "draws": draws}
+    front = {"error": [], "quality": ["opencl:tile16"], "rounding": ["opencl:tile16"]}
+    return planted(contenders=rows, network=network, frames=frames, front=front, unseen_frames=1)
+
+
+def test_the_table_has_quality_error_and_bounds_of_every_row() -> None:
+    lines = bench_report.table(traded()).splitlines()
+    start = "| 12 | 58,595 | 20 | 30% |"
+    assert (
+        lines[2]
+        == f"| whole * | opencl tile16 | ieee, 11 | – {start} 35.00 | 0.00 | 2.0e-07 | 1.0e-05 | 1.0e-04 † |"
+    )
+    assert lines[3].startswith(
+        "| rank8 | opencl tile16 | ieee, 11 | 8 | 12 | 7,811 | 20 | 30% | 34.00 | +1.00 |"
+    )
+    assert lines[4] == f"| native | opencl tile16 | native, its own | – {start} 35.00 | 0.00 | – | – | – |"
+    assert lines[6] == "| oidn:high | – | – | – | – | – | 20 | 30% | 32.00 | +3.00 | – | – | – |"
+
+
+def test_the_picture_has_a_panel_of_loss_and_one_of_bounds() -> None:
+    """Markers say the executor, colours the kind; what has no bound is in the second panel without one."""
+    loss, bound = bench_report.panels(traded())
+    assert (loss.is_loss, bound.is_loss) == (True, False)
+    marks = {mark.name: mark for mark in bound.marks}
+    assert list(marks) == ["tile16", "rank8", "native", "torch", "oidn:high"]
+    assert [mark.kind for mark in marks.values()] == ["whole", "rank", "sine", "peer", "peer"]
+    assert [mark.executor for mark in marks.values()] == ["opencl"] * 3 + ["", "other"]
+    assert [mark.y for mark in marks.values()] == [1e-5, 1e-5, None, None, None]
+    assert [mark.y for mark in loss.marks] == [-0.001, 1.0, -0.001, -0.001, 3.0]
+    assert [mark.on_front for mark in loss.marks] == [True, False, False, False, False]
+
+
+def test_the_picture_is_a_function_of_the_data(tmp_path) -> None:
+    """Written whole or not at all; again from the JSON to the same bytes, and refused without numbers."""
+    data = json.loads(json.dumps(traded()))
+    for name in ("a.png", "b.png"):
+        bench_report.picture(data, tmp_path / name)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    with pytest.raises(InputError, match="no row has a time and a loss or a bound"):
+        bench_report.picture(planted(), tmp_path / "c.png")
+    assert not (tmp_path / "c.png").exists()
+
+
+def test_names_in_the_picture_do_not_overlap(monkeypatch) -> None:
+    """Of forty rows in the same place and beside it: names without a free place are left out."""
+    from matplotlib.figure import Figure
+    from matplotlib.text import Annotation, Text
+
+    found = []
+    monkeypatch.setattr(plots, "_png", lambda figure: found.append(figure) or b"")
+    marks = [
+        plots.Mark(f"form {k}", (1.0 + k % 2, 1.0, 9.0), 1e-5, "opencl", "rank", k == 0) for k in range(40)
+    ]
+    plots.trade_off([plots.Panel("bound", marks, is_loss=False)], plots.PAPER)
+    (figure,) = found
+    assert isinstance(figure, Figure)
+    names = [text for text in figure.axes[0].texts if isinstance(text, Annotation)]
+    boxes = [Text.get_window_extent(name) for name in names]
+    assert names[0].get_text() == "form 0"
+    assert 5 <= len(names) < 40
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
 
 
 def page(**facts) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import shutil
@@ -10,7 +11,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from wamnet.cli import demo, exr, machine, runs
+from wamnet.cli import bench, bench_forms, demo, exr, machine, runs
 from wamnet.cli.images import read_png
 from wamnet.cli.main import main
 from wamnet.compiler.model_file import load_model
@@ -298,3 +299,27 @@ def test_the_report_tells_whose_picture_it_is(finished, report) -> None:
     html = (finished / "report.html").read_text()
     assert "it sees color, normal, albedo, position of its" in html
     assert "its own noise counts as error" in html
+
+
+@pytest.mark.parametrize(
+    ("trainer", "forms"), [("opencl", ["full", "rank16", "window8+rank16"]), ("numpy", [])]
+)
+def test_the_report_compares_trained_forms_on_the_unseen_frames(
+    finished, tmp_path, monkeypatch, trainer, forms
+) -> None:
+    """With their draws; where nothing compiled trains, there are no forms."""
+    shutil.copytree(finished, tmp_path / "out")
+    trained, given = [], []
+    monkeypatch.setattr(bench, "measure", lambda request, **more: given.append((request, more)) or {})
+    monkeypatch.setattr(
+        bench_forms,
+        "trained",
+        lambda model, wanted, pairs, *_: trained.append((wanted, len(pairs))) or ["form"],
+    )
+    results = type("Results", (), {"model": load_model(finished / "model.safetensors")})()
+    demo.measure_speed(dataclasses.replace(demo.QUICK, trainer=trainer), results, tmp_path / "out")
+    ((request, more),) = given
+    assert [draw["time_in_training"] for draw in request.frames["draws"]] == [False] * 2
+    assert len(request.pairs) == 2
+    assert more["forms"] == (["form"] if forms else [])
+    assert [(list(wanted), count) for wanted, count in trained] == ([(forms, 2)] if forms else [])

@@ -9,8 +9,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from wamnet.compiler import variants
+from wamnet.compiler.compile import sine_contract
 from wamnet.kernels.bench import accuracy, contenders, contest, rates, workload
-from wamnet.kernels.bench.contender import FULL, Contender, Opened, Tools, Variant
+from wamnet.kernels.bench.contender import FULL, Contender, Opened, Tools, Variant, parameters_of
 from wamnet.kernels.bench.cost import Stage
 from wamnet.refimpl import siren
 from wamnet.refimpl.dataset import Normalization, Window
@@ -257,6 +259,7 @@ def test_quality_is_a_loss_against_the_full_network(model) -> None:
     assert "error" not in rows(data)["perfect"]
     assert data["front"]["quality"] == ["same"]
     assert data["unseen_frames"] == 2
+    assert same["psnr_frames_db"] == [same["psnr_db"]] * 2
 
 
 def _encoded(model: Model, clean: Frame) -> np.ndarray:
@@ -285,6 +288,45 @@ def test_turns_are_taken(model) -> None:
     assert order == ["a", "b", "a", "b", "a", "b", "a", "b"]
 
 
+@pytest.mark.parametrize("variant", contenders.VARIANTS, ids=lambda variant: variant.name)
+def test_variants_are_within_their_bound(executor, model, variant) -> None:
+    """On this frame, and for all images; a sine that promises nothing has neither bound."""
+    found = rows(run(model, [contenders.kernel(executor.name, "plain", variant)]))
+    (row,) = found.values()
+    rounding = row["rounding"]
+    assert (row["profile"], row["executor"], row["schedule"]) == (variant.profile, executor.name, "plain")
+    if sine_contract(variant.profile, executor.name).error is None:
+        assert (rounding["bound"], rounding["bound_all"], rounding["certified"]) == (None, None, False)
+    else:
+        assert rounding["max"] <= rounding["bound"] <= rounding["bound_all"]
+    assert row["degree"] == {"sine7": 7, "sine9": 9, "sine5": 5, "native": None, "exact": 11}[variant.name]
+
+
+def test_a_trained_form_is_held_to_its_own_network(executor, model) -> None:
+    """A narrower window with other weights: its rounding is small, its error against the full one is not."""
+    small = variants.vary(variants.parse("window3"), model).model
+    form = Variant("window3", "trained", model=small, steps=7)
+    (row,) = run(model, [contenders.kernel(executor.name, "plain", form)])["contenders"]
+    assert row["rounding"]["max"] <= row["rounding"]["bound"] < row["error"]["max"]
+    assert (row["window"], row["rank"], row["trained_steps"]) == (3, None, 7)
+    # 3 x 3 taps of 6 channels to 8 neurons, 8 to 3, and 11 biases.
+    assert row["parameters"] == 3 * 3 * 6 * 8 + 8 * 3 + 11
+
+
+def test_a_form_that_does_not_see_a_feature_is_given_the_others(executor, model) -> None:
+    blind = variants.vary(variants.parse("without-normal"), model).model
+    (row,) = run(model, [contenders.kernel(executor.name, "plain", Variant("blind", "", model=blind))])[
+        "contenders"
+    ]
+    assert row["rounding"]["max"] <= row["rounding"]["bound"]
+
+
+def test_parameters_of_a_rank_are_those_of_its_factors(model) -> None:
+    """Rank 3: for each, 4 x 6 numbers of a row and 4 x 8 of columns; then 8 x 3, and 11 biases."""
+    assert parameters_of(model) == 96 * 8 + 24 + 11
+    assert parameters_of(model, 3) == 3 * (24 + 32) + 24 + 11
+
+
 # ---- the list of contenders --------------------------------------------------------------------------------
 
 
@@ -296,6 +338,10 @@ def test_names_are_unique_and_schedules_complete() -> None:
         few = contenders.of_machine(tools, SIZE, quick=True)
     names = [each.name for each in everybody]
     assert len(set(names)) == len(names)
+    form = Variant("rank3", "trained", rank=3)
+    with Tools() as tools:
+        trained = contenders.of_machine(tools, SIZE, forms=[form])
+    assert {each.executor for each in trained if each.variant is form} == {"opencl", "opengl"}
     assert {f"{t.name}:{s.name}" for t in TARGETS.values() for s in t.schedules} <= set(names)
     assert {each.name for each in few} < set(names)
 

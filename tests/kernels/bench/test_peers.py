@@ -109,7 +109,7 @@ def test_first_runs_are_those_of_another_process(monkeypatch) -> None:
 
     network = siren.init((2 * 2 * 3, 4, 3), 3.0, 3.0, seed=1, dtype=np.float32)
     model = Model(network, ("color",), Window(2), Normalization())
-    never, later = first_run.first_runs("numpy:plain", model)
+    never, later = first_run.first_runs("numpy:plain", model, 64)
     assert never is not None
     assert later is not None
-    assert first_run.first_runs("nobody", model) == (None, None)
+    assert first_run.first_runs("nobody", model, 64) == (None, None)

@@ -65,8 +65,9 @@ def test_blocks_are_kept_of_each_frame(made):
     for values in (kept.get("wamnet", 0), kept.get("wamnet-own", 0)):
         each = values["per_frame"]["blocks"]
         assert len(each) == len(values["per_frame"]["psnr"])
-        assert min(each) <= values["blocks"] * (1 + 1e-12)
-        assert values["blocks"] <= max(each) * (1 + 1e-12)
+        # A ratio of sums lies between the frames' own, but for the roundings of so many terms.
+        rounding = 2 * 48 * 48 * 3 * 2.0**-52
+        assert min(each) * (1 - rounding) <= values["blocks"] <= max(each) * (1 + rounding)
 
 
 def test_the_input_s_scores_are_those_of_its_picture(made):
@@ -298,8 +299,7 @@ def test_claims_read_the_table_s_records(made, capsys):
     # As it is, the noisy frames are the row of Table 1.
     (per_frame,) = kept.of("input as it is", "per_frame")
     (of_table, _) = Results.read(folder / "out/table1.json").of("input", "per_frame")
-    for name, values in per_frame.items():
-        assert max(abs(a / b - 1.0) for a, b in zip(values, of_table[name], strict=True)) <= 1e-12
+    assert per_frame == {name: of_table[name] for name in per_frame}
     assert len(kept.get("times", 0)["step_s"]) == 2
     # Times and frames are not measured again.
     claims.main(["--scale", "toy", "--as-it-is", *place])

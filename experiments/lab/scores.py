@@ -11,8 +11,10 @@
    falls with their number, and what display-encoding adds is measured [`Ladder.spp_of`], [`Ladder.mse_of`].
 
 *WAMnet for Image Denoising* prints MSE on 0 .. 255 and, as PSNR, ten times the natural logarithm of
-255^2 / MSE; so does [`paper_figure`]. No picture of 1 spp has its MSE of 82.93, which is 28.9 dB: squares of
-8-bit numbers that wrap around give such values [`wrapped_mse`].
+255^2 / MSE; so does [`paper_figure`]. Its MSE of 82.93 for pictures of 1 spp is 28.9 dB. Such pictures have
+that if they are some stops darker, but then their SSIM is far above the 0.21 beside it (`claims.py`). Squares
+of 8-bit numbers that wrap around give numbers of that size [`wrapped_mse`]; that the paper's did is a
+conjecture.
 """
 
 from __future__ import annotations

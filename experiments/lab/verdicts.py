@@ -37,7 +37,10 @@ class Measured:
 
 @dataclass(frozen=True)
 class Question:
-    """Whether a number lies above a bound, or below it; `decides`: whether the claim depends on it."""
+    """Whether a number lies above a bound, or below it; `decides`: whether the claim depends on it.
+
+    `digits` after the point; `means_digits`: those of the means that are compared, if they are others.
+    """
 
     what: str
     bound: float
@@ -45,6 +48,7 @@ class Question:
     decides: bool = True
     digits: int = 2
     unit: str = ""
+    means_digits: int | None = None
 
     def ask(self, measure: Callable[[], Measured]) -> Answer:
         """Return the answer of what is measured, or why there is none."""
@@ -75,6 +79,7 @@ class Answer:
             found = self.found.interval
             data |= {"mean": found.mean, "low": found.low, "high": found.high, "over": self.found.over}
             data["means"] = list(self.found.means)
+            data["means_digits"] = asked.digits if asked.means_digits is None else asked.means_digits
         return data
 
 
@@ -108,7 +113,7 @@ def said(answer: Mapping[str, Any], alone: bool) -> str:
         return f"{beside}{answer['what']}: {', '.join(filter(None, (verdict, answer['reason'])))}"
     write = f"{{:.{answer['digits']}f}}".format
     unit = f" {answer['unit']}" if answer["unit"] else ""
-    means = " to ".join(map(write, answer["means"]))
+    means = " to ".join(f"{mean:.{answer['means_digits']}f}" for mean in answer["means"])
     ends = "" if answer["reason"] else f" [{write(answer['low'])}, {write(answer['high'])}]"
     parts = [means, f"{write(answer['mean'])}{ends}{unit}", answer["over"]]
     wanted = f"{'above' if answer['above'] else 'below'} {answer['bound']:g}"

@@ -43,10 +43,10 @@ TRAINING_SEED = 1 << 30
 TRAINING_PX = 256
 """Width and height of the training frames: those of the models that ship with the package."""
 
-TRAINING_FRAMES = 96
+TRAINING_FRAMES = 64
 """Training frames: a camera that moves needs more of them than one at rest."""
 
-TRAINING_SPP = 64
+TRAINING_SPP = 32
 """Samples of a training target: many targets teach more than few clean ones."""
 
 PICTURES = ("noisy", "target")

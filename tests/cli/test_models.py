@@ -86,6 +86,6 @@ def test_a_model_denoises_an_unseen_frame(name):
     model = load_model(MODELS / f"{name}.safetensors")
     found = metrics.psnr(denoise(model, noisy), target)
     assert found >= LEAST_DB[name]
-    # The features matter: without normals the same network is far off.
-    blind = {**noisy.layers, "normal": np.zeros_like(noisy["normal"])}
+    # The features matter: without normals, and the light that follows from them, the network is far off.
+    blind = {**noisy.layers, **{name: np.zeros_like(noisy[name]) for name in ("normal", "unshadowed")}}
     assert metrics.psnr(denoise(model, Frame(blind)), target) <= found - 2.0

@@ -26,7 +26,7 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
-#if defined(__FAST_MATH__) || !defined(FLT_EVAL_METHOD) || FLT_EVAL_METHOD != 0
+#if defined(__FAST_MATH__) || !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif
 /* No product may be fused with a sum. Compilers differ in what they obey, so give them -ffp-contract=off too:

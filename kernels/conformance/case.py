@@ -22,7 +22,7 @@ import numpy as np
 from ...refimpl.errors import InputError
 from .numbers import from_file, from_json, rounded_up, to_json
 
-VERSION = "1.1.0"
+VERSION = "1.2.0"
 """Version of format, behaviour and cases."""
 
 FORMAT = "wamnet-vectors"

@@ -394,26 +394,24 @@ def demo_runs(records: Records) -> str:
 
 
 def draw_quality(records: Records) -> Any:
-    """Draw the PSNR of each row on the mini cubes, inside of the ranges and outside."""
+    """Draw the PSNR of each denoiser on the mini cubes, inside of the ranges and outside, on one scale.
+
+    The noisy input is left out: it is so far off that no interval could be seen beside it.
+    """
     module, found = importlib.import_module("quality"), records["quality"]
     figure, axes = plots.axes(2, (11.0, 3.6))
     for axis, (split, text) in zip(axes, module.SPLITS.items(), strict=True):
         shown = {}
         for row, kind in module.ROWS.items():
             at = found.interval(module.configuration("minicubes", split, row), "psnr")
-            if at is not None:
+            if at is not None and (kind.quality or kind.recipe):
                 shown[kind.text] = (at.mean, at.low, at.high)
         plots.bars(axis, shown, f"PSNR {text}, dB")
-    low, high = (choose(end[at] for end in map(_ends, axes)) for at, choose in ((0, min), (1, max)))
-    for axis in axes:
-        axis.set_xlim(low, high)
+    axes[1].sharex(axes[0])
+    axes[1].sharey(axes[0])
+    axes[1].tick_params(labelleft=False)
+    axes[0].autoscale(axis="x")
     return figure
-
-
-def _ends(axis: Any) -> tuple[float, float]:
-    """Return the ends of an axis of x."""
-    low, high = axis.get_xlim()
-    return float(low), float(high)
 
 
 def draw_ablations(records: Records) -> Any:
@@ -459,8 +457,9 @@ def pictures(records: Records) -> str:
             made.append(f"![{plot.caption}](images/{name}.svg)\n\n*{plot.caption}*\n")
     for name in records.names():
         for path in records[name].data().get("pictures", {}):
-            command = records[name].data()["commands"][0]
-            made.append(f"![Pictures of `{name}`]({path.removeprefix('docs/')})\n\n*`{command}`*\n")
+            # The file says all commands that made the records; their program is what drew the picture.
+            program = " ".join(records[name].data()["commands"][0].split()[:2])
+            made.append(f"![Pictures of `{name}`]({path.removeprefix('docs/')})\n\n*`{program}`*\n")
     return "\n".join(made) or "None of the records in git has a picture yet.\n"
 
 
@@ -468,7 +467,7 @@ PLOTS: Mapping[str, Plot] = {
     "quality": Plot(
         draw_quality,
         ("quality",),
-        "The presets beside Open Image Denoise: means over poses and seeds, and 95 % intervals.",
+        "The mini cubes, camera and time moving: means over poses and seeds, and 95 % intervals.",
     ),
     "ablations": Plot(
         draw_ablations,

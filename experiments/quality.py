@@ -24,7 +24,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -168,14 +168,7 @@ class Bench:
 
     def training(self, rays: int) -> list[Pair]:
         """Return the training frames, with features of so many camera rays, and their targets' colours."""
-        wanted = [
-            s
-            for shot in self._shots(TRAIN, rays)
-            for s in (noisy(shot), reference(shot, self.plan.train_spp))
-        ]
-        found = self._frames(wanted)
-        targets = [Frame({"color": clean["color"]}, clean.info) for clean in found[1::2]]
-        return list(zip(found[::2], targets, strict=True))
+        return training_pairs(self, rays)
 
     def tests(self, seed: int, rays: int, split: str = TEST) -> list[Pair]:
         """Return the test frames with the noise of a seed; their references are the same for all."""
@@ -198,6 +191,20 @@ class Bench:
             recipe = replace(recipe, steps=self.plan.steps)
         of = replace(self, name=row.of or self.name)
         return training.trained(recipe, of.training(row.rays), self.cache / "models", self.executor)
+
+
+@lru_cache(maxsize=1)
+def training_pairs(bench: Bench, rays: int) -> list[Pair]:
+    """Return a set's training frames, with features of so many camera rays, and their targets' colours.
+
+    Rows, seeds and splits of one set share them: reading hundreds of frames takes longer than judging some.
+    """
+    plan, counts = bench.plan, bench.counts
+    shots = SETS[bench.name].shots(TRAIN, counts, plan.size, rays if rays > 1 else 0)
+    wanted = [s for shot in shots for s in (noisy(shot), reference(shot, plan.train_spp))]
+    found = frames(bench.cache / "frames", wanted, bench.executor)
+    targets = [Frame({"color": clean["color"]}, clean.info) for clean in found[1::2]]
+    return list(zip(found[::2], targets, strict=True))
 
 
 def judged(bench: Bench, row: Row, split: str, ladder: scores.Ladder | None, seed: int) -> Values:

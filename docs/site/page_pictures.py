@@ -76,7 +76,7 @@ def pictures(model: Path, folder: Path, name: str, size: int) -> list[Path]:
 def main(arguments: Sequence[str]) -> int:
     """Draw what is asked for."""
     parser = argparse.ArgumentParser(description="Draw the web page at 40 degrees and under other colours.")
-    parser.add_argument("model", type=Path, help="model file, or the name of one that comes along")
+    parser.add_argument("model", type=Path, help="model file, or the name of a shipped one")
     parser.add_argument("folder", type=Path, help="where the pictures go")
     parser.add_argument("name", help="what their names begin with, after page-")
     parser.add_argument("--size", type=int, default=256, help="width and height in pixels")

@@ -1,7 +1,7 @@
 """Sets of frames that experiments train and judge on: a scene, what varies, and frames that are truly unseen.
 
 1. A set has a name, a scene and ranges of time, camera and lamps [`SETS`].
-2. Training frames, test frames inside of the ranges and outside are draws like those of `wamnet dataset`
+2. Training frames, test frames inside of the ranges and outside are the draws of `wamnet dataset`
    [`FrameSet.draws`], and become shots with seeds of their own [`FrameSet.shots`].
 3. Before a set is used, what its frames show is compared: frames that are alike are refused [`compared`].
 
@@ -13,10 +13,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from wamnet.kernels.draws import Draw, drawn, drawn_outside
-from wamnet.kernels.frame_plan import OUTSIDE, TEST, TRAIN
+from wamnet.kernels.draws import Draw
+from wamnet.kernels.frame_plan import OUTSIDE, TEST, TRAIN, Request, frame_draws
 from wamnet.kernels.geometry import Comparison, Shown, compare
-from wamnet.refimpl.scenes import canonical
 from wamnet.refimpl.variation import Ranges
 
 from .frames import Shot
@@ -58,13 +57,21 @@ class FrameSet:
 
     def draws(self, split: str, counts: Counts) -> list[Draw]:
         """Return the draws of a split; those of tests continue the sequence of training."""
-        lights = canonical(self.scene).lights
-        if split == TRAIN:
-            return drawn(DRAW_SEED, self.ranges, lights, 0, counts.train)
-        if split == TEST:
-            return drawn(DRAW_SEED, self.ranges, lights, counts.train, counts.test)
-        first = counts.train + counts.test
-        return drawn_outside(DRAW_SEED, self.ranges, 0.0, lights, first, counts.outside)
+        start, end = self.ranges.time_s
+        request = Request(
+            self.scene,
+            start_s=start,
+            seconds=end - start,
+            frames=counts.train,
+            test_frames=counts.test,
+            outside_frames=counts.outside,
+            seed=DRAW_SEED,
+            yaw_deg=self.ranges.yaw_deg,
+            pitch_deg=self.ranges.pitch_deg,
+            distance=self.ranges.distance,
+            saturation=self.ranges.saturation,
+        )
+        return [draw for kind, draw in frame_draws(request) if kind == split]
 
     def shots(self, split: str, counts: Counts, size: int, rays: int = 0, noise: int = 0) -> list[Shot]:
         """Return the shots of a split with the noise of a seed; features of `rays` rays, 0: the colour's."""

@@ -99,7 +99,8 @@ def test_camera_and_lamps_are_options(wamnet, tmp_path) -> None:
     assert json.loads(got.info["lights"]) == [list(scenes.WARM), list(color)]
     # Two roundings of products and one of a sum, of numbers below 4.
     assert abs(sum(color) - sum(scenes.COOL)) <= 4 * 3 * 2.0**-53
-    assert np.allclose(np.divide(color, color[1]), [0.4, 1.0, 0.6], rtol=1e-12)
+    # Each share is a quotient of two such numbers: below eight roundings.
+    assert np.allclose(np.divide(color, color[1]), [0.4, 1.0, 0.6], rtol=8 * 2.0**-53, atol=0)
 
 
 def test_a_scene_that_is_written_has_its_camera(wamnet, tmp_path) -> None:

@@ -49,7 +49,7 @@ def test_other_colours_keep_the_lamps_brightness():
     for own in (scenes.WARM, scenes.COOL):
         bright = page_pictures.as_bright(page_pictures.GREEN, own)
         assert np.mean(bright) == pytest.approx(np.mean(own), rel=1e-15)  # some roundings of 2**-53
-        assert 1 - min(bright) / max(bright) == pytest.approx(0.7, rel=1e-15)
+        assert 1 - min(bright) / max(bright) == pytest.approx(0.7, rel=1e-15)  # the same, of a quotient
 
 
 @pytest.mark.parametrize("moment", page_pictures.MOMENTS)

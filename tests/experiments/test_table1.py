@@ -143,7 +143,9 @@ def test_scores_of_each_frame_are_kept(made):
     kept = Results.read(folder / "out/table1.json")
     values = kept.get("wamnet", 1)
     assert len(values["per_frame"]["psnr"]) == TINY.test
-    assert values["psnr"] == pytest.approx(np.mean(values["per_frame"]["psnr"]), rel=1e-12)
+    # Two means of the same numbers, added in another order: a rounding for each of them.
+    mean = np.mean(values["per_frame"]["psnr"])
+    assert abs(values["psnr"] - mean) <= 2 * TINY.test * np.finfo(float).eps * abs(mean)
     assert len(kept.get("wamnet-own", 1)["per_frame"]["psnr"]) == 1
 
 

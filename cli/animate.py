@@ -103,6 +103,7 @@ def animate(
     """
     from ..kernels import open_executor
     from ..kernels.frame_plan import animation_times
+    from ..refimpl.denoise import learned_feature_spp
 
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
@@ -111,7 +112,7 @@ def animate(
     network = load_model(model)
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
     facts += cut_facts(network, rank)
-    rays = rays_of(network) if feature_spp is None else feature_spp
+    rays = learned_feature_spp(network) if feature_spp is None else feature_spp
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     named = scene or scene_of(network), _parameters(parameters), view
     times = animation_times(start, seconds, fps)
@@ -167,14 +168,6 @@ def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) 
     unlike = [sentences for sentences in found if sentences]
     for sentence in unlike[0] if unlike else ():
         say(f"{output}: {len(unlike)} of {len(shots)} pictures are unlike those of the training: {sentence}")
-
-
-def rays_of(model: Model) -> int:
-    """Return the camera rays of the features that a model has learned from; 0: the colour's, or not known."""
-    from ..refimpl.render import FEATURE_SPP
-
-    found = model.info.get(f"trained_on_{FEATURE_SPP}", "")
-    return int(found) if found.isdecimal() else 0
 
 
 def scene_of(model: Model) -> str:

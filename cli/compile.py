@@ -6,8 +6,8 @@ one that comes along, as in model:minicubes.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..refimpl.errors import InputError
+from ..refimpl.reading import parse_json, read_file
 from . import options
 from .choose import Request, check_request, choose
 from .inputs import MODEL_PREFIX, load_model
@@ -216,13 +217,11 @@ def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:
     if folder.exists() and not folder.is_dir():
         raise InputError("output folder", str(folder), "it is a file", "choose another name with -o")
     check_parent(folder)
-    path = folder / artifact.MANIFEST_NAME
+    path, data = folder / artifact.MANIFEST_NAME, None
     if not path.exists():
         return
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        data = None
+    with suppress(InputError):
+        data = parse_json(read_file(path), "manifest", "choose another folder")
     kinds = {artifact.SCHEMA: "a model's kernel", path_kernel.SCHEMA: "a scene's kernel"}
     schema = data.get("schema") if isinstance(data, dict) else None
     if schema not in kinds:

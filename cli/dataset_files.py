@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..refimpl.errors import InputError
+from ..refimpl.reading import BROKEN, parse_json, read_file
 from .outputs import TEMPORARY, write_text
 
 if TYPE_CHECKING:
@@ -149,9 +150,9 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     if not path.is_file():
         raise InputError("data set", str(folder), f"it has no {MANIFEST}", "make one: wamnet dataset")
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
+        manifest = parse_json(read_file(path), "manifest", "restore it")
         schema = manifest["schema"]
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+    except BROKEN:
         raise _damaged(path) from None
     if schema != SCHEMA:
         raise InputError(f"{path}: schema", str(schema), f"it must be {SCHEMA}", "use that version of wamnet")
@@ -160,7 +161,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         good &= all(NAME.fullmatch(name) for name in _names(manifest)) and bool(manifest["frames"])
         good &= all(frame["split"] in ("train", "test", "outside") for frame in manifest["frames"])
         _sums_of(manifest)
-    except (TypeError, KeyError, ValueError, AttributeError, OverflowError):
+    except BROKEN:
         good = False
     if not good:
         raise _damaged(path)
@@ -389,9 +390,9 @@ def _read_journal(path: Path) -> dict[str, Sum]:
     text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
     for line in text.splitlines():
         try:
-            entry = json.loads(line)
+            entry = parse_json(line, "journal", "go on")
             sums[str(entry["file"])] = Sum(int(entry["bytes"]), str(entry["sha256"]))
-        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
+        except BROKEN:
             continue
     return sums
 

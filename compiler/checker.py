@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import json
 import re
 from decimal import ROUND_CEILING, Decimal
 from fractions import Fraction
@@ -23,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from ..refimpl.errors import InputError
+from ..refimpl.reading import parse_json, plain_name, read_file, refusing
 from .opencl import OpenCL
 from .profiles import emitted_sine
 from .sine import POLYNOMIALS
@@ -33,9 +32,6 @@ U, TINY, WIDER = 2.0**-24, 2.0**-126, 1 + 2.0**-34
 
 PROMISES = {promise.text: promise for promise in (*map(emitted_sine, POLYNOMIALS), OpenCL.native_sine)}
 """What is known of sines, by the name that a certificate gives."""
-
-BROKEN = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
-"""What may happen while something is read that is no certificate."""
 
 NODE = re.compile(r"  %(\d+) = (\w+)((?: %\d+,?)*)(?: \{(.*)\})? : \w+(?:\[(\d+)\])?")
 """A line of a program's text: number, operation, operands, attributes, length of the result."""
@@ -47,7 +43,8 @@ class Refused(Exception):
 
 def check(path: Path) -> dict[str, Any]:
     """Return a certificate whose every step holds; raise `Refused`, or `InputError` for what is none."""
-    try:
+    told = "it must be a whole certificate beside its kernel", "compile the model again"
+    with refusing("certificate", str(path), *told), np.errstate(over="ignore", invalid="ignore"):
         held, manifest, text, arrays = _read(path)
         layers, box = _layers(text)
         promise: Any = PROMISES.get(held["sine"]["text"])
@@ -67,17 +64,15 @@ def check(path: Path) -> dict[str, Any]:
         _at_least("bound: output", held["bound"]["output"], found)
         _at_least("manifest: bound", manifest["bound"]["output"], found)
         return held
-    except BROKEN as error:
-        rule = f"it must be a whole certificate beside its kernel ({type(error).__name__}: {error})"
-        raise InputError("certificate", str(path), rule, "compile the model again") from None
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any]]:
     """Return the certificate, the manifest, the program's text and its parameters, once all digests agree."""
-    held = json.loads(path.read_bytes())
-    manifest = json.loads((path.parent / "manifest.json").read_bytes())
+    texts = [read_file(p, "certificate") for p in (path, path.parent / "manifest.json")]
+    held, manifest = (parse_json(text, "certificate", "restore it") for text in texts)
     _same("schema", held["schema"], "wamnet-certificate-1")
-    files = {name: (path.parent / name).read_bytes() for name in manifest["files"]}
+    names = (plain_name(name, "manifest: name of a file", "restore it") for name in manifest["files"])
+    files = {name: read_file(path.parent / name) for name in names}
     for name, data in files.items():
         _same(f"digest of {name}", held["files"].get(name), hashlib.sha256(data).hexdigest())
     kernel = [manifest["digest"], manifest["profile"]["name"]]
@@ -88,6 +83,8 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, An
         if "base64" in place:
             array = np.frombuffer(base64.b64decode(place["base64"], validate=True), "<f4")
         else:
+            many = len(place["rows"]) * len(place["columns"]) > len(raw)
+            _same(f"{name}: more numbers than weights.bin has", many, False)
             at = place["offset"] + np.add.outer(place["rows"], place["columns"])
             array = raw[at if at.min() >= 0 else len(raw)]
         arrays[name] = array.reshape(place["shape"])
@@ -211,7 +208,10 @@ def _output(name: str, stated: Any, matrices: Any, own: Any) -> float:
         found.insert(0, min(by_norms, float(sizes @ own[at])) * WIDER)
         if at:
             before, after, matrix = scales[at - 1], scales[at], matrices[at - 1]
-            norm = _up(float(np.linalg.norm(after[:, None] * matrix / before, 2)) * (1 + 1e-9))
+            scaled = after[:, None] * matrix / before
+            if not np.isfinite(scaled).all():  # LAPACK would print a complaint of its own
+                raise Refused(f"{name}: layer {at}, scaled, is not finite")
+            norm = _up(float(np.linalg.norm(scaled, 2)) * (1 + 1e-9))
             _at_least(f"{name}: norm of layer {at}", [stated["norm_bounds"][at - 1]], [norm], exact=True)
             if not norm_is_below(norm, after, matrix, before):
                 raise Refused(f"{name}: the norm of layer {at} is not below {norm}")

@@ -13,12 +13,14 @@ import json
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..refimpl.errors import CompileError
+from ..refimpl.errors import CompileError, InputError
+from ..refimpl.reading import parse_json
 from . import artifact, bounds, certificate, ir, profiles, schedules
 from .artifact import Artifact
 from .c import C
@@ -440,8 +442,10 @@ def _window(gather: Gather) -> dict[str, Any]:
 
 
 def _info_value(name: str, text: str) -> Any:
-    """Return a text of a model's info, or what it holds where it is JSON itself."""
-    return json.loads(text) if name in JSON_INFO else text
+    """Return a text of a model's info, or what it holds where it is JSON: strangers write what they like."""
+    with suppress(InputError):
+        return parse_json(text, name, "train again") if name in JSON_INFO else text
+    return text
 
 
 def asdict_finite(contract: SineContract) -> dict[str, Any]:

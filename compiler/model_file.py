@@ -30,6 +30,7 @@ from ..refimpl import train
 from ..refimpl.dataset import Window, normalization_from_json
 from ..refimpl.denoise import Model, check_model
 from ..refimpl.errors import InputError
+from ..refimpl.reading import BROKEN, parse_json, read_file, to_dataclass
 from ..refimpl.siren import Siren
 from ..refimpl.train import TrainState
 
@@ -44,9 +45,6 @@ CHECKPOINT_FORMAT = "wamnet-checkpoint"
 
 VERSION = "1"
 """Value of the header's text `version`; it changes when older readers would misread the file."""
-
-LARGEST_FILE_BYTES = 256 * 2**20
-"""Largest file that is read: thousands of times a usual model, and it still fits the memory."""
 
 INFO_PREFIX = "info."
 """Put before the names of a model's own facts in the header, so that they cannot hide a field."""
@@ -85,7 +83,7 @@ def load_model(path: str | os.PathLike[str]) -> Model:
             _parsed(path, texts, "omega_0_hidden", float),
         ),
         features=_parsed(path, texts, "features", _names),
-        window=_parsed(path, texts, "window", lambda text: Window(**json.loads(text))),
+        window=_parsed(path, texts, "window", _window),
         normalization=_parsed(path, texts, "normalization", normalization_from_json),
         info={
             name.removeprefix(INFO_PREFIX): text
@@ -113,7 +111,7 @@ def load_checkpoint(path: str | os.PathLike[str]) -> TrainState:
         what = f"{path}: list of entries"
         rule = f"{error.args[0]!r} must be among them"
         raise InputError(what, ", ".join(sorted({*tensors, *texts})), rule, "start a new run") from None
-    except ValueError as error:
+    except BROKEN as error:
         raise _inside(path, error) from None
     _check(path, train.check_state, state)
     return state
@@ -153,29 +151,25 @@ def _write(path: Path, content: bytes) -> None:
 
 def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
     """Return tensors and texts of a file of this kind and version."""
-    try:
-        size = path.stat().st_size
-        if size > LARGEST_FILE_BYTES:
-            rule = f"at most {LARGEST_FILE_BYTES} bytes are read"
-            raise InputError(f"size of {path} in bytes", size, rule, f"give a {kind} file")
-        content = path.read_bytes()
-    except OSError as error:
-        rule = f"cannot be read ({error.strerror or error})"
-        raise InputError(f"{kind} file", str(path), rule, "check the path") from None
+    content = read_file(path, f"{kind} file")
+    way_out = "write it with `wamnet train`"
     try:
         tensors = decode_tensors(content)
-    except (SafetensorError, KeyError, ValueError) as error:
+    except SafetensorError as error:
         rule = f"not a safetensors file ({error})"
-        raise InputError(f"{kind} file", str(path), rule, "write it with `wamnet train`") from None
-    texts = _header_texts(content)
+        raise InputError(f"{kind} file", str(path), rule, way_out) from None
+    except BROKEN as error:
+        raise InputError(f"{kind} file", str(path), f"not a safetensors file ({error})", way_out) from None
+    texts = _header_texts(path, content)
     _check_kind(path, texts, kind)
     return tensors, texts
 
 
-def _header_texts(content: bytes) -> dict[str, str]:
+def _header_texts(path: Path, content: bytes) -> dict[str, str]:
     """Return the header's texts; the library has found the header sound, but keeps them to itself."""
     length = int.from_bytes(content[:8], "little")
-    texts: dict[str, str] = json.loads(content[8 : 8 + length]).get("__metadata__") or {}
+    header = parse_json(content[8 : 8 + length], f"{path}: header", "write it with `wamnet train`")
+    texts: dict[str, str] = header.get("__metadata__") or {}
     return texts
 
 
@@ -209,13 +203,18 @@ def _parsed(path: Path, texts: Texts, name: str, parse: Callable[[str], Any]) ->
         return parse(texts[name])
     except InputError as error:
         raise _inside(path, error) from None
-    except (TypeError, ValueError) as error:
+    except BROKEN as error:
         raise InputError(f"{path}: {name}", texts[name], f"cannot be read ({error})", "train again") from None
+
+
+def _window(text: str) -> Window:
+    """Return the window of a JSON object."""
+    return to_dataclass(Window, parse_json(text, "window", "train again"), "window")
 
 
 def _names(text: str) -> tuple[str, ...]:
     """Return a JSON list of strings."""
-    names = json.loads(text)
+    names = parse_json(text, "features", "train again")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise ValueError("a list of names is needed")
     return tuple(names)
@@ -229,7 +228,7 @@ def _check(path: Path, check: Callable[[Any], None], content: Any) -> None:
         raise _inside(path, error) from None
 
 
-def _inside(path: Path, error: ValueError) -> InputError:
+def _inside(path: Path, error: Exception) -> InputError:
     """Return the error with the file's name before the thing that it names."""
     if isinstance(error, InputError):
         return InputError(f"{path}: {error.what}", error.value, error.rule, error.way_out)

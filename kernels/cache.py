@@ -17,8 +17,12 @@ import json
 import logging
 import os
 import secrets
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
+
+from ..refimpl.errors import InputError
+from ..refimpl.reading import BROKEN, parse_json, read_file
 
 FOLDER_VARIABLE = "WAMNET_CACHE"
 """Environment variable that names another folder."""
@@ -51,19 +55,15 @@ def read_json(name: str) -> Any:
     """Return the data of the entry `<name>.json`, or None where there is none that can be trusted."""
     path = _path(name)
     try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_BYTES + 1)
-    except FileNotFoundError:
+        content = read_file(path, "cache entry", "remove it", LARGEST_BYTES)
+    except InputError as error:
+        if path.exists() or path.is_symlink():
+            _log.warning("%s: it is ignored", error)
         return None
-    except OSError as error:
-        _log.warning("cache entry %s cannot be read (%s): it is ignored", path, error.strerror)
-        return None
-    try:
-        entry = json.loads(content)
+    with suppress(*BROKEN):
+        entry = parse_json(content, "cache entry", "remove it")
         if entry["schema"] == SCHEMA and entry["sha256"] == _checksum(entry["data"]):
             return entry["data"]
-    except (ValueError, TypeError, KeyError, RecursionError):
-        pass
     _log.warning("cache entry %s is damaged, or no entry of wamnet: it is ignored and written anew", path)
     return None
 

@@ -12,7 +12,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -20,6 +19,7 @@ from typing import Any
 
 from ..compiler import variants
 from ..refimpl.errors import InputError
+from ..refimpl.reading import parse_json, read_file, refusing
 from . import cache
 
 SCHEMA = "wamnet-curve-1"
@@ -177,16 +177,14 @@ def from_data(data: Any, where: str) -> Curve:
     if not isinstance(data, Mapping) or data.get("schema") != SCHEMA:
         found = data.get("schema", "missing") if isinstance(data, Mapping) else type(data).__name__
         raise InputError(f"{where}: schema", found, f"must be {SCHEMA}", "give a curve that wamnet measured")
-    try:
+    rule, way_out = "a curve has model, device, size, profile and points", "measure it again"
+    with refusing(f"{where}: content", "damaged", rule, way_out):
         height, width = (int(n) for n in data["size"])
         points = tuple(_point(entry) for entry in data["points"])
         texts = [data[name] for name in ("model", "device", "profile")]
         if not all(isinstance(text, str) for text in texts):
             raise ValueError("model, device and profile are texts")
         return Curve(texts[0], texts[1], (height, width), texts[2], points)
-    except (KeyError, TypeError, ValueError) as error:
-        rule = "a curve has model, device, size, profile and points"
-        raise InputError(f"{where}: content", str(error), rule, "measure it again") from None
 
 
 def _point(entry: Mapping[str, Any]) -> Point:
@@ -202,14 +200,8 @@ def _point(entry: Mapping[str, Any]) -> Point:
 
 def read(path: Any) -> Curve:
     """Read a curve from a file of JSON."""
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        rule = f"cannot be read ({error.strerror or error})"
-        raise InputError("curve file", str(path), rule, "check the path") from None
-    except ValueError as error:
-        raise InputError("curve file", str(path), f"is no JSON ({error})", "measure it again") from None
-    return from_data(data, str(path))
+    text = read_file(path, "curve file")
+    return from_data(parse_json(text, f"curve file {path}", "measure it again"), str(path))
 
 
 def check_fits(curve: Curve, wanted: Curve, where: str) -> None:

@@ -16,8 +16,6 @@ rule and the encodings are decisions, explained in the chapter of this module.
 from __future__ import annotations
 
 import hashlib
-import json
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -28,6 +26,7 @@ from numpy.typing import NDArray
 from .encoding import to_display
 from .errors import InputError
 from .frame import Frame, check_finite
+from .reading import parse_json, to_dataclass
 from .rng import counter, random_block
 from .vectors import vector
 
@@ -40,6 +39,18 @@ PIXEL_TAG = 0x50495845
 LARGEST_WINDOW_PX = 64
 """Largest window: 64 x 64 pixels of 16 channels are 65,536 numbers a pixel, far beyond any use, and a typing
 error is told before it takes all memory."""
+
+
+LARGEST_SCALE = 1e18
+"""Largest scale and position, in scene units. The smallest scale is its inverse: with a position of 1e12 no
+feature overflows float32 before it is clipped."""
+
+NORMALIZATION_LIMITS: Mapping[str, tuple[float, float]] = {
+    "exposure_stops": (-64.0, 64.0),
+    "depth_scale": (1.0 / LARGEST_SCALE, LARGEST_SCALE),
+    "position_scale": (1.0 / LARGEST_SCALE, LARGEST_SCALE),
+}
+"""Least and largest value of a normalization's numbers; beyond 2^64 there is no picture."""
 
 
 @dataclass(frozen=True)
@@ -218,22 +229,23 @@ def check_normalization(normalization: Normalization) -> None:
     """Refuse scales that are not finite, or not positive where they divide."""
     for name in ("exposure_stops", "depth_scale", "position_scale"):
         value = getattr(normalization, name)
-        if not math.isfinite(value) or (name != "exposure_stops" and value <= 0.0):
-            raise InputError(name, value, "finite, and > 0 for a scale", "use normalization_of(frames)")
+        least, most = NORMALIZATION_LIMITS[name]
+        if not least <= value <= most:
+            raise InputError(
+                name, value, f"finite, from {least:g} to {most:g}", "use normalization_of(frames)"
+            )
     center = normalization.position_center
-    if len(center) != 3 or not all(math.isfinite(value) for value in center):
-        raise InputError("position_center", center, "three finite numbers", "use normalization_of(frames)")
+    if len(center) != 3 or not all(abs(value) <= LARGEST_SCALE for value in center):
+        rule = f"three finite numbers of at most {LARGEST_SCALE:g} in magnitude"
+        raise InputError("position_center", center, rule, "use normalization_of(frames)")
 
 
 def normalization_from_json(text: str) -> Normalization:
     """Return the normalization written in `text`, or say what is wrong with it."""
-    try:
-        values = json.loads(text)
-        normalization = Normalization(**{**values, "position_center": tuple(values["position_center"])})
-        check_normalization(normalization)
-    except (TypeError, KeyError, json.JSONDecodeError) as error:
-        rule = f"JSON of a normalization ({error})"
-        raise InputError("normalization", text, rule, "train the model again") from None
+    way_out = "train the model again"
+    data = parse_json(text, "normalization", way_out)
+    normalization = to_dataclass(Normalization, data, "normalization", whole=True)
+    check_normalization(normalization)
     return normalization
 
 

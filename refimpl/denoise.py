@@ -11,6 +11,7 @@ for Image Denoising*.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,7 +23,7 @@ from . import dataset
 from .dataset import Normalization, Window
 from .errors import InputError
 from .frame import Frame
-from .siren import Siren, check_shape, forward
+from .siren import LARGEST_PARAMETER, Siren, check_shape, forward
 
 Array = NDArray[np.floating[Any]]
 
@@ -73,15 +74,22 @@ def _check_layers(siren: Siren) -> None:
         if weight.ndim != 2 or bias.shape != weight.shape[:1] or n_in not in (None, weight.shape[1]):
             rule = f"weights (D_out, {n_in or 'D_in'}) and biases (D_out,) must chain"
             raise InputError(f"layer {layer}", shapes, rule, "train the model again")
-        bad = np.size(weight) + np.size(bias) - np.isfinite(weight).sum() - np.isfinite(bias).sum()
+        # Written so that NaN counts.
+        bad = sum(int(np.sum(~(np.abs(array) <= LARGEST_PARAMETER))) for array in (weight, bias))
         if bad:
             raise InputError(
-                f"layer {layer}: number of NaN or infinite parameters",
-                int(bad),
-                "all must be finite",
+                f"layer {layer}: number of NaN or infinite parameters, or huge ones,",
+                bad,
+                f"all must be finite, and at most {LARGEST_PARAMETER:g} in magnitude",
                 "train the model again, with a lower learning rate",
             )
         n_in = weight.shape[0]
+
+
+def learned_feature_spp(model: Model) -> int:
+    """Return the camera rays of the features that a model has learned from, the most of several; or 0."""
+    texts = model.info.get("trained_on_feature_spp", "").split(", ")
+    return max((int(text) for text in texts if re.fullmatch("[0-9]{1,9}", text)), default=0)
 
 
 def denoise_pixel(siren: Siren, window_vector: Any) -> Any:

@@ -19,11 +19,12 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass
-from typing import Any, TypeVar, get_args, get_type_hints
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any
 
 from .errors import InputError
 from .materials import MATERIALS, Material
+from .reading import Special, parse_json, to_dataclass
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
@@ -202,12 +203,7 @@ def _told(f: Any, value: Any) -> bool:
 
 def from_json(text: str) -> Scene:
     """Return the scene in a JSON text; raise InputError, with the value's path, where it breaks a rule."""
-    try:
-        data = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise InputError(
-            "scene text", f"no JSON ({error})", "a scene is a JSON object", "mend the text"
-        ) from None
+    data = parse_json(text, "scene", "mend the text: a scene is a JSON object")
     if not isinstance(data, dict):
         raise InputError("scene text", data, "a scene is a JSON object", "take one from `wamnet scene`")
     form, version = data.pop("format", None), data.pop("version", None)
@@ -216,63 +212,7 @@ def from_json(text: str) -> Scene:
     if version is True or version != VERSION:
         rule = f"it must be {VERSION}"
         raise InputError("scene.version", repr(version), rule, "convert the file or update wamnet")
-    return validate(_build(Scene, data, "scene"))
-
-
-_Built = TypeVar("_Built")
-
-
-def _build(kind: type[_Built], data: Any, path: str) -> _Built:
-    """Make the dataclass `kind` from a JSON object, each field by its annotation."""
-    if not isinstance(data, dict):
-        raise InputError(
-            path, data, "it must be a JSON object", f"give the keys of a {kind.__name__.lower()}"
-        )
-    known = {f.name: f for f in fields(kind)}  # type: ignore[arg-type]
-    for key in data:
-        if key not in known:
-            raise InputError(
-                f"{path}.{key}",
-                data[key],
-                f"{kind.__name__} has no such key",
-                f"known are {', '.join(known)}" if known else "remove it: there are none",
-            )
-    hints = get_type_hints(kind)
-    values = {}
-    for name, spec in known.items():
-        if name in data:
-            values[name] = _convert(hints[name], data[name], f"{path}.{name}")
-        elif spec.default is MISSING and spec.default_factory is MISSING:
-            raise InputError(f"{path}.{name}", "missing", "it is required", f"add the key to {path}")
-    return kind(**values)
-
-
-def _convert(hint: Any, value: Any, path: str) -> Any:
-    """Convert a JSON value to what the annotation `hint` asks for."""
-    if hint is float:
-        return _number(value, path)
-    if hint is str:
-        return _text(value, path)
-    if hint == dict[str, str]:
-        if not isinstance(value, dict):
-            raise InputError(path, value, "it must map texts to texts", "write {} for none")
-        return {str(key): _text(item, f"{path}.{key}") for key, item in value.items()}
-    if hint is Material:
-        return _material(value, path)
-    if is_dataclass(hint):
-        return _build(hint, value, path)  # type: ignore[arg-type]
-    arguments = get_args(hint)
-    if type(None) in arguments:
-        return None if value is None else _convert(arguments[0], value, path)
-    if not isinstance(value, list):
-        raise InputError(path, value, "it must be a list", "write it in square brackets")
-    if arguments[-1] is Ellipsis:
-        return tuple(_convert(arguments[0], item, f"{path}[{i}]") for i, item in enumerate(value))
-    if len(value) != len(arguments):
-        raise InputError(path, value, f"it must have {len(arguments)} entries", "add or remove entries")
-    return tuple(
-        _convert(h, item, f"{path}[{i}]") for i, (h, item) in enumerate(zip(arguments, value, strict=True))
-    )
+    return validate(to_dataclass(Scene, data, "scene", largest=LARGEST_NUMBER, special=SPECIAL))
 
 
 def _material(value: Any, path: str) -> Material:
@@ -284,34 +224,11 @@ def _material(value: Any, path: str) -> Material:
     if not isinstance(kind, str) or kind not in MATERIALS:
         rule = "no material has this name" if "kind" in value else "it is required"
         raise InputError(f"{path}.kind", repr(kind), rule, f"known are {', '.join(MATERIALS)}")
-    return _build(MATERIALS[kind], data, path)
+    return to_dataclass(MATERIALS[kind], data, path, largest=LARGEST_NUMBER)
 
 
-def _number(value: Any, path: str) -> float:
-    """Return a JSON number as a finite float."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST_NUMBER:
-        rule = f"it must be a finite number of at most {LARGEST_NUMBER:g} in magnitude"
-        raise InputError(path, _shortened(value), rule, "write a decimal number; choose other units")
-    return float(value)
-
-
-def _shortened(value: Any) -> str:
-    """Return a value as text; an integer of thousands of digits would be no line."""
-    return (
-        f"an integer of {value.bit_length()} bits"
-        if type(value) is int and abs(value) > 1e18
-        else repr(value)
-    )
-
-
-def _text(value: Any, path: str) -> str:
-    """Return a JSON string."""
-    if not isinstance(value, str):
-        raise InputError(path, value, "it must be a text", "put it in quotation marks")
-    if any("\ud800" <= character <= "\udfff" for character in value):
-        raise InputError(path, ascii(value), "half a character cannot be written to a file", "mend the text")
-    return value
-
+SPECIAL: Special = {Material: _material}
+"""Fields that are not made by their annotation alone."""
 
 # -----------------------------------------------------------------------------------------------------------
 # Rules

@@ -35,6 +35,10 @@ BIAS_TAG = 0x42494153
 """Counter `block` of the words that become biases ("BIAS" in ASCII)."""
 
 
+LARGEST_PARAMETER = 1e12
+"""Largest magnitude of a weight, a bias or an omega_0: sums of 65,536 such products fit float32 by far."""
+
+
 @dataclass(frozen=True)
 class Siren:
     """Parameters: layer l has weights (D_out, D_in) and biases (D_out,); D_in is the D_out of layer l - 1."""
@@ -101,8 +105,9 @@ def check_shape(widths: Sequence[int], omega_0_first: float, omega_0_hidden: flo
     if len(widths) < 2 or any(not isinstance(width, int) or width < 1 for width in widths):
         raise InputError("widths", tuple(widths), "at least two whole numbers >= 1", "give D_in, ..., D_out")
     for name, omega_0 in (("omega_0_first", omega_0_first), ("omega_0_hidden", omega_0_hidden)):
-        if not (math.isfinite(omega_0) and omega_0 > 0):
-            raise InputError(name, omega_0, "finite and > 0", "use 1 to 30; small values smooth more")
+        if not 0 < omega_0 <= LARGEST_PARAMETER:
+            rule = f"finite and > 0, at most {LARGEST_PARAMETER:g}"
+            raise InputError(name, omega_0, rule, "use 1 to 30; small values smooth more")
 
 
 def _signed_uniforms(seed: int, layer: int, tag: int, count: int) -> Array:

@@ -33,6 +33,7 @@ from .denoise import OUTPUT_CHANNELS, Model
 from .errors import InputError, TrainingError
 from .factored import Factors
 from .frame import Frame
+from .reading import parse_json, to_dataclass
 from .siren import Siren
 
 Array = NDArray[np.floating[Any]]
@@ -148,14 +149,7 @@ def recipe_to_json(recipe: Recipe) -> str:
 
 def recipe_from_json(text: str) -> Recipe:
     """Return the recipe written in `text`, or say what is wrong with it."""
-    try:
-        values = json.loads(text)
-        values["features"], values["widths"] = tuple(values["features"]), tuple(values["widths"])
-        recipe = Recipe(**{**values, "window": Window(**values["window"])})
-    except (TypeError, ValueError, KeyError) as error:
-        raise InputError(
-            "recipe", text, f"JSON of a recipe ({error})", "write it with recipe_to_json"
-        ) from None
+    recipe = to_dataclass(Recipe, parse_json(text, "recipe", "write it with recipe_to_json"), "recipe")
     check_recipe(recipe)
     return recipe
 

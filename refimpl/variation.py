@@ -17,10 +17,12 @@ import colorsys
 import json
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from .errors import InputError
+from .reading import BROKEN, parse_json, to_dataclass
 from .scene import Camera, Scene, Vector
 from .scenes import TURN_SECONDS
 
@@ -90,16 +92,8 @@ def _limits(name: str) -> tuple[float, float]:
 
 def ranges_from_json(text: str) -> Ranges:
     """Return the ranges that a frame or a model says, or refuse what is none."""
-    try:
-        pairs: dict[str, Any] = {
-            name: None if pair is None else (float(pair[0]), float(pair[1]))
-            for name, pair in json.loads(text).items()
-        }
-        found = Ranges(**pairs)
-        check_ranges(found)
-    except (TypeError, ValueError, KeyError, IndexError, AttributeError, RecursionError):
-        way_out = "make the data set or the model again"
-        raise InputError("ranges", text[:80], "JSON of ranges", way_out) from None
+    found = to_dataclass(Ranges, parse_json(text, "ranges", "make the data set or the model again"), "ranges")
+    check_ranges(found)
     return found
 
 
@@ -203,8 +197,7 @@ def _number(text: str | None) -> float | None:
 
 def _colors(text: str | None) -> list[Vector]:
     """Return the lamps' colours of an info; none where it says none."""
-    try:
-        data: Any = json.loads(text) if text else []
+    with suppress(*BROKEN):
+        data: Any = parse_json(text, "colours", "render the frame again") if text else []
         return [(float(r), float(g), float(b)) for r, g, b in data]
-    except (TypeError, ValueError, RecursionError):
-        return []
+    return []

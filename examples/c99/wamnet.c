@@ -112,7 +112,6 @@ struct json {
 typedef struct {
     const char *at, *end;
     int depth;
-    bool unique; /* whether names of an object must differ */
 } parser;
 
 enum { DEEPEST = 64 };
@@ -262,7 +261,7 @@ static json *parse_list(parser *p, bool object) {
                 name = parse_text(p);
                 if (!next_is(p, ':')) refuse("no JSON: a colon is missing");
             }
-            if (object && p->unique)
+            if (object)
                 for (size_t i = 0; i < made->length; i++)
                     if (same_text(made->names[i], name)) refuse("the name %.80s stands there twice", name->text);
             append(made, name, parse_value(p));
@@ -296,8 +295,8 @@ static json *parse_value(parser *p) {
     return *p->at == '-' || (*p->at >= '0' && *p->at <= '9') ? parse_number(p) : parse_word(p);
 }
 
-static json *parse(const char *text, size_t length, bool unique) {
-    parser p = {text, text + length, 0, unique};
+static json *parse(const char *text, size_t length) {
+    parser p = {text, text + length, 0};
     check_utf8(text, length);
     json *made = parse_value(&p);
     skip_space(&p);
@@ -305,7 +304,7 @@ static json *parse(const char *text, size_t length, bool unique) {
     return made;
 }
 
-/* Return the value of that name, the last one if there are several, or nothing. */
+/* Return the value of that name, or nothing. */
 static json *find(const json *in, const char *name) {
     if (in->type != J_OBJECT) refuse("an object is expected");
     for (size_t i = in->length; i-- > 0;)
@@ -1020,7 +1019,7 @@ static sky read_sky(const json *from, v3 background) {
 
 /* SCN-6, SCN-7 */
 static scene read_scene(const char *content, size_t length) {
-    const json *from = parse(content, length, false);
+    const json *from = parse(content, length);
     check_keys(from, " format version name camera room boxes spheres quads lights background environment info ");
     if (strcmp(text(from, "format"), "wamnet-scene")) refuse("format must be wamnet-scene");
     whole_of(field(from, "version"), 1, 1, "version");
@@ -1742,10 +1741,10 @@ typedef struct {
 static scales read_scales(const json *in) {
     scales made = {number(in, "exposure_stops"), number(in, "depth_scale"), number(in, "position_scale"),
                    vec_in(in, "position_center")};
-    if (!isfinite(made.stops) || !(made.depth_scale > 0 && made.depth_scale < HUGE_VAL)
-        || !(made.position_scale > 0 && made.position_scale < HUGE_VAL))
-        refuse("scales must be finite, lengths positive");
-    check_range(made.position_center, -DBL_MAX, DBL_MAX, "position_center");
+    if (!(fabs(made.stops) <= 64) || !(made.depth_scale >= 1e-18 && made.depth_scale <= 1e18)
+        || !(made.position_scale >= 1e-18 && made.position_scale <= 1e18))
+        refuse("stops must be within -64 and 64, lengths within 1e-18 and 1e18");
+    check_range(made.position_center, -1e18, 1e18, "position_center");
     return made;
 }
 
@@ -2064,7 +2063,7 @@ static container read_container(const unsigned char *content, size_t length) {
     for (int i = 7; i >= 0; i--) header = header << 8 | content[i];
     if (header > length - 8) refuse("the header is longer than the file");
     if (!header || content[8] != '{') refuse("the header is no object");
-    const json *head = parse((const char *)content + 8, (size_t)header, true);
+    const json *head = parse((const char *)content + 8, (size_t)header);
     made.data = content + 8 + header;
     made.length = length - 8 - (size_t)header;
     made.tensors = get(head->length, sizeof *made.tensors);
@@ -2103,7 +2102,7 @@ static double *parameters(const container *in, const tensor *from, size_t axes, 
             for (size_t k = 8; k-- > 0;) bits = bits << 8 | in->data[from->begin + 8 * i + k];
             memcpy(&made[i], &bits, sizeof bits);
         }
-        if (!isfinite(made[i])) refuse("a parameter is not finite");
+        if (!(fabs(made[i]) <= 1e12)) refuse("a parameter is not finite, or beyond 1e12");
     }
     return made;
 }
@@ -2148,7 +2147,7 @@ static double decimal(const json *in, const char *name) {
 
 static const json *json_text(const json *in, const char *name) {
     const char *content = text(in, name);
-    return parse(content, strlen(content), false);
+    return parse(content, strlen(content));
 }
 
 /* MOD-2, MOD-6, DEN-1 */
@@ -2161,7 +2160,9 @@ static model read_model(const char *base64) {
     model made = {.net = read_layers(&in)};
     made.net.omega_first = decimal(in.texts, "omega_0_first");
     made.net.omega_hidden = decimal(in.texts, "omega_0_hidden");
-    if (!(made.net.omega_first > 0 && made.net.omega_hidden > 0)) refuse("omega_0 must be positive");
+    if (!(made.net.omega_first > 0 && made.net.omega_first <= 1e12 && made.net.omega_hidden > 0
+          && made.net.omega_hidden <= 1e12))
+        refuse("omega_0 must be positive, and at most 1e12");
     const json *names = list_of(json_text(in.texts, "features"), SIZE_MAX, "features");
     for (size_t i = 0; i < names->length; i++) {
         const char *name = text_of(names->items[i], "a feature");
@@ -2799,7 +2800,7 @@ static void serve(const char *line, size_t length) {
     head = 0;
     answer = (buffer){0};
     if (!setjmp(way_out)) {
-        const json *request = parse(line, length, false);
+        const json *request = parse(line, length);
         const char *kind = text(request, "kind");
         if (!strcmp(kind, "hello")) {
             answer_hello();

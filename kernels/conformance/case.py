@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ...refimpl.errors import InputError
+from ...refimpl.reading import parse_json, read_file, refusing
 from .numbers import from_file, from_json, rounded_up, to_json
 
 VERSION = "1.2.0"
@@ -125,22 +126,15 @@ def text_of(kind: Kind) -> str:
 
 def load(path: Path) -> tuple[str, list[Case]]:
     """Return the kind's name and the cases of a file of vectors; paths in them are made absolute."""
-    try:
-        data = json.loads(path.read_text())
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(
-            "file of vectors", str(path), f"it cannot be read ({error})", "fetch it again"
-        ) from None
+    data = parse_json(read_file(path, "file of vectors"), f"file of vectors {path}", "fetch it again")
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise InputError("file of vectors", str(path), f"its format must be {FORMAT!r}", "give another file")
     if str(data.get("version")).split(".")[0] != VERSION.split(".")[0]:
         rule = f"this runner reads version {VERSION.split('.')[0]}"
         raise InputError(f"{path}: version", data.get("version"), rule, "update wamnet or the vectors")
-    try:
+    rule = "its cases must be as spec/vectors/schema.json says"
+    with refusing("file of vectors", str(path), rule, "fetch it again"):
         return str(data["kind"]), [_case(item, path.parent) for item in data["cases"]]
-    except (KeyError, TypeError, AttributeError) as error:
-        rule = f"its cases must be as spec/vectors/schema.json says ({error!r})"
-        raise InputError("file of vectors", str(path), rule, "fetch it again") from None
 
 
 def _case(data: Mapping[str, Any], folder: Path) -> Case:

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.errors import InputError
+from ...refimpl.reading import read_file, refusing
 
 
 def number_text(value: float) -> str:
@@ -48,13 +48,12 @@ def rounded_up(bound: Any) -> Any:
 
 def from_file(value: Mapping[str, Any], what: str) -> NDArray[np.float32]:
     """Return the array (...) in the file that a JSON value names."""
-    try:
+    way_out = "see spec/conformance.md"
+    rule = "it must name a file of little-endian float32 of its shape"
+    with refusing(what, _shortened(value), rule, way_out):
         shape = tuple(int(side) for side in value["shape"])
-        found = np.fromfile(Path(str(value["file"])), "<f4")
-        return found.reshape(shape)
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        rule = f"it must name a file of little-endian float32 of its shape ({error})"
-        raise InputError(what, _shortened(value), rule, "see spec/conformance.md") from None
+        raw = read_file(str(value["file"]), what, way_out)
+        return np.frombuffer(raw, "<f4").astype(np.float32).reshape(shape)
 
 
 def to_json(value: Any) -> Any:

@@ -24,6 +24,9 @@ from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any
 
+from ...refimpl.errors import InputError
+from ...refimpl.reading import parse_json
+
 PROTOCOL = 1
 """Version of the protocol."""
 
@@ -102,10 +105,9 @@ class Session:
 
     def _parsed(self, line: bytes) -> Mapping[str, Any]:
         """Return a line as a JSON object."""
-        try:
-            answer = json.loads(line)
-        except (ValueError, RecursionError):
-            answer = None
+        answer = None
+        with suppress(InputError):
+            answer = parse_json(line, "answer", "see spec/conformance.md")
         if not isinstance(answer, dict):
             self._end(at_once=True)
             raise NoAnswerError("garbage", f"the line is no JSON object: {line[:80]!r}")

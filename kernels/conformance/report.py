@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from ...refimpl.errors import InputError
+from ...refimpl.reading import parse_json, read_file, refusing
 from .case import VERSION, Case
 from .run import FAIL, PASS, UNSUPPORTED, VERDICTS, Verdict
 
@@ -179,14 +179,12 @@ def read_track(path: Path) -> dict[str, str] | None:
     """Return the last verdicts by id, or nothing where there is no file yet."""
     if not path.exists():
         return None
-    try:
-        data: Any = json.loads(path.read_text())
+    way_out = "name a new file, or one that --track wrote"
+    with refusing("--track", str(path), "it cannot be read", way_out):
+        data: Any = parse_json(read_file(path, "--track", way_out), f"--track {path}", way_out)
         if data["format"] != TRACK:
             raise ValueError(f"its format is not {TRACK!r}")
         return {str(name): str(verdict) for name, verdict in data["verdicts"].items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        rule = f"it cannot be read ({error})"
-        raise InputError("--track", str(path), rule, "name a new file, or one that --track wrote") from None
 
 
 def changes(before: Mapping[str, str], verdicts: Sequence[Verdict]) -> list[Change]:

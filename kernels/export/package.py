@@ -30,7 +30,7 @@ from ...compiler.lower_encode import layers_of
 from ...compiler.lower_scene import PathPrograms, lower_scene
 from ...compiler.path_kernel import PathArtifact, compile_path, most_unrolled
 from ...compiler.variants import FULL, compile_variant, parse, vary
-from ...refimpl.denoise import Model
+from ...refimpl.denoise import Model, learned_feature_spp
 from ...refimpl.errors import InputError
 from ...refimpl.scene import Scene
 from ...refimpl.transport import Settings
@@ -206,7 +206,7 @@ def _model(request: Request) -> dict[str, Any]:
         "features": list(varied.features),
         "widths": [varied.siren.weights[0].shape[1], *(len(b) for b in varied.siren.biases)],
         "variant": request.variant,
-        "feature_spp": int(request.model.info.get("trained_on_feature_spp", "1") or 1),
+        "feature_spp": learned_feature_spp(request.model) or 1,
     }
 
 

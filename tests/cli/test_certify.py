@@ -1,6 +1,7 @@
 """`wamnet certify`: the verdict, its exit status, and the table."""
 
 import json
+import os
 
 import pytest
 
@@ -43,7 +44,36 @@ def test_other_weights_are_refused(wamnet, kernel):
 def test_half_a_file_is_a_bad_file(refused, kernel):
     path = kernel / "denoise.certificate.json"
     path.write_bytes(path.read_bytes()[:200])
-    assert "it must be a whole certificate beside its kernel" in refused("certify", path)
+    assert "no JSON that can be taken" in refused("certify", path)
+
+
+@pytest.mark.parametrize("name", ["/dev/zero", "../secret", "..", "a/b", ""])
+def test_a_manifest_that_names_other_folders_is_refused_before_they_are_read(refused, kernel, name):
+    """A pipe or an endless device must not be opened either."""
+    path = kernel / "manifest.json"
+    manifest = json.loads(path.read_text())
+    path.write_text(json.dumps({**manifest, "files": {**manifest["files"], name: "0"}}))
+    (kernel.parent / "secret").write_text("x")
+    assert "it must be the plain name of a file" in refused("certify", kernel)
+
+
+def test_a_pipe_beside_a_kernel_is_refused_at_once(refused, kernel):
+    path = kernel / "manifest.json"
+    manifest = json.loads(path.read_text())
+    os.mkfifo(kernel / "pipe")
+    path.write_text(json.dumps({**manifest, "files": {**manifest["files"], "pipe": "0"}}))
+    assert "it is no regular file" in refused("certify", kernel)
+
+
+def test_numbers_that_a_weights_file_does_not_have_are_not_made_room_for(wamnet, kernel):
+    path = kernel / "denoise.certificate.json"
+    held = json.loads(path.read_text())
+    place = next(place for place in held["parameters"].values() if "rows" in place)
+    place["rows"] = place["columns"] = [0] * 60_000
+    path.write_text(json.dumps(held))
+    outcome = wamnet("certify", kernel)
+    assert outcome.status == 1
+    assert "more numbers than weights.bin has is True" in outcome.out
 
 
 def test_a_kernel_without_one_is_a_bad_file(wamnet, refused, samples, tmp_path):

@@ -99,7 +99,7 @@ REFUSALS = [
     ("format", "other", r"scene.format is 'other': it must be 'wamnet-scene'"),
     ("version", 2, r"scene.version is 2: it must be 1"),
     ("version", "1", r"scene.version is '1': it must be 1"),
-    ("name", "\ud800", r"scene.name is .*: half a character cannot be written"),
+    ("name", "\ud800", r"scene.name is .*: half a character .* cannot be written"),
     (
         "spheres.0.radius",
         10**400,
@@ -227,7 +227,7 @@ def test_refuses_a_sky_before_a_background():
 
 @pytest.mark.parametrize("text", ["", "{", "[1]", '"x"', "NaN", "[" * 100_000])
 def test_refuses_texts_that_are_no_scene(text):
-    with pytest.raises(InputError, match=r"scene text|scene.format"):
+    with pytest.raises(InputError, match=r"scene is|scene.format"):
         S.from_json(text)
 
 

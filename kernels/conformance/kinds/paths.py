@@ -24,6 +24,7 @@ from ....refimpl import camera, render, rng, scenes, transport
 from ....refimpl import scene as scene_module
 from ....refimpl.intersection import Hit, Surface, materials_by_id
 from ....refimpl.materials import Dielectric
+from ....refimpl.reading import to_dataclass
 from ....refimpl.transport import Counters, Path, Settings
 from ..case import Case, Kind, Output
 from ..functions import SOURCE
@@ -85,7 +86,7 @@ def _file(name: str) -> str:
 
 def settings_of(data: Mapping[str, Any]) -> Settings:
     """Return settings from JSON."""
-    return Settings(**data)
+    return to_dataclass(Settings, data, "settings")
 
 
 def world_of(text: str, settings: Mapping[str, Any]) -> World:

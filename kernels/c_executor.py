@@ -30,8 +30,21 @@ from .passes import Passes
 COMPILER_VARIABLE = "CC"
 """Environment variable that names the compiler, with options if need be; else `cc`."""
 
-OPTIONS = ("-std=c99", "-O3", "-ffp-contract=off", "-fPIC", "-shared")
-"""Nothing here may allow what the standard does not; contraction is off in the source too."""
+OPTIONS = ("-std=c99", "-O3", "-fPIC")
+"""Options of every call, before those that keep the arithmetic."""
+
+STRICT = (
+    "-fno-fast-math",
+    "-fno-unsafe-math-optimizations",
+    "-fno-associative-math",
+    "-fno-reciprocal-math",
+    "-fno-finite-math-only",
+    "-fsigned-zeros",
+    "-ftrapping-math",
+    "-ffp-contract=off",
+)
+"""What takes back whatever the user's options allow beyond IEEE 754: compilers obey the last of several.
+Contraction is off in the source too."""
 
 NATIVE = "-march=native"
 """Option for this very processor's instructions; not all compilers take it."""
@@ -39,11 +52,69 @@ NATIVE = "-march=native"
 PRIVATE_BYTES = 2**20
 """Most bytes of a pixel's arrays: half the smallest stack that glibc gives a thread."""
 
-TRIAL = "#include <math.h>\nint wamnet_trial;\n"
-"""What any C compiler with a library compiles."""
+TRIAL = """\
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+static void show(float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    printf("%08lx\\n", (unsigned long)bits);
+}
+
+int main(int count, char **arguments)
+{
+    (void)arguments;
+    /* The compiler does not know that count is 1. */
+    float one = (float)count, large = 16777216.0f * one, small = 1e-30f * one, third = one / 3.0f, sum = 0.0f;
+    float terms[64];
+    for (int i = 0; i < 64; ++i) terms[i] = one / (float)(i + 1);
+    for (int i = 0; i < 64; ++i) sum += terms[i];
+    show(sum);
+    show((large + one) - large);
+    show(third * third - one / 9.0f);
+    show(small * 1e-12f);
+    show(large / 7.0f);
+    show(sqrtf(third));
+    show(-one * 0.0f + -0.0f);
+    show(large * large * large * large * large * large * 0.0f == 0.0f ? one : 0.0f);
+    return 0;
+}
+"""
+"""A program in which each freedom that a compiler may take shows: order of sums, contraction, reciprocals,
+denormal numbers, signs of zeros, comparison with NaN."""
+
+
+def trial_bits() -> list[str]:
+    """Return what the trial prints, by NumPy: the definition of all arithmetic here."""
+    f = np.float32
+    one, large, small = f(1), f(16777216), f(1e-30)
+    third, total = one / f(3), f(0)
+    for i in range(64):
+        total = total + one / f(i + 1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        no_number = large * large * large * large * large * large * f(0)
+    values = [
+        total,
+        (large + one) - large,
+        third * third - one / f(9),
+        small * f(1e-12),
+        large / f(7),
+        np.sqrt(third),
+        -one * f(0) + -f(0),
+        one if no_number == 0 else f(0),
+    ]
+    return [f"{int(f(value).view(np.uint32)):08x}" for value in values]
+
 
 WAY_OUT = f"install one (Debian: gcc and libc6-dev), or name yours in {COMPILER_VARIABLE}"
 """What to do without a compiler."""
+
+TRIAL_S = 10.0
+"""Most seconds that the trial may take: it takes a thousandth of one."""
 
 MOST_TOLD = 300
 """Most letters of a compiler's complaint in a message of one line."""
@@ -70,25 +141,47 @@ class CExecutor(Executor):
     name = "c"
 
     def __init__(self) -> None:
-        self._command = shlex.split(os.environ.get(COMPILER_VARIABLE) or "") or ["cc"]
+        given = os.environ.get(COMPILER_VARIABLE) or ""
+        try:
+            self._command = shlex.split(given) or ["cc"]
+        except ValueError as error:
+            rule = f"{COMPILER_VARIABLE} is {given!r}, which is no command ({error})"
+            raise ExecutorUnavailable(f"c: {rule}; {WAY_OUT}") from None
         version = self._call("--version").stdout.strip().partition("\n")[0]
         self.device = f"{' '.join(self._command)}: {version}"
         self._built: dict[str, Any] = {}
-        self._options = [*OPTIONS, NATIVE]
+        self._options = list(OPTIONS)
         self._folder = tempfile.TemporaryDirectory(prefix="wamnet-c-")
-        self._try()
+        try:
+            self._try()
+        except ExecutorUnavailable:
+            self._folder.cleanup()
+            raise
         self._threads = ThreadPoolExecutor(os.cpu_count() or 1)
 
     def _try(self) -> None:
-        """Find out what the compiler takes, or say what it lacks."""
-        if self._compile("trial", TRIAL, ["-lm"]).returncode == 0:
-            return
-        self._options.remove(NATIVE)
-        done = self._compile("trial", TRIAL, ["-lm"])
-        if done.returncode:
-            self._folder.cleanup()
-            told = " ".join(done.stderr.split())[:MOST_TOLD]
+        """Find out what the compiler takes, and whether its programs compute as they must."""
+        program = Path(self._folder.name) / "trial"
+        # Not all compilers know all options; what the program prints decides, not what they are told.
+        for options in ([*STRICT, NATIVE], STRICT, []):
+            self._options = [*OPTIONS, *options]
+            done = self._compile(program, TRIAL, [])
+            if done.returncode == 0:
+                break
+        told = " ".join(done.stderr.split())[:MOST_TOLD]
+        if done.returncode or not program.is_file():
+            told = told or "it writes no program"
             raise ExecutorUnavailable(f"c: {self.device} does not compile C99 ({told}); {WAY_OUT}")
+        try:
+            ran = subprocess.run([program], capture_output=True, text=True, check=False, timeout=TRIAL_S)
+            found = ran.stdout.split()
+        except (OSError, ValueError, subprocess.TimeoutExpired) as error:
+            rule = f"what it compiles does not run here ({type(error).__name__})"
+            raise ExecutorUnavailable(f"c: {self.device}: {rule}; {WAY_OUT}") from None
+        if found != trial_bits():
+            rule = "what it compiles does not compute as IEEE 754 says"
+            way_out = f"take options that relax arithmetic out of {COMPILER_VARIABLE}"
+            raise ExecutorUnavailable(f"c: {self.device}: {rule}; {way_out}")
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
         """Compile and load the kernels."""
@@ -108,23 +201,21 @@ class CExecutor(Executor):
         stem, header = artifact.digest[:32], f"{artifact.digest[:32]}.h"
         (Path(self._folder.name) / header).write_text(artifact.source, encoding="utf-8")
         glue = GLUE.format(header=header, entry=artifact.entry_point, images=images)
-        done = self._compile(stem, glue, ["-lm"])
-        if done.returncode:
-            raise CompileError(f"{self.device} does not build the kernel: {done.stderr.strip()}")
-        function = ctypes.CDLL(str(self._object(stem))).wamnet_rows
+        library = Path(self._folder.name) / f"{stem}.so"
+        done = self._compile(library, glue, ["-shared"])
+        if done.returncode or not library.is_file():
+            told = done.stderr.strip()[:MOST_TOLD] or "it writes no library"
+            raise CompileError(f"{self.device} does not build the kernel: {told}; {WAY_OUT}")
+        function = ctypes.CDLL(str(library)).wamnet_rows
         function.restype = None
         function.argtypes = [*[ctypes.c_void_p] * 3, *[ctypes.c_int] * 4]
         return function
 
-    def _object(self, stem: str) -> Path:
-        """Return the path of a shared object."""
-        return Path(self._folder.name) / f"{stem}.so"
-
-    def _compile(self, stem: str, text: str, libraries: list[str]) -> subprocess.CompletedProcess[str]:
-        """Compile a text to a shared object."""
-        source = Path(self._folder.name) / f"{stem}.c"
+    def _compile(self, result: Path, text: str, options: list[str]) -> subprocess.CompletedProcess[str]:
+        """Compile a text to a program, or to a library if the options say so."""
+        source = result.with_suffix(".c")
         source.write_text(text, encoding="utf-8")
-        return self._call(*self._options, "-o", str(self._object(stem)), str(source), *libraries)
+        return self._call(*self._options, *options, "-o", str(result), str(source), "-lm")
 
     def _call(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run the compiler."""

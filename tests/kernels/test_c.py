@@ -141,6 +141,58 @@ def test_compiler_that_compiles_nothing(monkeypatch):
         kernels.open_executor("c")
 
 
+def test_command_that_is_none(monkeypatch):
+    monkeypatch.setenv("CC", "gcc '")
+    with pytest.raises(
+        ExecutorUnavailable, match=r"c: CC is .* no command \(No closing quotation\); install"
+    ):
+        kernels.open_executor("c")
+
+
+def test_compiler_that_writes_nothing(monkeypatch):
+    monkeypatch.setenv("CC", "true")
+    with pytest.raises(ExecutorUnavailable, match=r"\(it writes no program\); install one"):
+        kernels.open_executor("c")
+
+
+@pytest.mark.parametrize(
+    "relaxed",
+    [
+        "-ffast-math",
+        "-funsafe-math-optimizations",
+        "-Ofast",
+        "-fassociative-math -fno-signed-zeros -fno-trapping-math",
+        "-freciprocal-math",
+        "-ffp-contract=fast -mfma",
+        "-ffinite-math-only",
+    ],
+)
+def test_options_that_relax_arithmetic_are_taken_back(executor_named, case, monkeypatch, relaxed):
+    """The bits of profile exact, and denormal numbers of this process, survive what CC names."""
+    executor_named("c")
+    monkeypatch.setenv("CC", f"cc {relaxed}")
+    program, images, wanted = case
+    with kernels.open_executor("c") as executor:
+        found = executor.run(compile_program(program, "c", "exact"), images)
+    assert np.array_equal(found.view(np.uint32), wanted.view(np.uint32))
+    # A number below the smallest normal one, 2^-126, which a process that flushes them loses.
+    assert np.float32(2.0**-133) * np.float32(1) == np.float32(2.0**-133)
+
+
+@pytest.mark.parametrize("relaxed", ["-funsafe-math-optimizations", "-ffp-contract=fast -mfma", "-Ofast"])
+def test_compiler_that_relaxes_arithmetic_all_the_same_is_refused(
+    executor_named, tmp_path, monkeypatch, relaxed
+):
+    """The wrapper puts its options last; the trial's digits tell."""
+    executor_named("c")
+    wrapper = tmp_path / "cc"
+    wrapper.write_text(f'#!/bin/sh\nexec cc "$@" {relaxed}\n')
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("CC", str(wrapper))
+    with pytest.raises(ExecutorUnavailable, match="does not compute as IEEE 754 says; take options"):
+        kernels.open_executor("c")
+
+
 def test_compiler_that_does_not_know_this_processor(executor_named, kit, tmp_path, monkeypatch):
     """A compiler that refuses -march=native builds kernels without it."""
     executor_named("c")

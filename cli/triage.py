@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..refimpl.errors import ExecutorUnavailable, InputError
+from ..refimpl.reading import parse_json, read_file, refusing
 from . import machine, options
 from .inputs import load_model, model_path, need_layers
 from .outputs import check_new_folder, making_folder
@@ -28,6 +29,7 @@ from .terminal import progress, say, table
 
 if TYPE_CHECKING:
     from ..compiler.artifact import Artifact
+    from ..compiler.ir import Program
     from ..kernels.apart import Runner
     from ..kernels.executor import Images
     from ..kernels.reduce import Box, Reduced
@@ -101,7 +103,6 @@ def triage(
     one deviates, the first stage that does is looked for, and the smallest part of the frame that shows it is
     kept in FOLDER with the kernel's source. Exit status 1 says that a kernel deviates.
     """
-    from ..compiler.compile import compile_program
     from ..compiler.profiles import profile_named
     from ..kernels.denoise_on import images_of
     from . import exr
@@ -113,8 +114,8 @@ def triage(
     need_layers(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )
-    compiled = kept_kernel(kernel, network, profile) if kernel else compile_program
-    task = Task(network, noisy, images_of(network, noisy), profile, schedules, compiled, bool(kernel))
+    kept = kept_kernel(kernel, network, profile) if kernel else None
+    task = Task(network, noisy, images_of(network, noisy), profile, schedules, kept)
     with ExitStack() as opened:
         runners = open_runners(executor or [], opened)
         verdicts = _judged(task, runners)
@@ -131,7 +132,7 @@ def triage(
 class Task:
     """What is asked for: a model on a frame, whose encoded images are `images`, and how.
 
-    `kept`: `compiled` has the files of a kept kernel in it.
+    `kept`: the kernel that runs in the place of what the compiler makes for its target and schedule.
     """
 
     model: Model
@@ -139,8 +140,14 @@ class Task:
     images: Images
     profile: str
     schedules: str
-    compiled: Compile
-    kept: bool
+    kept: Kept | None
+
+    @property
+    def compiled(self) -> Compile:
+        """Return the compiler, which has the kept kernel for its own where there is one."""
+        from ..compiler.compile import compile_program
+
+        return self.kept.compiled if self.kept else compile_program
 
 
 def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Runner]:
@@ -173,7 +180,11 @@ def _judged(task: Task, runners: Sequence[Runner]) -> list[Verdict]:
     from ..kernels.triage import Judge, kernels_of
 
     program, size = lower(task.model), (task.frame.height, task.frame.width)
-    kernels = kernels_of(runners, program, task.profile, size, task.schedules, task.compiled)
+    # The schedule that an executor would pick is not that of the kept kernel.
+    instead = {task.kept.kernel.target: task.kept.schedule} if task.kept else {}
+    kernels = kernels_of(runners, program, task.profile, size, task.schedules, task.compiled, instead)
+    if task.kept:
+        task.kept.check_ran(kernels)
     judge, verdicts = Judge(program, task.images), []
     with progress("kernels", len(kernels)) as advance:
         for kernel in kernels:
@@ -350,42 +361,84 @@ def _command(task: Task, kernel: Kernel, kept: bool) -> list[str]:
     return [*words, "--kernel", _folder_of(kernel)] if kept else words
 
 
-def kept_kernel(folder: Path, model: Model, profile: str) -> Compile:
-    """Return a compiler that has the files in `folder` for the kernel whose manifest lies there.
+@dataclass(frozen=True)
+class Kept:
+    """A kernel whose files somebody kept: what they are a kernel of, and the artifact that has them in it."""
+
+    folder: Path
+    kernel: Artifact
+
+    @property
+    def schedule(self) -> str:
+        """Return the name of its schedule."""
+        return str(self.kernel.manifest["schedule"]["name"])
+
+    def compiled(self, program: Program, target: str, profile: str, schedule: str) -> Artifact:
+        """Return the kept kernel where it is asked for, else a new one."""
+        from ..compiler.compile import compile_program
+
+        made = compile_program(program, target, profile, schedule)
+        same = all(
+            made.manifest[key] == self.kernel.manifest[key] for key in ("program", "target", "schedule")
+        )
+        return self.kernel if same else made
+
+    def check_ran(self, kernels: Sequence[Kernel]) -> None:
+        """Refuse kernels among which the kept one is not: nobody may take their verdicts for its own."""
+        if not any(kernel.artifact is self.kernel for kernel in kernels):
+            rule = (
+                f"none of the kernels to run is of {self.kernel.target} in schedule {self.schedule}, as it is"
+            )
+            way_out = f"choose --executor {self.kernel.target}, and leave out --schedules"
+            raise InputError("--kernel", str(self.folder), rule, way_out)
+
+
+def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
+    """Return the kernel whose manifest and files lie in a folder.
 
     They may have been changed: their hashes are not asked for. The manifest says of what they are the kernel.
     """
-    import numpy as np
-
     from ..compiler import artifact, ir
     from ..compiler.compile import analysed, compile_program
     from ..compiler.lower import lower
 
-    path = folder / artifact.MANIFEST_NAME
-    try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-        wanted = (manifest["program"], manifest["target"], manifest["schedule"]["name"])
-        name = manifest["profile"]["name"]
-    except (OSError, ValueError, KeyError, TypeError):
-        rule = f"it must hold a {artifact.MANIFEST_NAME} that wamnet wrote beside a model's kernel"
-        raise InputError(
-            "--kernel", str(folder), rule, "give a folder that triage or compile wrote"
-        ) from None
-    if wanted[0] != ir.digest(analysed(lower(model), profile)) or name != profile:
+    way_out = "give a folder that triage or compile wrote"
+    rule = f"it must hold a {artifact.MANIFEST_NAME} that wamnet wrote beside a model's kernel"
+    with refusing("--kernel", str(folder), rule, way_out):
+        path = folder / artifact.MANIFEST_NAME
+        manifest = parse_json(read_file(path, "--kernel", way_out), f"--kernel {path}", way_out)
+        wanted, name = manifest["program"], str(manifest["profile"]["name"])
+        target, schedule = str(manifest["target"]), str(manifest["schedule"]["name"])
+    program = lower(model)
+    if wanted != ir.digest(analysed(program, profile)) or name != profile:
         rule = f"its kernel is of another model or profile ({name})"
         raise InputError("--kernel", str(folder), rule, "give the model and --profile that it was made with")
+    made = compile_program(program, target, profile, schedule)
+    if made.manifest["schedule"] != manifest["schedule"]:
+        rule = f"the compiler makes no kernel of this model for {target} in schedule {schedule} any more"
+        raise InputError("--kernel", str(folder), rule, "compile the model again")
+    return Kept(folder, _with_files(made, folder))
 
-    def compiled(program: ir.Program, target: str, profile: str, schedule: str) -> Artifact:
-        """Return the kept kernel where it is asked for, else a new one."""
-        made = compile_program(program, target, profile, schedule)
-        if (made.manifest["program"], target, made.manifest["schedule"]["name"]) != wanted:
-            return made
-        source = (folder / made.source_name).read_text(encoding="utf-8")
-        raw = (folder / artifact.WEIGHTS_NAME).read_bytes()
-        weights = np.frombuffer(raw, "<f4").astype(np.float32)
-        own = {made.source_name: ir.sha256(source.encode()), artifact.WEIGHTS_NAME: ir.sha256(raw)}
-        files = {**made.manifest["files"], **own}
-        manifest = {**made.manifest, "digest": ir.sha256(source.encode(), raw), "files": files}
-        return replace(made, source=source, weights=weights, manifest=manifest)
 
-    return compiled
+def _with_files(made: Artifact, folder: Path, prefix: str = "") -> Artifact:
+    """Return an artifact with the source and the weights that lie in a folder, in the place of its own."""
+    import numpy as np
+
+    from ..compiler import artifact, ir
+
+    content = read_file(folder / f"{prefix}{made.source_name}", "--kernel")
+    raw = read_file(folder / f"{prefix}{artifact.WEIGHTS_NAME}", "--kernel")
+    if len(raw) != 4 * made.weights.size:
+        rule = f"it must hold {made.weights.size} float32 weights, {4 * made.weights.size} bytes"
+        raise InputError(f"--kernel: length of {artifact.WEIGHTS_NAME}", len(raw), rule, "restore the file")
+    with refusing(f"--kernel: {made.source_name}", str(folder), "it must be UTF-8", "restore the file"):
+        source = content.decode("utf-8")
+    own = {made.source_name: ir.sha256(content), artifact.WEIGHTS_NAME: ir.sha256(raw)}
+    files = {**made.manifest["files"], **own}
+    return replace(
+        made,
+        source=source,
+        weights=np.frombuffer(raw, "<f4").astype(np.float32),
+        manifest={**made.manifest, "digest": ir.sha256(content, raw), "files": files},
+        before=_with_files(made.before, folder, artifact.FIRST_PASS) if made.before else None,
+    )

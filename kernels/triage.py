@@ -14,7 +14,7 @@ refuses a kernel in its own words has not: it has written nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -34,6 +34,9 @@ from .numpy_executor import NumpyExecutor
 
 Compile = Callable[[Program, str, str, str], Artifact]
 """A function of program, target, profile and schedule."""
+
+NONE: Mapping[str, str] = {}
+"""No schedule but the picked one."""
 
 PICKED, EVERY = "picked", "all"
 """Which schedules are run: the one that the executor picks, or all that its target has."""
@@ -117,13 +120,18 @@ def kernels_of(
     size: tuple[int, int],
     which: str = PICKED,
     compiled: Compile = compile_program,
+    instead: Mapping[str, str] = NONE,
 ) -> list[Kernel]:
-    """Return the kernels of a program for each runner, in the picked schedule or in `all` that hold it."""
+    """Return the kernels of a program for each runner, in the picked schedule or in `all` that hold it.
+
+    `instead`: schedules by target, in the place of the picked ones.
+    """
     known: dict[tuple[str, str], Artifact | str] = {}
     kernels = []
     for runner in runners:
         every = [schedule.name for schedule in target_named(runner.target).schedules]
-        for schedule in every if which == EVERY else [runner.picked(size) if which == PICKED else which]:
+        named = which if which != PICKED else instead.get(runner.target) or runner.picked(size)
+        for schedule in every if which == EVERY else [named]:
             key = (runner.target, schedule)
             if key not in known:
                 known[key] = _compiled(compiled, program, profile, *key)

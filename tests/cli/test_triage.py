@@ -122,6 +122,46 @@ def test_the_kept_command_repeats_it(wamnet, here, fault, monkeypatch, capsys) -
     assert main(shlex.split(commands[0])) == 0
 
 
+def test_a_kernel_that_is_given_runs_though_another_schedule_would_be_picked(wamnet, here) -> None:
+    """The executor's own choice must not take its place: its verdict would be told as the kept one's."""
+    compiled = wamnet("compile", "model.safetensors", "--target", "opencl", "-o", "kept")
+    assert compiled.status == 0
+    given = ("triage", "model.safetensors", "noisy.exr", "--executor", "opencl", "--kernel", "kept")
+    outcome = wamnet(*given)
+    assert outcome.status == 0
+    assert [line.split()[:2] for line in outcome.out.splitlines() if " row " in line] == [["opencl", "plain"]]
+    source = here / "kept/denoise.cl"
+    source.write_text(source.read_text() + "this is no OpenCL;")
+    outcome = wamnet(*given, "-o", "odd")
+    assert outcome.status in (1, 2)
+    assert "within its bound" not in outcome.out
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda folder: (folder / "weights.bin").unlink(), "No such file"),
+        (lambda folder: (folder / "weights.bin").write_bytes(bytes(1001)), "float32 weights"),
+        (lambda folder: (folder / "denoise.cl").write_bytes(b"\xff\xfe"), "it must be UTF-8"),
+        (lambda folder: (folder / "manifest.json").write_text("[" * 200_000), "nested"),
+        (lambda folder: (folder / "manifest.json").write_text("[]"), "it must hold a manifest.json"),
+    ],
+)
+def test_a_kernel_that_cannot_be_run_is_refused(wamnet, refused, here, change, says) -> None:
+    assert wamnet("compile", "model.safetensors", "--target", "opencl", "-o", "kept").status == 0
+    change(here / "kept")
+    assert says in refused(
+        "triage", "model.safetensors", "noisy.exr", "--executor", "numpy", "--kernel", "kept"
+    )
+
+
+@pytest.mark.parametrize("options", [["--executor", "numpy"], ["--executor", "c", "--schedules", "plain"]])
+def test_a_kernel_that_no_executor_would_run_is_refused(wamnet, refused, here, options) -> None:
+    assert wamnet("compile", "model.safetensors", "--target", "opencl", "-o", "kept").status == 0
+    text = refused("triage", "model.safetensors", "noisy.exr", *options, "--kernel", "kept")
+    assert "none of the kernels to run is of opencl in schedule plain" in text
+
+
 def test_pixels_that_are_no_numbers_are_kept_as_they_are_read(wamnet, here, fault, monkeypatch) -> None:
     """A file of a frame holds finite numbers: the kept ones are encoded to the same bits."""
     noisy = exr.read_frame(here / "noisy.exr")

@@ -302,6 +302,23 @@ def speed_against_error(record: str) -> TableOf:
     return lambda records: bench_report.table(bench_of(records[record]))
 
 
+def speed_readme(record: str) -> TableOf:
+    """Return the rows of [`speed_against_error`] for a first reader: front, whole networks, peers."""
+    whole, slow = {"whole", "exact", "native"}, ("opengl", "numpy", "group", "tile4", "tile8", "vector")
+
+    def table(records: Records) -> str:
+        heads, line, *rows = speed_against_error(record)(records).splitlines()
+        cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in rows]
+        kept = [
+            row
+            for row, (form, way, *_) in zip(rows, cells, strict=True)
+            if form.endswith("*") or way == "–" or (form in whole and not any(name in way for name in slow))
+        ]
+        return "\n".join([heads, line, *kept])
+
+    return table
+
+
 def draw_speed(record: str) -> Callable[[Records], Any]:
     """Return what draws time against loss and against bounds."""
     return lambda records: trade_off_figure(bench_report.panels(bench_of(records[record])), PAPER)
@@ -535,6 +552,7 @@ TABLES: Mapping[str, TableOf] = {
     "sines-octaves": as_printed("sines", 2),
     "sines-speed": as_printed("sines-speed"),
     "speed-against-error": speed_against_error("bench-minicubes"),
+    "speed-readme": speed_readme("bench-minicubes"),
     "table1": table1,
     "table1-readme": table1_readme,
     "train-speed": train_speed,

@@ -4,6 +4,7 @@
 # PYTHON=python3   the Python that makes it, 3.10 or newer
 # WAMNET_REQUIRE=  executors whose absence fails `make test`; empty: skip, and say so, what is not there;
 #                  c is among them where $(CC) finds the C library
+# MINUTES=10       how long `make fuzz` goes on
 # ALSO=            what must be there besides, as torch,pyoidn after `make baselines`
 
 VENV ?= .venv
@@ -12,13 +13,14 @@ comma := ,
 WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba,chromium$(if $(shell $(CC) -E -include math.h -x c /dev/null >/dev/null 2>&1 && echo yes),$(comma)c)
 override WAMNET_REQUIRE := $(WAMNET_REQUIRE)$(if $(ALSO),$(comma)$(ALSO))
 PYTEST_OPTIONS ?= -n 2
+MINUTES ?= 10
 export VENV PYTHON WAMNET_REQUIRE
 
 # Two workers share two cores: one thread of linear algebra each.
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup baselines demo docs test long lint clean distclean
+.PHONY: help setup baselines demo docs test long fuzz lint clean distclean
 
 help: ## List the targets
 	@grep -hE '^[a-z]+: .*## ' Makefile | sed -E 's/^([a-z]+):.*## (.*)/  make \1	\2/' | expand -t 20
@@ -42,6 +44,10 @@ test: setup ## Run all tests (15 minutes at most on two cores)
 
 long: setup ## Test kernels with other cases each time, many and wide (2 hours on two cores); SEED=n repeats a run
 	@$(ONE_THREAD) PYTEST_OPTIONS="$(PYTEST_OPTIONS)" .ci/long $(TESTS)
+
+fuzz: setup ## Feed changed files to every reader and command; MINUTES=10, SEED=n repeats a run, ONLY=name, AT=n one input
+	@$(ONE_THREAD) PYTHONPATH=tests/fuzz $(VENV)/bin/python tests/fuzz/fuzz.py --minutes $(MINUTES) \
+		$(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only $(ONLY)) $(if $(AT),--at $(AT))
 
 lint: setup ## Check style, format, types on the installed wheel, and the house rules
 	@.ci/lint

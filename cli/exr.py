@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -23,6 +23,7 @@ import numpy as np
 
 from ..refimpl.errors import InputError
 from ..refimpl.frame import LAYERS, Floats, Frame, validate
+from ..refimpl.reading import check_room, refusing
 from .inputs import check_input
 from .outputs import replacing, unwritable
 from .packages import need
@@ -57,6 +58,9 @@ COMPONENTS: Mapping[int, tuple[tuple[str, ...], ...]] = {
 
 INFO_PREFIX = "wamnet."
 """Before each name of the frame's info among the file's attributes, so that it meets no other program's."""
+
+EXR_BYTES = 12
+"""Memory that a pixel of a channel takes until it is in a frame: as read, as float32, in its layer."""
 
 Group = Mapping[str, Any]
 """Channels of one layer by the lower-case last part of their names."""
@@ -95,7 +99,8 @@ def read_frame(path: Path, finite: bool = True) -> Frame:
         raise InputError(
             f"{path}: list of channels", names, rule, "name colour R,G,B and normals normal.X,..."
         )
-    info = {k.removeprefix(INFO_PREFIX): str(v) for k, v in header.items() if k.startswith(INFO_PREFIX)}
+    with refusing(f"{path}: attributes", "damaged", "they must be texts in UTF-8", "export it again"):
+        info = {k.removeprefix(INFO_PREFIX): str(v) for k, v in header.items() if k.startswith(INFO_PREFIX)}
     frame = Frame(layers, info)
     try:
         validate(frame, finite)
@@ -110,8 +115,12 @@ def _read_channels(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     openexr = need("OpenEXR", "to read EXR files", "files")
     try:
         with _quiet():
-            expected = len(openexr.File(str(path), header_only=True).parts)
+            headers = openexr.File(str(path), header_only=True).parts
+            expected = len(headers)
+            _check_room(path, headers)
             parts = openexr.File(str(path), separate_channels=True).parts
+    except InputError:
+        raise
     except (RuntimeError, ValueError, TypeError):
         raise InputError(
             "input file", str(path), "it is not an OpenEXR image", "render or export it as .exr"
@@ -125,6 +134,15 @@ def _read_channels(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         text = ", ".join(sorted(windows))
         raise InputError(f"{path}: data windows", text, "all parts must have the same", "export full frames")
     return {name: channel for part in parts for name, channel in part.channels.items()}, parts[0].header
+
+
+def _check_room(path: Path, headers: Sequence[Any]) -> None:
+    """Refuse pictures that do not fit the memory: a file of a few bytes may stand for any size."""
+    needed = 0
+    for part in headers:
+        (left, top), (right, bottom) = (corner.tolist() for corner in part.header["dataWindow"])
+        needed += EXR_BYTES * (right - left + 1) * (bottom - top + 1) * len(part.header["channels"])
+    check_room(needed, "input file", str(path), "cut the picture, or leave channels out")
 
 
 def _group(channels: Mapping[str, Any]) -> dict[str, dict[str, Group]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ import numpy as np
 from ..refimpl import encoding
 from ..refimpl.errors import InputError
 from ..refimpl.frame import Floats
+from ..refimpl.reading import check_room, read_file
 from . import exr
 from .inputs import check_input, need_layers
 from .outputs import replacing
@@ -25,6 +27,9 @@ from .packages import need
 EIGHT_BIT_MODES = ("1", "L", "LA", "P", "RGB", "RGBA")
 """Pillow's modes that fit 8 bits a channel; others would lose precision silently."""
 
+
+PNG_BYTES = 64
+"""Memory that a pixel takes until it is linear: levels, and a few pictures of three float32 on the way."""
 
 LABEL_PX = 18
 """Height of the line of labels above pictures: Pillow's own font has letters of 11 pixels."""
@@ -93,11 +98,17 @@ def read_png(path: Path) -> Floats:
     """Read a PNG of 8 bits a channel as display-encoded colour (H, W, 3); transparency is ignored."""
     check_input(path)
     pillow = need("PIL.Image", "to read PNG files", "files")
+    # Not from the file itself: of a chunk that says it is huge, a file would give room for all of it.
+    content = BytesIO(read_file(path))
     try:
-        with pillow.open(path, formats=["PNG"]) as picture:
-            mode = picture.mode
+        with pillow.open(content, formats=["PNG"]) as picture:
+            mode, (width, height) = picture.mode, picture.size
+            # A file of a few bytes may stand for a picture of any size.
+            check_room(PNG_BYTES * width * height, f"size of {path}", f"{width} x {height}", "cut it")
             levels = np.asarray(picture.convert("RGB"))
-    except (OSError, SyntaxError, ValueError):
+    except InputError:
+        raise
+    except (OSError, SyntaxError, ValueError, pillow.DecompressionBombError):
         raise InputError("input file", str(path), "it is not a readable PNG", "export it again") from None
     if mode not in EIGHT_BIT_MODES:
         raise InputError(

@@ -16,9 +16,10 @@ import json
 import math
 import os
 import re
+import resource
 import stat
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
@@ -85,6 +86,29 @@ def _check_regular(found: os.stat_result, what: str, shown: str) -> None:
         raise InputError(what, shown, "it is a folder", "give the name of a file in it")
     if not stat.S_ISREG(found.st_mode):
         raise InputError(what, shown, "it is no regular file (a pipe or a device)", "give a file on a disk")
+
+
+def check_room(needed: int, what: str, shown: object, way_out: str) -> None:
+    """Refuse what would take more memory, in bytes, than this process can get; nothing was asked for yet."""
+    free = _free_bytes()
+    if needed > free:
+        rule = f"it would take {needed / 2**20:,.0f} MiB of memory, and {free / 2**20:,.0f} MiB are free"
+        raise InputError(what, shown, rule, way_out)
+
+
+def _free_bytes() -> float:
+    """Return how much memory is free by the system's and by this process's own limits, as far as is known."""
+    free = math.inf
+    # Linux tells both; elsewhere the request itself may fail.
+    with suppress(OSError, ValueError, IndexError):
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+        free = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable"))
+        pages = [int(field) for field in Path("/proc/self/statm").read_text(encoding="ascii").split()]
+        for limit, used in ((resource.RLIMIT_AS, pages[0]), (resource.RLIMIT_DATA, pages[5])):
+            most = resource.getrlimit(limit)[0]
+            if most != resource.RLIM_INFINITY:
+                free = min(free, most - used * resource.getpagesize())
+    return free
 
 
 def plain_name(name: Any, what: str, way_out: str) -> str:

@@ -231,3 +231,20 @@ def test_bugs_and_interrupts_pass():
         with pytest.raises(error), refusing("thing", 3, "rule", "way out"):
             raise error
     assert sys.getrecursionlimit() >= 1000
+
+
+# ---- memory -----------------------------------------------------------------------------------------------
+
+
+def test_what_does_not_fit_the_memory_is_refused_before_it_is_asked_for():
+    reading.check_room(1, "picture", "1 x 1", "cut it")
+    with pytest.raises(
+        InputError, match=r"picture is 9 x 9: it would take [\d,]+ MiB of memory, and [\d,]+ MiB"
+    ):
+        reading.check_room(2**60, "picture", "9 x 9", "cut it")
+
+
+def test_the_limits_of_the_process_count(monkeypatch):
+    monkeypatch.setattr(reading.resource, "getrlimit", lambda _limit: (2**30, -1))
+    with pytest.raises(InputError, match="would take 1,024 MiB"):
+        reading.check_room(2**30, "picture", "9 x 9", "cut it")

@@ -1,0 +1,250 @@
+"""Fuzz every reader and every command with changed files: `make fuzz MINUTES=10`.
+
+1. Each input is a function of (seed, target, number): what was found can be repeated by itself [`changed`].
+2. An input is used in a folder of its own, within a limit of time and of memory [`Limits`], [`tried`].
+   A value or a `WamnetError` is right; another exception, a hang, too much memory, a number that is not
+   finite, or control characters on the terminal are findings.
+3. Targets take turns until the time is over or each had its count; processes share them [`fuzz`].
+4. Counts, the seed, and for each finding the input's file and the command that repeats it are printed; the
+   exit status is 1 if there are findings. A finding's file belongs into tests/fuzz/corpus once it is mended.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import resource
+import secrets
+import shutil
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+from mutations import WAYS
+from targets import Good, Target, commands, readers
+
+from wamnet.refimpl.errors import WamnetError
+
+HANG_S = 20.0
+"""Seconds after which an input counts as a hang; the slowest good one takes one."""
+
+MEMORY_BYTES = 512 * 2**20
+"""Most memory that an input may take beside the program's own."""
+
+SLICE_S = 2.0
+"""Seconds that a target runs before another has its turn."""
+
+_good: Good | None = None
+_targets: dict[str, Target] = {}
+
+
+class Hang(BaseException):
+    """An input has taken too long; no handler of the program catches it."""
+
+
+@dataclass
+class Found:
+    """What a slice has seen: counts by outcome, and findings (number of the input, what was wrong)."""
+
+    name: str
+    counts: Counter[str] = field(default_factory=Counter)
+    findings: list[tuple[int, str]] = field(default_factory=list)
+
+
+def changed(target: Target, seed: int, number: int) -> bytes:
+    """Return the changed file of this number."""
+    random = Random(f"{seed}/{target.name}/{number}")
+    return WAYS[target.way](random, random.choice(target.examples))
+
+
+def tried(target: Target, content: bytes) -> tuple[str, str]:
+    """Use an input; return its outcome (accepted, refused, FOUND) and what was wrong."""
+    before = Path.cwd()
+    folder = Path(tempfile.mkdtemp(prefix="wamnet-fuzz-"))
+    try:
+        os.chdir(folder)
+        signal.setitimer(signal.ITIMER_REAL, HANG_S)
+        with np.errstate(all="ignore"):
+            target.use(content, folder)
+    except WamnetError:
+        return "refused", ""
+    except Hang:
+        return "FOUND", f"a hang of {HANG_S:g} s"
+    except MemoryError:
+        return "FOUND", f"more than {MEMORY_BYTES} bytes of memory"
+    except UnicodeDecodeError as error:
+        # The targets themselves decode texts that the program gets as such.
+        return ("refused", "") if "targets.py" in _innermost(error) else ("FOUND", _told(error))
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is none of ours
+        return "FOUND", _told(error)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        os.chdir(before)
+        shutil.rmtree(folder, ignore_errors=True)
+    return "accepted", ""
+
+
+def _innermost(error: BaseException) -> str:
+    """Return the file in which an exception arose."""
+    return traceback.extract_tb(error.__traceback__)[-1].filename
+
+
+def _told(error: BaseException) -> str:
+    """Return an exception and where it arose, on one line."""
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    return ascii(f"{type(error).__name__}: {error} ({Path(frame.filename).name}:{frame.lineno})")[1:301]
+
+
+def _hang(_number: int, _frame: object) -> None:
+    raise Hang
+
+
+def prepare() -> None:
+    """Make the good files and the limits of this process."""
+    global _good  # noqa: PLW0603 - the pool's initializer has no other way to reach its tasks
+    os.environ["WAMNET_CACHE"] = tempfile.mkdtemp(prefix="wamnet-fuzz-cache-")
+    os.environ["COLUMNS"] = "200"
+    # The log's lines about damaged entries are right, and many.
+    logging.getLogger("wamnet").setLevel(logging.CRITICAL)
+    _good = Good(Path(tempfile.mkdtemp(prefix="wamnet-fuzz-good-")))
+    _targets.update({target.name: target for target in (*readers(_good), *commands(_good))})
+    for target in _targets.values():
+        for example in target.examples:
+            outcome, what = tried(target, example)
+            assert outcome != "FOUND", f"{target.name}: a good file gives {what}"
+    signal.signal(signal.SIGALRM, _hang)
+    own = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_DATA, (own + MEMORY_BYTES, resource.RLIM_INFINITY))
+
+
+def run_slice(name: str, seed: int, first: int, count: int, until: float) -> tuple[Found, int]:
+    """Try inputs from number `first` on: `count` of them, or as many as fit; return the next number too."""
+    found, target = Found(name), _targets[name]
+    ends = min(until, time.monotonic() + SLICE_S)
+    number = first
+    while number < first + count and (time.monotonic() < ends or number == first):
+        outcome, what = tried(target, changed(target, seed, number))
+        found.counts[outcome] += 1
+        if what:
+            found.findings.append((number, what))
+        number += 1
+    return found, number
+
+
+def names_of() -> list[str]:
+    """Return the names of all targets."""
+    return list(_targets)
+
+
+def fuzz(seed: int, seconds: float, count: int, workers: int, only: Sequence[str]) -> dict[str, Found]:
+    """Let all targets take turns; return what was found, by target."""
+    until = time.monotonic() + seconds
+    total: dict[str, Found] = {}
+    context = get_context("spawn")
+    pool = ProcessPoolExecutor(workers, context, prepare)
+    every = pool.submit(names_of).result()
+    names = [name for name in every if not only or any(word in name for word in only)]
+    following = dict.fromkeys(names, 0)
+    waiting, running = list(names), {}
+    while waiting or running:
+        while waiting and len(running) < workers and time.monotonic() < until:
+            name = waiting.pop(0)
+            left = count - following[name]
+            running[pool.submit(run_slice, name, seed, following[name], left, until)] = name
+        if not running:
+            break
+        done, _ = wait(running, return_when="FIRST_COMPLETED")
+        for future in done:
+            name = running.pop(future)
+            known = total.setdefault(name, Found(name))
+            try:
+                found, following[name] = future.result()
+            except BrokenProcessPool:
+                known.findings.append((following[name], "the process ended (from this number on)"))
+                pool, running = ProcessPoolExecutor(workers, context, prepare), {}
+                following[name] += 1
+                break
+            known.counts += found.counts
+            known.findings += found.findings
+            if following[name] < count:
+                waiting.append(name)
+    pool.shutdown()
+    return total
+
+
+def report(total: dict[str, Found], seed: int, folder: Path) -> int:
+    """Print counts and findings, and keep the inputs of the findings; return the exit status."""
+    everything = sum((found.counts for found in total.values()), Counter())
+    print(f"{'target':28} {'inputs':>9} {'refused':>9} {'accepted':>9} {'FOUND':>6}")
+    for name, found in sorted(total.items()):
+        inputs = sum(found.counts.values())
+        refused, accepted = found.counts["refused"], found.counts["accepted"]
+        print(f"{name:28} {inputs:9} {refused:9} {accepted:9} {len(found.findings):6}")
+    findings = [(name, *finding) for name, found in total.items() for finding in found.findings]
+    told: Counter[tuple[str, str]] = Counter()
+    for name, number, what in findings:
+        told[name, what.rpartition("(")[2]] += 1
+        if told[name, what.rpartition("(")[2]] <= 3:
+            keep(name, seed, number, folder)
+            print(f"FOUND {name}: {what}; again: make fuzz SEED={seed} ONLY='{name}' AT={number}")
+    print(f"fuzz: seed {seed}: {sum(everything.values())} inputs, {len(findings)} findings")
+    return 1 if findings else 0
+
+
+def keep(name: str, seed: int, number: int, folder: Path) -> None:
+    """Keep a finding's input."""
+    if not _targets:
+        prepare()
+    folder.mkdir(parents=True, exist_ok=True)
+    stem = name.replace("wamnet ", "command ").replace(", ", "-").replace(" ", "-")
+    (folder / f"{stem}.{seed}.{number}").write_bytes(changed(_targets[name], seed, number))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--minutes", type=float, default=10.0, help="how long, beside the start")
+    parser.add_argument("--count", type=int, default=2**40, help="inputs of each target, at most")
+    parser.add_argument("--seed", type=int, default=None, help="repeats a run")
+    parser.add_argument("--workers", type=int, default=len(os.sched_getaffinity(0)))
+    parser.add_argument("--only", nargs="*", default=[], help="targets whose name holds one of these words")
+    parser.add_argument("--at", type=int, default=None, help="this one input, with its traceback")
+    parser.add_argument("-o", "--output", type=Path, default=Path("out/fuzz"), help="folder of findings")
+    given: Any = parser.parse_args(arguments)
+    seed = secrets.randbits(32) if given.seed is None else given.seed
+    if given.at is not None:
+        return again(given.only[0], seed, given.at)
+    return report(fuzz(seed, given.minutes * 60, given.count, given.workers, given.only), seed, given.output)
+
+
+def again(name: str, seed: int, number: int) -> int:
+    """Try one input without a net."""
+    prepare()
+    folder = Path(tempfile.mkdtemp(prefix="wamnet-fuzz-"))
+    os.chdir(folder)
+    content = changed(_targets[name], seed, number)
+    print(ascii(content[:2000]))
+    try:
+        _targets[name].use(content, folder)
+    except WamnetError as error:
+        print(f"refused: {error}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

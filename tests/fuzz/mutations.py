@@ -1,0 +1,146 @@
+"""What a stranger may do to a file: damage of bytes, and changes that keep its form.
+
+1. Bytes are flipped, cut, doubled, moved, or replaced by pieces that parsers have stumbled over [`of_bytes`].
+2. A JSON text keeps its form while values, keys and lists change [`of_json`]; texts inside that are JSON
+   themselves are changed in the same way.
+3. A safetensors file keeps its header's length right while header and numbers change [`of_safetensors`].
+
+All of it is a function of a `random.Random`: the same seed gives the same input.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Mapping
+from random import Random
+from typing import Any
+
+VALUES: tuple[Any, ...] = (
+    *(None, True, False, 0, -1, 1, 2, 3, 0.5, -0.0, 1e-320, 1e-30, 1e30, 1e308, -1e308),
+    *(float("nan"), float("inf"), float("-inf"), 2**31, 2**53 + 1, 2**63, -(2**63), 10**18, 10**400),
+    *("", "x", "0", "nan", "1e999", "\x1b[2J", "\0", "\u202e", "\ud800", "../x", "/dev/zero", "color"),
+    *([], {}, [[]], [0] * 3, [0.0] * 2000, "y" * 5000, [None] * 40),
+)
+"""Values that programs have taken for something else."""
+
+PIECES = (
+    *(b"[" * 3000, b"{" * 70, b"}", b"]", b",", b'"', b"\\", b"\\ud800", b"null", b"NaN", b"Infinity"),
+    *(
+        b"-",
+        b"1" * 5000,
+        b"1e999",
+        b"1e-999",
+        b"0.",
+        b"\xff\xfe",
+        b"\xef\xbb\xbf",
+        b"\xed\xa0\x80",
+        b"\0" * 9,
+    ),
+    *(b"\x1b[2J", b"\xff" * 8, b"\x7f\xff\xff\xff", b"\x80\0\0\0", b"../", b"/dev/zero", b'{"a":0,"a":1}'),
+)
+"""Bytes that programs have stumbled over."""
+
+FLOATS = (b"\0\0\xc0\x7f", b"\0\0\x80\x7f", b"\0\0\x80\xff", b"\xff\xff\x7f\x7f", b"\1\0\0\0", b"\0\0\0\x80")
+"""float32, little-endian: NaN, both infinities, the largest, a denormal number, -0."""
+
+
+def of_bytes(random: Random, content: bytes) -> bytes:
+    """Return content with one to four kinds of damage."""
+    data = bytearray(content)
+    for _ in range(random.choice((1, 1, 1, 2, 4))):
+        at = random.randrange(len(data) + 1)
+        to = min(len(data), at + random.choice((1, 1, 4, 16, 200)))
+        way = random.randrange(6)
+        if way == 0 and at < len(data):
+            data[at] ^= 1 << random.randrange(8)
+        elif way == 1:
+            data[at:to] = b""
+        elif way == 2:
+            data[at:at] = data[at:to] * random.choice((1, 2, 50))
+        elif way == 3:
+            data[at:to] = random.choice(PIECES)
+        elif way == 4:
+            data[at:to] = random.randbytes(to - at)
+        else:
+            del data[at:]
+    return bytes(data)
+
+
+def of_json(random: Random, content: bytes) -> bytes:
+    """Return a JSON text with values, keys or lists changed; of a text that is none, damaged bytes."""
+    try:
+        tree = json.loads(content)
+    except (ValueError, RecursionError):
+        return of_bytes(random, content)
+    for _ in range(random.choice((1, 1, 2, 5))):
+        tree = _changed(random, tree)
+    text = json.dumps(tree).encode()
+    return of_bytes(random, text) if random.random() < 0.2 else text
+
+
+def _changed(random: Random, tree: Any) -> Any:
+    """Return a tree with a change at a random place, which is deep or not."""
+    if isinstance(tree, dict) and tree and random.random() < 0.85:
+        return _changed_object(random, tree)
+    if isinstance(tree, list) and tree and random.random() < 0.85:
+        items = list(tree)
+        at = random.randrange(len(items))
+        way = random.random()
+        if way < 0.1:
+            del items[at]
+        elif way < 0.2:
+            items.insert(at, random.choice(items))
+        else:
+            items[at] = _changed(random, items[at])
+        return items
+    if isinstance(tree, str) and tree[:1] in ("{", "["):
+        return of_json(random, tree.encode()).decode(errors="replace")
+    if (
+        isinstance(tree, (int, float))
+        and not isinstance(tree, bool)
+        and abs(tree) < 1e30
+        and random.random() < 0.3
+    ):
+        return tree * random.choice((-1, 2, 0.5, 10, 1e10))
+    return random.choice(VALUES)
+
+
+def _changed_object(random: Random, tree: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an object without a key, with one more, with one renamed, or with another value."""
+    items = dict(tree)
+    key = random.choice(list(items))
+    way = random.random()
+    if way < 0.1:
+        del items[key]
+    elif way < 0.15:
+        items[random.choice((key + "x", "", "\x1b[2J", "__class__"))] = random.choice(VALUES)
+    elif way < 0.2:
+        other, value = random.choice(list(items)), items.pop(key)
+        items[other] = value
+    else:
+        items[key] = _changed(random, items[key])
+    return items
+
+
+def of_safetensors(random: Random, content: bytes) -> bytes:
+    """Return a container whose header, or whose numbers, are changed; its length mostly stays right."""
+    if random.random() < 0.2 or len(content) < 8:
+        return of_bytes(random, content)
+    (length,) = struct.unpack("<Q", content[:8])
+    header, data = content[8 : 8 + length], bytearray(content[8 + length :])
+    if random.random() < 0.7:
+        header = of_json(random, header)
+    else:
+        for _ in range(random.choice((1, 1, 10))):
+            at = 4 * random.randrange(max(1, len(data) // 4))
+            data[at : at + 4] = random.choice((*FLOATS, random.randbytes(4)))
+    return struct.pack("<Q", len(header)) + header + bytes(data)
+
+
+WAYS: Mapping[str, Callable[[Random, bytes], bytes]] = {
+    "bytes": of_bytes,
+    "json": of_json,
+    "safetensors": of_safetensors,
+}
+"""Ways by the form of a file."""

@@ -107,7 +107,7 @@ def tiny_model() -> denoise.Model:
 def tiny_curve(model: denoise.Model) -> dict[str, Any]:
     """Return a curve of two points of a model, as JSON's types."""
     numbers = (1.0, 0.1, 0.01, 0.2, float("nan"))
-    points = tuple(curve.Point(name, "plain", "numpy", *numbers) for name in ("full", "rank1"))
+    points = tuple(curve.Point(name, "plain", "c", *numbers) for name in ("full", "rank1"))
     return curve.Curve(variants.digest_of(model), "a device", (4, 5), "ieee", points).as_data()
 
 

@@ -257,7 +257,7 @@ COMMANDS: Sequence[tuple[str, str, str, str]] = (
         "compile, curve",
         "json",
         "curve.json",
-        "compile {good}/model.safetensors --max-error 0.9 --curve {} -o out",
+        "compile {good}/model.safetensors --target c --max-error 0.9 --curve {} -o out",
     ),
     ("export", "safetensors", "model.safetensors", "export {} --target c -o out"),
     (

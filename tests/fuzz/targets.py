@@ -286,12 +286,10 @@ def commands(good: Good) -> list[Target]:
 def _command(good: Good, file: str, line: str, content: bytes, folder: Path) -> None:
     """Run a command on a changed file: status 0, 1 or 2, and of 2 one line that a terminal can show."""
     path = folder / file
-    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.parent != folder:
+        # What the file speaks of lies beside it.
+        shutil.copytree(good.folder / Path(file).parent, path.parent)
     path.write_bytes(content)
-    if file.startswith("kernel/"):
-        for other in (good.folder / "kernel").iterdir():
-            if other.name != path.name:
-                shutil.copy(other, path.parent / other.name)
     words = line.replace("{good}/kernel-copy", str(path.parent)).replace("{good}", str(good.folder)).split()
     out, err = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(err):

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import os
-import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .ir import Program
+from .writing import making_parents, write_together
 
 SCHEMA = "wamnet-artifact-1"
 """Name and version of the manifest's form; described in spec/kernel_interface.md."""
@@ -117,19 +117,12 @@ def manifest_text(artifact: Files) -> str:
 def write(artifact: Files, folder: str | os.PathLike[str]) -> tuple[Path, ...]:
     """Write source, weights if there are any, and manifest into `folder`; no file is ever seen half written.
 
-    Others may write there at once. What fails before the first file has its name leaves the folder as it was.
+    Others may write there at once. What fails before the first file has its name leaves the folder as it was,
+    or none if there was none.
     """
     target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
     contents = {**artifact.contents(), MANIFEST_NAME: manifest_text(artifact).encode()}
-    own = secrets.token_hex(8)
-    parts = {target / name: target / f".{name}.{own}.part" for name in contents}
-    try:
-        for part, content in zip(parts.values(), contents.values(), strict=True):
-            part.write_bytes(content)
-        for path, part in parts.items():
-            part.replace(path)
-    finally:
-        for part in parts.values():
-            part.unlink(missing_ok=True)
-    return tuple(parts)
+    files = {target / name: content for name, content in contents.items()}
+    with making_parents(target):
+        write_together(files)
+    return tuple(files)

@@ -4,7 +4,7 @@
    and `version` how to read it [`save_model`], [`save_checkpoint`].
 2. The same content gives the same bytes: the header is written with sorted keys [`_encode`]. The safetensors
    library writes its metadata in the order of a hash table, so it only reads here.
-3. A file appears under its name when it is complete: it is written beside it and then renamed [`_write`].
+3. A file appears under its name when it is complete [`_write`, writing.py].
 4. Nothing in a file is believed: what is missing, of another kind, too large, not finite or not fitting is
    refused with one line [`load_model`], [`load_checkpoint`].
 
@@ -33,6 +33,7 @@ from ..refimpl.errors import InputError
 from ..refimpl.reading import BROKEN, parse_json, read_file, to_dataclass
 from ..refimpl.siren import Siren
 from ..refimpl.train import TrainState
+from .writing import write_bytes
 
 Tensors = Mapping[str, NDArray[Any]]
 Texts = Mapping[str, str]
@@ -136,17 +137,13 @@ def _encode(kind: str, tensors: Tensors, texts: Texts) -> bytes:
 
 def _write(path: Path, content: bytes) -> None:
     """Give `path` the content, whole or not at all."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        temporary.write_bytes(content)
-        temporary.replace(path)
+        write_bytes(path, content)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(
             "output file", str(path), f"cannot be written ({reason})", "choose another"
         ) from None
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:

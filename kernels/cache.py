@@ -16,11 +16,11 @@ import hashlib
 import json
 import logging
 import os
-import secrets
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from ..compiler.writing import write_bytes
 from ..refimpl.errors import InputError
 from ..refimpl.reading import BROKEN, parse_json, read_file
 
@@ -72,17 +72,13 @@ def write_json(name: str, data: Any) -> Path | None:
     """Keep data of JSON's types as the entry `<name>.json`; return its path, or None if it cannot be kept."""
     entry = {"schema": SCHEMA, "sha256": _checksum(data), "data": data}
     path = _path(name)
-    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
     try:
         # What is kept may become code of this user's processes: nobody else writes here.
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        part.write_text(json.dumps(entry, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-        part.replace(path)
+        write_bytes(path, (json.dumps(entry, indent=1, sort_keys=True) + "\n").encode())
     except OSError as error:
         _log.warning("cache entry %s cannot be written (%s): nothing is kept", path, error.strerror)
         return None
-    finally:
-        _remove(part)
     return path
 
 
@@ -95,11 +91,3 @@ def _path(name: str) -> Path:
 def _checksum(data: Any) -> str:
     """Return the SHA-256 of data as JSON, in one form for equal data."""
     return hashlib.sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()
-
-
-def _remove(path: Path) -> None:
-    """Remove a file that may not be there, in a folder that may not be there."""
-    try:
-        path.unlink(missing_ok=True)
-    except OSError:
-        return

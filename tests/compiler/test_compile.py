@@ -116,10 +116,11 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
 def test_a_disk_that_fills_up_leaves_all_old_files(tmp_path, monkeypatch):
     artifacts.write(compile_program(lower(model()), "opencl"), tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    real = artifacts.Path.write_bytes
+    real, calls = artifacts.Path.write_bytes, []
 
     def fills_up(self, content):
-        if "manifest" in self.name:
+        calls.append(content)
+        if len(calls) == 3:  # the last of three: the manifest
             raise OSError("disk full")
         return real(self, content)
 
@@ -127,6 +128,20 @@ def test_a_disk_that_fills_up_leaves_all_old_files(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="disk full"):
         artifacts.write(compile_program(lower(model(omega_0=2.0)), "opencl"), tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_folder_that_a_full_disk_leaves_empty_goes(tmp_path, monkeypatch):
+    """And those above it that were made; one that was there stays."""
+
+    def full(self, content):
+        raise OSError("disk full")
+
+    monkeypatch.setattr(artifacts.Path, "write_bytes", full)
+    (tmp_path / "there").mkdir()
+    for folder in (tmp_path / "new" / "deep", tmp_path / "there"):
+        with pytest.raises(OSError, match="disk full"):
+            artifacts.write(compile_program(lower(model()), "opencl"), folder)
+    assert [path.name for path in tmp_path.rglob("*")] == ["there"]
 
 
 def test_failure_at_the_second_name_leaves_whole_files_and_the_old_manifest(tmp_path, monkeypatch):

@@ -12,19 +12,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..compiler.writing import making_parents, remove_temporaries
 from ..refimpl.errors import InputError
 from . import machine, movie, options
+from .alone import alone_in
 from .inputs import load_model, model_path, unlike_training
 from .options import ExecutorName, Renderer
-from .outputs import TEMPORARY, check_output, check_parent
+from .outputs import check_output, check_parent, check_real_folder
 from .terminal import hint_on_interrupt, progress, say
 
 if TYPE_CHECKING:
@@ -101,7 +103,6 @@ def animate(
 
     After any interruption the same command goes on where it was.
     """
-    from ..kernels import open_executor
     from ..kernels.frame_plan import animation_times
     from ..refimpl.denoise import learned_feature_spp
 
@@ -117,21 +118,49 @@ def animate(
     named = scene or scene_of(network), _parameters(parameters), view
     times = animation_times(start, seconds, fps)
     shots = plan_shots(folder, named, times, (size, reference_spp, seed, rays), facts)
-    left = missing(folder, shots)
+    if is_film:
+        check_real_folder(folder)
+    missing(folder, shots)
     _say_what_is_not_learned(output, shots, network)
-    folder.mkdir(exist_ok=True)
     with (
+        making_parents(folder),
+        alone_in(folder, "drawing pictures"),
         hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"),
+    ):
+        made = _draw(shots, folder, network, (executor, renderer), rank)
+        if is_film:
+            movie.write_movie(output, [shot.path for shot in shots], fps)
+            _remove(shots)
+    if is_film:
+        with suppress(OSError):  # there is more in it than the pictures that have become the film
+            folder.rmdir()
+    say(f"{output}: {len(shots)} pictures, {made} of them made now")
+
+
+def _remove(shots: Sequence[Shot]) -> None:
+    """Remove the pictures that have become a film."""
+    for shot in shots:
+        shot.path.unlink()
+
+
+def _draw(
+    shots: Sequence[Shot], folder: Path, network: Model, by: tuple[ExecutorName, Renderer], rank: int
+) -> int:
+    """Draw the pictures that are not in the folder, which is this process's alone; return how many."""
+    from ..kernels import open_executor
+
+    executor, renderer = by
+    # It was another process's until now.
+    left = missing(folder, shots)
+    remove_temporaries(folder)
+    with (
         open_executor(executor.value) as runner,
         progress("drawing", len(left)) as advance,
     ):
         draw = draw_frames if _one_device(executor, renderer, shots[0].noisy) else draw_apart
         for _ in draw(left, network, runner, renderer.value, rank):
             advance(1)
-    if is_film:
-        movie.write_movie(output, [shot.path for shot in shots], fps)
-        shutil.rmtree(folder)
-    say(f"{output}: {len(shots)} pictures, {len(left)} of them made now")
+    return len(left)
 
 
 def _check_names(output: Path, model: Path, fps: float) -> None:
@@ -218,20 +247,15 @@ def plan_shots(
 
 
 def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
-    """Return the pictures that are not there or damaged; refuse a folder with anything else in it.
-
-    What a killed run has left is removed.
-    """
+    """Return the pictures that are not there or damaged; refuse a folder with anything else in it."""
     from . import images
 
     if folder.exists() and not folder.is_dir():
         raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
     check_parent(folder)
     known = {shot.path: shot for shot in shots}
-    there, strays = {}, []
+    there = {}
     for path in sorted(folder.iterdir()) if folder.exists() else []:
-        if path.name.startswith(TEMPORARY):
-            strays.append(path)
         if path.name.startswith("."):
             continue
         origin = images.read_origin(path) if path in known else ""
@@ -239,8 +263,6 @@ def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
             rule = f"it holds something else: {path.name}"
             raise InputError("output folder", str(folder), rule, "choose another with -o, or empty it")
         there[path] = origin
-    for path in strays:
-        path.unlink()
     return [shot for shot in shots if there.get(shot.path) is None]
 
 

@@ -9,27 +9,30 @@
    stays.
 3. Every file is compared with its checksum before it counts as done [`verify`]; one that is damaged or
    missing is made again.
-4. One process at a time works in a folder [`_locked`]; another data set's folder is refused [`Store.open`].
+4. One process at a time works in a folder [alone.py]; another data set's folder is refused [`Store.open`].
+5. What is removed is a regular file of a name that is given here. Folders that are links, and what else lies
+   in `unfinished/`, are refused before anything is written or removed [`check_work_folders`].
 """
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
 import re
-import shutil
+import stat
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
+from ..compiler.writing import TEMPORARY_NAME, is_regular, making_parents, remove_temporaries
 from ..refimpl.errors import InputError
 from ..refimpl.reading import BROKEN, parse_json, read_file
-from .outputs import TEMPORARY, write_text
+from .alone import alone_in
+from .outputs import check_real_folder, write_text
 
 if TYPE_CHECKING:
     from ..kernels.frame_plan import FramePlan, Picture, Request, Task
@@ -48,14 +51,17 @@ UNFINISHED = "unfinished"
 JOURNAL = "journal.jsonl"
 """File in UNFINISHED: a line of JSON for each picture since the manifest was written."""
 
-LOCK = ".lock"
-"""File that is locked, and there, as long as a process works in the folder."""
+NEW = "new.exr"
+"""Band in UNFINISHED whose checksum is not known yet."""
 
 NAME = re.compile(r"(train|test|outside)/\d{5}-(noisy|target)\.exr")
 """What a picture's file may be called; nothing that leads out of the folder."""
 
 BAND = re.compile(r"(train|test|outside)-(\d{5}-(?:noisy|target))\.(\d+)-(\d+)\.([0-9a-f]{64})\.exr")
 """What a band's file is called: its picture, its rows [first, last), its SHA-256."""
+
+SPLITS = ("train", "test", "outside")
+"""Folders of the pictures."""
 
 KINDS = ("noisy", "target")
 """A frame's pictures in a manifest."""
@@ -79,7 +85,11 @@ Look = Callable[[int], None]
 def sum_of(path: Path) -> Sum:
     """Return what a file is known by."""
     digest, length = hashlib.sha256(), 0
-    with path.open("rb") as file:
+    # A pipe of this name must not make us wait, nor a device give bytes without end.
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(handle, "rb") as file:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise InputError("file", str(path), "it is no regular file", "remove it")
         while block := file.read(1 << 20):
             digest.update(block)
             length += len(block)
@@ -159,7 +169,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     try:
         good = isinstance(manifest["request"], dict) and isinstance(manifest["wamnet"], str)
         good &= all(NAME.fullmatch(name) for name in _names(manifest)) and bool(manifest["frames"])
-        good &= all(frame["split"] in ("train", "test", "outside") for frame in manifest["frames"])
+        good &= all(frame["split"] in SPLITS for frame in manifest["frames"])
         _sums_of(manifest)
     except BROKEN:
         good = False
@@ -258,9 +268,11 @@ class Store:
         if folder.is_dir() and not (folder / MANIFEST).exists() and _visible(folder):
             rule = "it holds something else"
             raise InputError("output folder", str(folder), rule, "choose a new or empty one with -o")
+        check_work_folders(folder)
         before = _known_before(folder, request, frames) if (folder / MANIFEST).exists() else {}
-        folder.mkdir(parents=True, exist_ok=True)
-        with _locked(folder):
+        with making_parents(folder), alone_in(folder, "making a data set"):
+            # It was another process's until now.
+            check_work_folders(folder)
             store = cls(folder, request, frames, before, nearest or {})
             store._begin(on_look)
             yield store
@@ -269,8 +281,7 @@ class Store:
 
     def _begin(self, on_look: Look | None) -> None:
         """Find what is there; write down what is not, before any of it is made."""
-        for stray in self.folder.glob(f"{TEMPORARY}*"):
-            stray.unlink()
+        remove_temporaries(self.folder)
         names = list(self.pictures)
         self.sums = dict(self.before) | _read_journal(self.unfinished / JOURNAL)
         self.before = dict(self.sums)
@@ -283,19 +294,18 @@ class Store:
         self._write_manifest()
         for path in {self.unfinished, *((self.folder / name).parent for name in self.missing)}:
             path.mkdir(exist_ok=True)
-        (self.unfinished / JOURNAL).unlink(missing_ok=True)
         for path in sorted(self.unfinished.iterdir()):
             self._find_band(path)
         for name in list(self.missing):
             self._join_if_whole(self.pictures[name])
 
     def _find_band(self, path: Path) -> None:
-        """Keep a band of a missing picture that is what its name says, and remove every other file."""
+        """Keep a band of a missing picture that is what its name says; remove every other file of ours."""
         match = BAND.fullmatch(path.name)
         name = f"{match[1]}/{match[2]}.exr" if match else ""
         if match and name in self.missing and sum_of(path).sha256 == match[5]:
             self._bands[name][int(match[3]), int(match[4])] = path
-        else:
+        elif _is_own(path):
             path.unlink()
 
     def tasks(self) -> list[Task]:
@@ -318,7 +328,7 @@ class Store:
         """Write a band under a name that ends in its checksum."""
         from . import exr
 
-        new = self.unfinished / "new.exr"
+        new = self.unfinished / NEW
         exr.write_frame(new, band)
         first, last = rows
         stem = picture.name.replace("/", "-").removesuffix(".exr")
@@ -338,7 +348,7 @@ class Store:
             self._publish(picture, whole, join(parts))
         path = bands[whole]
         known = Sum(path.stat().st_size, path.suffixes[-2][1:])
-        with (self.unfinished / JOURNAL).open("a", encoding="utf-8") as journal:
+        with _appending(self.unfinished / JOURNAL) as journal:
             line = {"file": picture.name, "bytes": known.bytes, "sha256": known.sha256}
             journal.write(json.dumps(line) + "\n")
         path.replace(self.folder / picture.name)
@@ -353,7 +363,11 @@ class Store:
     def _finish(self) -> None:
         """Write the manifest with all checksums, and remove what an unfinished data set has."""
         self._write_manifest()
-        shutil.rmtree(self.unfinished, ignore_errors=True)
+        for path in self.unfinished.iterdir():
+            if _is_own(path):
+                path.unlink()
+        with suppress(OSError):
+            self.unfinished.rmdir()
 
     def _write_manifest(self) -> None:
         """Write the manifest, all of it or nothing."""
@@ -387,7 +401,7 @@ def _known_before(folder: Path, request: Request, frames: Sequence[FramePlan]) -
 def _read_journal(path: Path) -> dict[str, Sum]:
     """Return the pictures that a journal knows; a line that is cut short or damaged is none."""
     sums = {}
-    text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+    text = read_file(path, "journal").decode("utf-8", "replace") if path.exists() else ""
     for line in text.splitlines():
         try:
             entry = parse_json(line, "journal", "go on")
@@ -397,20 +411,33 @@ def _read_journal(path: Path) -> dict[str, Sum]:
     return sums
 
 
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Keep other processes out of a folder; the system forgets the lock of a process that was killed."""
-    path = folder / LOCK
-    with path.open("a") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            mine = path.exists() and path.stat().st_ino == os.fstat(lock.fileno()).st_ino
-        except BlockingIOError:
-            mine = False
-        if not mine:
-            rule = "another process is making a data set there"
-            raise InputError("output folder", str(folder), rule, "wait for it, or choose another with -o")
-        try:
-            yield
-        finally:
-            path.unlink(missing_ok=True)
+def check_work_folders(folder: Path) -> None:
+    """Refuse a data set in which something is not as it is made here: nothing was touched until then.
+
+    A link of a folder's name would lead what is written and removed to somebody else's files.
+    """
+    for name in (*SPLITS, UNFINISHED):
+        check_real_folder(folder / name)
+    unfinished = folder / UNFINISHED
+    there = [*(unfinished.iterdir() if unfinished.exists() else ())]
+    if (folder / MANIFEST).is_symlink():
+        there.append(folder / MANIFEST)
+    for path in sorted(there):
+        if path.name == MANIFEST or not _is_own(path):
+            what = "it is none of the files that wamnet makes there"
+            raise InputError(
+                "file of a data set", str(path), what, "move it elsewhere, or choose another folder with -o"
+            )
+
+
+def _is_own(path: Path) -> bool:
+    """Tell whether a file in UNFINISHED is one that is made here: of such a name, and no link."""
+    name = path.name
+    known = name in (JOURNAL, NEW) or BAND.fullmatch(name) or TEMPORARY_NAME.fullmatch(name)
+    return bool(known) and is_regular(path)
+
+
+def _appending(path: Path) -> IO[str]:
+    """Open a text file to add to it, but no link of its name."""
+    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+    return os.fdopen(os.open(path, flags, 0o666), "a", encoding="utf-8")

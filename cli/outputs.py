@@ -3,24 +3,23 @@
 1. Before long work starts, the output's name is checked: the folder exists and can be written, the name is no
    folder and none of the inputs [`check_output`].
 2. The content goes into a new file of another name in the same folder; only when it is complete does it take
-   the output's name, in one step of the file system [`replacing`]. Whatever ends the writer before that (an
-   error, Ctrl-C) removes the new file and leaves the old one.
-3. A folder that is written as a whole appears in the same way [`check_new_folder`], [`making_folder`].
+   the output's name, in one step of the file system [`replacing`, compiler/writing.py]. Whatever ends the
+   writer before that (an error, Ctrl-C) removes the new file and leaves the old one.
+3. A folder that a command works in is a real one, or is not there yet [`check_real_folder`].
+4. A folder that is written as a whole appears in the same way [`check_new_folder`], [`making_folder`].
 """
 
 from __future__ import annotations
 
 import os
 import shutil
-import tempfile
+import stat
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from ..compiler import writing
 from ..refimpl.errors import InputError
-
-TEMPORARY = ".wamnet-"
-"""How the names of unfinished files begin; a process that is killed leaves them behind."""
 
 
 def check_output(path: Path, suffixes: Sequence[str] = (), inputs: Sequence[Path] = ()) -> None:
@@ -71,26 +70,29 @@ def replacing(path: Path) -> Iterator[Path]:
     """Yield the name of a new file beside `path`: when the block ends well it replaces it, else it goes."""
     check_output(path)
     try:
-        # The name is short: one that repeats the output's could be longer than file systems allow.
-        handle, name = tempfile.mkstemp(prefix=TEMPORARY, suffix=path.suffix, dir=path.parent)
+        with writing.replacing(path) as new:
+            yield new
     except OSError as error:
         raise unwritable(path, error) from None
-    os.close(handle)
-    new = Path(name)
-    try:
-        yield new
-        _give_usual_rights(new)
-        new.replace(path)
-    except OSError as error:
-        raise unwritable(path, error) from None
-    finally:
-        new.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
     """Write `text` to `path`, all of it or none."""
     with replacing(path) as new:
         new.write_text(text, encoding="utf-8")
+
+
+def check_real_folder(folder: Path) -> bool:
+    """Tell whether a folder is there; refuse a link of its name, which would lead elsewhere, and all else."""
+    try:
+        found = folder.lstat().st_mode
+    except FileNotFoundError:
+        return False
+    if not stat.S_ISDIR(found):
+        kind = "a symbolic link" if stat.S_ISLNK(found) else "no folder"
+        rule = f"it is {kind}, and a folder of this command's own must be there, or nothing"
+        raise InputError("folder", str(folder), rule, "move it elsewhere, or choose another output with -o")
+    return True
 
 
 def check_new_folder(folder: Path) -> None:
@@ -106,21 +108,13 @@ def check_new_folder(folder: Path) -> None:
 def making_folder(folder: Path) -> Iterator[Path]:
     """Yield a new folder beside `folder`: when the block ends well it takes its name, else it goes."""
     check_new_folder(folder)
-    new: Path | None = None
+    new = writing.temporary_beside(folder)
     try:
-        new = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=folder.parent))
+        new.mkdir()
         yield new
-        _give_usual_rights(new, 0o777)
         new.replace(folder)
     except OSError as error:
         raise unwritable(folder, error, "output folder") from None
     finally:
-        if new is not None:
-            shutil.rmtree(new, ignore_errors=True)
-
-
-def _give_usual_rights(path: Path, rights: int = 0o666) -> None:
-    """Give a temporary file, which only its owner may read, the rights of any new file."""
-    mask = os.umask(0)
-    os.umask(mask)
-    path.chmod(rights & ~mask)
+        # Of a name that nobody else has; inside, no link is followed.
+        shutil.rmtree(new, ignore_errors=True)

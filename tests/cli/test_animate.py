@@ -170,12 +170,31 @@ def test_an_interrupted_run_goes_on(wamnet, tmp_path, monkeypatch) -> None:
 
 
 def test_what_a_killed_run_leaves_is_removed(wamnet, tmp_path) -> None:
-    """The unfinished picture; another hidden file stays."""
+    """The unfinished picture and the lock; another hidden file stays, as does a link of such a name."""
     (tmp_path / "a").mkdir()
-    for name in (".wamnet-x.png", ".kept"):
+    for name in (".wamnet-0123456789abcdef.png", ".kept", ".lock"):
         (tmp_path / "a" / name).write_text("")
+    link = ".wamnet-fedcba9876543210.png"
+    (tmp_path / "a" / link).symlink_to("00000.png")
     assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a").status == 0
-    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == [".kept", "00000.png", "00001.png"]
+    found = sorted(path.name for path in (tmp_path / "a").iterdir())
+    assert found == [".kept", link, "00000.png", "00001.png"]
+
+
+def test_the_folder_of_a_film_s_pictures_is_no_link(refused, tmp_path) -> None:
+    """What is in it would be written over and removed."""
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "a.gif.frames").symlink_to("mine")
+    text = "folder is a.gif.frames: it is a symbolic link, and a folder of this command's own"
+    assert text in refused("animate", "m.safetensors", *SHORT, "-o", "a.gif")
+
+
+def test_a_film_s_folder_with_more_in_it_stays(wamnet, tmp_path) -> None:
+    """Only the pictures that have become the film are removed."""
+    (tmp_path / "a.gif.frames").mkdir()
+    (tmp_path / "a.gif.frames" / ".kept").write_text("mine")
+    assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a.gif").status == 0
+    assert [path.name for path in (tmp_path / "a.gif.frames").iterdir()] == [".kept"]
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from wamnet.cli import dataset_files as files
+from wamnet.cli.alone import LOCK
 from wamnet.kernels import frame_plan
 from wamnet.kernels.frame_plan import Request, carry_out, plan
 from wamnet.refimpl.errors import InputError
@@ -183,6 +185,78 @@ def test_other_frames_are_refused(tmp_path) -> None:
         make(tmp_path)
 
 
+@pytest.mark.parametrize("name", ["unfinished", "train", "test", "outside", "unfinished/journal.jsonl"])
+def test_links_in_a_data_set_are_refused_before_anything_changes(tmp_path, name) -> None:
+    """A link of a work folder's name once led to the removal of all files in another folder."""
+    folder, victim = tmp_path / "a", tmp_path / "victim"
+    with files.Store.open(folder, REQUEST, plan(REQUEST)):
+        pass
+    victim.mkdir()
+    (victim / "thesis.txt").write_text("precious")
+    link = folder / name
+    if link.is_dir():
+        for path in link.iterdir():
+            path.unlink()
+        link.rmdir()
+    link.unlink(missing_ok=True)
+    link.symlink_to(victim if link.suffix == "" else victim / "thesis.txt")
+    before = content(tmp_path)
+    with pytest.raises(InputError, match=r"it is a symbolic link|none of the files that wamnet makes"):
+        make(folder)
+    assert content(tmp_path) == before
+    link.unlink()
+    assert make(folder)[0] == 18
+
+
+@pytest.mark.parametrize("name", ["thesis.txt", f"train-00000-noisy.0-6.{64 * '0'}.exr"])
+def test_other_files_in_the_unfinished_folder_are_refused(tmp_path, name) -> None:
+    """They stay: one of another name, and a link of a band's."""
+    with files.Store.open(tmp_path / "a", REQUEST, plan(REQUEST)):
+        pass
+    mine = tmp_path / "a" / files.UNFINISHED / name
+    if mine.suffix == ".txt":
+        mine.write_text("precious")
+    else:
+        mine.symlink_to(tmp_path)
+    with pytest.raises(InputError, match="it is none of the files that wamnet makes there; move it"):
+        make(tmp_path / "a")
+    assert mine.exists()
+
+
+def test_a_manifest_that_is_a_link_is_refused(tmp_path) -> None:
+    """It would be replaced when the data set is finished."""
+    with files.Store.open(tmp_path / "a", REQUEST, plan(REQUEST)):
+        pass
+    (tmp_path / "a" / files.MANIFEST).rename(tmp_path / "m.json")
+    (tmp_path / "a" / files.MANIFEST).symlink_to(tmp_path / "m.json")
+    with pytest.raises(InputError, match=r"manifest\.json: it is none of the files"):
+        make(tmp_path / "a")
+
+
+def test_hidden_files_of_others_stay(tmp_path) -> None:
+    """Only unfinished files of this project's names are removed; no folder, and no link of such a name."""
+    (tmp_path / "a").mkdir()
+    names = [".wamnet-notes", ".wamnet-0123456789abcdef", ".wamnet-fedcba9876543210.json"]
+    (tmp_path / "a" / names[0]).write_text("mine")
+    (tmp_path / "a" / names[1]).mkdir()
+    (tmp_path / "a" / names[2]).symlink_to(tmp_path)
+    (tmp_path / "a" / ".wamnet-0123456789abcdee.json").write_text("{")
+    make(tmp_path / "a")
+    assert sorted(path.name for path in (tmp_path / "a").glob(".*")) == sorted(names)
+
+
+def test_a_pipe_is_no_picture(tmp_path) -> None:
+    """It is missing, and its name does not make a reader wait."""
+    make(tmp_path / "a")
+    path = tmp_path / "a/train/00000-noisy.exr"
+    path.unlink()
+    os.mkfifo(path)
+    found = files.verify(tmp_path / "a", files.read_manifest(tmp_path / "a"))
+    assert found == {"train/00000-noisy.exr": "missing"}
+    with pytest.raises(InputError, match="it is no regular file"):
+        files.sum_of(path)
+
+
 def test_folders_that_are_something_else(tmp_path) -> None:
     """A file, a folder with files, a folder in which another process works."""
     (tmp_path / "file").write_text("kept")
@@ -196,7 +270,7 @@ def test_folders_that_are_something_else(tmp_path) -> None:
     ):
         make(tmp_path / "a")
     assert make(tmp_path / "a")[0] == 18
-    assert not (tmp_path / "a" / files.LOCK).exists()
+    assert not (tmp_path / "a" / LOCK).exists()
 
 
 @pytest.mark.parametrize(

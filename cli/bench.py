@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..compiler.writing import making_parents
 from ..refimpl.errors import ExecutorUnavailable, InputError
 from . import bench_forms, bench_frames, bench_report, machine, packages
+from .alone import alone_in
 from .bench_frames import Frames
 from .inputs import load_model
 from .options import ExecutorName, parse_names
@@ -194,12 +197,12 @@ def bench(
     taking_part = parse_names(only), executors
     forms = _forms(network, train_variants, quick, counts["steps"])
     forms = _needed(forms, *taking_part, size=numbers["size"], quick=quick)
-    make_folder(output)
-    with hint_on_interrupt(lambda: f"the same command goes on with the frames and forms in {output}"):
-        shown = what.frames(network, output, numbers["size"], counts)
-        trained = what.train(network, forms, output)
-    request = _request(name, network, shown, quick=quick, first_runs=first_runs, **numbers)
-    tell(measure(request, *taking_part, output, forms=trained), output)
+    with _in_folder(output):
+        with hint_on_interrupt(lambda: f"the same command goes on with the frames and forms in {output}"):
+            shown = what.frames(network, output, numbers["size"], counts)
+            trained = what.train(network, forms, output)
+        request = _request(name, network, shown, quick=quick, first_runs=first_runs, **numbers)
+        tell(measure(request, *taking_part, output, forms=trained), output)
 
 
 @dataclass(frozen=True)
@@ -393,6 +396,18 @@ def check_folder(output: Path) -> None:
     if output.is_dir():
         for name in (JSON_NAME, TEXT_NAME):
             check_output(output / name)
+
+
+@contextmanager
+def _in_folder(output: Path) -> Iterator[None]:
+    """Make the output folder, which is this process's alone until the block has ended."""
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(making_parents(output))
+        except OSError as error:
+            raise unwritable(output, error, "output folder") from None
+        stack.enter_context(alone_in(output, "measuring"))
+        yield
 
 
 def make_folder(output: Path) -> None:

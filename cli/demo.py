@@ -18,15 +18,19 @@ import json
 import math
 import shlex
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from ..compiler.writing import making_parents
 from ..refimpl.errors import ExecutorUnavailable, InputError
+from ..refimpl.reading import read_file
 from . import bench, bench_forms, bench_frames, dataset, dataset_files, report, train
+from .alone import alone_in
 from .compare import Score, measure
 from .compile import write_kernel
 from .outputs import unwritable, write_text
@@ -175,8 +179,7 @@ def demo(
     plan = for_this_machine(QUICK if quick else Plan(size_px=Plan.size_px if size is None else size))
     folder = output or Path(QUICK_FOLDER if quick else FOLDER)
     command = f"wamnet demo {'--quick' if quick else f'--size {plan.size_px}'} -o {shlex.quote(str(folder))}"
-    begin(plan, folder)
-    with hint_on_interrupt(lambda: f"go on with the same command: {command}"):
+    with begun(plan, folder), hint_on_interrupt(lambda: f"go on with the same command: {command}"):
         results = carry_out(plan, folder)
         speed = (
             None if quick else _timed(results.seconds, "speed", lambda: measure_speed(plan, results, folder))
@@ -207,28 +210,45 @@ def for_this_machine(plan: Plan) -> Plan:
     return replace(few, renderer="numpy", trainer="numpy")
 
 
-def begin(plan: Plan, folder: Path) -> None:
-    """Make the folder and note the plan in it; refuse a folder that has anything but results of this plan."""
+@contextmanager
+def begun(plan: Plan, folder: Path) -> Iterator[None]:
+    """Make the folder and note the plan in it; refuse a folder that has anything but results of this plan.
+
+    Nobody else makes a demonstration there until the block has ended.
+    """
     from ..refimpl.render import Job
 
     Job(plan.size_px, plan.size_px)  # Refuses a size that cannot be rendered.
     if folder.exists() and not folder.is_dir():
         raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
-    note, text = folder / PLAN_NAME, json.dumps(asdict(plan), indent=2) + "\n"
-    if folder.is_dir() and any(folder.iterdir()):
+    text = json.dumps(asdict(plan), indent=2) + "\n"
+    _check_note(folder, text)
+    with ExitStack() as stack:
         try:
-            found = note.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError):
-            found = ""
-        if found != text:
-            rule = "it holds results of another plan" if found else "it holds files that are not the demo's"
-            raise InputError("output folder", str(folder), rule, "choose another with -o, or remove it")
-        return
+            stack.enter_context(making_parents(folder))
+        except OSError as error:
+            raise unwritable(folder, error, "output folder") from None
+        stack.enter_context(alone_in(folder, "making a demonstration"))
+        if not _check_note(folder, text):
+            write_text(folder / PLAN_NAME, text)
+        yield
+
+
+def _check_note(folder: Path, text: str) -> bool:
+    """Tell whether the folder has results of this plan; refuse it if it has anything else to be seen.
+
+    What is hidden is a lock, or a file of a run that was killed before it had noted its plan.
+    """
+    if not folder.is_dir() or all(path.name.startswith(".") for path in folder.iterdir()):
+        return False
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise unwritable(folder, error, "output folder") from None
-    write_text(note, text)
+        found = read_file(folder / PLAN_NAME).decode("utf-8", "replace")
+    except InputError:
+        found = ""
+    if found != text:
+        rule = "it holds results of another plan" if found else "it holds files that are not the demo's"
+        raise InputError("output folder", str(folder), rule, "choose another with -o, or remove it")
+    return True
 
 
 def carry_out(plan: Plan, output: Path) -> Results:

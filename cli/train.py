@@ -14,6 +14,7 @@ import typer
 
 from ..refimpl.errors import InputError
 from . import options
+from .alone import alone_at
 from .inputs import CHECKPOINT_MARK, need_layers
 from .options import Preset, TrainerName
 from .outputs import check_output
@@ -132,18 +133,19 @@ def train(
     check_output(output, (".safetensors",), [*inputs, *targets])
     check_output(checkpoint_path(output))
     saved = checkpoint_path(output)
-    check_begin(saved, preset, resume, restart)
-    state = load_checkpoint(saved) if resume else None
-    recipe = _wanted(preset, state, features, steps, seed, rank)
-    network = _first_network(begin, state)
-    if variant is not None:
-        if features is not None or rank is not None:
-            option = "--features" if rank is None else "--rank"
-            raise InputError("--variant", variant, f"it chooses what {option} does", f"leave out {option}")
-        recipe, network = _begin_varied(recipe, begin, variant)
-    pairs = read_training(dataset, inputs, targets, recipe.features)
-    state = _fit_to_the_end(recipe, pairs, output, state, network, executor.value)
-    say(f"{output}: {state.step} steps; checkpoint in {saved}")
+    # Two runs would leave a model of one and a checkpoint of the other.
+    with alone_at(output, "training a model"), alone_at(saved, "training a model"):
+        check_begin(saved, preset, resume, restart)
+        state = load_checkpoint(saved) if resume else None
+        recipe = _wanted(preset, state, features, steps, seed, rank)
+        network = _first_network(begin, state)
+        if variant is not None:
+            if features is not None or rank is not None:
+                raise _chosen_twice(variant, "--features" if rank is None else "--rank")
+            recipe, network = _begin_varied(recipe, begin, variant)
+        pairs = read_training(dataset, inputs, targets, recipe.features)
+        state = _fit_to_the_end(recipe, pairs, output, state, network, executor.value)
+        say(f"{output}: {state.step} steps; checkpoint in {saved}")
 
 
 def _wanted(
@@ -173,6 +175,11 @@ def _first_network(begin: Path | None, state: TrainState | None) -> Siren | None
     if state is not None:
         raise InputError("--from", str(begin), "a resumed run goes on from its checkpoint", "leave it out")
     return load_model(begin).siren
+
+
+def _chosen_twice(variant: str, option: str) -> InputError:
+    """Return the refusal of an option beside the name of a variant, which says the same."""
+    return InputError("--variant", variant, f"it chooses what {option} does", f"leave out {option}")
 
 
 def _begin_varied(recipe: Recipe, begin: Path | None, name: str) -> tuple[Recipe, Siren]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +12,7 @@ import typer
 
 from ..refimpl.errors import InputError
 from . import options
+from .alone import alone_in
 from .inputs import load_model
 from .options import ExecutorName
 from .terminal import say, table
@@ -70,7 +73,7 @@ def tune(
         os.environ["WAMNET_CACHE"] = str(cache)
     network = load_model(model) if model else paper()
     square = (size, size)
-    with open_executor(executor.value) as runner:
+    with _alone(), open_executor(executor.value) as runner:
         known = None if force else tuning.remembered(runner, network, square, rank=rank)
         found = known or tuning.tune(runner, network, square, rank=rank)
         picks = {n: tuning.choose(runner, network, square, rank=rank, pictures=n) for n in (1, MANY)}
@@ -79,6 +82,25 @@ def tune(
         say(f"measured on {found.day}; --force measures again")
     for count, pick in picks.items():
         say(f"for {count} picture{'s' if count > 1 else ''}: {pick.schedule}; {pick.reason}")
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """Keep out another process that tunes on this machine: each would measure the other's load."""
+    from ..kernels import cache
+
+    folder = cache.folder()
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        writable = os.access(folder, os.W_OK | os.X_OK)
+    except OSError:
+        writable = False
+    # A cache that cannot be written costs time, never a run.
+    if not writable:
+        yield
+        return
+    with alone_in(folder, "tuning", "wait for it, or choose another with --cache"):
+        yield
 
 
 def paper() -> Model:

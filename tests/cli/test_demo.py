@@ -252,7 +252,8 @@ def test_a_folder_holds_one_plan(refused, tmp_path, finished) -> None:
     shutil.copytree(finished, tmp_path / "out")
     text = "output folder is out: it holds results of another plan; choose another with -o"
     assert text in refused("demo", "--size", 16, "-o", "out")
-    demo.begin(demo.for_this_machine(demo.QUICK), tmp_path / "out")
+    with demo.begun(demo.for_this_machine(demo.QUICK), tmp_path / "out"):
+        assert "another process is making a demonstration there" in refused("demo", "--quick", "-o", "out")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "noisy.exr").write_text("precious")
     assert "it holds files that are not the demo's" in refused("demo", "--quick", "-o", "mine")

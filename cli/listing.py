@@ -53,7 +53,8 @@ def listing(
     name = EXECUTOR_OF[target]
     text = as_text(_lines(model, name, profile), _reference)
     if output is None:
-        say(text.rstrip("\n"))
+        for line in text.rstrip("\n").split("\n"):
+            say(line)
     else:
         write_text(output, text)
         say(str(output))

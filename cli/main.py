@@ -10,7 +10,6 @@ Modules that compute are imported when a command runs, so that a help text appea
 from __future__ import annotations
 
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -38,6 +37,7 @@ from . import (
 )
 from .compile import EXAMPLES as COMPILE_EXAMPLES
 from .compile import compile_model
+from .terminal import tell
 
 STATUS_BAD_INPUT = 2
 """Exit status when a file, an option or the machine is not as it must be."""
@@ -152,7 +152,7 @@ def _run(arguments: Sequence[str] | None) -> int:
             raise
         return _fail(_usage(error))
     if status == STATUS_INTERRUPTED:
-        sys.stderr.write("wamnet: interrupted\n")
+        tell("interrupted")
     return status if isinstance(status, int) else 0
 
 
@@ -165,5 +165,5 @@ def _usage(error: Any) -> str:
 
 def _fail(message: str) -> int:
     """Say in one line on standard error what is wrong."""
-    sys.stderr.write(f"wamnet: error: {' '.join(message.split())}\n")
+    tell(f"error: {message}")
     return STATUS_BAD_INPUT

@@ -1,4 +1,7 @@
-"""What the commands print: results on standard output, progress on standard error if that is a terminal."""
+"""What the commands print: results on standard output, progress on standard error if that is a terminal.
+
+Names and texts may be those of strangers: nothing reaches the terminal before [`errors.escaped`] has seen it.
+"""
 
 from __future__ import annotations
 
@@ -19,13 +22,20 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
+from ..refimpl.errors import escaped, shown
+
 Advance = Callable[[float], None]
 """Called with the work done since the last call, in the unit of the total."""
 
 
 def say(text: str) -> None:
     """Print one line of result as it is: names of files may look like rich's markup or emoji codes."""
-    Console(highlight=False, soft_wrap=True).print(text, markup=False, emoji=False)
+    Console(highlight=False, soft_wrap=True).print(escaped(text), markup=False, emoji=False)
+
+
+def tell(text: str) -> None:
+    """Write one line of `wamnet` itself to standard error, such as an error."""
+    sys.stderr.write(f"wamnet: {shown(text)}\n")
 
 
 @contextmanager
@@ -34,7 +44,7 @@ def hint_on_interrupt(hint: Callable[[], str]) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        sys.stderr.write(f"wamnet: {hint()}\n")
+        tell(hint())
         raise
 
 
@@ -52,7 +62,7 @@ def progress(title: str, total: float) -> Iterator[Advance]:
         TextColumn("left"),
     )
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(title, total=total)
+        task = bar.add_task(escaped(title), total=total)
         yield lambda done: bar.update(task, advance=done)
 
 
@@ -61,9 +71,9 @@ def table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]], *, t
 
     All texts are shown as they are, without markup.
     """
-    grid = Table(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD)
+    grid = Table(title=Text(escaped(title)), title_justify="left", box=box.SIMPLE_HEAD)
     for index, name in enumerate(header):
-        grid.add_column(Text(name), justify="left" if index < texts else "right")
+        grid.add_column(Text(escaped(name)), justify="left" if index < texts else "right")
     for row in rows:
-        grid.add_row(*map(Text, row))
+        grid.add_row(*(Text(escaped(cell)) for cell in row))
     Console(highlight=False).print(grid)

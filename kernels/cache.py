@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ..compiler.writing import write_bytes
-from ..refimpl.errors import InputError
+from ..refimpl.errors import InputError, shown
 from ..refimpl.reading import BROKEN, parse_json, read_file
 
 FOLDER_VARIABLE = "WAMNET_CACHE"
@@ -64,7 +64,9 @@ def read_json(name: str) -> Any:
         entry = parse_json(content, "cache entry", "remove it")
         if entry["schema"] == SCHEMA and entry["sha256"] == _checksum(entry["data"]):
             return entry["data"]
-    _log.warning("cache entry %s is damaged, or no entry of wamnet: it is ignored and written anew", path)
+    _log.warning(
+        "cache entry %s is damaged, or no entry of wamnet: it is ignored and written anew", shown(str(path))
+    )
     return None
 
 
@@ -77,7 +79,9 @@ def write_json(name: str, data: Any) -> Path | None:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_bytes(path, (json.dumps(entry, indent=1, sort_keys=True) + "\n").encode())
     except OSError as error:
-        _log.warning("cache entry %s cannot be written (%s): nothing is kept", path, error.strerror)
+        _log.warning(
+            "cache entry %s cannot be written (%s): nothing is kept", shown(str(path)), error.strerror
+        )
         return None
     return path
 

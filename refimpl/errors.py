@@ -2,16 +2,54 @@
 
 Every message is one line with four parts: what is wrong, its value, the rule that it breaks, and the way out.
 Programs catch [`WamnetError`]; the command line prints its text and exits with status 2.
+
+Parts of a message come from files of strangers, and a terminal obeys what it is shown: [`escaped`] replaces
+its control characters, and [`shown`] also makes one line of a stated length.
 """
 
 from __future__ import annotations
 
-_SHOWN_CHARACTERS = 120
-"""Longest piece of an offending value that a message repeats, in characters: a line, not a dump."""
+import unicodedata
+
+LONGEST_MESSAGE = 1000
+"""Most characters of a message: some lines of a terminal, not a dump."""
+
+_MOST_OF_WHAT, _MOST_OF_VALUE, _MOST_OF_RULE = 200, 120, 320
+"""Most characters of a message's parts: the name of the thing, its value, the rule and, as long, the way out.
+Together with what stands between them they are at most LONGEST_MESSAGE."""
+
+_CONTROLS = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+"""Unicode's categories of what moves a cursor, turns or hides writing, or is half a character."""
+
+
+def escaped(text: str) -> str:
+    """Return the text with its control characters as escapes, such as `\\x1b` and `\\u202e`."""
+    if text.isprintable():
+        return text
+    return "".join(
+        character.encode("unicode_escape").decode("ascii")
+        if unicodedata.category(character) in _CONTROLS
+        else character
+        for character in text
+    )
+
+
+def shown(text: str, most: int = LONGEST_MESSAGE) -> str:
+    """Return the text on one line without control characters, its middle left out where it is too long."""
+    # Folding comes first: a line's end inside of a text is a blank to its reader, not an escape.
+    line = escaped(" ".join(text.split()))
+    if len(line) <= most:
+        return line
+    tail = (most - 3) // 3
+    return f"{line[: most - 3 - tail]}...{line[len(line) - tail :]}"
 
 
 class WamnetError(Exception):
     """Base of all errors that stem from input, set-up or data; anything else that is raised is a bug."""
+
+    def __str__(self) -> str:
+        """Return the message as a terminal may have it; `args` keep it as it was given."""
+        return shown(super().__str__())
 
 
 class InputError(WamnetError, ValueError):
@@ -21,7 +59,13 @@ class InputError(WamnetError, ValueError):
     """
 
     def __init__(self, what: str, value: object, rule: str, way_out: str) -> None:
-        super().__init__(f"{what} is {_shown(value)}: {rule}; {way_out}")
+        told = shown(value if isinstance(value, str) else repr(value), _MOST_OF_VALUE)
+        thing, law, help_ = (
+            shown(what, _MOST_OF_WHAT),
+            shown(rule, _MOST_OF_RULE),
+            shown(way_out, _MOST_OF_RULE),
+        )
+        super().__init__(f"{thing} is {told}: {law}; {help_}")
         self.what, self.value, self.rule, self.way_out = what, value, rule, way_out
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, object, str, str]]:
@@ -39,10 +83,3 @@ class CompileError(WamnetError):
 
 class ExecutorUnavailable(WamnetError):
     """A device, driver or package that an executor needs is missing."""
-
-
-def _shown(value: object) -> str:
-    """Return `value` on one line, cut to a readable length."""
-    text = value if isinstance(value, str) else repr(value)
-    text = " ".join(text.split())
-    return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 3] + "..."

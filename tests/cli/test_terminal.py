@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-import pytest
+import io
+import unicodedata
+from contextlib import redirect_stderr, redirect_stdout
 
-from wamnet.cli import terminal
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.cli import main, terminal
 
 NAME = "out[bold]/[/]:smile:[red].exr"
 """A file name that rich would read as markup and emoji."""
@@ -38,3 +44,51 @@ def test_the_hint_is_said_on_interrupt(capsys) -> None:
     with pytest.raises(KeyboardInterrupt):
         interrupted()
     assert capsys.readouterr().err == "wamnet: go on so\n"
+
+
+def controls_of(text: str) -> list[str]:
+    """Return the control characters of a text, without the ends of its lines."""
+    return [c for c in text if c != "\n" and unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp")]
+
+
+ANY_TEXT = st.one_of(
+    st.text(st.integers(0, 0x10FFFF).map(chr)),
+    st.text(st.sampled_from("\x00\x07\x1b[2J\x9b\u200b\u202e\u2028\ud800\r\n\tab")),
+)
+"""Texts of all code points, and of controls mostly."""
+
+
+@given(ANY_TEXT)
+def test_no_control_character_reaches_the_terminal(text) -> None:
+    """Whatever a file or a name has said: in lines, tables, errors and hints."""
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        terminal.say(text)
+        assert out.getvalue().count("\n") == 1
+        terminal.table(text, ("a", text), [(text, text)], texts=2)
+        terminal.tell(text)
+        main._fail(text)
+    assert controls_of(out.getvalue()) == []
+    assert controls_of(err.getvalue()) == []
+    assert err.getvalue().count("\n") == 2
+
+
+def test_titles_of_progress_are_escaped(capsys, monkeypatch) -> None:
+    """Where the bar is shown; its own colours and movements are rich's."""
+    monkeypatch.setattr(terminal.Console, "is_terminal", True)
+    monkeypatch.setenv("COLUMNS", "200")
+    with terminal.progress("rendering \x07\u202ehome", 1) as advance:
+        advance(1)
+    assert "rendering \\x07\\u202ehome" in capsys.readouterr().err
+
+
+def test_keys_of_files_do_not_clear_the_screen(wamnet, tmp_path) -> None:
+    """Nor do names of files."""
+    (tmp_path / "s.json").write_text(
+        '{"format": "wamnet-scene", "version": 1, "x\\u001b[2J\\u202e": 1}', encoding="utf-8"
+    )
+    outcome = wamnet("render", "s.json")
+    assert outcome.status == 2
+    assert controls_of(outcome.err) == []
+    assert "x\\x1b[2J\\u202e" in outcome.err
+    assert controls_of(wamnet("render", "a\x1b[2J.json").err) == []

@@ -84,7 +84,7 @@ def test_checkpoints_by_time(wamnet, pair, tmp_path, monkeypatch) -> None:
         ),
         (["-o", "m.pt"], "output file is m.pt: its name must end in .safetensors"),
         (["-o", "no/m.safetensors"], "output folder is no: it does not exist"),
-        (["--resume"], "wamnet-checkpoint file is model.checkpoint.safetensors: cannot be read"),
+        (["--resume"], "wamnet-checkpoint file is model.checkpoint.safetensors: it cannot be read"),
         (["-i", "none.exr", "-t", "noisy.exr"], "input file is none.exr: it does not exist"),
         (["--preset", "long"], "Invalid value for '--preset'"),
     ],

@@ -1,0 +1,89 @@
+"""Tests of messages: one line of a stated length that no terminal obeys, whatever the text in it."""
+
+from __future__ import annotations
+
+import pickle
+import unicodedata
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.refimpl.errors import (
+    LONGEST_MESSAGE,
+    CompileError,
+    ExecutorUnavailable,
+    InputError,
+    TrainingError,
+    WamnetError,
+    escaped,
+    shown,
+)
+
+CONTROLS = ("Cc", "Cf", "Cs", "Zl", "Zp")
+"""Categories of what must not reach a terminal."""
+
+HOSTILE = "\x00\x07\x1b[2J\x7f\x9b31m\u200b\u202e\u2066\ufeff\u2028\u2029\ud800\U000e0041\r\n\t"
+"""Clear the screen, ring, turn the writing around, hide, half a character, a tag, ends of lines."""
+
+ANY_TEXT = st.one_of(
+    st.text(st.integers(0, 0x10FFFF).map(chr)),
+    st.text(st.sampled_from(HOSTILE + "abc")),
+    st.text(min_size=400),
+)
+"""Texts of all code points, of controls mostly, and long ones."""
+
+
+def controls_of(text: str) -> list[str]:
+    """Return the control characters of a text."""
+    return [character for character in text if unicodedata.category(character) in CONTROLS]
+
+
+@given(ANY_TEXT)
+def test_escaped_texts_have_no_controls(text):
+    """And are the same where they had none."""
+    assert controls_of(escaped(text)) == []
+    if not controls_of(text):
+        assert escaped(text) == text
+
+
+@given(ANY_TEXT, st.integers(8, 400))
+def test_shown_texts_are_one_short_line(text, most):
+    found = shown(text, most)
+    assert controls_of(found) == []
+    assert len(found) <= most
+    assert shown(found, most) == found
+
+
+@given(ANY_TEXT, ANY_TEXT, ANY_TEXT, ANY_TEXT)
+def test_no_part_of_an_error_reaches_a_terminal_raw(what, value, rule, way_out):
+    error = InputError(what, value, rule, way_out)
+    assert controls_of(str(error)) == []
+    assert len(str(error)) <= LONGEST_MESSAGE
+    assert (error.what, error.value) == (what, value), "programs get what was given"
+
+
+@pytest.mark.parametrize("kind", [WamnetError, TrainingError, CompileError, ExecutorUnavailable])
+def test_errors_of_one_sentence_are_shown_so_too(kind):
+    error = kind(f"a driver says: {HOSTILE}" + 5000 * "x")
+    assert controls_of(str(error)) == []
+    assert len(str(error)) == LONGEST_MESSAGE
+    assert str(pickle.loads(pickle.dumps(error))) == str(error)
+
+
+def test_long_parts_keep_their_ends_and_leave_room_for_the_others():
+    """A file's name stands at the end of its path."""
+    path = f"/{'folder/' * 1000}frame.exr"
+    error = InputError(f"{path}: layers", path, 5000 * "r", 5000 * "w")
+    first, second = str(error).split(" is ")[0], str(error).split(" is ")[1]
+    assert first.startswith("/folder/")
+    assert first.endswith("frame.exr: layers")
+    assert "...folder" in second or "frame.exr: rrr" in second
+    assert str(error).count("r" * 100) > 0
+    assert str(error).endswith("www")
+
+
+def test_escapes_are_those_of_python():
+    assert escaped("a\x1b[2J\u202e\ud800\U000e0041 \u00e4\u4e16") == (
+        "a\\x1b[2J\\u202e\\ud800\\U000e0041 \u00e4\u4e16"
+    )

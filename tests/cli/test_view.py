@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import shutil
@@ -93,7 +94,7 @@ def test_the_page_is_served_to_this_machine(wamnet, here, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(view.webbrowser, "open", browse)
-    monkeypatch.setattr(view.ThreadingHTTPServer, "serve_forever", serve_two)
+    monkeypatch.setattr(view.PageServer, "serve_forever", serve_two)
     monkeypatch.setattr(view, "page_of", lambda *_: "<!DOCTYPE html>")
     outcome = wamnet("view", "model.safetensors")
     found["thread"].join()
@@ -108,7 +109,7 @@ def test_no_browser_where_none_is_wanted(wamnet, here, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(view.webbrowser, "open", lambda address: pytest.fail("a browser was opened"))
-    monkeypatch.setattr(view.ThreadingHTTPServer, "serve_forever", stop)
+    monkeypatch.setattr(view.PageServer, "serve_forever", stop)
     monkeypatch.setattr(view, "page_of", lambda *_: "")
     assert wamnet("view", "model.safetensors", "--no-browser").status == 0
 
@@ -136,3 +137,93 @@ def test_a_port_that_is_taken_is_refused(refused, here, monkeypatch):
         taken.listen()
         line = refused("view", "model.safetensors", "--port", taken.getsockname()[1])
     assert "it cannot be had (Address already in use); choose another, or 0" in line
+
+
+# ---- the server, through real sockets ---------------------------------------------------------------------
+
+PAGE = b"<!DOCTYPE html>the page"
+
+
+@pytest.fixture
+def served():
+    """Give a function that serves PAGE with limits, and returns the port."""
+    servers = []
+
+    def serve(most=view.MOST_CONNECTIONS, seconds=view.LONGEST_CONNECTION_S):
+        server = view.PageServer((view.HOST, 0), view.handler_of(PAGE), most, seconds)
+        servers.append(server)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        return server.server_address[1]
+
+    yield serve
+    for server in servers:
+        server.shutdown()
+        server.server_close()
+
+
+def answer_to(port, text):
+    """Send a request as it is, and return all that comes back: nothing where the connection is refused."""
+    with socket.create_connection((view.HOST, port), timeout=60) as connection:
+        try:
+            connection.sendall(text.encode("latin-1"))
+            return b"".join(iter(lambda: connection.recv(65536), b""))
+        except ConnectionError:
+            return b""
+
+
+@pytest.mark.parametrize("name", ["127.0.0.1", "localhost", "LocalHost", "[::1]"])
+def test_who_names_this_machine_gets_the_page(served, name):
+    port = served()
+    head, _, body = answer_to(port, f"GET / HTTP/1.1\r\nHost: {name}:{port}\r\n\r\n").partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.0 200 ")
+    assert b"Cache-Control: no-store" in head
+    assert b"X-Content-Type-Options: nosniff" in head
+    assert body == PAGE
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "Host: evil.example:{port}\r\n",
+        "Host: evil.example\r\n",
+        "Host: 127.0.0.1\r\n",
+        "Host: 127.0.0.1:1\r\n",
+        "Host: 127.0.0.1:{port}.evil.example\r\n",
+        "Host: 127.0.0.1:{port}\r\nHost: evil.example\r\n",
+        "Host:\r\n",
+        "",
+    ],
+)
+@pytest.mark.parametrize("method", ["GET", "HEAD"])
+def test_who_names_another_machine_gets_nothing(served, method, host):
+    """A page of another site, whose name was made to point here, could read the model otherwise."""
+    port = served()
+    found = answer_to(port, f"{method} / HTTP/1.1\r\n{host.format(port=port)}\r\n")
+    assert found.startswith(b"HTTP/1.0 421 ")
+    assert PAGE not in found
+
+
+def test_a_head_is_answered_without_the_page(served):
+    port = served()
+    found = answer_to(port, f"HEAD / HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n")
+    assert found.startswith(b"HTTP/1.0 200 ")
+    assert f"Content-Length: {len(PAGE)}".encode() in found
+    assert found.endswith(b"\r\n\r\n")
+    missing = answer_to(port, f"HEAD /../../etc/passwd HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n")
+    assert missing.startswith(b"HTTP/1.0 404 ")
+
+
+def test_connections_are_few_and_make_room(served):
+    """One too many is closed at once; those that say nothing, or a letter now and then, are ended too."""
+    port = served(most=3, seconds=1.0)
+    with contextlib.ExitStack() as made:
+        idle = [made.enter_context(socket.create_connection((view.HOST, port), timeout=60)) for _ in range(3)]
+        idle[0].sendall(b"GET / HT")
+        fourth = made.enter_context(socket.create_connection((view.HOST, port), timeout=60))
+        assert fourth.recv(1) == b"", "there is no place for it"
+        for connection in idle:
+            assert connection.recv(1) == b"", "the server has ended it"
+    # The places are given back just after the connections are closed.
+    while not (found := answer_to(port, f"GET / HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n")):
+        pass
+    assert found.endswith(PAGE)

@@ -2,8 +2,8 @@
 
 import sys
 
-from .main import main
+from .entry import run
 
 # Processes that share the rendering import this module again, and must not start the command again.
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run())

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ..compiler.artifact import Artifact
 from ..refimpl.errors import ExecutorUnavailable, WamnetError
 from .executor import Executor, Images
+from .orphans import end_with_parent
 from .registry import WAYS, open_executor
 
 LIMIT_S = 300.0
@@ -159,6 +160,7 @@ class Apart:
 
 def _serve(pipe: Any, name: str, options: Mapping[str, str]) -> None:
     """Open an executor, say its device, and answer requests until the other end is closed."""
+    end_with_parent()
     # Ctrl-C reaches all processes of a terminal: the parent ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:

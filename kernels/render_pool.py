@@ -23,6 +23,7 @@ from ..refimpl.errors import InputError
 from ..refimpl.render import Job, Render, join_rows, render
 from ..refimpl.scene import Scene
 from .memory import keep_freed_memory
+from .orphans import end_with_parent
 
 PROGRESS_INTERVAL_S = 0.2
 """Seconds between two looks at the workers' counter: smooth for a progress bar, free for the workers."""
@@ -124,7 +125,8 @@ def _watch(futures: list[Future[Render]], counter: Any, on_progress: Callable[[i
 
 
 def _start_worker(counter: Any) -> None:
-    """Keep the shared counter in this worker, in which SIGINT is blocked: its parent ends it."""
+    """Keep the shared counter in this worker, in which SIGINT is blocked: it ends with its parent."""
+    end_with_parent()
     keep_freed_memory()
     global _finished  # noqa: PLW0603 - the pool's initializer has no other way to reach the tasks
     _finished = counter

@@ -1,0 +1,39 @@
+"""Tests of the command's first moments: Ctrl-C while modules are imported is one line."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+CODE = (
+    "import builtins, signal, sys\n"
+    "from wamnet.cli import entry\n"
+    "real = builtins.__import__\n"
+    "def interrupted(name, *rest):\n"
+    "    if name == {name!r}:\n"
+    "        signal.raise_signal(signal.SIGINT)\n"
+    "    return real(name, *rest)\n"
+    "builtins.__import__ = interrupted\n"
+    "sys.argv = ['wamnet', 'render', 'minicubes', '--width', '4', '--height', '4', '-o', 'a.exr']\n"
+    "sys.exit(entry.run())\n"
+)
+"""The command, interrupted at its first import of a module."""
+
+
+@pytest.mark.parametrize("name", ["typer", "numpy"])
+def test_an_interrupt_of_the_imports_is_one_line(tmp_path, name) -> None:
+    """It was a traceback of KeyboardInterrupt for the first tenths of a second."""
+    command = [sys.executable, "-c", CODE.format(name=name)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+    assert done.stderr == "wamnet: interrupted\n"
+    assert done.returncode == 128 + signal.SIGINT
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_entry_imports_next_to_nothing(tmp_path) -> None:
+    """What is imported before Ctrl-C is handled must be a matter of milliseconds."""
+    code = "import sys; import wamnet.cli.entry; sys.exit('typer' in sys.modules or 'rich' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=False, timeout=60).returncode == 0

@@ -1,0 +1,75 @@
+"""Tests of workers whose parent is killed: none stays."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+GRACE_S = 10.0
+"""Seconds after which a process that is still there counts as one that stays: a guard, no speed."""
+
+POOL = (
+    "import sys; from wamnet.kernels.render_pool import render_parallel\n"
+    "from wamnet.refimpl.render import Job; from wamnet.refimpl.scenes import canonical\n"
+    "if __name__ == '__main__':\n"
+    "    told = lambda samples: print('ready', flush=True)\n"
+    "    render_parallel(canonical('minicubes'), Job(256, 256, 10000), workers=2, on_progress=told)\n"
+)
+"""A render on two processes that tells when they work."""
+
+APART = (
+    "import time; from wamnet.kernels.apart import Apart\n"
+    "if __name__ == '__main__':\n"
+    "    with Apart('numpy'): print('ready', flush=True); time.sleep(600)\n"
+)
+"""An executor in a process of its own."""
+
+CLUSTER = (
+    "import time; from wamnet.cli.cluster import open_client\n"
+    "if __name__ == '__main__':\n"
+    "    with open_client(2, None): print('ready', flush=True); time.sleep(600)\n"
+)
+"""A Dask cluster of two processes."""
+
+
+def members(group: int) -> set[int]:
+    """Return the processes of a session that have not ended."""
+    found = set()
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, _, session = path.read_text().rpartition(")")[2].split()[:4]
+        except OSError:  # it has ended meanwhile
+            continue
+        if int(session) == group and state != "Z":
+            found.add(int(path.parent.name))
+    return found
+
+
+@pytest.mark.parametrize("code", [POOL, APART, CLUSTER], ids=["pool", "apart", "cluster"])
+def test_workers_end_with_a_parent_that_is_killed(tmp_path, code) -> None:
+    """Two workers of each killed render stayed for ever, with 53 MB each."""
+    if code is CLUSTER:
+        pytest.importorskip("distributed")
+    (tmp_path / "run.py").write_text(code)
+    command = [sys.executable, "run.py"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, cwd=tmp_path, stdout=pipe, start_new_session=True) as process:
+        try:
+            assert process.stdout.readline() == b"ready\n"
+            assert len(members(process.pid)) > 1
+            process.kill()
+            process.wait()
+            for _ in range(int(GRACE_S / 0.1)):
+                if not (left := members(process.pid)):
+                    break
+                time.sleep(0.1)
+            assert left == set()
+        finally:
+            for pid in members(process.pid):
+                os.kill(pid, signal.SIGKILL)

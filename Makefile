@@ -5,6 +5,7 @@
 # WAMNET_REQUIRE=  executors whose absence fails `make test`; empty: skip, and say so, what is not there;
 #                  c is among them where $(CC) finds the C library
 # MINUTES=10       how long `make fuzz` goes on
+# COUNT=, SEED=    how many faults `make faults` has, and which
 # ALSO=            what must be there besides, as torch,pyoidn after `make baselines`
 
 VENV ?= .venv
@@ -14,13 +15,14 @@ WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba,chromium$(if $(shell $
 override WAMNET_REQUIRE := $(WAMNET_REQUIRE)$(if $(ALSO),$(comma)$(ALSO))
 PYTEST_OPTIONS ?= -n 2
 MINUTES ?= 10
+COUNT ?= 300
 export VENV PYTHON WAMNET_REQUIRE
 
 # Two workers share two cores: one thread of linear algebra each.
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup baselines demo docs test long fuzz lint clean distclean
+.PHONY: help setup baselines demo docs test long fuzz faults lint clean distclean
 
 help: ## List the targets
 	@grep -hE '^[a-z]+: .*## ' Makefile | sed -E 's/^([a-z]+):.*## (.*)/  make \1	\2/' | expand -t 20
@@ -48,6 +50,8 @@ long: setup ## Test kernels with other cases each time, many and wide (2 hours o
 fuzz: setup ## Feed changed files to every reader and command; MINUTES=10, SEED=n repeats a run, ONLY=name, AT=n one input
 	@$(ONE_THREAD) PYTHONPATH=tests/fuzz $(VENV)/bin/python tests/fuzz/fuzz.py --minutes $(MINUTES) \
 		$(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only $(ONLY)) $(if $(AT),--at $(AT))
+faults: setup ## Kill commands, fill their disk, start two at once: COUNT=300 times (half an hour); SEED=n repeats
+	@$(ONE_THREAD) $(VENV)/bin/python tests/support/faults.py --count $(COUNT) $(if $(SEED),--seed $(SEED))
 
 lint: setup ## Check style, format, types on the installed wheel, and the house rules
 	@.ci/lint

@@ -1,0 +1,347 @@
+"""Faults at random times: kills, full disks, folders that cannot be written, two processes at one output.
+
+`make faults COUNT=300 SEED=1` runs as many and prints what it has found; a run is repeated by its seed, up to
+the machine's speed. Each fault has an empty folder with a model and two frames:
+
+1. the command runs once undisturbed for each kind, which gives the wanted bytes and a duration [`Case`];
+2. it runs again and is disturbed [`FAULTS`];
+3. a file under a final name has the wanted bytes, no process of it is left after GRACE_S, nothing shows a
+   traceback, and after SIGINT and SIGTERM nothing hidden stays [`look`];
+4. the command, repeated or resumed, ends well with the wanted bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import fnmatch
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+GRACE_S = 10.0
+"""Seconds after which a process that is still there counts as one that stays: a guard, no speed."""
+
+LIMIT_S = 240.0
+"""Seconds after which a command counts as one that hangs."""
+
+KILLS = {"KILL": signal.SIGKILL, "INT": signal.SIGINT, "TERM": signal.SIGTERM}
+FAULTS = (*KILLS, "full", "read-only", "two")
+"""What can happen; each command meets all."""
+
+WITHOUT_RIGHTS = ("setpriv", "--bounding-set=-dac_override,-dac_read_search")
+"""Runs a command of root's without the right to write where rights forbid it, as any other user."""
+
+DATASET = ("dataset", "minicubes", "--frames", "2", "--test", "1", "--size", "24", "--spp", "8", "-o", "out")
+TRAIN = ("train", "-i", "n.exr", "-t", "r.exr", "--steps", "40", "-o", "out.safetensors")
+RENDER = ("render", "minicubes", "--width", "64", "--height", "64", "--spp", "32", "-o", "out.exr")
+ANIMATE = ("animate", "m.safetensors", "--seconds", "0.4", "--fps", "5", "--size", "16")
+BENCH = ("bench", "m.safetensors", "--quick", "--size", "24", "--frames", "1", "--reference-spp", "2")
+
+
+@dataclass
+class Case:
+    """A command, the files whose bytes are wanted, and those that may lie there besides, as patterns."""
+
+    arguments: Sequence[str]
+    exact: Sequence[str]
+    besides: Sequence[str] = ()
+    locks: bool = True
+    wanted: dict[str, bytes] = field(default_factory=dict)
+    duration: float = 0.0
+
+
+CASES = {
+    "dataset": Case(
+        (*DATASET, "--workers", "1"), ["out/t*/*.exr"], ["out/manifest.json", "out/unfinished/*"]
+    ),
+    "dataset-2": Case(
+        (*DATASET, "--workers", "2"), ["out/t*/*.exr"], ["out/manifest.json", "out/unfinished/*"]
+    ),
+    "train": Case(TRAIN, ["out.safetensors"], ["out.checkpoint.safetensors"]),
+    "animate": Case((*ANIMATE, "-o", "out"), ["out/*.png"]),
+    "animate-gif": Case((*ANIMATE, "-o", "out.gif"), ["out.gif"], ["out.gif.frames/*.png"]),
+    "export": Case(("export", "m.safetensors", "--target", "c", "-o", "out"), ["out/*"], locks=False),
+    "compile": Case(("compile", "m.safetensors", "--target", "opencl", "-o", "out"), ["out/*"], locks=False),
+    "render": Case((*RENDER, "--workers", "2"), ["out.exr"], locks=False),
+    "view": Case(("view", "m.safetensors", "-o", "out.html"), ["out.html"], locks=False),
+    "tune": Case(
+        ("tune", "m.safetensors", "--size", "12", "--force", "--cache", "out"), ["none"], ["out/*.json"]
+    ),
+    "demo": Case(
+        ("demo", "--quick", "-o", "out"), ["out/frames/t*/*.exr", "out/model.safetensors"], ["out/*"]
+    ),
+    "bench": Case((*BENCH, "--only", "numpy*", "-o", "out"), ["out/frames-*/t*/*.exr"], ["out/*"]),
+}
+"""The commands. Times are in the results of the last three: of those files only the others are compared."""
+
+LONG = {"demo", "bench", "tune"}
+"""Commands that take longer, and come less often."""
+
+
+def prepare(folder: Path) -> None:
+    """Make a small model and two frames, which all runs begin with."""
+    import numpy as np
+
+    from wamnet.cli import exr
+    from wamnet.compiler.model_file import save_model
+    from wamnet.refimpl import siren
+    from wamnet.refimpl.dataset import Normalization, Window
+    from wamnet.refimpl.denoise import Model
+    from wamnet.refimpl.render import Job, render
+    from wamnet.refimpl.scenes import canonical
+
+    scene = canonical("minicubes", time=1.0)
+    for name, spp in (("n.exr", 1), ("r.exr", 8)):
+        exr.write_frame(folder / name, render(scene, Job(16, 16, spp, spp)).frame)
+    network = siren.init((4 * 4 * 6, 8, 3), 2.0, 2.0, 5, np.float32)
+    info = {"trained_on_scene": "minicubes"}
+    model = Model(network, ("color", "normal"), Window(4, "clamp"), Normalization(), info)
+    save_model(folder / "m.safetensors", model)
+
+
+def members(session: int) -> set[int]:
+    """Return the processes of a session that have not ended."""
+    found = set()
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, _, of = path.read_text().rpartition(")")[2].split()[:4]
+        except OSError:  # it has ended meanwhile
+            continue
+        if int(of) == session and state != "Z":
+            found.add(int(path.parent.name))
+    return found
+
+
+def start(
+    case: Case,
+    folder: Path,
+    more: Sequence[str] = (),
+    preexec: Callable[[], None] | None = None,
+    before: Sequence[str] = (),
+) -> subprocess.Popen[bytes]:
+    """Start a command in a session of its own; what it says waits in a pipe, which is larger."""
+    command = [*before, sys.executable, "-m", "wamnet.cli", *case.arguments, *more]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "WAMNET_CACHE": f"{folder}.cache"}
+    return subprocess.Popen(
+        command,
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+        preexec_fn=preexec,  # noqa: PLW1509 - this program has one thread
+    )
+
+
+def end(process: subprocess.Popen[bytes]) -> tuple[int, str, set[int]]:
+    """Wait for the end; return status, what was said, and the processes that stayed, which are ended."""
+    try:
+        process.wait(LIMIT_S)
+    except subprocess.TimeoutExpired:
+        return -1000, "it hangs", _swept(process.pid)
+    for _ in range(int(GRACE_S / 0.1)):
+        if not members(process.pid):
+            break
+        time.sleep(0.1)
+    left = _swept(process.pid)
+    assert process.stdout is not None
+    with process.stdout as pipe:
+        return process.returncode, pipe.read().decode(errors="replace"), left
+
+
+def _swept(session: int) -> set[int]:
+    """Return the processes of a session, and end them."""
+    left = members(session)
+    for pid in left:
+        os.kill(pid, signal.SIGKILL)
+    return left
+
+
+def matches(name: str, patterns: Sequence[str]) -> bool:
+    """Tell whether a name matches one of the patterns."""
+    return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def look(case: Case, folder: Path, inputs: set[str], whole: bool, hidden: bool) -> list[str]:
+    """Return what is wrong with the files in a folder; `whole`: all must be there, `hidden`: may stay."""
+    wrong, seen = [], set()
+    for path in folder.rglob("*"):
+        name = path.relative_to(folder).as_posix()
+        if path.is_dir() or name in inputs:
+            continue
+        if path.name.startswith("."):
+            wrong += [] if hidden else [f"hidden file stays: {name}"]
+        elif matches(name, case.exact):
+            seen.add(name)
+            if path.read_bytes() != case.wanted.get(name):
+                wrong.append(f"other bytes than wanted: {name}")
+        elif not matches(name, case.besides):
+            wrong.append(f"unknown file: {name}")
+    missing = case.wanted.keys() - seen if whole else ()
+    return [*wrong, *(f"missing: {name}" for name in missing)]
+
+
+class Bench:
+    """A folder for all runs: inputs, and the wanted files of each command."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.number = folder, 0
+        self.inputs = folder / "inputs"
+        self.inputs.mkdir()
+        prepare(self.inputs)
+        self.names = {path.name for path in self.inputs.iterdir()}
+
+    def fresh(self) -> Path:
+        """Return a new folder with the inputs."""
+        self.number += 1
+        return Path(shutil.copytree(self.inputs, self.folder / str(self.number)))
+
+    def undisturbed(self, case: Case) -> None:
+        """Run a command once, for its bytes and its duration."""
+        folder, began = self.fresh(), time.monotonic()
+        status, said, _ = end(start(case, folder))
+        case.duration = time.monotonic() - began
+        if status:
+            raise RuntimeError(f"{' '.join(case.arguments)}: status {status}: {said}")
+        files = {p.relative_to(folder).as_posix(): p for p in folder.rglob("*") if p.is_file()}
+        case.wanted = {name: p.read_bytes() for name, p in files.items() if matches(name, case.exact)}
+
+    def fault(self, case: Case, kind: str, draw: random.Random) -> list[str] | None:
+        """Let a fault happen; return what went wrong, or None where this machine cannot have it."""
+        folder = self.fresh()
+        try:
+            if kind == "two":
+                return self._two(case, folder, draw)
+            if kind == "read-only":
+                return self._read_only(case, folder)
+            return self._one(case, folder, kind, draw)
+        finally:
+            folder.chmod(0o755)
+            shutil.rmtree(folder)
+
+    def _one(self, case: Case, folder: Path, kind: str, draw: random.Random) -> list[str]:
+        """Kill the command, or let files of more than some bytes be too long for the disk."""
+        most = draw.choice([0, 300, 3000, 30000])
+
+        def limit() -> None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
+
+        process = start(case, folder, preexec=None if kind != "full" else limit)
+        if kind in KILLS:
+            time.sleep(draw.uniform(0.15, 1.05 * case.duration))
+            if process.poll() is None:
+                os.kill(process.pid, KILLS[kind])
+        status, said, left = end(process)
+        wrong = [f"{len(left)} processes stay"] if left else []
+        if "Traceback" in said:
+            wrong.append(f"traceback: {said[-400:]}")
+        usual = {"KILL": {-9, 0}, "INT": {130, 0, -2}, "TERM": {143, 0, -15}, "full": {0, 2}}
+        if status not in usual[kind]:
+            wrong.append(f"status {status}: {said[-300:]}")
+        if kind == "full" and status == 2 and said and said.count("wamnet: error: ") != 1:
+            wrong.append(f"no error in one line: {said[-300:]}")
+        wrong += look(case, folder, self.names, whole=status == 0, hidden=kind == "KILL" or status < 0)
+        return wrong + self._again(case, folder)
+
+    def _again(self, case: Case, folder: Path) -> list[str]:
+        """Repeat the command, or resume it, and hold the result to the wanted one."""
+        more = []
+        if case.arguments[0] == "train" and (folder / "out.checkpoint.safetensors").exists():
+            more = ["--resume"]
+        if case.arguments[0] == "export" and (folder / "out").exists():
+            return look(case, folder, self.names, whole=True, hidden=True)
+        status, said, _ = end(start(case, folder, more))
+        wrong = [f"again: status {status}: {said[-400:]}"] if status else []
+        return wrong + [f"again: {what}" for what in look(case, folder, self.names, True, hidden=True)]
+
+    def _two(self, case: Case, folder: Path, draw: random.Random) -> list[str]:
+        """Let two processes have one output."""
+        one = start(case, folder)
+        time.sleep(draw.uniform(0.0, 0.5 * case.duration))
+        two = start(case, folder)
+        ends = [end(process) for process in (one, two)]
+        wrong = [f"status {status}: {said[-300:]}" for status, said, _ in ends if status not in (0, 2)]
+        if all(status for status, _, _ in ends):
+            wrong.append("both are refused")
+        refusals = [said for status, said, _ in ends if status == 2]
+        known = ("another process is ", "is not empty", "from an earlier run", "it holds something else")
+        wrong += [f"other words: {said}" for said in refusals if not any(word in said for word in known)]
+        if case.locks and not refusals and case.arguments[0] in ("train",):
+            wrong.append("none is refused")
+        return wrong + look(case, folder, self.names, whole=True, hidden=False)
+
+    def _read_only(self, case: Case, folder: Path) -> list[str] | None:
+        """Let the folder be one in which the user may not write."""
+        folder.chmod(0o555)
+        if os.geteuid() == 0 and not shutil.which(WITHOUT_RIGHTS[0]):
+            return None
+        before = WITHOUT_RIGHTS if os.geteuid() == 0 else ()
+        status, said, left = end(start(case, folder, before=before))
+        wrong = [f"{len(left)} processes stay"] if left else []
+        if case.arguments[0] != "tune" and (status != 2 or said.count("wamnet: error: ") != 1):
+            wrong.append(f"status {status}: {said[-300:]}")
+        folder.chmod(0o755)
+        return wrong + look(case, folder, self.names, whole=False, hidden=False)
+
+
+def _say(text: str) -> None:
+    """Print a line at once."""
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
+
+
+def run(count: int, seed: int, only: Sequence[str], folder: Path, until_s: float = float("inf")) -> int:
+    """Let faults happen, tell each that goes wrong, and return how many have."""
+    draw, bench, began = random.Random(seed), Bench(folder), time.monotonic()
+    names = list(only) or list(CASES)
+    for name in names:
+        bench.undisturbed(CASES[name])
+        _say(f"{name}: undisturbed, {CASES[name].duration:.1f} s")
+    weights = [1 if name in LONG else 6 for name in names]
+    done, failed, missing = Counter(), 0, Counter()
+    for index in range(count):
+        if time.monotonic() - began > until_s:
+            break
+        name, kind = draw.choices(names, weights)[0], draw.choice(FAULTS)
+        wrong = bench.fault(CASES[name], kind, random.Random(f"{seed}/{index}"))
+        if wrong is None:
+            missing[kind] += 1
+            continue
+        done[name, kind] += 1
+        failed += bool(wrong)
+        for what in wrong:
+            _say(f"WRONG, fault {index}, {name}, {kind}: {what}")
+    for name in names:
+        _say(f"{name}: " + ", ".join(f"{done[name, kind]} {kind}" for kind in FAULTS if done[name, kind]))
+    for kind, times in missing.items():
+        _say(f"NOT TRIED: {times} of {kind}: root may write everywhere, and setpriv is not there")
+    _say(f"faults: {sum(done.values())} done, {failed} went wrong; seed {seed}")
+    return failed
+
+
+def main() -> int:
+    """Run the faults that the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=random.randrange(2**32))
+    parser.add_argument("--only", nargs="*", choices=list(CASES), default=[])
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="begin none later than that")
+    options = parser.parse_args()
+    _say(f"seed {options.seed}")
+    with tempfile.TemporaryDirectory(prefix="faults-") as name:
+        Path(name).chmod(0o755)
+        return min(1, run(options.count, options.seed, options.only, Path(name), options.seconds))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

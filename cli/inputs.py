@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..refimpl.errors import InputError
+from .terminal import tell
 
 if TYPE_CHECKING:
     from ..refimpl.denoise import Model
@@ -40,9 +41,12 @@ def shipped_models() -> list[str]:
 
 def model_path(path: Path) -> Path:
     """Return the file of a model: the file that is named, else the one that comes along under this name."""
-    if path.suffix or path.exists():
-        return path
     known, name = shipped_models(), str(path).removeprefix(MODEL_PREFIX)
+    # No model is a folder: one of that name, perhaps of results, does not hide the model.
+    if path.suffix or (path.exists() and not (name in known and path.is_dir())):
+        return path
+    if path.is_dir():
+        tell(f"{path}/ is a folder, and no model: the model of this name that comes along is taken")
     if name not in known:
         rule = "there is no such file, and no model of this name comes along"
         raise InputError("model", str(path), rule, f"give a .safetensors file, or one of {', '.join(known)}")

@@ -56,8 +56,19 @@ def page_of(model: Path, scene: str | None, assignments: Sequence[str], fast: Pa
     """Return the page of files and names as a command is given them."""
     need("jinja2", "for web pages", "report")
     network = load_model(model)
-    name = scene or network.info.get("trained_on_scene", "") or "minicubes"
+    name = scene or learned_scene(network)
     return build_page(animation_of(name, assignments), network, load_model(fast) if fast else None)
+
+
+def learned_scene(model: Model) -> str:
+    """Return the canonical scene that a model has learned, minicubes if it names none; refuse others."""
+    from ..refimpl.scenes import CANONICAL
+
+    found = model.info.get("trained_on_scene", "") or "minicubes"
+    if found not in CANONICAL:
+        rule = "it must be one canonical scene, or one must be chosen"
+        raise InputError("scene that the model has learned", found, rule, "name one with --scene")
+    return found
 
 
 def animation_of(name: str, assignments: Sequence[str] = ()) -> Animation:

@@ -239,6 +239,8 @@ Rule = Callable[[Any], bool]
 def validate(scene: Scene) -> Scene:
     """Return the scene itself, or raise InputError with the path of the first value that breaks a rule."""
     _check_camera(scene.camera)
+    rule = f"all numbers must be finite and at most {LARGEST_NUMBER:g} in magnitude"
+    _check(scene.background, "scene.background", _is_finite, rule, "mend the number")
     _check(
         scene.background, "scene.background", _not_negative, "radiance must not be negative", "use 0 or more"
     )

@@ -23,6 +23,10 @@ from .scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sky, Sphere, V
 TURN_SECONDS = 8.0
 """Time in which the mini cubes turn once, in seconds: slow enough to follow, fast enough for a loop."""
 
+LARGEST_TIME_S = 1e9
+"""Farthest time from 0, in seconds: thirty years, where an angle is still exact to 1e-6 rad; far beyond it a
+turn has no angle, and 2 pi times the time no value."""
+
 CUBE_SPACING = 0.72
 """Distance between the centres of neighbouring mini cubes, in scene units (the room is 4 wide)."""
 
@@ -222,4 +226,8 @@ def canonical(name: str, **parameters: Any) -> Scene:
         if np.shape(value) != np.shape(default):
             wanted = "three numbers with commas" if np.shape(default) else "one number"
             raise InputError(what, value, f"{name} wants {wanted}", f"for example {default}")
+    time = parameters.get("time", 0.0)
+    if not abs(time) <= LARGEST_TIME_S:
+        rule = f"it must be a number from {-LARGEST_TIME_S:g} to {LARGEST_TIME_S:g} seconds"
+        raise InputError("time", time, rule, f"the scenes repeat every {TURN_SECONDS:g} seconds")
     return validate(CANONICAL[name](**parameters))

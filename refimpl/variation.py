@@ -24,7 +24,7 @@ from typing import Any
 from .errors import InputError
 from .reading import BROKEN, parse_json, to_dataclass
 from .scene import Camera, Scene, Vector
-from .scenes import TURN_SECONDS
+from .scenes import LARGEST_TIME_S, TURN_SECONDS
 
 STEEPEST_DEG = 85.0
 """Largest angle of a turned camera against the horizon: straight from above, `up` would be no direction."""
@@ -87,7 +87,7 @@ def _limits(name: str) -> tuple[float, float]:
     """Return the least and the largest value that a range may have."""
     limits = {"yaw_deg": (-180.0, 180.0), "pitch_deg": (-STEEPEST_DEG, STEEPEST_DEG)}
     limits |= {"distance": (0.1, 10.0), "saturation": (0.0, 1.0)}
-    return limits.get(name, (-math.inf, math.inf))
+    return limits.get(name, (-LARGEST_TIME_S, LARGEST_TIME_S))
 
 
 def ranges_from_json(text: str) -> Ranges:

@@ -109,8 +109,11 @@ def test_the_longest_name_is_written(wamnet, here) -> None:
     assert (here / name).is_file()
 
 
-def test_models_have_names(samples, monkeypatch, tmp_path) -> None:
-    """A file that is there comes first; then a name, with a prefix or not; else the names are listed."""
+def test_models_have_names(samples, monkeypatch, tmp_path, capsys) -> None:
+    """A file that is there comes first; then a name, with a prefix or not; else the names are listed.
+
+    A folder of that name hides nothing.
+    """
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(inputs, "MODELS", tmp_path / "along")
     (tmp_path / "along").mkdir()
@@ -119,6 +122,10 @@ def test_models_have_names(samples, monkeypatch, tmp_path) -> None:
     for name in ("cubes", "model:cubes"):
         assert inputs.model_path(Path(name)) == tmp_path / "along" / "cubes.safetensors"
         assert inputs.load_model(Path(name)).features == ("color", "normal")
+    (tmp_path / "cubes").mkdir()
+    assert inputs.model_path(Path("cubes")) == tmp_path / "along" / "cubes.safetensors"
+    assert "cubes/ is a folder, and no model" in capsys.readouterr().err
+    (tmp_path / "cubes").rmdir()
     (tmp_path / "cubes").touch()
     assert inputs.model_path(Path("cubes")) == Path("cubes")
     assert inputs.model_path(Path("cubes.safetensors")) == Path("cubes.safetensors")

@@ -186,7 +186,7 @@ def test_refusals(refused, arguments, text) -> None:
 def test_refusals_of_scene_files(refused, wamnet, tmp_path) -> None:
     """Not JSON; not text; parameters that a file does not have; a target that is the source."""
     (tmp_path / "a.json").write_text("{")
-    assert "a.json: scene text is no JSON" in refused("render", "a.json")
+    assert "a.json: scene is {: no JSON that can be taken" in refused("render", "a.json")
     (tmp_path / "a.json").write_bytes(b"\xff\xfe\xfd")
     assert "scene file is a.json: it cannot be read (it is no text)" in refused("render", "a.json")
     wamnet("scene", "empty", "-o", "b.json")
@@ -225,3 +225,10 @@ def test_a_kernel_computes_in_float32(wamnet, executor_named) -> None:
     outcome = wamnet("render", "cornell", "--executor", "opencl", "--dtype", "float64")
     assert outcome.status == 2
     assert "dtype is float64: kernels compute in float32" in outcome.err
+
+
+@pytest.mark.parametrize("command", ["render", "scene"])
+def test_times_beyond_all_turns_are_refused(refused, command):
+    assert "time is 1e+308: it must be a number from -1e+09 to 1e+09 seconds" in refused(
+        command, "minicubes", "--time", "1e308"
+    )

@@ -10,10 +10,12 @@ import socket
 import threading
 import urllib.error
 import urllib.request
+from dataclasses import replace
 
 import pytest
 
 from wamnet.cli import view, webpage
+from wamnet.compiler.model_file import load_model, save_model
 from wamnet.refimpl import scenes
 
 
@@ -137,6 +139,16 @@ def test_a_port_that_is_taken_is_refused(refused, here, monkeypatch):
         taken.listen()
         line = refused("view", "model.safetensors", "--port", taken.getsockname()[1])
     assert "it cannot be had (Address already in use); choose another, or 0" in line
+
+
+@pytest.mark.parametrize("learned", ["minicubes, cornell", "mine"])
+def test_a_model_of_no_single_canonical_scene_needs_a_name(refused, here, learned):
+    model = load_model(here / "model.safetensors")
+    several = replace(model, info={"trained_on_scene": learned})
+    save_model(here / "several.safetensors", several)
+    line = refused("view", "several.safetensors", "-o", "page.html")
+    assert f"scene that the model has learned is {learned}: " in line
+    assert "name one with --scene" in line
 
 
 # ---- the server, through real sockets ---------------------------------------------------------------------

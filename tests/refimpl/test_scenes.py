@@ -84,3 +84,22 @@ def test_glossy_has_every_material_and_its_parameters():
     assert 0.5 in {m.roughness for m in materials if isinstance(m, Conductor)}
     with pytest.raises(InputError, match=r"scene.boxes\[2\].material.ior is 5: an index of refraction"):
         scenes.canonical("glossy", ior=5)
+
+
+@pytest.mark.parametrize("name", scenes.CANONICAL)
+@pytest.mark.parametrize("time", [1e308, -1e308, 1.1e9, float("inf"), float("nan")])
+def test_times_that_no_turn_has_are_refused(name, time):
+    """2 pi times the largest of them is no number."""
+    with pytest.raises(InputError, match=r"time is .*: it must be a number from -1e\+09 to 1e\+09 seconds"):
+        scenes.canonical(name, time=time)
+
+
+@pytest.mark.parametrize("name", scenes.CANONICAL)
+def test_the_farthest_times_are_scenes(name):
+    for time in (-1e9, 1e9):
+        assert scenes.canonical(name, time=time).name == name
+
+
+def test_a_background_beyond_float32_is_refused():
+    with pytest.raises(InputError, match=r"scene.background is .*: all numbers must be finite and at most"):
+        scenes.canonical("empty", background=1e308)

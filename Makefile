@@ -49,7 +49,8 @@ long: setup ## Test kernels with other cases each time, many and wide (2 hours o
 
 fuzz: setup ## Feed changed files to every reader and command; MINUTES=10, SEED=n repeats a run, ONLY=name, AT=n one input
 	@$(ONE_THREAD) PYTHONPATH=tests/fuzz $(VENV)/bin/python tests/fuzz/fuzz.py --minutes $(MINUTES) \
-		$(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only $(ONLY)) $(if $(AT),--at $(AT))
+		$(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only "$(ONLY)") $(if $(AT),--at $(AT))
+
 faults: setup ## Kill commands, fill their disk, start two at once: COUNT=300 times (half an hour); SEED=n repeats
 	@$(ONE_THREAD) $(VENV)/bin/python tests/support/faults.py --count $(COUNT) $(if $(SEED),--seed $(SEED))
 

@@ -228,7 +228,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given: Any = parser.parse_args(arguments)
     seed = secrets.randbits(32) if given.seed is None else given.seed
     if given.at is not None:
-        return again(given.only[0], seed, given.at)
+        return again(" ".join(given.only), seed, given.at)
     return report(fuzz(seed, given.minutes * 60, given.count, given.workers, given.only), seed, given.output)
 
 

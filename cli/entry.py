@@ -5,13 +5,30 @@ at once until then [`run`]. Modules in C turn an interrupt of their import into 
 it is not raised meanwhile.
 """
 
+import atexit
 import os
 import signal
 import sys
 
+BY_SIGNALS = (130, 143)
+"""Exit statuses after SIGINT and SIGTERM."""
+
 
 def run() -> int:
     """Import and run the command line; return its exit status."""
+    status = _run()
+    if status in BY_SIGNALS:
+        # Python kills itself by SIGINT, whatever the status, if an interrupt that was handled long ago has
+        # passed through `exec` of a text, as dataclasses use while modules are imported.
+        atexit._run_exitfuncs()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    return status
+
+
+def _run() -> int:
+    """Import and run the command line, with Ctrl-C handled all the time."""
     ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if ours:
         signal.signal(signal.SIGINT, _end)

@@ -37,3 +37,19 @@ def test_the_entry_imports_next_to_nothing(tmp_path) -> None:
     """What is imported before Ctrl-C is handled must be a matter of milliseconds."""
     code = "import sys; import wamnet.cli.entry; sys.exit('typer' in sys.modules or 'rich' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=False, timeout=60).returncode == 0
+
+
+def test_the_status_is_the_command_s(tmp_path) -> None:
+    """SIGTERM while a dataclass was made ended in a kill by SIGINT: Python's own end, by its memory of it."""
+    code = (
+        "import sys; from wamnet.cli import entry, main\n"
+        "def ended():\n"
+        "    try: exec('import signal; signal.raise_signal(signal.SIGINT)')\n"
+        "    except KeyboardInterrupt: return 143\n"
+        "main.main = ended\n"
+        "sys.exit(entry.run())\n"
+    )
+    (tmp_path / "ended.py").write_text(code)
+    command = [sys.executable, "-m", "ended"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (143, b"")

@@ -14,7 +14,7 @@ from wamnet.cli import animate, images
 from wamnet.cli.images import LABEL_PX, read_png
 from wamnet.compiler.model_file import load_model, save_model
 from wamnet.refimpl import encoding, factored
-from wamnet.refimpl.denoise import denoise
+from wamnet.refimpl.denoise import denoise, learned_feature_spp
 from wamnet.refimpl.render import Job, render
 from wamnet.refimpl.scenes import canonical
 from wamnet.refimpl.variation import Ranges, Variation, varied
@@ -71,10 +71,10 @@ def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:
     network = load_model(tmp_path / "m.safetensors")
     facts = {"trained_on_scene": "cornell", "trained_on_feature_spp": "3"}
     learned = replace(network, info=facts)
-    assert (animate.scene_of(learned), animate.rays_of(learned)) == ("cornell", 3)
-    assert (animate.scene_of(network), animate.rays_of(network)) == ("minicubes", 0)
+    assert (animate.scene_of(learned), learned_feature_spp(learned)) == ("cornell", 3)
+    assert (animate.scene_of(network), learned_feature_spp(network)) == ("minicubes", 0)
     odd = replace(network, info={"trained_on_scene": "cornell, empty", "trained_on_feature_spp": "1, 3"})
-    assert (animate.scene_of(odd), animate.rays_of(odd)) == ("minicubes", 0)
+    assert (animate.scene_of(odd), learned_feature_spp(odd)) == ("minicubes", 3)
     save_model(tmp_path / "l.safetensors", learned)
     one = ("--seconds", 0.2, "--fps", 5, "--size", 13)
     assert wamnet("animate", "l.safetensors", *one, "-o", "own").status == 0

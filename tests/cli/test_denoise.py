@@ -185,7 +185,7 @@ def test_a_schedule_that_does_not_hold_the_model(wamnet, here, monkeypatch) -> N
 def test_refusals_of_compile(refused, here) -> None:
     """No model; another kind of file; no such profile or target; a file in the folder's place."""
     target = ["--target", "glsl"]
-    assert "wamnet-model file is none.st: cannot be read" in refused("compile", "none.st", *target)
+    assert "wamnet-model file is none.st: it cannot be read" in refused("compile", "none.st", *target)
     assert (
         "model or scene is minicube: neither a canonical scene nor a file; scenes are minicubes,"
         in refused("compile", "minicube", *target)

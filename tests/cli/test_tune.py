@@ -67,7 +67,7 @@ def test_a_kernel_for_this_machine(wamnet, refused, executor_named, here) -> Non
 def test_refusals_of_tune(refused, here) -> None:
     """Sizes that mean nothing, and no model."""
     assert "--size is 0: it must be from 1 to 8192; for example --size 512" in refused("tune", "--size", 0)
-    assert "none.st: cannot be read" in refused("tune", "none.st")
+    assert "none.st: it cannot be read" in refused("tune", "none.st")
 
 
 def test_without_a_model_the_network_is_the_paper_s(wamnet, here) -> None:

@@ -136,7 +136,7 @@ REFUSED = {
     "curve.json: profile is ieee: this one is for native": (
         *(*COMPILE, "--profile", "native", "--max-ms", 3, "--curve", "curve.json"),
     ),
-    "curve file is none.json: cannot be read": (*COMPILE, "--max-ms", 3, "--curve", "none.json"),
+    "curve file is none.json: it cannot be read": (*COMPILE, "--max-ms", 3, "--curve", "none.json"),
     "rank is 2: the variant is window3": (
         *("denoise", "model.safetensors", "noisy.exr", "--rank", 2, "--variant", "window3"),
     ),

@@ -18,6 +18,7 @@ from ..refimpl.errors import InputError
 from ..refimpl.reading import parse_json, read_file
 from . import options
 from .choose import Request, check_request, choose
+from .effort import said_of_compiling
 from .inputs import MODEL_PREFIX, load_model
 from .options import Sampler, Target
 from .outputs import check_parent, unwritable
@@ -108,6 +109,8 @@ def compile_model(
         _only_for("a model", of_models | request.options(), rule)
         check_folder(folder, name, of_scene=True)
         scene = load_scene(model, time, parameters or [])
+        for line in said_of_compiling(scene):
+            say(line)
         kernel = _compiled_scene(scene, name, profile, max_depth, sampler, lanes)
     else:
         of_scenes: dict[str, object] = {"--time": time, "--set": parameters, "--lanes": lanes}

@@ -20,6 +20,7 @@ import typer
 
 from ..refimpl.errors import InputError
 from . import cluster, dataset_files, options
+from .effort import said_of_rendering
 from .options import Renderer, Sampler
 from .terminal import hint_on_interrupt, progress, say
 
@@ -213,6 +214,9 @@ def _render(store: dataset_files.Store, workers: int | None, scheduler: str | No
         workers = 1 if alone else len(os.sched_getaffinity(0))
     if not tasks:
         return
+    shown, pixels = next(iter(store.pictures.values())).scene, store.request.size_px**2
+    for line in said_of_rendering(shown, total, pixels, store.request.executor, workers):
+        say(line)
     with progress("rendering", total) as advance:
         if scheduler is None and workers == 1:
             cluster.do_here(tasks, lambda task: carry_out(task, advance), store.put)

@@ -11,6 +11,7 @@ import typer
 
 from ..refimpl.errors import InputError
 from . import options
+from .effort import said_of_rendering
 from .options import FloatType, Renderer, Sampler
 from .outputs import check_output, write_text
 from .terminal import progress, say
@@ -93,6 +94,8 @@ def render(
     if workers is not None and renderer(executor.value).shares_work:
         rule = f"{executor.value} shares the work by itself"
         raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
+    for line in said_of_rendering(loaded, job.samples, width * height, executor.value, workers):
+        say(line)
     started = clock.perf_counter()
     with progress(f"rendering {scene}", job.samples) as advance:
         frame = render_frame(executor.value, loaded, job, workers=workers, on_progress=advance).frame

@@ -245,7 +245,7 @@ def compile_program(
     if chosen.most is not None and rank > chosen.most:
         raise CompileError(
             f"rank {rank}: the image between both passes has as many channels, and {chosen.language} "
-            f"writes at most {chosen.most}; use a smaller rank, or executor opencl or numpy"
+            f"writes at most {chosen.most}; use a smaller rank, or OpenCL or C, which have no such limit"
         )
     cut = factor(common, rank, chosen.widest)
     bound = bound_over_images(common, profile, target, cut)

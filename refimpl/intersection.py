@@ -159,21 +159,23 @@ def build(scene: Scene, dtype: DTypeLike = np.float32) -> Geometry:
     )
 
 
-def _rotations(scene: Scene) -> list[Any]:
-    """Return the different rotations of the scene's boxes, in order of first use."""
-    return list(dict.fromkeys(box.rotation for box in scene.boxes))
+def _by_rotation(scene: Scene) -> list[list[Box]]:
+    """Return the boxes of each rotation, in order of first use; of boxes there may be many."""
+    found: dict[Any, list[Box]] = {}
+    for box in scene.boxes:
+        found.setdefault(box.rotation, []).append(box)
+    return list(found.values())
 
 
 def _grouped(scene: Scene) -> list[Box]:
     """Return the boxes in the order of their ids: by rotation."""
-    return sorted(scene.boxes, key=lambda box: _rotations(scene).index(box.rotation))
+    return list(chain(*_by_rotation(scene)))
 
 
 def _box_groups(scene: Scene, first_id: int, constant: Any) -> tuple[BoxGroup, ...]:
     """Group the boxes by rotation, join small groups, and turn the centres into the rotated axes."""
-    members = [[box for box in scene.boxes if box.rotation == rotation] for rotation in _rotations(scene)]
     groups = []
-    for joined, run in groupby(members, _joined):
+    for joined, run in groupby(_by_rotation(scene), _joined):
         for boxes in [list(chain(*run))] if joined else run:
             matrices = np.array([box.rotation for box in boxes], np.float64)
             centers = [_turned(m, np.array(b.center)) for m, b in zip(matrices, boxes, strict=True)]

@@ -272,10 +272,9 @@ ROWS: tuple[Row, ...] = (
         entry="mainImage",
         single=True,
         most_images=Limit("buffers of a Shadertoy, A to D", 4, "use fewer features"),
+        # The site states none: with more its editor hardly moves.
         source=Limit(
-            "characters of a tab, a bound of ours: the site states none",
-            1_000_000,
-            "use a smaller --variant",
+            "characters of the largest shader", 1_000_000, "use a smaller --variant, as window8"
         ),
     ),
     Row(

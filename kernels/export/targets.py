@@ -273,9 +273,7 @@ ROWS: tuple[Row, ...] = (
         single=True,
         most_images=Limit("buffers of a Shadertoy, A to D", 4, "use fewer features"),
         # The site states none: with more its editor hardly moves.
-        source=Limit(
-            "characters of the largest shader", 1_000_000, "use a smaller --variant, as window8"
-        ),
+        source=Limit("characters of the largest shader", 1_000_000, "use a smaller --variant, as window8"),
     ),
     Row(
         "godot",

@@ -206,6 +206,18 @@ def test_refusals_name_the_limit(request_, told):
         export(request_)
 
 
+def test_ways_out_are_those_of_an_export():
+    """It has no --executor; a target of one pass takes no rank; a limit's name is a thing, no sentence."""
+    for row in targets.ROWS:
+        places = [place.limit for place in row.places.values()]
+        for limit in filter(None, (*places, row.most_images, row.source)):
+            assert "executor" not in limit.way_out
+            assert not (row.single and limit is row.source and "rank" in limit.way_out)
+            assert ":" not in limit.name
+    with pytest.raises(CompileError, match="use a smaller rank, or OpenCL or C, which have no such limit"):
+        export(Request(model((96, 48, 3)), "glsl-es", variant="rank20"))
+
+
 def test_a_tool_that_is_missing_is_named(monkeypatch, tmp_path):
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(ExecutorUnavailable, match="cc is not installed: apt-get install gcc"):

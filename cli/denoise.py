@@ -67,7 +67,7 @@ def denoise(
     from . import exr
 
     check_output(output, (".exr", ".png"), [model, frame])
-    network, noisy = load_model(model), exr.read_frame(frame, finite=False)
+    network, noisy = load_model(model), exr.read_frame(frame, finite=False, tell=say)
     need_layers(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )

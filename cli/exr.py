@@ -6,21 +6,23 @@
 2. Reading also knows the names that other renderers and denoisers use [`ALIASES`], in upper or lower case and
    behind a prefix such as a view layer's; half floats are widened, other channels ignored [`read_frame`].
 3. The picture is the data window; where it lies in the display window does not matter to a denoiser.
-4. What comes from a file is checked before anything else sees it; errors start with the file's name.
+4. A depth of 1e9 or more in a file of another program stands for a miss and is read as 0, as ours are.
+5. What comes from a file is checked before anything else sees it; errors start with the file's name.
 """
 
 from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from io import StringIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..refimpl.dataset import FARTHEST_DEPTH
 from ..refimpl.errors import InputError
 from ..refimpl.frame import LAYERS, Floats, Frame, validate
 from ..refimpl.reading import check_room, refusing
@@ -62,7 +64,15 @@ INFO_PREFIX = "wamnet."
 EXR_BYTES = 12
 """Memory that a pixel of a channel takes until it is in a frame: as read, as float32, in its layer."""
 
-Group = Mapping[str, Any]
+
+class Plane(NamedTuple):
+    """One channel: its name in the file, and its pixels (H, W)."""
+
+    name: str
+    pixels: Any
+
+
+Group = Mapping[str, Plane]
 """Channels of one layer by the lower-case last part of their names."""
 
 
@@ -87,12 +97,21 @@ def write_frame(path: Path, frame: Frame) -> None:
             raise unwritable(path, RuntimeError(reason)) from None
 
 
-def read_frame(path: Path, finite: bool = True) -> Frame:
-    """Read the known layers of an EXR file as a float32 frame that is valid, `finite` or not."""
+def read_frame(path: Path, finite: bool = True, tell: Callable[[str], None] | None = None) -> Frame:
+    """Read the known layers of an EXR file as a float32 frame that is valid, `finite` or not.
+
+    `tell` is given a sentence on layers that stand under other names than ours, and on depths of misses.
+    """
     channels, header = _read_channels(path)
     groups = _group(channels)
-    found = {name: _layer(path, name, groups) for name in LAYERS}
-    layers = {name: values for name, values in found.items() if values is not None}
+    found = {name: planes for name in LAYERS if (planes := _layer(path, name, groups)) is not None}
+    layers = {name: _stack(path, name, planes) for name, planes in found.items()}
+    told = _taken(found)
+    ours = any(key.startswith(INFO_PREFIX) for key in header)
+    if "depth" in layers and not ours and (missed := _without_misses(layers)):
+        told.append(f"{missed} depths of {FARTHEST_DEPTH:g} or more are read as 0: nothing is hit there")
+    if tell is not None and told:
+        tell(f"{path}: {'; '.join(told)}")
     if not layers:
         names = ", ".join(sorted(channels))
         rule = "no known layer is among them"
@@ -147,16 +166,16 @@ def _check_room(path: Path, headers: Sequence[Any]) -> None:
 
 def _group(channels: Mapping[str, Any]) -> dict[str, dict[str, Group]]:
     """Group channels by layer: alias of the layer -> full prefix -> last part of the name -> pixels."""
-    groups: dict[str, dict[str, dict[str, Any]]] = defaultdict(lambda: defaultdict(dict))
+    groups: dict[str, dict[str, dict[str, Plane]]] = defaultdict(lambda: defaultdict(dict))
     for name, channel in channels.items():
         prefix, _, component = name.rpartition(".")
         alias = prefix.rpartition(".")[2].lower()
-        groups[alias][prefix][component.lower()] = channel.pixels
+        groups[alias][prefix][component.lower()] = Plane(name, channel.pixels)
     return {alias: dict(prefixes) for alias, prefixes in groups.items()}
 
 
-def _layer(path: Path, name: str, groups: Mapping[str, Mapping[str, Group]]) -> Floats | None:
-    """Return layer `name` (H, W, C) under the best of its aliases, or None if the file has none of them."""
+def _layer(path: Path, name: str, groups: Mapping[str, Mapping[str, Group]]) -> list[Plane] | None:
+    """Return the planes of layer `name` under the best of its aliases, or None if none is in the file."""
     for alias in ALIASES[name]:
         candidates = groups.get(alias, {})
         whole = {
@@ -169,12 +188,12 @@ def _layer(path: Path, name: str, groups: Mapping[str, Mapping[str, Group]]) -> 
             rule = f"each of them could be {name}"
             raise InputError(f"{path}: layers", text, rule, "leave one of them out of the file")
         if whole:
-            return _stack(path, name, next(iter(whole.values())))
+            return next(iter(whole.values()))
     return None
 
 
-def _components(name: str, alias: str, group: Group) -> list[Any] | None:
-    """Return the pixels of the channels that make up a layer, in order, or None if one is missing.
+def _components(name: str, alias: str, group: Group) -> list[Plane] | None:
+    """Return the channels that make up a layer, in order, or None if one is missing.
 
     Without a layer's name, one channel is depth only if it is called Z: a lone Y is luminance.
     """
@@ -185,15 +204,33 @@ def _components(name: str, alias: str, group: Group) -> list[Any] | None:
     return None
 
 
-def _stack(path: Path, name: str, planes: list[Any]) -> Floats:
+def _stack(path: Path, name: str, planes: list[Plane]) -> Floats:
     """Return the planes (H, W) of one layer as float32 (H, W, C)."""
-    kinds = sorted({str(plane.dtype) for plane in planes})
+    kinds = sorted({str(plane.pixels.dtype) for plane in planes})
     if not set(kinds) <= {"float16", "float32"}:
         rule = "they must be half or float"
         raise InputError(
             f"{path}: pixels of {name}", ", ".join(kinds), rule, "export them as 16 or 32 bit floats"
         )
-    return np.stack([plane.astype(np.float32) for plane in planes], axis=-1)
+    return np.stack([plane.pixels.astype(np.float32) for plane in planes], axis=-1)
+
+
+def _taken(found: Mapping[str, list[Plane]]) -> list[str]:
+    """Return which channels became which layer, where their names are not ours."""
+    names = {layer: [plane.name for plane in planes] for layer, planes in found.items()}
+    return [
+        f"{layer} is taken from {', '.join(channels)}"
+        for layer, channels in names.items()
+        if channels != list(CHANNELS[layer])
+    ]
+
+
+def _without_misses(layers: dict[str, Floats]) -> int:
+    """Put 0 for depths that many renderers write where nothing is hit; return how many there were."""
+    missed = np.isfinite(layers["depth"]) & (layers["depth"] >= FARTHEST_DEPTH)
+    if missed.any():
+        layers["depth"] = np.where(missed, np.float32(0.0), layers["depth"])
+    return int(missed.sum())
 
 
 @contextmanager

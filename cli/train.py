@@ -290,7 +290,7 @@ def read_pairs(
         raise InputError("number of targets", len(targets), rule, "repeat -i and -t in the same order")
     pairs = []
     for noisy, target in zip(inputs, targets, strict=True):
-        pair = exr.read_frame(noisy), exr.read_frame(target)
+        pair = exr.read_frame(noisy, tell=say), exr.read_frame(target, tell=say)
         way_out = "render or export it too, or choose other --features"
         need_layers(noisy, pair[0], features, "the network is to see it", way_out)
         need_layers(target, pair[1], ("color",), "it is what the network learns", "export it too")

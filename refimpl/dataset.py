@@ -45,6 +45,9 @@ LARGEST_SCALE = 1e18
 """Largest scale and position, in scene units. The smallest scale is its inverse: with a position of 1e12 no
 feature overflows float32 before it is clipped."""
 
+FARTHEST_DEPTH = 1e9
+"""From here on a depth stands for a miss: renderers write 1e10 there (Blender), or the largest float."""
+
 NORMALIZATION_LIMITS: Mapping[str, tuple[float, float]] = {
     "exposure_stops": (-64.0, 64.0),
     "depth_scale": (1.0 / LARGEST_SCALE, LARGEST_SCALE),
@@ -261,13 +264,18 @@ def n_inputs(features: Sequence[str], window: Window) -> int:
 
 def normalization_of(frames: Sequence[Frame], exposure_stops: float = 0.0) -> Normalization:
     """Measure the scales: the farthest depth, and the cube around all positions that are not exactly 0."""
-    far = max((float(frame["depth"].max()) for frame in frames if "depth" in frame.layers), default=0.0)
+    far = max((_farthest(frame["depth"]) for frame in frames if "depth" in frame.layers), default=0.0)
     hits = [_hits(frame["position"]) for frame in frames if "position" in frame.layers]
     points = np.concatenate(hits) if hits else np.zeros((0, 3))
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.zeros(3))
     x, y, z = (float(value) for value in (low + high) / 2)
     extent = float((high - low).max()) / 2
     return Normalization(exposure_stops, far if far > 0 else 1.0, (x, y, z), extent if extent > 0 else 1.0)
+
+
+def _farthest(depth: Array) -> float:
+    """Return the largest depth of (H, W, 1) that is no miss, or 0."""
+    return float(np.max(depth, initial=0.0, where=depth < FARTHEST_DEPTH))
 
 
 def _hits(position: Array) -> Array:

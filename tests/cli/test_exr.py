@@ -273,3 +273,31 @@ def test_luminance_is_no_depth(tmp_path: Path, names: str, layers: set[str] | No
             exr.read_frame(tmp_path / "a.exr")
     else:
         assert set(exr.read_frame(tmp_path / "a.exr").layers) == layers
+
+
+def test_what_is_taken_from_other_names_is_said(tmp_path) -> None:
+    """File channels to our layer; depths of misses become 0; of our own names nothing is said."""
+    planes = {f"ViewLayer.Denoising Normal.{axis}": np.ones((1, 3), np.float32) for axis in "XYZ"}
+    planes |= {f"ViewLayer.Combined.{letter}": np.ones((1, 3), np.float32) for letter in "RGB"}
+    planes["ViewLayer.Depth.Z"] = np.array([[2.0, 1e10, np.finfo(np.float32).max]], np.float32)
+    write(tmp_path / "blender.exr", planes)
+    told: list[str] = []
+    frame = exr.read_frame(tmp_path / "blender.exr", tell=told.append)
+    assert frame["depth"].ravel().tolist() == [2.0, 0.0, 0.0]
+    (line,) = told
+    names = ", ".join(f"ViewLayer.Combined.{letter}" for letter in "RGB")
+    assert line.startswith(f"{tmp_path / 'blender.exr'}: color is taken from {names}; ")
+    assert "normal is taken from ViewLayer.Denoising Normal.X, " in line
+    assert "depth is taken from ViewLayer.Depth.Z; " in line
+    assert line.endswith("2 depths of 1e+09 or more are read as 0: nothing is hit there")
+
+
+def test_our_own_frames_are_read_as_they_are(tmp_path) -> None:
+    """Nothing is said, and no depth is changed."""
+    depth = np.array([[2.0, 3e10]], np.float32)[..., None]
+    exr.write_frame(
+        tmp_path / "own.exr", Frame({"color": np.ones((1, 2, 3), np.float32), "depth": depth}, {"a": "b"})
+    )
+    told: list[str] = []
+    assert np.array_equal(exr.read_frame(tmp_path / "own.exr", tell=told.append)["depth"], depth)
+    assert told == []

@@ -318,3 +318,11 @@ def test_index_is_the_scaled_word() -> None:
     assert 0 <= top.min() <= top.max() < 2**31 - 1
     # 4096 uniform draws all miss the upper 1 % with probability 0.99**4096 < 1e-17.
     assert top.max() >= 0.99 * 2**31
+
+
+@pytest.mark.parametrize("missed", [1e9, 1e10, np.finfo(np.float32).max, np.inf, np.nan])
+def test_depths_of_misses_are_no_scale(missed) -> None:
+    """As many renderers write them; with it as the scale all other depths would be 0."""
+    depth = np.array([[2.0, 5.0, missed]], np.float32)[..., None]
+    assert dataset.normalization_of([Frame({"depth": depth})]).depth_scale == 5.0
+    assert dataset.normalization_of([Frame({"depth": depth[:, 2:]})]).depth_scale == 1.0

@@ -145,6 +145,7 @@ def load_scene(
     name: str, time: float | None, assignments: Sequence[str], view: options.View | None = None
 ) -> Scene:
     """Return a canonical scene by name, as a view has it, or the scene in a JSON file."""
+    from ..refimpl.reading import read_file
     from ..refimpl.scene import from_json
     from ..refimpl.scenes import CANONICAL, canonical
 
@@ -166,10 +167,17 @@ def load_scene(
     if view not in (None, options.View()):
         rule = "a scene file has its own camera and lamps"
         raise InputError("camera and lamps", "given", rule, "change the file, or write it with wamnet scene")
+    text = decoded(path, read_file(path, "scene file", "check the name"))
     try:
-        return from_json(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is no text"
-        raise InputError("scene file", str(path), f"it cannot be read ({reason})", "check the name") from None
+        return from_json(text)
     except InputError as error:
         raise InputError(f"{path}: {error.what}", error.value, error.rule, error.way_out) from None
+
+
+def decoded(path: Path, content: bytes) -> str:
+    """Return a scene file's text."""
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError:
+        rule = "it cannot be read (it is no text)"
+        raise InputError("scene file", str(path), rule, "check the name") from None

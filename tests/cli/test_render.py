@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import colorsys
 import json
+import os
 
 import numpy as np
 import pytest
@@ -232,3 +233,9 @@ def test_times_beyond_all_turns_are_refused(refused, command):
     assert "time is 1e+308: it must be a number from -1e+09 to 1e+09 seconds" in refused(
         command, "minicubes", "--time", "1e308"
     )
+
+
+def test_a_pipe_is_no_scene_file(refused, tmp_path):
+    """Reading it would wait for ever."""
+    os.mkfifo(tmp_path / "s.json")
+    assert "scene file is s.json: it is no regular file (a pipe or a device)" in refused("render", "s.json")

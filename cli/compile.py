@@ -109,8 +109,6 @@ def compile_model(
         _only_for("a model", of_models | request.options(), rule)
         check_folder(folder, name, of_scene=True)
         scene = load_scene(model, time, parameters or [])
-        for line in said_of_compiling(scene):
-            say(line)
         kernel = _compiled_scene(scene, name, profile, max_depth, sampler, lanes)
     else:
         of_scenes: dict[str, object] = {"--time": time, "--set": parameters, "--lanes": lanes}
@@ -201,11 +199,13 @@ def _compiled_scene(
     sampler: Sampler | None,
     lanes: int | None,
 ) -> PathArtifact:
-    """Return the kernel that follows a scene's paths."""
+    """Return the kernel that follows a scene's paths; of a large scene it is said first how long it takes."""
     from ..compiler.lower_scene import lower_scene
     from ..compiler.path_kernel import compile_path, most_unrolled
     from ..refimpl.transport import Settings
 
+    for line in said_of_compiling(scene):
+        say(line)
     settings = Settings() if max_depth is None else Settings(max_depth=max_depth)
     if sampler is not None:
         settings = replace(settings, sampler=sampler.value)

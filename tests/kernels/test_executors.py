@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.lower import lower
 from wamnet.compiler.trace import trace
 from wamnet.kernels import denoise_on, open_executor
+from wamnet.kernels.executor import black
 from wamnet.refimpl import dataset, denoise, frame
 from wamnet.refimpl.errors import CompileError, InputError
 
@@ -373,3 +375,28 @@ def test_two_contexts_that_open_before_either_runs(executor_named):
             for artifact, factor in zip(artifacts, (2.0, 3.0), strict=True):
                 picture = executor.run(artifact, {"a": np.full((2, 2, 1), 0.25, np.float32)})
                 assert np.array_equal(picture, np.full((2, 2, 1), 0.25 * factor, np.float32))
+
+
+def test_opengl_keeps_nothing_of_a_picture_s_size(kit):
+    """Textures and framebuffers of thirty sizes are given back; what lives is the weights."""
+    moderngl = pytest.importorskip("moderngl")
+    program = kit.denoiser(kit.network([27, 4, 3], (2.0, 2.0)), {"a": 3}, 3, "clamp")
+    artifact = compile_program(program, "opengl", "native")
+
+    def living():
+        kinds = (moderngl.Texture, moderngl.Framebuffer, moderngl.Buffer)
+        things = [thing for thing in gc.get_objects() if isinstance(thing, kinds)]
+        return sum(not isinstance(thing.mglo, moderngl.mgl.InvalidObject) for thing in things)
+
+    with open_executor("opengl") as executor:
+
+        def run(size):
+            executor.build(artifact, size)
+            executor.run(artifact, black(artifact, size))
+
+        run((5, 4))
+        before = living()
+        for number in range(30):
+            run((6 + number, 40 - number))
+        assert living() == before
+        assert before > 0

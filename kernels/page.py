@@ -39,7 +39,7 @@ from ..compiler.lower_scene import lower_scene
 from ..compiler.path_kernel import PathArtifact, compile_path
 from ..compiler.scene_inputs import SceneInputs, varying
 from ..refimpl import dataset, factored, rng, transport
-from ..refimpl.denoise import Model, check_model
+from ..refimpl.denoise import Model, check_model, learned_feature_spp
 from ..refimpl.errors import InputError
 from ..refimpl.intersection import quad_area_pdf
 from ..refimpl.render import Job, render
@@ -139,6 +139,7 @@ def page_data(
     variants = [variant(network, images, profile) for network in networks]
     for one, network in zip(variants, networks, strict=True):
         one["ranges"] = learned_ranges(network.model, scene.name)
+        one["rays"] = learned_feature_spp(network.model) or 1
         # How far a variant's picture is from the first one's is a fact about the weights, not about a device.
         off = one["picture"] - variants[0]["picture"]
         one["rms_to_first"] = float(np.sqrt(np.mean(off**2)))

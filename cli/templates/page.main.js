@@ -7,6 +7,7 @@ const AUTO_QUICK_MS = 20; // a larger picture is tried below this
 const AUTO_SLOW_MS = 400; // a smaller one above this
 const AUTO_FRAMES = 4; // frames before either is believed
 const SLOW_MS = 60; // a device that needs more for a frame
+const VERY_SLOW_MS = 1500; // a picture that takes longer is no animation
 const REST_MS = 100; // is left this long, at most, to the rest of the page before the next one
 const GRAB_PX = 18; // how near to the line a pointer takes hold of it
 const DEGREES_PER_PX = 0.4;
@@ -38,6 +39,8 @@ class Page {
     this.held = false; // a test draws; the loop leaves pictures alone
     this.times = [];
     this.checks = new Map();
+    this.drawn = new Promise((done, failed) => Object.assign(this, { firstDrawn: done, firstFailed: failed }));
+    this.drawn.catch(() => {}); // it has been told
   }
 
   // ---- starting ---------------------------------------------------------------------------------------
@@ -62,6 +65,7 @@ class Page {
     find("variant").value = this.state.variant;
     requestAnimationFrame((now) => this.loop(now));
     await this.choose(this.state.variant);
+    await this.drawn;
   }
 
   /** Textures that some pass draws into at once. */
@@ -81,11 +85,14 @@ class Page {
       this.auto.frames = 0;
       this.dirty = true;
       if (!this.checks.has(name)) {
+        this.say("Checking the network on this device.");
         this.checks.set(name, await this.renderer.check(name));
       }
       this.preparing = null;
       this.tellVariant();
-      this.say(this.state.playing ? "Ready. The animation is playing." : "Ready. The animation is paused.");
+      this.announcing = true; // it is ready when it has drawn: on a slow device that takes seconds
+      this.dirty = true;
+      this.say("Drawing the first picture.");
     } catch (error) {
       if (!(error instanceof Lost)) {
         this.trouble(error);
@@ -171,11 +178,23 @@ class Page {
       this.restUntil = performance.now() + (ms > SLOW_MS ? Math.min(REST_MS, ms / 4) : 0);
       this.measured(size, ms);
       this.show();
+      this.firstDrawn();
+      this.announce(ms);
     } catch (error) {
       if (!(error instanceof Lost)) {
         this.trouble(error);
+        this.firstFailed(error);
         throw error;
       }
+    }
+  }
+
+  /** Say once that a network is ready, and how slow it is where that is seen. */
+  announce(ms) {
+    if (this.announcing && !this.preparing) {
+      this.announcing = false;
+      const slow = ms > VERY_SLOW_MS ? ` A picture takes ${(ms / 1000).toFixed(0)} s here.` : "";
+      this.say(`Ready. The animation is ${this.state.playing ? "playing" : "paused"}.${slow}`);
     }
   }
 
@@ -304,6 +323,7 @@ class Page {
     find("first-difference").textContent =
       facts.name === this.data.variants[0].name ? "it is the full one" : `${(100 * facts.rms_to_first).toFixed(1)} %`;
     find("unknown-ranges").hidden = facts.ranges !== null;
+    find("rays").textContent = raysSentence(facts.rays);
     this.reserveOutside();
     this.tellOutside();
     if (check) {

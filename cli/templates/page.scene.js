@@ -151,6 +151,13 @@ function outsideSentence(found) {
     : "";
 }
 
+/** What a network that has learned from features of more rays than the page traces makes of them. */
+function raysSentence(rays) {
+  return rays > 1
+    ? `This network has learned from features of ${rays} rays per pixel, and the page traces 1: edges are rougher here.`
+    : "";
+}
+
 /** sRGB's curve (IEC 61966-2-1), for colours that are chosen as one sees them. */
 function linearFromHex(hex) {
   return [1, 3, 5].map((start) => {

@@ -340,6 +340,45 @@ def test_a_network_that_says_no_ranges_has_a_note(chromium, data, tmp_path):
         assert tab.text("outside-room") == ""
 
 
+@pytest.mark.parametrize(("rays", "shown"), [(1, False), (16, True)])
+def test_features_of_fewer_rays_than_learned_are_said(chromium, data, tmp_path, rays, shown):
+    """Beside the picture; the page traces one ray a pixel."""
+    learned = json.loads(json.dumps(data))
+    for one in learned["variants"]:
+        one["rays"] = rays
+    (tmp_path / "page.html").write_text(webpage.render_page(learned), encoding="utf-8")
+    with chromium.tab(tmp_path / "page.html", **NO_MOTION) as tab:
+        tab.page.evaluate("wamnet.ready")
+        assert tab.page.locator("#rays").is_visible() == shown
+        assert ("has learned from features of 16 rays per pixel" in tab.text("rays")) == shown
+
+
+def test_rays_are_those_of_the_model(model, data):
+    assert [one["rays"] for one in data["variants"]] == [1, 1, 1]
+    many = replace(model, info={**model.info, "trained_on_feature_spp": "16, 4"})
+    animation = P.Animation(TIMES[:1], (scenes.canonical("minicubes", time=TIMES[0]),))
+    assert P.page_data(animation, P.networks_of(many, rank=4)[:1], SETTINGS)["variants"][0]["rays"] == 16
+
+
+def test_ready_is_what_has_drawn(chromium, path):
+    """On a slow device seconds pass between the check and the first picture: nothing is claimed meanwhile."""
+    script = """
+      window.heard = [];
+      addEventListener("DOMContentLoaded", () => {
+        const status = document.getElementById("status");
+        const listen = () => heard.push([status.textContent, Boolean(window.wamnet?.page.times.length)]);
+        new MutationObserver(listen).observe(status, { childList: true, characterData: true, subtree: true });
+      });
+    """
+    with chromium.tab(path, script, **NO_MOTION) as tab:
+        tab.page.evaluate("wamnet.ready")
+        tab.until("document.getElementById('status').textContent.startsWith('Ready')")
+        heard = tab.page.evaluate("heard")
+        assert [drawn for text, drawn in heard if text.startswith("Ready")] == [True]
+        said = [text for text, _ in heard]
+        assert said.index("Checking the network on this device.") < said.index("Drawing the first picture.")
+
+
 def test_the_pointer_turns_the_camera_and_moves_the_line(still):
     page = still.page
     page.evaluate("wamnet.go(); wamnet.page.turn(wamnet.parts.REST); wamnet.page.wipeTo(0.5)")
@@ -363,7 +402,7 @@ def test_it_plays_where_motion_is_welcome(chromium, path):
     with chromium.tab(path) as tab:
         tab.page.evaluate("wamnet.page.change({ size: 64 })")
         tab.page.evaluate("wamnet.ready")
-        assert tab.text("status") == "Ready. The animation is playing."
+        assert tab.text("status").startswith("Ready. The animation is playing.")
         tab.until("wamnet.page.state.seed > 2 && wamnet.page.frame() > 0")
         tab.page.locator("#play").press("Enter")  # a click would wait for the picture to stand still
         assert tab.text("play") == "Play"

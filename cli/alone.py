@@ -144,5 +144,5 @@ def signals_wait() -> Iterator[None]:
     finally:
         for number, handler in zip(numbers, before, strict=True):
             signal.signal(number, handler)
-        for number in noted:
-            signal.raise_signal(number)
+        for held in noted:
+            signal.raise_signal(held)

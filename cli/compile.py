@@ -220,13 +220,15 @@ def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:
     if folder.exists() and not folder.is_dir():
         raise InputError("output folder", str(folder), "it is a file", "choose another name with -o")
     check_parent(folder)
-    path, data = folder / artifact.MANIFEST_NAME, None
+    path = folder / artifact.MANIFEST_NAME
+    data: Any = None
     if not path.exists():
         return
     with suppress(InputError):
         data = parse_json(read_file(path), "manifest", "choose another folder")
     kinds = {artifact.SCHEMA: "a model's kernel", path_kernel.SCHEMA: "a scene's kernel"}
-    schema = data.get("schema") if isinstance(data, dict) else None
+    data = data if isinstance(data, dict) else {}
+    schema = data.get("schema")
     if schema not in kinds:
         rule = f"its {artifact.MANIFEST_NAME} is not one that wamnet wrote"
         raise InputError("output folder", str(folder), rule, "choose another with -o")

@@ -98,16 +98,16 @@ def check_room(needed: int, what: str, shown: object, way_out: str) -> None:
 
 def _free_bytes() -> float:
     """Return how much memory is free by the system's and by this process's own limits, as far as is known."""
-    free = math.inf
+    free: float = math.inf
     # Linux tells both; elsewhere the request itself may fail.
     with suppress(OSError, ValueError, IndexError):
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
-        free = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable"))
+        free = next(float(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable"))
         pages = [int(field) for field in Path("/proc/self/statm").read_text(encoding="ascii").split()]
         for limit, used in ((resource.RLIMIT_AS, pages[0]), (resource.RLIMIT_DATA, pages[5])):
             most = resource.getrlimit(limit)[0]
             if most != resource.RLIM_INFINITY:
-                free = min(free, most - used * resource.getpagesize())
+                free = min(free, float(most - used * resource.getpagesize()))
     return free
 
 
@@ -133,7 +133,7 @@ def parse_json(text: str | bytes, what: str, way_out: str, most: int = LARGEST_J
     unusual: list[str] = []
 
     def number(text: str) -> float:
-        value = _checked(float, text)
+        value: float = _checked(float, text)
         if not math.isfinite(value):
             unusual.append(text)
         return value

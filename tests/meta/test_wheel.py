@@ -65,7 +65,7 @@ def test_wheel_has_the_command_and_the_licence(wheel):
         for name in wheel.namelist()
         if ".dist-info/" in name
     }
-    assert "wamnet = wamnet.cli.main:main" in texts["entry_points.txt"]
+    assert "wamnet = wamnet.cli.entry:run" in texts["entry_points.txt"]
     assert "Apache License" in texts["LICENSE"]
 
 

@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -33,6 +34,10 @@ EXECUTORS = (*PIPELINES, "c")
 
 PEERS = ("mitsuba", "chromium")
 """Other programs that tests compare with or run pages in, under the policy of executors."""
+
+# A shell that starts a run in the background lets it ignore Ctrl-C, and all that it starts.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, database=None, print_blob=True)
 hypothesis.settings.register_profile(

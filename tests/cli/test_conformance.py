@@ -168,4 +168,4 @@ def test_a_file_that_is_no_track_is_refused(wamnet, tmp_path, text):
     path.write_text(text)
     done = wamnet("conformance", "--executor", "numpy", "-k", "sine/0", "--track", str(path))
     assert (done.status, path.read_text()) == (2, text)
-    assert "--track is" in done.err
+    assert "error: --track " in done.err

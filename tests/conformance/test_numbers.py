@@ -108,5 +108,6 @@ def test_a_picture_may_be_a_file(tmp_path):
 def test_other_files_are_refused(tmp_path, monkeypatch, value):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.f32").write_bytes(bytes(24))
-    with pytest.raises(InputError, match="it must name a file of little-endian float32 of its shape"):
+    rule = r"it must name a file of little-endian float32 of its shape|it cannot be read"
+    with pytest.raises(InputError, match=rule):
         from_file(value, "x")

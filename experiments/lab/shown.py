@@ -178,7 +178,10 @@ PRINTED: Mapping[str, tuple[str, str]] = {
 }
 """MSE and SSIM of the paper's Table 1."""
 
-PAPER_ROWS = ("input", "dncnn", "wamnet-color", "wamnet", "pix2pix", "svgf", "nlm", "render30")
+PAPER_ROWS = (
+    *("input", "dncnn", "wamnet-color", "wamnet-color-own", "wamnet", "wamnet-own", "pix2pix", "svgf", "nlm"),
+    *("oidn", "render30"),
+)
 """Rows of Table 1 that the README shows."""
 
 

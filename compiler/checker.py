@@ -256,7 +256,7 @@ def _at_least(step: str, stated: Any, found: Any, exact: bool = False) -> None:
     """Refuse numbers that are below those found, these rounded up as a certificate's are."""
     for value, wanted in zip(stated, found, strict=True):
         least = float(wanted) if exact else _up(float(wanted))
-        if type(value) not in (int, float) or not least <= value < np.inf:
+        if type(value) not in (int, float) or not least <= value <= 1e308:
             raise Refused(f"{step} is {value!r}: it must be a number, at least {least!r}")
 
 

@@ -9,8 +9,6 @@ its control characters, and [`shown`] also makes one line of a stated length.
 
 from __future__ import annotations
 
-import unicodedata
-
 LONGEST_MESSAGE = 1000
 """Most characters of a message: some lines of a terminal, not a dump."""
 
@@ -18,18 +16,16 @@ _MOST_OF_WHAT, _MOST_OF_VALUE, _MOST_OF_RULE = 200, 120, 320
 """Most characters of a message's parts: the name of the thing, its value, the rule and, as long, the way out.
 Together with what stands between them they are at most LONGEST_MESSAGE."""
 
-_CONTROLS = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
-"""Unicode's categories of what moves a cursor, turns or hides writing, or is half a character."""
-
 
 def escaped(text: str) -> str:
-    """Return the text with its control characters as escapes, such as `\\x1b` and `\\u202e`."""
+    """Return the text with what no terminal should be given as escapes, such as `\\x1b` and `\\u202e`.
+
+    That is what moves a cursor, turns or hides writing, is half a character, or one without a sign.
+    """
     if text.isprintable():
         return text
     return "".join(
-        character.encode("unicode_escape").decode("ascii")
-        if unicodedata.category(character) in _CONTROLS
-        else character
+        character.encode("unicode_escape").decode("ascii") if not character.isprintable() else character
         for character in text
     )
 

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wamnet.cli import exr
+from wamnet.refimpl import reading
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import LAYERS, Frame
 
@@ -75,6 +76,19 @@ def test_round_trip_of_any_size_and_selection(
     frame = random_frame(height, width, seed, tuple(name for name in LAYERS if name in names))
     exr.write_frame(path, frame)
     assert_same(frame, exr.read_frame(path))
+
+
+def test_a_frame_that_does_not_fit_the_memory_is_refused_before_its_pixels(
+    tmp_path: Path, monkeypatch
+) -> None:
+    """A few bytes may stand for any size: what the header says is compared with what is free."""
+    path = tmp_path / "a.exr"
+    exr.write_frame(path, Frame({"color": np.zeros((4, 5, 3), np.float32)}))
+    monkeypatch.setattr(reading, "_free_bytes", lambda: exr.EXR_BYTES * 60 - 1)
+    with pytest.raises(InputError, match=r"input file is .*a\.exr: it would take 0 MiB of memory"):
+        exr.read_frame(path)
+    monkeypatch.setattr(reading, "_free_bytes", lambda: exr.EXR_BYTES * 60)
+    assert exr.read_frame(path).width == 5
 
 
 def test_float64_is_rounded_to_float32(tmp_path: Path) -> None:

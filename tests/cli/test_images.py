@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.cli import exr
+from wamnet.cli import exr, images
 from wamnet.cli.images import read_image, read_png, write_png
-from wamnet.refimpl import encoding
+from wamnet.refimpl import encoding, reading
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 
@@ -50,6 +50,16 @@ def test_16_bit_png_is_refused(tmp_path: Path) -> None:
         InputError, match=r"pixel format is I;16.*: a PNG must have 8 bits a channel; use \.exr"
     ):
         read_png(tmp_path / "a.png")
+
+
+def test_a_png_that_does_not_fit_the_memory_is_refused_before_its_pixels(tmp_path: Path, monkeypatch) -> None:
+    """A few bytes may stand for any size: what the header says is compared with what is free."""
+    write_png(tmp_path / "a.png", np.zeros((40, 30, 3)))
+    monkeypatch.setattr(reading, "_free_bytes", lambda: images.PNG_BYTES * 1200 - 1)
+    with pytest.raises(InputError, match=r"size of .*a\.png is 30 x 40: it would take 0 MiB"):
+        read_png(tmp_path / "a.png")
+    monkeypatch.setattr(reading, "_free_bytes", lambda: images.PNG_BYTES * 1200)
+    assert read_png(tmp_path / "a.png").shape == (40, 30, 3)
 
 
 def test_missing_and_broken_pngs(tmp_path: Path) -> None:

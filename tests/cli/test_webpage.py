@@ -328,12 +328,17 @@ def test_the_page_says_what_the_reference_says(still, times, saturation):
     assert max(counts) >= 4
 
 
+def changed_page(data, folder, **facts):
+    """Write a page whose networks say something else, and return its path."""
+    other = json.loads(json.dumps(data))
+    for one in other["variants"]:
+        one.update(facts)
+    (folder / "page.html").write_text(webpage.render_page(other), encoding="utf-8")
+    return folder / "page.html"
+
+
 def test_a_network_that_says_no_ranges_has_a_note(chromium, data, tmp_path):
-    unknown = json.loads(json.dumps(data))
-    for one in unknown["variants"]:
-        one["ranges"] = None
-    (tmp_path / "page.html").write_text(webpage.render_page(unknown), encoding="utf-8")
-    with chromium.tab(tmp_path / "page.html", **NO_MOTION) as tab:
+    with chromium.tab(changed_page(data, tmp_path, ranges=None), **NO_MOTION) as tab:
         tab.page.evaluate("wamnet.ready")
         assert tab.page.locator("#unknown-ranges").is_visible()
         assert tab.page.evaluate("wamnet.page.outside({ yaw: 90, pitch: 0, distance: 1 }, [])") == ""
@@ -343,11 +348,7 @@ def test_a_network_that_says_no_ranges_has_a_note(chromium, data, tmp_path):
 @pytest.mark.parametrize(("rays", "shown"), [(1, False), (16, True)])
 def test_features_of_fewer_rays_than_learned_are_said(chromium, data, tmp_path, rays, shown):
     """Beside the picture; the page traces one ray a pixel."""
-    learned = json.loads(json.dumps(data))
-    for one in learned["variants"]:
-        one["rays"] = rays
-    (tmp_path / "page.html").write_text(webpage.render_page(learned), encoding="utf-8")
-    with chromium.tab(tmp_path / "page.html", **NO_MOTION) as tab:
+    with chromium.tab(changed_page(data, tmp_path, rays=rays), **NO_MOTION) as tab:
         tab.page.evaluate("wamnet.ready")
         assert tab.page.locator("#rays").is_visible() == shown
         assert ("has learned from features of 16 rays per pixel" in tab.text("rays")) == shown

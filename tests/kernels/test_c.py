@@ -127,31 +127,18 @@ def test_building_again_costs_nothing(executor_named, case, monkeypatch):
 # ---- refusals ----------------------------------------------------------------------------------------
 
 
-def test_no_compiler(monkeypatch):
-    monkeypatch.setenv("CC", "no-such-compiler -O2")
-    with pytest.raises(
-        ExecutorUnavailable, match=r"c: the compiler 'no-such-compiler' cannot be run .*Debian: gcc"
-    ):
-        kernels.open_executor("c")
-
-
-def test_compiler_that_compiles_nothing(monkeypatch):
-    monkeypatch.setenv("CC", "false")
-    with pytest.raises(ExecutorUnavailable, match=r"does not compile C99 \(.*\); install one"):
-        kernels.open_executor("c")
-
-
-def test_command_that_is_none(monkeypatch):
-    monkeypatch.setenv("CC", "gcc '")
-    with pytest.raises(
-        ExecutorUnavailable, match=r"c: CC is .* no command \(No closing quotation\); install"
-    ):
-        kernels.open_executor("c")
-
-
-def test_compiler_that_writes_nothing(monkeypatch):
-    monkeypatch.setenv("CC", "true")
-    with pytest.raises(ExecutorUnavailable, match=r"\(it writes no program\); install one"):
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        ("no-such-compiler -O2", r"c: the compiler 'no-such-compiler' cannot be run .*Debian: gcc"),
+        ("false", r"does not compile C99 \(.*\); install one"),
+        ("true", r"\(it writes no program\); install one"),
+        ("gcc '", r"c: CC is .* no command \(No closing quotation\); install"),
+    ],
+)
+def test_no_compiler(monkeypatch, command, says):
+    monkeypatch.setenv("CC", command)
+    with pytest.raises(ExecutorUnavailable, match=says):
         kernels.open_executor("c")
 
 

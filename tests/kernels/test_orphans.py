@@ -7,9 +7,9 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
+from faults import members
 
 GRACE_S = 10.0
 """Seconds after which a process that is still there counts as one that stays: a guard, no speed."""
@@ -36,19 +36,6 @@ CLUSTER = (
     "    with open_client(2, None): print('ready', flush=True); time.sleep(600)\n"
 )
 """A Dask cluster of two processes."""
-
-
-def members(group: int) -> set[int]:
-    """Return the processes of a session that have not ended."""
-    found = set()
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            state, _, _, session = path.read_text().rpartition(")")[2].split()[:4]
-        except OSError:  # it has ended meanwhile
-            continue
-        if int(session) == group and state != "Z":
-            found.add(int(path.parent.name))
-    return found
 
 
 @pytest.mark.parametrize("code", [POOL, APART, CLUSTER], ids=["pool", "apart", "cluster"])

@@ -1,8 +1,8 @@
 """One writer for one output: the second is refused, in one line, before it has written anything.
 
-1. A writer locks an empty file, in its folder [`alone_in`] or beside its file [`alone_at`]. The system
-   forgets the lock of a process that was killed, so that the next run goes on; the file goes at every other
-   end.
+1. A writer locks an empty file, in its folder [`alone_in`] or beside its file [`alone_at`]; [`working_in`]
+   makes the folder too. The system forgets the lock of a process that was killed, so that the next run goes
+   on; the file goes at every other end.
 2. A lock is made or opened as itself: a link of its name, anything but a regular file, and a file with
    content are somebody else's, refused, and stay.
 3. While a lock is taken or given back SIGINT and SIGTERM wait, so that none ends a run in between
@@ -19,10 +19,12 @@ import signal
 import stat
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
+from ..compiler.writing import making_parents
 from ..refimpl.errors import InputError
+from .outputs import unwritable
 
 LOCK = ".lock"
 """File that is locked, and there, as long as a process writes into the folder."""
@@ -38,6 +40,18 @@ def alone_in(
     """Keep other writers out of a folder, which is there; `doing` says what they do."""
     refusal = InputError("output folder", str(folder), f"another process is {doing} there", way_out)
     with _locked(folder / LOCK, refusal):
+        yield
+
+
+@contextmanager
+def working_in(folder: Path, doing: str) -> Iterator[None]:
+    """Make a folder if it is missing, and keep others out; an error that leaves it empty removes it."""
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(making_parents(folder))
+        except OSError as error:
+            raise unwritable(folder, error, "output folder") from None
+        stack.enter_context(alone_in(folder, doing))
         yield
 
 

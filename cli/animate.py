@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..compiler.writing import making_parents, remove_temporaries
+from ..compiler.writing import remove_temporaries
 from ..refimpl.errors import InputError
 from . import machine, movie, options
-from .alone import alone_in
+from .alone import working_in
 from .inputs import load_model, model_path, unlike_training
 from .options import ExecutorName, Renderer
 from .outputs import check_output, check_parent, check_real_folder
@@ -123,8 +123,7 @@ def animate(
     missing(folder, shots)
     _say_what_is_not_learned(output, shots, network)
     with (
-        making_parents(folder),
-        alone_in(folder, "drawing pictures"),
+        working_in(folder, "drawing pictures"),
         hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"),
     ):
         made = _draw(shots, folder, network, (executor, renderer), rank)

@@ -5,18 +5,16 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..compiler.writing import making_parents
 from ..refimpl.errors import ExecutorUnavailable, InputError
 from . import bench_forms, bench_frames, bench_report, machine, packages
-from .alone import alone_in
+from .alone import working_in
 from .bench_frames import Frames
 from .inputs import load_model
 from .options import ExecutorName, parse_names
@@ -197,7 +195,7 @@ def bench(
     taking_part = parse_names(only), executors
     forms = _forms(network, train_variants, quick, counts["steps"])
     forms = _needed(forms, *taking_part, size=numbers["size"], quick=quick)
-    with _in_folder(output):
+    with working_in(output, "measuring"):
         with hint_on_interrupt(lambda: f"the same command goes on with the frames and forms in {output}"):
             shown = what.frames(network, output, numbers["size"], counts)
             trained = what.train(network, forms, output)
@@ -396,18 +394,6 @@ def check_folder(output: Path) -> None:
     if output.is_dir():
         for name in (JSON_NAME, TEXT_NAME):
             check_output(output / name)
-
-
-@contextmanager
-def _in_folder(output: Path) -> Iterator[None]:
-    """Make the output folder, which is this process's alone until the block has ended."""
-    with ExitStack() as stack:
-        try:
-            stack.enter_context(making_parents(output))
-        except OSError as error:
-            raise unwritable(output, error, "output folder") from None
-        stack.enter_context(alone_in(output, "measuring"))
-        yield
 
 
 def make_folder(output: Path) -> None:

@@ -113,11 +113,11 @@ def scene_of(model: Model) -> str | None:
 def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     """Return the request of frames that are like those that a model was trained on."""
     from ..kernels.frame_plan import Request
-    from ..refimpl.render import FEATURE_SPP
+    from ..refimpl.denoise import learned_feature_spp
 
     scene = scene_of(model)
     assert scene is not None, "whoever asks for frames has looked for a scene"
-    rays = _first(model, FEATURE_SPP, 1)
+    rays = learned_feature_spp(model)
     numbers = {**numbers, **ranges_of(model), "feature_spp": rays if rays > 1 else 0}
     found = Request(scene, executor=executor, **numbers)
     return replace(found, max_depth=_first(model, "max_depth", found.max_depth))

@@ -28,10 +28,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from ..compiler.writing import TEMPORARY_NAME, is_regular, making_parents, remove_temporaries
+from ..compiler.writing import TEMPORARY_NAME, is_regular, remove_temporaries
 from ..refimpl.errors import InputError
 from ..refimpl.reading import BROKEN, parse_json, read_file
-from .alone import alone_in
+from .alone import working_in
 from .outputs import check_real_folder, write_text
 
 if TYPE_CHECKING:
@@ -270,7 +270,7 @@ class Store:
             raise InputError("output folder", str(folder), rule, "choose a new or empty one with -o")
         check_work_folders(folder)
         before = _known_before(folder, request, frames) if (folder / MANIFEST).exists() else {}
-        with making_parents(folder), alone_in(folder, "making a data set"):
+        with working_in(folder, "making a data set"):
             # It was another process's until now.
             check_work_folders(folder)
             store = cls(folder, request, frames, before, nearest or {})

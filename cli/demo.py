@@ -19,21 +19,20 @@ import math
 import shlex
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from ..compiler.writing import making_parents
 from ..refimpl.errors import ExecutorUnavailable, InputError
 from ..refimpl.reading import read_file
 from . import bench, bench_forms, bench_frames, dataset, dataset_files, report, train
-from .alone import alone_in
+from .alone import working_in
 from .compare import Score, measure
 from .compile import write_kernel
-from .outputs import unwritable, write_text
+from .outputs import write_text
 from .packages import need
 from .runs import Run, run_all
 from .terminal import hint_on_interrupt, progress, say, table
@@ -223,12 +222,7 @@ def begun(plan: Plan, folder: Path) -> Iterator[None]:
         raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
     text = json.dumps(asdict(plan), indent=2) + "\n"
     _check_note(folder, text)
-    with ExitStack() as stack:
-        try:
-            stack.enter_context(making_parents(folder))
-        except OSError as error:
-            raise unwritable(folder, error, "output folder") from None
-        stack.enter_context(alone_in(folder, "making a demonstration"))
+    with working_in(folder, "making a demonstration"):
         if not _check_note(folder, text):
             write_text(folder / PLAN_NAME, text)
         yield

@@ -80,7 +80,7 @@ def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
         told.append(f"outside of what the model has learned: {', '.join(beyond)}; expect errors")
     if scenes and "spp" in info:
         rays, wanted = info.get(FEATURE_SPP, "1"), model.info.get(f"trained_on_{FEATURE_SPP}", "1")
-        if rays != wanted:
+        if rays not in wanted.split(", "):
             rule = f"its features are of --feature-spp {rays}, those that the model learned from of {wanted}"
             told.append(f"{rule}: expect worse edges")
     return told

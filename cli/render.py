@@ -167,17 +167,7 @@ def load_scene(
     if view not in (None, options.View()):
         rule = "a scene file has its own camera and lamps"
         raise InputError("camera and lamps", "given", rule, "change the file, or write it with wamnet scene")
-    text = decoded(path, read_file(path, "scene file", "check the name"))
     try:
-        return from_json(text)
+        return from_json(read_file(path, "scene file", "check the name"))
     except InputError as error:
         raise InputError(f"{path}: {error.what}", error.value, error.rule, error.way_out) from None
-
-
-def decoded(path: Path, content: bytes) -> str:
-    """Return a scene file's text."""
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError:
-        rule = "it cannot be read (it is no text)"
-        raise InputError("scene file", str(path), rule, "check the name") from None

@@ -420,14 +420,14 @@ def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
     return Kept(folder, _with_files(made, folder))
 
 
-def _with_files(made: Artifact, folder: Path, prefix: str = "") -> Artifact:
+def _with_files(made: Artifact, folder: Path) -> Artifact:
     """Return an artifact with the source and the weights that lie in a folder, in the place of its own."""
     import numpy as np
 
     from ..compiler import artifact, ir
 
-    content = read_file(folder / f"{prefix}{made.source_name}", "--kernel")
-    raw = read_file(folder / f"{prefix}{artifact.WEIGHTS_NAME}", "--kernel")
+    content = read_file(folder / made.source_name, "--kernel")
+    raw = read_file(folder / artifact.WEIGHTS_NAME, "--kernel")
     if len(raw) != 4 * made.weights.size:
         rule = f"it must hold {made.weights.size} float32 weights, {4 * made.weights.size} bytes"
         raise InputError(f"--kernel: length of {artifact.WEIGHTS_NAME}", len(raw), rule, "restore the file")
@@ -440,5 +440,4 @@ def _with_files(made: Artifact, folder: Path, prefix: str = "") -> Artifact:
         source=source,
         weights=np.frombuffer(raw, "<f4").astype(np.float32),
         manifest={**made.manifest, "digest": ir.sha256(content, raw), "files": files},
-        before=_with_files(made.before, folder, artifact.FIRST_PASS) if made.before else None,
     )

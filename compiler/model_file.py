@@ -152,10 +152,7 @@ def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, str
     way_out = "write it with `wamnet train`"
     try:
         tensors = decode_tensors(content)
-    except SafetensorError as error:
-        rule = f"not a safetensors file ({error})"
-        raise InputError(f"{kind} file", str(path), rule, way_out) from None
-    except BROKEN as error:
+    except (SafetensorError, *BROKEN) as error:
         raise InputError(f"{kind} file", str(path), f"not a safetensors file ({error})", way_out) from None
     texts = _header_texts(path, content)
     _check_kind(path, texts, kind)

@@ -202,8 +202,8 @@ def _deeper_than(value: Any, depth: int) -> bool:
 
 def _unusual(value: Any, path: str) -> Iterator[tuple[str, str, str]]:
     """Yield path, value and rule of what stands in a value and is no number or no text; it is not deep."""
-    if isinstance(value, str) and any("\ud800" <= character <= "\udfff" for character in value):
-        yield path, ascii(value), "half a character (a surrogate alone) cannot be written to a file"
+    if isinstance(value, str) and _has_half_character(value):
+        yield path, ascii(value), HALF
     elif isinstance(value, float) and not math.isfinite(value):
         yield path, str(value), "it must be a finite number, as JSON knows no other"
     elif isinstance(value, list):
@@ -213,6 +213,15 @@ def _unusual(value: Any, path: str) -> Iterator[tuple[str, str, str]]:
         for key, item in value.items():
             yield from _unusual(key, f"{path}: a key")
             yield from _unusual(item, f"{path}.{key}")
+
+
+HALF = "half a character (a surrogate alone) cannot be written to a file"
+"""The rule of a text that UTF-8 cannot hold."""
+
+
+def _has_half_character(text: str) -> bool:
+    """Tell whether a text has a surrogate without its other half."""
+    return any("\ud800" <= character <= "\udfff" for character in text)
 
 
 @contextmanager
@@ -342,6 +351,6 @@ def _text(value: Any, path: str) -> str:
     """Return a JSON string that can be written to a file."""
     if not isinstance(value, str):
         raise InputError(path, value, "it must be a text", "put it in quotation marks")
-    if any("\ud800" <= character <= "\udfff" for character in value):
-        raise InputError(path, ascii(value), "half a character cannot be written to a file", "mend the text")
+    if _has_half_character(value):
+        raise InputError(path, ascii(value), HALF, "mend the text")
     return value

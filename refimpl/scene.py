@@ -201,8 +201,11 @@ def _told(f: Any, value: Any) -> bool:
 # JSON in
 
 
-def from_json(text: str) -> Scene:
-    """Return the scene in a JSON text; raise InputError, with the value's path, where it breaks a rule."""
+def from_json(text: str | bytes) -> Scene:
+    """Return the scene in a JSON text, which may be a file's bytes.
+
+    Raises InputError, with the path of the value, where it breaks a rule.
+    """
     data = parse_json(text, "scene", "mend the text: a scene is a JSON object")
     if not isinstance(data, dict):
         raise InputError("scene text", data, "a scene is a JSON object", "take one from `wamnet scene`")

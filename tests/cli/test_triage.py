@@ -155,6 +155,16 @@ def test_a_kernel_that_cannot_be_run_is_refused(wamnet, refused, here, change, s
     )
 
 
+def test_a_kernel_of_two_passes_is_refused(wamnet, refused, here) -> None:
+    """Triage runs whole networks; half of a cut one must not be run in the place of one."""
+    compiled = wamnet(
+        "compile", "model.safetensors", "--target", "opencl", "--variant", "rank2", "-o", "kept"
+    )
+    assert compiled.status == 0
+    given = ("triage", "model.safetensors", "noisy.exr", "--executor", "opencl", "--kernel", "kept")
+    assert "--kernel" in refused(*given)
+
+
 @pytest.mark.parametrize("options", [["--executor", "numpy"], ["--executor", "c", "--schedules", "plain"]])
 def test_a_kernel_that_no_executor_would_run_is_refused(wamnet, refused, here, options) -> None:
     assert wamnet("compile", "model.safetensors", "--target", "opencl", "-o", "kept").status == 0

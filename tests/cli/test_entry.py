@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -51,5 +52,7 @@ def test_the_status_is_the_command_s(tmp_path) -> None:
     )
     (tmp_path / "ended.py").write_text(code)
     command = [sys.executable, "-m", "ended"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, check=False, timeout=60)
+    # The working folder is no place of modules where PYTHONSAFEPATH is set, as in .ci/run.
+    found = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(command, env=found, cwd=tmp_path, capture_output=True, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (143, b"")

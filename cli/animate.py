@@ -146,6 +146,7 @@ def _draw(
     shots: Sequence[Shot], folder: Path, network: Model, by: tuple[ExecutorName, Renderer], rank: int
 ) -> int:
     """Draw the pictures that are not in the folder, which is this process's alone; return how many."""
+    from ..compiler.variants import FULL, with_rank
     from ..kernels import open_executor
 
     executor, renderer = by
@@ -157,7 +158,7 @@ def _draw(
         progress("drawing", len(left)) as advance,
     ):
         draw = draw_frames if _one_device(executor, renderer, shots[0].noisy) else draw_apart
-        for _ in draw(left, network, runner, renderer.value, rank):
+        for _ in draw(left, network, runner, renderer.value, with_rank(FULL, rank)):
             advance(1)
     return len(left)
 
@@ -266,7 +267,7 @@ def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
 
 
 def draw_apart(
-    shots: Sequence[Shot], model: Model, executor: Executor, renderer: str, rank: int = 0
+    shots: Sequence[Shot], model: Model, executor: Executor, renderer: str, variant: str
 ) -> Iterator[None]:
     """Render, denoise and write pictures, rendering and denoising on different devices."""
     from ..kernels import denoise_on
@@ -276,7 +277,7 @@ def draw_apart(
     for shot in shots:
         frame = render_frame(renderer, shot.scene, shot.noisy, workers=None).frame
         noisy = to_display(frame["color"], model.normalization.exposure_stops)
-        denoised = denoise_on(executor, model, frame, rank=rank, pictures=len(shots)).image
+        denoised = denoise_on(executor, model, frame, variant=variant, pictures=len(shots)).image
         reference = None
         if shot.reference is not None:
             reference = render_frame(renderer, shot.scene, shot.reference, workers=None).frame
@@ -285,7 +286,7 @@ def draw_apart(
 
 
 def draw_frames(
-    shots: Sequence[Shot], model: Model, executor: Executor, renderer: str, rank: int = 0
+    shots: Sequence[Shot], model: Model, executor: Executor, renderer: str, variant: str
 ) -> Iterator[None]:
     """Render, denoise and write pictures by one pipeline, on the device that does both."""
     from contextlib import ExitStack
@@ -305,7 +306,7 @@ def draw_frames(
                     settings=shot.noisy.settings,
                     show=("color",),
                     whole=whole,
-                    rank=rank,
+                    variant=variant,
                     pictures=len(shots),
                 )
                 pipeline = stack.enter_context(made)

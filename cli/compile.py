@@ -130,14 +130,14 @@ def _write(kernel: Files, folder: Path) -> None:
 
 def _chosen_here(model: Model, executor: str, profile: str, schedule: str | None, variant: str) -> str:
     """Return the schedule of a variant for this machine's device, and say why."""
-    from ..compiler.variants import parse, vary
+    from ..compiler.variants import plan_model
     from ..kernels import open_executor, tune
 
     if schedule is not None:
         raise InputError("--schedule", schedule, "--here chooses another", "leave one of them out")
-    varied = vary(parse(variant), model)
+    plan = plan_model(model, executor, profile, variant=variant)
     with open_executor(executor) as runner:
-        found = tune.choose(runner, varied.model, HERE_SIZE, profile, varied.rank, HERE_PICTURES)
+        found = tune.choose(runner, plan, HERE_SIZE, HERE_PICTURES)
         say(f"schedule {found.schedule} for {runner.device}: {found.reason}")
     return found.schedule
 
@@ -152,8 +152,9 @@ def _compiled_model(
     here: bool,
 ) -> Artifact:
     """Return the kernel of a model: of a variant that is named, or that keeps limits, or of all of it."""
+    from ..compiler.compile import compile_plan
     from ..compiler.schedules import PLAIN
-    from ..compiler.variants import FULL, compile_variant
+    from ..compiler.variants import FULL, plan_model
 
     check_request(request, variant)
     model = load_model(path)
@@ -164,7 +165,7 @@ def _compiled_model(
         variant, schedule = choose(model, request, target, profile, schedule)
     elif here:
         schedule = _chosen_here(model, target, profile, schedule, variant or FULL)
-    return compile_variant(model, variant or FULL, target, profile, schedule or PLAIN)
+    return compile_plan(plan_model(model, target, profile, schedule or PLAIN, variant or FULL))
 
 
 def _only_for(what: str, given: Mapping[str, Any], rule: str) -> None:

@@ -336,8 +336,9 @@ def run_kernels(
 
     Return the pictures, whose they are, and what was found about each executor.
     """
-    from ..compiler.compile import TARGETS, compile_program
+    from ..compiler.compile import compile_program
     from ..compiler.lower import lower
+    from ..compiler.targets import TARGETS
     from ..kernels import denoise_on, open_executor
 
     kernels = {target: compile_program(lower(model), target) for target in TARGETS}

@@ -61,7 +61,7 @@ def denoise(
     The kernel's schedule is the one that suits the device, unless another is named. With profile exact the
     result is the same to the last bit on every executor; its digest is printed, to be compared.
     """
-    from ..compiler.variants import FULL
+    from ..compiler.variants import FULL, with_rank
     from ..kernels import denoise_on, open_executor
     from ..kernels.tune import first_time
     from . import exr
@@ -75,7 +75,7 @@ def denoise(
     for what in unlike_training(network, noisy.info):
         say(f"{frame}: {what}")
     with open_executor(executor.value) as runner:
-        result = denoise_on(runner, network, noisy, profile, schedule, rank, variant or FULL)
+        result = denoise_on(runner, network, noisy, profile, schedule, with_rank(variant or FULL, rank))
         first = first_time(runner, result.kernel, result.seconds_compile)
     write_denoised(output, result.image, network, noisy)
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")

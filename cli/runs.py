@@ -10,11 +10,9 @@ from ..refimpl.errors import CompileError, ExecutorUnavailable
 
 if TYPE_CHECKING:
     from ..compiler.artifact import Artifact
+    from ..compiler.plan import Plan
     from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
-
-BLOCK_NUMBERS = 2**21
-"""Numbers in the windows of a block of rows while bounds are computed: 16 MiB in float64."""
 
 
 @dataclass(frozen=True)
@@ -61,46 +59,35 @@ def run_one(name: str, kernel: Artifact, model: Model, frame: Frame, truth: Any)
 
     The kernel runs twice and the second time counts: drivers put off work until the first run.
     """
-    from ..compiler.compile import compile_program
-    from ..compiler.lower import lower
+    from ..compiler.enclosure import round_up
+    from ..compiler.variants import plan_model
     from ..kernels import denoise_on, open_executor
     from ..refimpl.metrics import largest_error
 
     with open_executor(name) as executor:
         schedule = executor.schedule_for((frame.height, frame.width))
-        made = compile_program(lower(model), name, kernel.profile, schedule).manifest
+        plan = plan_model(model, name, kernel.profile, schedule)
         first = denoise_on(executor, model, frame)
         second = denoise_on(executor, model, frame)
-    everywhere = made["bound"]["output"]
+    everywhere = plan.bound.output
     run = Run(
         name,
         second.device,
         first.seconds_compile,
         second.seconds_run,
         largest_error(second.image, truth),
-        frame_bound(model, frame, name, kernel.profile, made["schedule"]["name"]),
-        max(everywhere) if everywhere else None,
+        frame_bound(plan, frame),
+        round_up(max(everywhere)) if everywhere else None,
     )
     return second.image, run
 
 
-def frame_bound(
-    model: Model, frame: Frame, target: str, profile: str, schedule: str = "plain"
-) -> float | None:
-    """Return the compiler's bound on a kernel's largest error in this frame, or None where it has none."""
+def frame_bound(plan: Plan, frame: Frame) -> float | None:
+    """Return the bound on the largest error of a plan's kernel in this frame, or None where it has none."""
     import numpy as np
 
-    from ..compiler import bounds
-    from ..compiler.compile import analysed, schedule_named, sine_contract
-    from ..compiler.lower import lower
     from ..kernels.denoise_on import images_of
 
-    program, sine = analysed(lower(model)), sine_contract(profile, target)
-    images, chosen = images_of(model, frame), schedule_named(target, schedule)
-    rows = max(1, BLOCK_NUMBERS // (frame.width * model.siren.widths[0]))
-    largest = 0.0
-    for top in range(0, frame.height, rows):
-        found = chosen.enclosures(program, sine, images, slice(top, top + rows))
-        (errors,) = bounds.output_errors(program, found).values()
-        largest = max(largest, float(errors.max()))
+    assert plan.varied is not None, "plan_model makes plans of networks"
+    largest = float(plan.expected(images_of(plan.varied.model, frame)).bound.max())
     return largest if np.isfinite(largest) else None

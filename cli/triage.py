@@ -29,7 +29,7 @@ from .terminal import progress, say, table
 
 if TYPE_CHECKING:
     from ..compiler.artifact import Artifact
-    from ..compiler.ir import Program
+    from ..compiler.plan import Plan
     from ..kernels.apart import Runner
     from ..kernels.executor import Images
     from ..kernels.reduce import Box, Reduced
@@ -145,9 +145,9 @@ class Task:
     @property
     def compiled(self) -> Compile:
         """Return the compiler, which has the kept kernel for its own where there is one."""
-        from ..compiler.compile import compile_program
+        from ..compiler.compile import compile_plan
 
-        return self.kept.compiled if self.kept else compile_program
+        return self.kept.compiled if self.kept else compile_plan
 
 
 def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Runner]:
@@ -185,7 +185,7 @@ def _judged(task: Task, runners: Sequence[Runner]) -> list[Verdict]:
     kernels = kernels_of(runners, program, task.profile, size, task.schedules, task.compiled, instead)
     if task.kept:
         task.kept.check_ran(kernels)
-    judge, verdicts = Judge(program, task.images), []
+    judge, verdicts = Judge(task.images), []
     with progress("kernels", len(kernels)) as advance:
         for kernel in kernels:
             verdicts.append(judge.verdict(kernel))
@@ -276,8 +276,8 @@ def _report(task: Task, verdicts: Sequence[Verdict], found: Reduced) -> dict[str
     from dataclasses import asdict
 
     from ..compiler import ir
-    from ..compiler.compile import analysed
     from ..compiler.lower import lower
+    from ..compiler.plan import analysed
     from ..kernels.triage import conclusion
 
     return {
@@ -373,11 +373,11 @@ class Kept:
         """Return the name of its schedule."""
         return str(self.kernel.manifest["schedule"]["name"])
 
-    def compiled(self, program: Program, target: str, profile: str, schedule: str) -> Artifact:
+    def compiled(self, plan: Plan) -> Artifact:
         """Return the kept kernel where it is asked for, else a new one."""
-        from ..compiler.compile import compile_program
+        from ..compiler.compile import compile_plan
 
-        made = compile_program(program, target, profile, schedule)
+        made = compile_plan(plan)
         same = all(
             made.manifest[key] == self.kernel.manifest[key] for key in ("program", "target", "schedule")
         )
@@ -399,8 +399,9 @@ def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
     They may have been changed: their hashes are not asked for. The manifest says of what they are the kernel.
     """
     from ..compiler import artifact, ir
-    from ..compiler.compile import analysed, compile_program
+    from ..compiler.compile import compile_program
     from ..compiler.lower import lower
+    from ..compiler.plan import analysed
 
     way_out = "give a folder that triage or compile wrote"
     rule = f"it must hold a {artifact.MANIFEST_NAME} that wamnet wrote beside a model's kernel"

@@ -64,6 +64,7 @@ def tune(
     Every schedule that the device holds is checked against the reference, then timed. Other commands take the
     fastest for networks of this shape and pictures of about this size.
     """
+    from ..compiler.variants import FULL, plan_model, with_rank
     from ..kernels import open_executor
     from ..kernels import tune as tuning
 
@@ -74,9 +75,10 @@ def tune(
     network = load_model(model) if model else paper()
     square = (size, size)
     with _alone(), open_executor(executor.value) as runner:
-        known = None if force else tuning.remembered(runner, network, square, rank=rank)
-        found = known or tuning.tune(runner, network, square, rank=rank)
-        picks = {n: tuning.choose(runner, network, square, rank=rank, pictures=n) for n in (1, MANY)}
+        plan = plan_model(network, runner.name, variant=with_rank(FULL, rank))
+        known = None if force else tuning.remembered(runner, plan, square)
+        found = known or tuning.tune(runner, plan, square)
+        picks = {n: tuning.choose(runner, plan, square, n) for n in (1, MANY)}
     show(found)
     if known:
         say(f"measured on {found.day}; --force measures again")

@@ -13,7 +13,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,21 +21,22 @@ from numpy.typing import NDArray
 from .ir import Program
 from .writing import making_parents, write_together
 
+if TYPE_CHECKING:
+    from .plan import Plan
+
 SCHEMA = "wamnet-artifact-1"
 """Name and version of the manifest's form; described in spec/kernel_interface.md."""
 
 
 @dataclass(frozen=True)
 class Artifact:
-    """A compiled kernel; `program` is what was emitted, after all passes.
+    """A compiled kernel of a plan; `program` is what was emitted, after all passes.
 
     `before`: the kernel that writes the only image of this one, of a first layer in two passes [factor.py];
     `certificate`: the proof of the bound, as JSON's types.
     """
 
-    target: str
-    profile: str
-    entry_point: str
+    plan: Plan
     source: str
     source_name: str
     program: Program
@@ -43,6 +44,21 @@ class Artifact:
     manifest: Mapping[str, Any]
     before: Artifact | None = None
     certificate: Mapping[str, Any] | None = None
+
+    @property
+    def target(self) -> str:
+        """Return the name of the target."""
+        return self.plan.target.name
+
+    @property
+    def profile(self) -> str:
+        """Return the name of the profile."""
+        return self.plan.profile.name
+
+    @property
+    def entry_point(self) -> str:
+        """Return the name of the kernel's function."""
+        return self.plan.target.entry
 
     @property
     def digest(self) -> str:

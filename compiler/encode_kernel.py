@@ -23,7 +23,6 @@ from ..refimpl.errors import CompileError
 from . import bounds, ir, profiles
 from .artifact import OneSource
 from .c_path import CEncode
-from .compile import sine_contract, target_named
 from .cuda import CUDAEncode
 from .encode_dialect import EncodeDialect, GLSLEncode, OpenCLEncode
 from .glsl_buffers import FIRST_IMAGE, ComputeEncode, VulkanEncode
@@ -32,6 +31,8 @@ from .ir import Image, Program
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
 from .metal import MetalEncode
 from .passes import pipeline
+from .plan import sine_contract
+from .targets import target_named
 from .wgsl import WGSLEncode
 
 SCHEMA = "wamnet-encode-kernel-1"

@@ -21,7 +21,7 @@ from ..refimpl.errors import CompileError
 from . import emit_path, ir, opencl_path, profiles
 from .artifact import OneSource
 from .c_path import CPath
-from .compile import asdict_finite, sine_contract, target_named
+from .compile import asdict_finite
 from .cuda import CUDAPath
 from .glsl_buffers import ComputePath, VulkanPath
 from .glsl_es import GLSLESPath
@@ -30,7 +30,9 @@ from .lower_scene import MOST_UNROLLED, PASSES, PathPrograms
 from .metal import MetalPath
 from .passes import pipeline
 from .path_dialect import PathDialect
+from .plan import sine_contract
 from .profiles import Profile
+from .targets import target_named
 from .wgsl import WGSLPath
 
 SCHEMA = "wamnet-path-kernel-1"

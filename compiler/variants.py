@@ -32,13 +32,12 @@ from ..refimpl.dataset import FEATURES, Window
 from ..refimpl.denoise import Model
 from ..refimpl.errors import InputError
 from ..refimpl.siren import Siren
-from . import bounds, factor, ir, sine
-from .artifact import Artifact
+from . import bounds, ir, sine
 from .bounds import Enclosure
-from .compile import analysed, compile_program, round_up, schedule_named, sine_contract
 from .emit import kernel_gather
-from .ir import Program
+from .enclosure import round_up
 from .lower import lower
+from .plan import Plan, analysed, plan_program
 from .schedules import PLAIN
 
 Array = NDArray[np.float64]
@@ -70,6 +69,7 @@ class Varied:
     kept: tuple[Indices, ...]
     window: Window
     features: tuple[str, ...]
+    variant: Variant
     rank: int = 0
     degree: int = sine.DEGREE
 
@@ -120,6 +120,21 @@ class Varied:
     def profile(self, base: str) -> str:
         """Return the name of the profile that has the variant's sine."""
         return base if self.degree == sine.DEGREE else f"{base}-sine{self.degree}"
+
+    def manifest(self, plan: Plan) -> Mapping[str, Any]:
+        """Return what a kernel's manifest says about the variant: what was done, and what it moves."""
+        bound = bound_of(plan)
+        return {
+            "name": self.variant.name,
+            "approximations": [f"{kind}{value}" for kind, value in self.variant.steps],
+            "program": digest_of(self.whole),
+            "products": self.products,
+            "products_of_full": vary(Variant(), self.whole).products,
+            "bound": {
+                "output": None if bound is None else [round_up(float(error)) for error in bound],
+                "against": "float64 reference of the full network, for all images, in display-encoded colour",
+            },
+        }
 
 
 # ---- approximations ---------------------------------------------------------------------------------------
@@ -262,6 +277,13 @@ def parse(text: str) -> Variant:
     return Variant(tuple(steps))
 
 
+def with_rank(text: str, rank: int) -> str:
+    """Return the name of a variant that may be given as a rank instead: short for the variant `rankR`."""
+    if rank and text != FULL:
+        raise InputError("rank", rank, f"the variant is {text}", "name it in the variant: +rank12")
+    return f"rank{rank}" if rank else text
+
+
 def _check_order(text: str, steps: Sequence[tuple[str, int | str]]) -> None:
     """Refuse approximations that come twice, or after one that rests on them."""
     done: list[str] = []
@@ -281,7 +303,9 @@ def vary(variant: Variant, model: Model) -> Varied:
     siren = model.siren
     wide = [[array.astype(np.float64) for array in arrays] for arrays in (siren.weights, siren.biases)]
     kept = tuple(np.arange(weight.shape[1]) for weight in siren.weights)
-    varied = Varied(model, tuple(wide[0]), tuple(wide[1]), kept, model.window, model.features)
+    varied = Varied(
+        model, tuple(wide[0]), tuple(wide[1]), kept, model.window, model.features, variant=variant
+    )
     for kind, value in variant.steps:
         varied = KINDS[kind].apply(varied, value)
     return varied
@@ -296,10 +320,10 @@ def _check(name: str, holds: bool, rule: str, way_out: str) -> None:
 # ---- bounds -----------------------------------------------------------------------------------------------
 
 
-def enclose(varied: Varied, target: str, profile: str, schedule: str = PLAIN) -> list[Enclosure]:
+def enclose(varied: Varied, plan: Plan) -> list[Enclosure]:
     """Return enclosures of the full network's values for all images, errors being a variant's kernel's."""
     whole = analysed(lower(varied.whole))
-    contract = sine_contract(varied.profile(profile), target)
+    contract = plan.sine
     box = bounds.window_box(kernel_gather(whole))
     layers = [index for index, node in enumerate(whole.nodes) if node.op == "affine"]
     assert len(layers) == len(varied.weights), "a lowered model has one affine map a layer"
@@ -319,7 +343,7 @@ def enclose(varied: Varied, target: str, profile: str, schedule: str = PLAIN) ->
             )
         error = np.where(np.isnan(kernel.error), np.inf, kernel.error)
         if layer == 0:
-            error = _first_error(varied, target, profile, schedule, error)
+            error = _first_error(varied, plan, error)
         known[index] = replace(
             kernel,
             low=wanted.low,
@@ -339,34 +363,29 @@ def _moved(x: Enclosure, weight: Array, bias: Array) -> Array:
     return found
 
 
-def _first_error(varied: Varied, target: str, profile: str, schedule: str, error: Array) -> Array:
+def _first_error(varied: Varied, plan: Plan, error: Array) -> Array:
     """Return the error of the first layer's sums as the kernel computes them: one pass, two, or spectra.
 
     `error` is that of one pass; neurons that are left out keep it.
     """
-    program, contract = analysed(lower(varied.model)), sine_contract(varied.profile(profile), target)
-    if varied.rank:
-        found = factor.over_images(factor.factor(program, varied.rank), contract)
-    else:
-        found = schedule_named(target, schedule).enclosures(program, contract)
-    layer = next(index for index, node in enumerate(program.nodes) if node.op == "affine")
+    layer = next(index for index, node in enumerate(plan.analysed.nodes) if node.op == "affine")
+    found = plan.enclosures()
     rows = varied.kept[1] if len(varied.kept) > 1 else np.arange(len(varied.biases[0]))
     errors = np.array(np.broadcast_to(error, varied.biases[0].shape))
     errors[rows] = found[layer].error
     return errors
 
 
-def bound_of(varied: Varied, target: str, profile: str, schedule: str = PLAIN) -> Array | None:
+def bound_of(plan: Plan) -> Array | None:
     """Return how far each channel (3,) of a variant's kernel may be from the full network; None: no bound.
 
     In display-encoded colour, over all images, against float64.
     """
-    whole = analysed(lower(varied.whole))
-    if not varied.is_whole:
-        found = enclose(varied, target, profile, schedule)
+    assert plan.varied is not None, "plan_model makes plans of variants"
+    if not plan.varied.is_whole:
+        whole, found = analysed(lower(plan.varied.whole)), enclose(plan.varied, plan)
     else:  # The kernel's own bound, which is sharper than one layer after another.
-        contract = sine_contract(varied.profile(profile), target)
-        found = schedule_named(target, schedule).enclosures(whole, contract)
+        whole, found = plan.analysed, plan.enclosures()
     (errors,) = bounds.output_errors(whole, found).values()
     return np.minimum(errors, LARGEST_DIFFERENCE) if np.isfinite(errors).all() else None
 
@@ -374,40 +393,13 @@ def bound_of(varied: Varied, target: str, profile: str, schedule: str = PLAIN) -
 # ---- kernels ----------------------------------------------------------------------------------------------
 
 
-def program_of(model: Model, name: str) -> Program:
-    """Return the program of a variant, without its rank and its sine, which are how it is compiled."""
-    return lower(vary(parse(name), model).model)
-
-
-def compile_variant(
-    model: Model, name: str, target: str, profile: str = "ieee", schedule: str = PLAIN
-) -> Artifact:
-    """Return the kernel of a variant; its manifest says under `variant` what was done and what it moves."""
-    variant = parse(name)
-    varied = vary(variant, model)
-    found = compile_program(lower(varied.model), target, varied.profile(profile), schedule, varied.rank)
-    if not variant.steps:
-        return found
-    used = found.manifest["schedule"]["name"]
-    return replace(
-        found, manifest={**found.manifest, "variant": report(variant, varied, target, profile, used)}
-    )
-
-
-def report(variant: Variant, varied: Varied, target: str, profile: str, schedule: str) -> Mapping[str, Any]:
-    """Return what a manifest says about a variant."""
-    bound = bound_of(varied, target, profile, schedule)
-    return {
-        "name": variant.name,
-        "approximations": [f"{kind}{value}" for kind, value in variant.steps],
-        "program": digest_of(varied.whole),
-        "products": varied.products,
-        "products_of_full": vary(Variant(), varied.whole).products,
-        "bound": {
-            "output": None if bound is None else [round_up(float(error)) for error in bound],
-            "against": "float64 reference of the full network, for all images, in display-encoded colour",
-        },
-    }
+def plan_model(
+    model: Model, target: str, profile: str = "ieee", schedule: str = PLAIN, variant: str = FULL
+) -> Plan:
+    """Return the plan of a model, or of a variant of it; `profile` may get the variant's sine."""
+    varied = vary(parse(variant), model)
+    found = plan_program(lower(varied.model), target, varied.profile(profile), schedule, varied.rank)
+    return replace(found, varied=varied)
 
 
 def digest_of(model: Model) -> str:

@@ -20,11 +20,13 @@ import numpy as np
 from wamnet.cli import exr
 from wamnet.cli.runs import frame_bound
 from wamnet.compiler import bounds, scaled, sums
-from wamnet.compiler.compile import analysed, compile_program, schedule_named
 from wamnet.compiler.emit import kernel_gather
 from wamnet.compiler.lower import lower
 from wamnet.compiler.model_file import load_model
+from wamnet.compiler.plan import Plan, analysed
 from wamnet.compiler.profiles import EMITTED_SINE
+from wamnet.compiler.targets import schedule_named
+from wamnet.compiler.variants import plan_model
 from wamnet.kernels import EXECUTORS, denoise_on, open_executor
 from wamnet.refimpl.denoise import denoise
 from wamnet.refimpl.errors import WamnetError
@@ -103,7 +105,7 @@ def attack(matrices: list[Any], own: list[Any]) -> float:
     return worst
 
 
-def measured(model: Any, frame: Any, program: Any) -> None:
+def measured(model: Any, frame: Any) -> None:
     """Print each executor's largest error in the frame beside both bounds."""
     truth = denoise(model, frame, np.float64)
     print(f"{'kernel':16} {'error':>10} {'a-posteriori':>13} {'ratio':>7} {'certified':>10} {'ratio':>7}")
@@ -114,7 +116,7 @@ def measured(model: Any, frame: Any, program: Any) -> None:
                 # The schedule that suits the device, and its stand-in: each has a bound of its own.
                 for schedule in dict.fromkeys((picked, schedule_named(name, picked).instead)):
                     image = denoise_on(executor, model, frame, schedule=schedule).image
-                    row = _row(model, frame, program, name, schedule)
+                    row = _row(plan_model(model, name, schedule=schedule), frame)
                     found = float(np.abs(image - truth).max())
                     ratios = f"{row[0]:13.2e} {row[0] / found:7.0f} {row[1]:10.2e} {row[1] / found:7.0f}"
                     print(f"{name + ':' + schedule:16} {found:10.2e} {ratios}")
@@ -122,11 +124,9 @@ def measured(model: Any, frame: Any, program: Any) -> None:
             print(f"{name:16} {error}")
 
 
-def _row(model: Any, frame: Any, program: Any, name: str, schedule: str) -> tuple[float, float]:
+def _row(plan: Plan, frame: Any) -> tuple[float, float]:
     """Return the bound in this frame and that in all frames, of one schedule."""
-    here = frame_bound(model, frame, name, "ieee", schedule) or np.inf
-    everywhere = compile_program(program, name, "ieee", schedule).manifest["bound"]["output"]
-    return here, max(everywhere or [np.inf])
+    return frame_bound(plan, frame) or np.inf, max(plan.bound.output or [np.inf])
 
 
 def main() -> None:
@@ -135,9 +135,9 @@ def main() -> None:
     parser.add_argument("model", type=Path)
     parser.add_argument("frame", type=Path)
     given = parser.parse_args()
-    model, program = load_model(given.model), lower(load_model(given.model))
-    ladder(analysed(program))
-    measured(model, exr.read_frame(given.frame), program)
+    model = load_model(given.model)
+    ladder(analysed(lower(model)))
+    measured(model, exr.read_frame(given.frame))
 
 
 if __name__ == "__main__":

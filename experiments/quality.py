@@ -35,8 +35,8 @@ from lab.results import PER_FRAME, Results, Values
 from lab.sets import SETS, Counts, compared
 
 from wamnet.cli.outputs import write_text
-from wamnet.compiler.compile import compile_program
-from wamnet.compiler.lower import lower
+from wamnet.compiler.compile import compile_plan
+from wamnet.compiler.variants import plan_model
 from wamnet.kernels import open_executor, tune
 from wamnet.kernels.bench.peer_oidn import filtered, prefiltered
 from wamnet.kernels.denoise_on import images_of
@@ -264,8 +264,8 @@ def timed(bench: Bench, kept: Results, rounds: int) -> None:
     model, _ = bench.model(ROWS["page-16"], 0)
     with open_executor(bench.executor) as device:
         size = (frame.height, frame.width)
-        schedule = tune.choose(device, model, size, "ieee", 0, rounds).schedule
-        kernel = compile_program(lower(model), device.name, "ieee", schedule)
+        plan = tune.choose(device, plan_model(model, device.name), size, rounds).plan
+        kernel = compile_plan(plan)
         device.build(kernel, size)
         images = images_of(model, frame)
         ways: dict[str, Callable[[], Any]] = {
@@ -275,7 +275,7 @@ def timed(bench: Bench, kept: Results, rounds: int) -> None:
         ways["page-16, encoded features given"] = lambda: device.run(kernel, images)
         found = in_turns({name: _done(way) for name, way in ways.items()}, rounds)
     values = {name: list(times.seconds) for name, times in found.items()}
-    kept.put("times", 0, {"device": device.device, "schedule": schedule, "seconds": values})
+    kept.put("times", 0, {"device": device.device, "schedule": plan.asked, "seconds": values})
 
 
 def _done(way: Callable[[], Any]) -> Callable[[], None]:

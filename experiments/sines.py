@@ -29,7 +29,8 @@ from numpy.typing import NDArray
 
 from wamnet.compiler import sine
 from wamnet.compiler.artifact import Artifact
-from wamnet.compiler.compile import compile_program, round_up
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.enclosure import round_up
 from wamnet.compiler.ir import Gather, Image, Type, sha256
 from wamnet.compiler.profiles import DEGREE_WORD
 from wamnet.compiler.trace import trace

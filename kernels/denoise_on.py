@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 
 from ..compiler import schedules
 from ..compiler.artifact import Artifact
+from ..compiler.compile import compile_plan
 from ..compiler.ir import sha256
-from ..compiler.variants import FULL, compile_variant, parse, vary
+from ..compiler.schedules import PLAIN
+from ..compiler.variants import FULL, parse, plan_model, vary
 from ..refimpl.dataset import feature_image
 from ..refimpl.denoise import Model
-from ..refimpl.errors import InputError
 from ..refimpl.frame import Frame
 from .executor import Executor, Images
 from .memory import keep_freed_memory
-from .tune import Choice, choose
+from .tune import choose
 
 
 @dataclass(frozen=True)
@@ -57,34 +58,30 @@ def denoise_on(
     frame: Frame,
     profile: str = "ieee",
     schedule: str | None = None,
-    rank: int = 0,
     variant: str = FULL,
     pictures: int = 1,
 ) -> RunResult:
     """Return the denoised frame and the times.
 
     Without a `schedule`, it is the one that suits device, size and so many `pictures` to come [tune.py].
-    `variant`: with fewer operations [variants.py]; a `rank` is short for the variant of this name.
+    `variant`: with fewer operations [variants.py].
     """
-    if rank:
-        if variant != FULL:
-            raise InputError("rank", rank, f"the variant is {variant}", "name it in the variant: +rank12")
-        variant = f"rank{rank}"
     varied = vary(parse(variant), model)
     images = images_of(varied.model, frame)
     start = time.perf_counter()
     size = (frame.height, frame.width)
-    found = Choice(schedule or "", "as asked")
+    plan, reason = plan_model(model, executor.name, profile, schedule or PLAIN, variant), "as asked"
     if not schedule:
-        found = choose(executor, varied.model, size, profile, varied.rank, pictures)
-    artifact = compile_variant(model, variant, executor.name, profile, found.schedule)
+        found = choose(executor, plan, size, pictures)
+        plan, reason = found.plan, found.reason
+    artifact = compile_plan(plan)
     executor.build(artifact, size)
     keep_freed_memory()
     built = time.perf_counter()
     image = executor.run(artifact, images)
     seconds = time.perf_counter() - built
     picked = schedules.text(artifact.manifest["schedule"])
-    facts = (executor.device, picked, found.reason, artifact.digest, _text_of(artifact))
+    facts = (executor.device, picked, reason, artifact.digest, _text_of(artifact))
     return RunResult(image, built - start, seconds, *facts)
 
 

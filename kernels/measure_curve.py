@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from ..compiler import variants
 from ..compiler.artifact import Artifact
-from ..compiler.compile import TARGETS
-from ..compiler.variants import Varied
+from ..compiler.compile import compile_plan
+from ..compiler.plan import Plan
+from ..compiler.variants import plan_model
 from ..refimpl import dataset, metrics
 from ..refimpl.denoise import Model, denoise
 from ..refimpl.errors import CompileError, InputError
@@ -94,11 +95,11 @@ def measure(
         varied = variants.vary(variants.parse(name), model)
         given = {feature: numbers[feature] for feature in varied.features}
         for schedule in chosen:
-            artifact = _compiled(model, name, executor, profile, schedule)
+            artifact = _compiled(plan_model(model, executor.name, profile, schedule, name))
             if artifact is None:
                 continue
             key = f"{name} {schedule}"
-            points[key] = _untimed(executor, varied, name, schedule, artifact, profile, pairs, pictures)
+            points[key] = _untimed(executor, artifact, pairs, pictures)
             ways[key] = partial(_run, executor, artifact, given)
         on_done(1 / (len(names) + 1))
     times = in_turns(ways, repeats, pause_s=PAUSE_S)
@@ -111,8 +112,9 @@ def promising(executor: Executor, model: Model, profile: str) -> tuple[str, ...]
     """Return the schedules under which the full network is fastest on a small picture, the best first."""
     images = noise(model, (TRIAL_PX, TRIAL_PX))
     ways = {}
-    for schedule in TARGETS[executor.name].schedules:
-        artifact = _compiled(model, variants.FULL, executor, profile, schedule.name)
+    plan = plan_model(model, executor.name, profile)
+    for schedule in plan.target.schedules:
+        artifact = _compiled(plan.scheduled(schedule.name))
         if artifact is not None:
             ways[schedule.name] = partial(_run, executor, artifact, images)
     times = in_turns(ways, repeats=3, pause_s=PAUSE_S)
@@ -153,13 +155,13 @@ def quality(
     return max(float(error.max()) for error in errors), mean, math.fsum(losses) / len(losses)
 
 
-def _compiled(model: Model, name: str, executor: Executor, profile: str, schedule: str) -> Artifact | None:
-    """Return the kernel of a variant, or None where this schedule or target cannot hold it."""
+def _compiled(plan: Plan) -> Artifact | None:
+    """Return the kernel of a plan, or None where its schedule or target cannot hold it."""
     try:
-        artifact = variants.compile_variant(model, name, executor.name, profile, schedule)
+        artifact = compile_plan(plan)
     except CompileError:
         return None
-    return artifact if artifact.manifest["schedule"]["name"] == schedule else None
+    return artifact if artifact.manifest["schedule"]["name"] == plan.asked else None
 
 
 def _run(executor: Executor, artifact: Artifact, images: Images) -> None:
@@ -168,24 +170,17 @@ def _run(executor: Executor, artifact: Artifact, images: Images) -> None:
 
 
 def _untimed(
-    executor: Executor,
-    varied: Varied,
-    name: str,
-    schedule: str,
-    artifact: Artifact,
-    profile: str,
-    pairs: Pairs,
-    full: Sequence[NDArray[np.floating]],
+    executor: Executor, artifact: Artifact, pairs: Pairs, full: Sequence[NDArray[np.floating]]
 ) -> Point:
-    """Return a point that lacks its time."""
-    scales = varied.whole.normalization
-    pictures = [executor.run(artifact, images_of(varied.model, noisy)) for noisy, _ in pairs]
-    targets = [dataset.target_image(clean, scales) for _, clean in pairs]
-    found = quality(pictures, full, targets)
-    bound = variants.bound_of(varied, executor.name, profile, schedule)
-    return Point(
-        name, schedule, executor.name, math.nan, *found, math.nan if bound is None else float(bound.max())
-    )
+    """Return the point of a variant's kernel, which lacks its time."""
+    plan = artifact.plan
+    assert plan.varied is not None, "plan_model makes plans of variants"
+    model = plan.varied.model
+    pictures = [executor.run(artifact, images_of(model, noisy)) for noisy, _ in pairs]
+    targets = [dataset.target_image(clean, model.normalization) for _, clean in pairs]
+    found, bound = quality(pictures, full, targets), variants.bound_of(plan)
+    most = math.nan if bound is None else float(bound.max())
+    return Point(plan.varied.variant.name, plan.asked, executor.name, math.nan, *found, most)
 
 
 def _timed(point: Point, milliseconds: float) -> Point:

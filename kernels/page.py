@@ -22,23 +22,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler import bounds
 from ..compiler.artifact import Artifact
-from ..compiler.compile import analysed, compile_program, sine_contract
+from ..compiler.compile import compile_plan
 from ..compiler.emit import kernel_gather, output_channels
 from ..compiler.emit_packed import WEIGHTS_A_TEXEL
 from ..compiler.encode_kernel import compile_encode
-from ..compiler.expected import expected
-from ..compiler.factor import at_images, factor, product
 from ..compiler.glsl_es import MOST_BUFFERS
-from ..compiler.interpret import interpret
-from ..compiler.ir import Program, digest
+from ..compiler.ir import digest
 from ..compiler.lower import lower
 from ..compiler.lower_encode import layers_of, planes_of
 from ..compiler.lower_scene import lower_scene
 from ..compiler.path_kernel import PathArtifact, compile_path
+from ..compiler.plan import plan_program
 from ..compiler.scene_inputs import SceneInputs, varying
-from ..refimpl import dataset, factored, rng, transport
+from ..refimpl import factored, rng, transport
 from ..refimpl.denoise import Model, check_model, learned_feature_spp
 from ..refimpl.errors import InputError
 from ..refimpl.intersection import quad_area_pdf
@@ -256,9 +253,9 @@ def variant(network: Network, images: Mapping[str, NDArray[np.float32]], profile
     """Return a network as passes, with its bound, and what it makes of the check's images."""
     model, rank = network.model, network.rank
     program = lower(model)
-    artifact = compile_program(program, TARGET, profile, network.schedule, rank)
-    given = {feature: images[feature] for feature in model.features}
-    value, bound = _expected(program, artifact, rank, given)
+    plan = plan_program(program, TARGET, profile, network.schedule, rank)
+    artifact = compile_plan(plan)
+    held = plan.expected({feature: images[feature] for feature in model.features})
     whole = artifact.manifest["factored"]["rounding"] if rank else artifact.manifest["bound"]
     return {
         "name": network.name,
@@ -271,8 +268,8 @@ def variant(network: Network, images: Mapping[str, NDArray[np.float32]], profile
         "products": sum(_products(kernel) for kernel in artifact.kernels),
         "bound": None if whole["output"] is None else max(whole["output"]),
         "passes": [_pass(kernel) for kernel in artifact.kernels],
-        "check": {"expected": _packed(value, "<f8"), "bound": _packed(_raised(bound))},
-        "picture": value,
+        "check": {"expected": _packed(held.value, "<f8"), "bound": _packed(_raised(held.bound))},
+        "picture": held.value,
     }
 
 
@@ -298,23 +295,6 @@ def _pass(kernel: Artifact) -> dict[str, Any]:
         "texel": kernel.manifest["schedule"].get(WEIGHTS_A_TEXEL, 1),
         "buffers": -(-output_channels(kernel.program) // 4),
     }
-
-
-def _expected(
-    program: Program, artifact: Artifact, rank: int, images: Mapping[str, NDArray[np.float32]]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the reference's picture (H, W, 3) in float64, and the bound of rounding at each number."""
-    if not rank:
-        found = expected(program, artifact, images)
-        return found.value, found.bound
-    common = analysed(program, artifact.profile)
-    cut, gather = factor(common, rank), kernel_gather(common)
-    contract = sine_contract(artifact.profile, artifact.target)
-    (bound,) = bounds.output_errors(common, at_images(cut, contract, images, of_cut=False)).values()
-    joined = np.concatenate([images[image.name] for image in gather.images], axis=-1)
-    windows = dataset.all_windows(dataset.pad(joined, gather.window), gather.window)
-    (value,) = interpret(product(cut), {"window": windows}, np.float64).values()
-    return value, np.broadcast_to(bound, value.shape)
 
 
 def check(

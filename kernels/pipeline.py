@@ -19,12 +19,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler.compile import compile_program
+from ..compiler.compile import compile_plan
 from ..compiler.encode_kernel import compile_encode
-from ..compiler.lower import lower
 from ..compiler.lower_encode import layers_of
 from ..compiler.lower_scene import lower_scene
 from ..compiler.path_kernel import PathArtifact, compile_path, most_unrolled
+from ..compiler.variants import FULL, parse, plan_model, vary
 from ..refimpl.dataset import check_features
 from ..refimpl.denoise import Model, check_model
 from ..refimpl.errors import InputError
@@ -41,9 +41,9 @@ class Pipeline:
     """A scene and a model on an open executor, for pictures of one size; a context manager.
 
     `show` names features that are to be readable besides those of the model. With `whole`, paths are traced
-    by the kernel of render_on.py, which writes more than is needed: one to compile where both are used. With
-    a `rank` the model's first layer is cut to it, and is two passes [factor.py]. So many `pictures` are to
-    come: what compiles long may pay [tune.py]. The kernels are `path`, `encode` and `denoise`; `passes` runs
+    by the kernel of render_on.py, which writes more than is needed: one to compile where both are used. A
+    `variant` of the model has fewer operations [variants.py]. So many `pictures` are to come: what compiles
+    long may pay [tune.py]. The kernels are `path`, `encode` and `denoise`; `passes` runs
     them one by one.
     """
 
@@ -58,11 +58,13 @@ class Pipeline:
         profile: str = "ieee",
         show: Sequence[str] = (),
         whole: bool = False,
-        rank: int = 0,
+        variant: str = FULL,
         pictures: int = 1,
     ) -> None:
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
+        plan = plan_model(model, executor.name, profile, variant=variant)
+        model = vary(parse(variant), model).model
         self._height, self._width = size
         Job(self._width, self._height)  # refuses sizes that mean nothing
         self._executor, self._profile = executor, profile
@@ -74,8 +76,7 @@ class Pipeline:
         self.encode = compile_encode(
             self._features, model.normalization, executor.name, profile, self.path.planes
         )
-        chosen = choose(executor, model, size, profile, rank, pictures)
-        self.denoise = compile_program(lower(model), executor.name, profile, chosen.schedule, rank)
+        self.denoise = compile_plan(choose(executor, plan, size, pictures).plan)
         self._drawn = self._closed = False
         self.passes = executor.passes(self.encode, self.denoise, size)
 

@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.compile import compile_program, target_named
+from ..compiler.compile import compile_plan
 from ..compiler.ir import OUTPUT_ENCODING, Program, Type
 from ..compiler.lower import lower
+from ..compiler.targets import target_named
 from ..compiler.trace import trace
 from ..refimpl.denoise import Model, as_dtype
 from ..refimpl.siren import Siren, forward
@@ -174,7 +175,7 @@ def first_stage(
     model: Model,
     profile: str,
     images: Images,
-    compiled: Compile = compile_program,
+    compiled: Compile = compile_plan,
 ) -> tuple[Stage, Verdict] | None:
     """Return the first stage whose kernel deviates on images (H, W, C), or None if none does alone."""
     most = target_named(runner.target).most or MOST_NEURONS
@@ -182,7 +183,7 @@ def first_stage(
     for stage in stages(model.siren, most):
         program = stage_program(model, stage)
         kernels = kernels_of([runner], program, profile, size, schedule, compiled)
-        (verdict,) = judged(kernels, program, images)
+        (verdict,) = judged(kernels, images)
         if verdict.deviates:
             return stage, verdict
     return None
@@ -226,19 +227,19 @@ def reduced(
     model: Model,
     profile: str,
     images: Images,
-    compiled: Compile = compile_program,
+    compiled: Compile = compile_plan,
 ) -> Reduced:
     """Return a small part of images (H, W, C) on which the kernels that deviate still do, and since where.
 
     If all deviate, the part shows the worst one. The stages are those of one kernel of each odd executor.
     """
-    odd, program = odd_ones(verdicts), lower(model)
+    odd = odd_ones(verdicts)
     worst = max(odd, key=lambda verdict: (not verdict.failure, verdict.ratio))
     probes = [worst] if all(v.deviates for v in verdicts if v.ran) else odd
 
     def fails(box: Box) -> bool:
         """Tell whether the probes deviate on a part."""
-        judge = Judge(program, box.cut(images))
+        judge = Judge(box.cut(images))
         return all(judge.verdict(probe.kernel).deviates for probe in probes)
 
     size = next(iter(images.values())).shape[:2]
@@ -248,7 +249,7 @@ def reduced(
     most = MOST_FAILURES if crashed else MOST_RUNS
     box = shrink(whole, fails, at, model.window.size, most)
     part = box.cut(images)
-    again = judged([verdict.kernel for verdict in verdicts], program, part)
+    again = judged([verdict.kernel for verdict in verdicts], part)
     repeats = bool(odd_ones(again))
     if not repeats:
         box, part, again = whole, images, list(verdicts)

@@ -1,8 +1,8 @@
 """When executors disagree: which one is off, where, since which stage, and on how small a picture.
 
 1. Compile the network for each executor and schedule [`kernels_of`], run each kernel, and hold each number
-   against the float64 reference and the bound of its schedule at this frame [`judged`], [`expected.py`]. What
-   is no finite number deviates. Under profile `exact` the bits must also be those of the interpreter.
+   against the float64 reference and the bound of its schedule at this frame [`judged`], [compiler/plan.py].
+   What is no finite number deviates. Under profile `exact` the bits must also be those of the interpreter.
 2. Name the odd ones out: those that deviate while others are within their bounds. If all deviate, it is the
    program or the bound that is suspect [`conclusion`].
 3. Cut the picture down to one that still shows it [reduce.py: `shrink`], and run the network's first stages
@@ -15,25 +15,26 @@ refuses a kernel in its own words has not: it has written nothing.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiler import ir
 from ..compiler.artifact import Artifact
-from ..compiler.compile import compile_program, sine_contract, target_named
-from ..compiler.expected import Expected, expected
+from ..compiler.compile import compile_plan
 from ..compiler.ir import Program
-from ..compiler.schedules import Schedule
+from ..compiler.plan import Expected, Plan, plan_program
+from ..compiler.schedules import PLAIN
+from ..compiler.targets import target_named
 from ..refimpl.errors import CompileError
 from .apart import Outcome, Runner
 from .executor import Images
 from .numpy_executor import NumpyExecutor
 
-Compile = Callable[[Program, str, str, str], Artifact]
-"""A function of program, target, profile and schedule."""
+Compile = Callable[[Plan], Artifact]
+"""What makes a plan's kernel."""
 
 NONE: Mapping[str, str] = {}
 """No schedule but the picked one."""
@@ -119,7 +120,7 @@ def kernels_of(
     profile: str,
     size: tuple[int, int],
     which: str = PICKED,
-    compiled: Compile = compile_program,
+    compiled: Compile = compile_plan,
     instead: Mapping[str, str] = NONE,
 ) -> list[Kernel]:
     """Return the kernels of a program for each runner, in the picked schedule or in `all` that hold it.
@@ -151,17 +152,18 @@ def _compiled(
 ) -> Artifact | str:
     """Return a kernel, or why there is none."""
     try:
-        return compiled(program, target, profile, schedule)
+        return compiled(plan_program(program, target, profile, schedule))
     except CompileError as error:
         return str(error)
 
 
 class Judge:
-    """What kernels of a program may write for images (H, W, C): computed once where it is the same."""
+    """What kernels may write for images (H, W, C) by their plans: computed once where it is the same."""
 
-    def __init__(self, program: Program, images: Images) -> None:
-        self.program, self.images = program, images
+    def __init__(self, images: Images) -> None:
+        self.images = images
         self._known: dict[Any, Expected] = {}
+        self._bits: dict[str, NDArray[np.float32]] = {}
 
     def verdict(self, kernel: Kernel) -> Verdict:
         """Run a kernel, and judge what it writes."""
@@ -170,33 +172,31 @@ class Judge:
         outcome = kernel.runner.run(kernel.artifact, self.images)
         if outcome.image is None:
             return Verdict(kernel, refusal=outcome.refusal, failure=outcome.failure)
-        held = self._expected(kernel.artifact)
-        wanted = self._interpreted if kernel.artifact.profile == EXACT else None
-        return _judged(kernel, outcome, held, wanted)
+        plan = kernel.artifact.plan
+        wanted = self._interpreted(plan) if plan.profile.name == EXACT else None
+        return _judged(kernel, outcome, self._expected(plan), wanted)
 
-    def _expected(self, artifact: Artifact) -> Expected:
-        """Return what an artifact may write; most schedules share one bound."""
-        targets = target_named(artifact.target).schedules
-        (schedule,) = (s for s in targets if s.name == artifact.manifest["schedule"]["name"])
-        shared = type(schedule).enclosures is Schedule.enclosures
-        key = (sine_contract(artifact.profile, artifact.target), None if shared else schedule.name)
+    def _expected(self, plan: Plan) -> Expected:
+        """Return what a plan's kernel may write; most schedules share one bound."""
+        own = None if plan.shares_bound else plan.schedule.name
+        key = (ir.digest(plan.analysed), plan.sine, own)
         if key not in self._known:
-            self._known[key] = expected(self.program, artifact, self.images)
+            self._known[key] = plan.expected(self.images)
         return self._known[key]
 
-    @cached_property
-    def _interpreted(self) -> NDArray[np.float32]:
+    def _interpreted(self, plan: Plan) -> NDArray[np.float32]:
         """Return the picture (H, W, C) whose bits profile exact promises."""
-        with NumpyExecutor() as executor:
-            found: NDArray[np.float32] = executor.run(
-                compile_program(self.program, executor.name, EXACT), self.images
-            )
-        return found
+        key = ir.digest(plan.analysed)
+        if key not in self._bits:
+            with NumpyExecutor() as executor:
+                there = replace(plan, target=target_named(executor.name), asked=PLAIN)
+                self._bits[key] = executor.run(compile_plan(there), self.images)
+        return self._bits[key]
 
 
-def judged(kernels: Sequence[Kernel], program: Program, images: Images) -> list[Verdict]:
-    """Run kernels of a program on images (H, W, C), and return the verdicts in their order."""
-    judge = Judge(program, images)
+def judged(kernels: Sequence[Kernel], images: Images) -> list[Verdict]:
+    """Run kernels on images (H, W, C), and return the verdicts in their order."""
+    judge = Judge(images)
     return [judge.verdict(kernel) for kernel in kernels]
 
 

@@ -20,24 +20,19 @@ import hashlib
 import os
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import compiler
-from ..compiler import bounds
 from ..compiler.artifact import Artifact
-from ..compiler.compile import DENOISERS, analysed, compile_program, sine_contract
-from ..compiler.factor import at_images, factor, product
-from ..compiler.interpret import interpret
+from ..compiler.compile import compile_plan
 from ..compiler.ir import Program
-from ..compiler.lower import lower
-from ..compiler.schedules import Schedule
-from ..refimpl import dataset, rng
+from ..compiler.plan import Plan
+from ..refimpl import rng
 from ..refimpl.denoise import Model
 from ..refimpl.errors import CompileError
 from . import cache, measure
@@ -54,9 +49,6 @@ SLOW = 8.0
 
 REPEATS = 5
 """Rounds of measurement."""
-
-Checks = tuple[Images, NDArray[np.float64], Callable[[Schedule], NDArray[np.float64]]]
-"""A crop's images, the float64 reference, and the bound there of a schedule."""
 
 
 @dataclass(frozen=True)
@@ -92,40 +84,34 @@ class Table:
 
 @dataclass(frozen=True)
 class Choice:
-    """The name of a schedule, and why it was chosen."""
+    """A plan with its schedule, and why that was chosen."""
 
-    schedule: str
+    plan: Plan
     reason: str
 
+    @property
+    def schedule(self) -> str:
+        """Return the schedule's name."""
+        return self.plan.asked
 
-def choose(
-    executor: Executor,
-    model: Model,
-    size: tuple[int, int],
-    profile: str = "ieee",
-    rank: int = 0,
-    pictures: int = 1,
-) -> Choice:
-    """Return the schedule for so many pictures of `size` (height, width): as measured here, or built in."""
-    if len(DENOISERS[executor.name].schedules) > 1 and (
-        found := remembered(executor, model, size, profile, rank)
-    ):
+
+def choose(executor: Executor, plan: Plan, size: tuple[int, int], pictures: int = 1) -> Choice:
+    """Return a plan for so many pictures of `size` (height, width): as measured here, or built in."""
+    if len(plan.target.schedules) > 1 and (found := remembered(executor, plan, size)):
         best = found.best(pictures)
         if best is not None:
             height, width = found.size
             text = f"tuned on this device on {found.day}: {best.ms:.3g} ms at {width}x{height}"
-            return Choice(best.schedule, f"{text}, {best.again_s:.2g} s to build")
-    return Choice(executor.schedule_for(size), executor.schedule_reason)
+            return Choice(plan.scheduled(best.schedule), f"{text}, {best.again_s:.2g} s to build")
+    return Choice(plan.scheduled(executor.schedule_for(size)), executor.schedule_reason)
 
 
-def remembered(
-    executor: Executor, model: Model, size: tuple[int, int], profile: str = "ieee", rank: int = 0
-) -> Table | None:
+def remembered(executor: Executor, plan: Plan, size: tuple[int, int]) -> Table | None:
     """Return what was measured for this device, network and size, if it was."""
-    found = cache.read_json(_entry(executor, model, size, profile, rank))
+    found = cache.read_json(_entry(executor, plan, size))
     try:
         rows = tuple(Row(**row) for row in found["rows"])
-        known = {schedule.name for schedule in DENOISERS[executor.name].schedules}
+        known = {schedule.name for schedule in plan.target.schedules}
         if not known >= {row.schedule for row in rows}:
             return None
         height, width = found["size"]
@@ -136,31 +122,26 @@ def remembered(
 
 def tune(
     executor: Executor,
-    model: Model,
+    plan: Plan,
     size: tuple[int, int],
-    profile: str = "ieee",
-    rank: int = 0,
     repeats: int | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Table:
     """Measure all schedules for pictures of `size` (height, width), keep the table, and return it."""
-    program = lower(model)
-    checks = _checks(program, executor.name, profile, rank)
-    images = noise(program, size)
+    crop, images = noise(plan.analysed, CROP), noise(plan.analysed, size)
     rows: dict[str, Row] = {}
     ready: dict[str, Artifact] = {}
     trials: dict[str, float] = {}
-    for schedule in DENOISERS[executor.name].schedules:
+    for schedule in plan.target.schedules:
         progress(schedule.name)
-        compiled = lambda name=schedule.name: compile_program(program, executor.name, profile, name, rank)  # noqa: E731
         try:
-            row, artifact = _built(executor, schedule.name, compiled, size)
-            _checked(executor, artifact, checks, schedule)
+            row, artifact = _built(executor, plan.scheduled(schedule.name), size)
+            _checked(executor, artifact, crop)
         except (CompileError, WrongResult) as error:
             rows[schedule.name] = Row(schedule.name, note=str(error))
             continue
         rows[schedule.name], ready[schedule.name] = row, artifact
-        trials[schedule.name] = _trial(executor, artifact, program, size)
+        trials[schedule.name] = _trial(executor, artifact, plan.analysed, size)
     least = min(trials.values(), default=0.0)
     for name in [name for name, seconds in trials.items() if seconds > SLOW * least]:
         del ready[name]
@@ -170,9 +151,15 @@ def tune(
     for name, times in measure.in_turns(ways, repeats or REPEATS).items():
         rows[name] = Row(name, 1e3 * times.median, rows[name].first_s, rows[name].again_s)
     day = datetime.datetime.now(datetime.timezone.utc).date().isoformat()
-    table = Table(executor.device, shape_text(model), size, day, tuple(rows.values()))
-    cache.write_json(_entry(executor, model, size, profile, rank), asdict(table))
+    table = Table(executor.device, shape_text(_network(plan)), size, day, tuple(rows.values()))
+    cache.write_json(_entry(executor, plan, size), asdict(table))
     return table
+
+
+def _network(plan: Plan) -> Model:
+    """Return the network of a plan."""
+    assert plan.varied is not None, "plan_model makes plans of networks"
+    return plan.varied.model
 
 
 class WrongResult(Exception):
@@ -188,31 +175,28 @@ def _way(executor: Executor, artifact: Artifact, images: Images) -> Callable[[],
     return run
 
 
-def _built(
-    executor: Executor, name: str, compiled: Callable[[], Artifact], size: tuple[int, int]
-) -> tuple[Row, Artifact]:
-    """Return a schedule's artifact, built, with both times of compilation; raise where it cannot be."""
+def _built(executor: Executor, plan: Plan, size: tuple[int, int]) -> tuple[Row, Artifact]:
+    """Return a plan's artifact, built, with both times of compilation; raise where it cannot be."""
     seconds = []
     for _ in range(2):
         executor.forget()
         start = time.perf_counter()
-        artifact = compiled()
+        artifact = compile_plan(replace(plan))  # a plan keeps what it has computed; a copy has nothing yet
         reason = artifact.manifest["schedule"].get("reason")
         if reason:
             raise CompileError(reason)
         executor.build(artifact, size)
         seconds.append(time.perf_counter() - start)
     in_source = not any(kernel.weights.size for kernel in artifact.kernels)
-    return Row(name, None, seconds[0], seconds[0] if in_source else seconds[1]), artifact
+    return Row(plan.asked, None, seconds[0], seconds[0] if in_source else seconds[1]), artifact
 
 
-def _checked(executor: Executor, artifact: Artifact, checks: Checks, schedule: Schedule) -> None:
-    """Refuse an artifact whose result on the crop is not within the bound."""
-    images, expected, bound_of = checks
-    bound = bound_of(schedule)
-    error = np.abs(executor.run(artifact, images).astype(np.float64) - expected)
-    if not (error <= bound).all():
-        worst = float(np.nanmax(error / bound)) if np.isfinite(error).any() else float("nan")
+def _checked(executor: Executor, artifact: Artifact, crop: Images) -> None:
+    """Refuse an artifact whose result on a crop's images is not within the bound there."""
+    held = artifact.plan.expected(crop)
+    error = np.abs(executor.run(artifact, crop).astype(np.float64) - held.value)
+    if not (error <= held.bound).all():
+        worst = float(np.nanmax(error / held.bound)) if np.isfinite(error).any() else float("nan")
         raise WrongResult(f"its result is wrong on this device: {worst:.3g} times the bound on the error")
 
 
@@ -220,30 +204,6 @@ def _trial(executor: Executor, artifact: Artifact, program: Program, size: tuple
     """Return the least seconds of a picture that is no larger than the whole."""
     run = _way(executor, artifact, noise(program, (min(TRIAL, size[0]), min(TRIAL, size[1]))))
     return min(measure.in_turns({"trial": run}, 2, pause_s=0.0)["trial"].seconds)
-
-
-def _checks(program: Program, target: str, profile: str, rank: int) -> Checks:
-    """Return the crop, the reference there, and its bound: of rounding alone, if the first layer is cut."""
-    whole, contract = analysed(program), sine_contract(profile, target)
-    images = noise(program, CROP)
-    gather = program.gather
-    assert gather is not None, "lower gives a program with a window"
-    joined = np.concatenate(list(images.values()), axis=-1)
-    windows = {"window": dataset.all_windows(dataset.pad(joined, gather.window), gather.window)}
-    cut = factor(whole, rank) if rank else None
-
-    def bound(schedule: Schedule) -> NDArray[np.float64]:
-        """Return the bound at the crop's pixels."""
-        found = (
-            at_images(cut, contract, images, of_cut=False)
-            if cut
-            else schedule.enclosures(whole, contract, images)
-        )
-        (errors,) = bounds.output_errors(whole, found).values()
-        return errors
-
-    (expected,) = interpret(product(cut) if cut else whole, windows, np.float64).values()
-    return images, expected, bound
 
 
 def noise(program: Program, size: tuple[int, int]) -> Images:
@@ -276,10 +236,11 @@ def device_parts(executor: Executor) -> list[Any]:
     return [executor.name, executor.device, executor.driver, cores]
 
 
-def _entry(executor: Executor, model: Model, size: tuple[int, int], profile: str, rank: int) -> str:
+def _entry(executor: Executor, plan: Plan, size: tuple[int, int]) -> str:
     """Return the name of the cache's entry."""
+    model, rank = _network(plan), plan.cut.rank if plan.cut else 0
     network = [list(model.siren.widths), list(model.features), model.window.size, model.window.border]
-    parts = [*device_parts(executor), network, profile, rank, size_class(size), schedules_version()]
+    parts = [*device_parts(executor), network, plan.profile.name, rank, size_class(size), schedules_version()]
     return f"tuning-{cache.key(*parts)}"
 
 

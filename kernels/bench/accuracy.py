@@ -18,14 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler import bounds
-from ...compiler.compile import analysed, schedule_named, sine_contract
 from ...compiler.emit import kernel_gather
-from ...compiler.factor import at_images, factor, product
 from ...compiler.interpret import interpret
 from ...compiler.ir import Program
 from ...compiler.lower import lower
-from ...compiler.profiles import SineContract
-from ...compiler.schedules import PLAIN, Schedule, windows
+from ...compiler.plan import Plan, plan_program
+from ...compiler.schedules import PLAIN, windows
 from ...refimpl import dataset, metrics
 from ...refimpl.denoise import Model, denoise
 from ...refimpl.frame import Frame
@@ -71,29 +69,21 @@ class Crop:
 
         `schedule` of `target`: whose sums; a peer without a target is held to those of the interpreter.
         """
-        chosen = schedule_named(target or "numpy", schedule or PLAIN)
-        contract = sine_contract(variant.profile, target or "numpy")
+        plan = plan_program(
+            variant.program(self.model), target or "numpy", variant.profile, schedule or PLAIN, variant.rank
+        )
         # Most schedules of all targets share one bound, which takes seconds to compute.
-        key = variant.name, contract, type(chosen).enclosures
+        key = variant.name, plan.sine, None if plan.shares_bound else plan.schedule.name
         if key not in self._rounding:
-            self._rounding[key] = self._rounded(variant, contract, chosen)
+            self._rounding[key] = self._rounded(plan)
         return self._rounding[key]
 
-    def _rounded(self, variant: Variant, contract: SineContract, chosen: Schedule) -> tuple[Array, float]:
-        """Compute both in the variant's profile; the bound is infinite where a sine promises nothing."""
-        program = analysed(variant.program(self.model), variant.profile)
-        if variant.rank:
-            whole = factor(program, variant.rank)
-            near = self._near(program)
-            found = bounds.output_errors(program, at_images(whole, contract, near, of_cut=False))
-            program = product(whole)
-        else:
-            direct = type(chosen).enclosures is Schedule.enclosures
-            near = self._near(program) if direct else self.images
-            rows = slice(0, self.rows)
-            found = bounds.output_errors(program, chosen.enclosures(program, contract, near, rows))
-        (bound,) = found.values()
-        return self.interpreted(program), float(self.cut(bound).max())
+    def _rounded(self, plan: Plan) -> tuple[Array, float]:
+        """Compute both; the bound is infinite where a sine promises nothing."""
+        near = self._near(plan.analysed) if plan.shares_bound else self.images
+        found = plan.enclosures(near, slice(0, self.rows), of_cut=False)
+        (bound,) = bounds.output_errors(plan.analysed, found).values()
+        return self.interpreted(plan.reference), float(self.cut(bound).max())
 
     def _near(self, program: Program) -> Images:
         """Return the crop's images with no more around it than its windows see: bounds take seconds."""

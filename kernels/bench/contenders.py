@@ -13,9 +13,11 @@ from fnmatch import fnmatchcase
 from functools import partial
 
 from ...compiler.artifact import Artifact
-from ...compiler.compile import TARGETS, analysed, compile_program, schedule_named
+from ...compiler.compile import compile_program
 from ...compiler.emit import kernel_gather
+from ...compiler.plan import analysed
 from ...compiler.schedules import PLAIN
+from ...compiler.targets import TARGETS, schedule_named
 from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ..executor import Images

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...compiler.artifact import Artifact
-from ...compiler.compile import DENOISERS, TARGETS, compile_program
+from ...compiler.compile import compile_program
 from ...compiler.emit_path import END
 from ...compiler.ir import Gather, Image, Program, Type
 from ...compiler.lower_scene import PATH, SURFACE, lower_scene
@@ -26,6 +26,7 @@ from ...compiler.passes import pipeline
 from ...compiler.path_kernel import PathArtifact, compile_path, most_unrolled
 from ...compiler.profiles import profile_named
 from ...compiler.schedules import PLAIN
+from ...compiler.targets import DENOISERS, TARGETS
 from ...compiler.trace import trace
 from ...refimpl import scene as scene_module
 from ...refimpl.dataset import Window

@@ -21,18 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler import emit_path
-from ...compiler.artifact import Artifact
-from ...compiler.compile import compile_program
 from ...compiler.emit import kernel_gather
-from ...compiler.expected import expected
 from ...compiler.interpret import interpret
 from ...compiler.ir import Gather, Program
 from ...compiler.lower import lower
 from ...compiler.lower_encode import layers_of
 from ...compiler.lower_scene import PathPrograms
 from ...compiler.path_kernel import compile_path
+from ...compiler.plan import Plan, plan_program
 from ...compiler.schedules import windows
-from ...compiler.variants import parse, vary
 from ...refimpl.dataset import FEATURES, encode_sums
 from ...refimpl.denoise import Model
 from ..executor import Part
@@ -101,33 +98,24 @@ class Pair:
         }
 
 
-def pair(
-    model: Model,
-    variant: str,
-    denoiser: Artifact | None = None,
-    programs: PathPrograms | None = None,
-    profile: str = "ieee",
-) -> Pair:
-    """Return the pair of a model's variant, with its kernel's bound; with a scene, of its picture."""
-    varied = vary(parse(variant), model)
-    program = lower(varied.model)
-    gather = kernel_gather(program)
+def pair(plan: Plan, model: Model, promised: bool, programs: PathPrograms | None = None) -> Pair:
+    """Return the pair of a plan's kernel, or of both of its passes; with a scene's programs, of its picture.
+
+    `model` is what the plan compiles; `promised`: whether the kernel keeps the plan's bound. Otherwise the
+    bound is what the emitted sine would have.
+    """
+    gather = kernel_gather(plan.analysed)
     size = (gather.rows + SIDES[0], gather.columns + SIDES[1])
     sums: NDArray[np.float32] | None = None
     planes: tuple[str, ...] = ()
     if programs is None:
-        images = _livelier(program, size)
+        images = _livelier(plan.analysed, size)
     else:
-        planes, sums = _sums(programs, varied.features, profile, size)
-        images = _encoded(varied.model, dict(zip(planes, sums, strict=True)))
-    promised = denoiser is not None and denoiser.manifest["bound"]["output"] is not None
-    one_pass = denoiser is not None and denoiser.before is None and promised
-    held = expected(program, denoiser if one_pass and denoiser else compile_program(program, "numpy"), images)
-    output, bound = held.value.astype(np.float32), held.bound
-    if denoiser is not None and promised and not one_pass:
-        # Two passes have a bound for all pictures.
-        bound = np.broadcast_to(np.asarray(denoiser.manifest["bound"]["output"]), output.shape)
-    rounded = np.nextafter((bound + np.abs(output - held.value)).astype(np.float32), np.float32(np.inf))
+        planes, sums = _sums(programs, model.features, plan.profile.name, size)
+        images = _encoded(model, dict(zip(planes, sums, strict=True)))
+    held = (plan if promised else plan_program(lower(model), "numpy")).expected(images)
+    output = held.value.astype(np.float32)
+    rounded = np.nextafter((held.bound + np.abs(output - held.value)).astype(np.float32), np.float32(np.inf))
     return Pair(images, output, rounded, promised, sums, planes)
 
 

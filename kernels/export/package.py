@@ -22,14 +22,17 @@ import numpy as np
 from ...compiler import artifact as artifacts
 from ...compiler import weights as weight_layout
 from ...compiler.artifact import Artifact
-from ...compiler.compile import target_named
+from ...compiler.compile import compile_plan
 from ...compiler.encode_kernel import EncodeArtifact, compile_encode
 from ...compiler.host_pass import feature_pass
 from ...compiler.ir import sha256
+from ...compiler.lower import lower
 from ...compiler.lower_encode import layers_of
 from ...compiler.lower_scene import PathPrograms, lower_scene
 from ...compiler.path_kernel import PathArtifact, compile_path, most_unrolled
-from ...compiler.variants import FULL, compile_variant, parse, vary
+from ...compiler.plan import plan_program
+from ...compiler.targets import target_named
+from ...compiler.variants import FULL, parse, plan_model, vary
 from ...refimpl.denoise import Model, learned_feature_spp
 from ...refimpl.errors import InputError
 from ...refimpl.scene import Scene
@@ -96,7 +99,8 @@ def export(request: Request) -> Export:
         return _graph(request)
     row = TARGETS[request.target]
     how, place = _place(row, request.weights)
-    denoiser = compile_variant(request.model, request.variant, place.kernel, request.profile, place.schedule)
+    plan = plan_model(request.model, place.kernel, request.profile, place.schedule, request.variant)
+    denoiser = compile_plan(plan)
     limits = _limits(row, place, denoiser)
     files: dict[str, bytes] = {}
     for kernel, folder in _folders(denoiser):
@@ -112,7 +116,8 @@ def export(request: Request) -> Export:
         found = row.files(f"feature.{name}", text)
         files |= {f"features/{n}": data for n, data in found.items()}
         _check(row.source, max(map(len, found.values())), row.name)
-    pair = check_pair.pair(request.model, request.variant, denoiser, programs, request.profile)
+    model, promised = vary(parse(request.variant), request.model).model, plan.bound.output is not None
+    pair = check_pair.pair(plan, model, promised, programs)
     files |= {f"check/{name}": data for name, data in pair.files().items()}
     facts = _facts(request, row, how, denoiser, limits)
     facts["kernels"] = bindings.kernels(row, denoiser, path, encoder, passes)
@@ -128,7 +133,7 @@ def _graph(request: Request) -> Export:
         raise InputError("--weights", request.weights, "a graph holds its weights", "leave it out")
     varied = vary(parse(request.variant), request.model)
     data = onnx_export.graph(varied.model)
-    pair = check_pair.pair(request.model, request.variant)
+    pair = check_pair.pair(plan_program(lower(varied.model), "numpy"), varied.model, promised=False)
     files = {"denoise/denoise.onnx": data}
     files |= {f"check/{name}": content for name, content in pair.files().items()}
     model = varied.model

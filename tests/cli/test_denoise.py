@@ -77,7 +77,7 @@ def test_a_rank_cuts_the_first_layer(wamnet, here) -> None:
     assert "variant rank2: " in outcome.out
     with open_executor("numpy") as executor:
         model, noisy = load_model(here / "model.safetensors"), exr.read_frame(here / "noisy.exr")
-        expected = denoise_on(executor, model, noisy, rank=2).image
+        expected = denoise_on(executor, model, noisy, variant="rank2").image
     assert (encoding.to_8bit(read_png(here / "denoised.png")) == encoding.to_8bit(expected)).all()
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from wamnet.cli import main as module
 from wamnet.cli import options
-from wamnet.compiler.compile import DENOISERS
+from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import EXECUTORS
 from wamnet.refimpl.errors import TrainingError
 from wamnet.refimpl.scenes import CANONICAL

@@ -38,11 +38,11 @@ def here(samples, tmp_path, executor_named):
 @pytest.fixture
 def fault(monkeypatch):
     """Plant a fault in OpenCL's kernels: one pixel's green is off. Return a way to mend them."""
-    real = compiling.compile_program
+    real = compiling.compile_plan
 
-    def compiled(program, target, *rest):
-        made = real(program, target, *rest)
-        if target != "opencl" or "neurons" in made.manifest["output"]["encoding"]:
+    def compiled(plan):
+        made = real(plan)
+        if plan.target.name != "opencl" or "neurons" in made.manifest["output"]["encoding"]:
             return made
         vector = re.findall(r"    float (v\d+)\[3\];", made.source)[-1]
         mark = "    /* output color */\n"
@@ -52,8 +52,8 @@ def fault(monkeypatch):
         files = {**made.manifest["files"], made.source_name: digest}
         return replace(made, source=source, manifest={**made.manifest, "digest": digest, "files": files})
 
-    monkeypatch.setattr(compiling, "compile_program", compiled)
-    return lambda: monkeypatch.setattr(compiling, "compile_program", real)
+    monkeypatch.setattr(compiling, "compile_plan", compiled)
+    return lambda: monkeypatch.setattr(compiling, "compile_plan", real)
 
 
 def test_all_within(wamnet, here) -> None:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from wamnet.compiler import artifact, bounds, factor
-from wamnet.compiler.compile import analysed, compile_program, sine_contract
+from wamnet.compiler.compile import compile_program
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import Gather, Image, Type, text
+from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import dataset, siren
 from wamnet.refimpl.denoise import denoise_pixel

@@ -10,11 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wamnet.compiler import bounds, emit_fourier, fourier, profiles
-from wamnet.compiler.compile import analysed, compile_program, round_up, sine_contract
+from wamnet.compiler.compile import compile_program
 from wamnet.compiler.emit_tiled import LARGEST_PRIVATE
+from wamnet.compiler.enclosure import round_up
 from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.opencl_fourier import OPENCL_FOURIER, fourier_schedule
 from wamnet.compiler.passes import pipeline
+from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import dataset, siren
 from wamnet.refimpl.denoise import denoise_pixel

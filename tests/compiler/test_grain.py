@@ -10,12 +10,13 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from wamnet.compiler import grain, sine
-from wamnet.compiler.compile import analysed, compile_program
+from wamnet.compiler.compile import compile_program
 from wamnet.compiler.grain import READ, SINE, Size
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import LEAST, Gather, Image, Type
 from wamnet.compiler.ops import OPS
 from wamnet.compiler.passes import pipeline
+from wamnet.compiler.plan import analysed
 from wamnet.compiler.profiles import EXACT_SINE, PROFILES
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import siren

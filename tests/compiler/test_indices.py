@@ -13,8 +13,9 @@ from itertools import product
 import pytest
 from targets import tiny_model
 
-from wamnet.compiler.compile import DENOISERS, EXPORTED, compile_program, target_named
+from wamnet.compiler.compile import compile_program
 from wamnet.compiler.lower import lower
+from wamnet.compiler.targets import DENOISERS, EXPORTED, target_named
 from wamnet.refimpl.errors import CompileError
 
 LIMIT = 2**31

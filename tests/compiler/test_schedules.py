@@ -10,12 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wamnet.compiler import schedules
-from wamnet.compiler.compile import TARGETS, compile_program
+from wamnet.compiler.compile import compile_program
 from wamnet.compiler.emit_inlined import LARGEST_WEIGHTS
 from wamnet.compiler.emit_tiled import LARGEST_PRIVATE
 from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.opencl_group import OPENCL_GROUPS
 from wamnet.compiler.opencl_tiled import OPENCL_LADDER
+from wamnet.compiler.targets import TARGETS
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import siren
 from wamnet.refimpl.dataset import Window

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wamnet.compiler import adjoint, bounds, scaled, sums
-from wamnet.compiler.compile import analysed
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import Gather, Image, Type
 from wamnet.compiler.lower import lower
+from wamnet.compiler.plan import analysed
 from wamnet.compiler.profiles import EMITTED_SINE
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import siren

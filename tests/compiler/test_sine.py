@@ -13,10 +13,12 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from wamnet.compiler import sine
-from wamnet.compiler.compile import compile_program, round_up, sine_contract
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.enclosure import round_up
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import Type
 from wamnet.compiler.passes import pipeline
+from wamnet.compiler.plan import sine_contract
 from wamnet.compiler.profiles import emitted_cosine, emitted_sine, profile_named
 from wamnet.compiler.trace import trace
 from wamnet.refimpl.errors import CompileError

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wamnet.compiler import sine, variants
-from wamnet.compiler.compile import TARGETS
-from wamnet.compiler.variants import parse, vary
+from wamnet.compiler.compile import compile_plan
+from wamnet.compiler.targets import TARGETS
+from wamnet.compiler.variants import parse, plan_model, vary
 from wamnet.refimpl import dataset, factored, siren
 from wamnet.refimpl.dataset import Normalization, Window
 from wamnet.refimpl.denoise import Model, check_model, denoise_pixel
@@ -205,7 +206,7 @@ def test_no_picture_moves_by_more_than_the_bound(case, seed) -> None:
         varied = vary(parse(name), model)
     except InputError:
         return  # a rank that this window does not have
-    bound = variants.bound_of(varied, "opencl", "ieee")
+    bound = variants.bound_of(plan_model(model, "opencl", variant=name))
     for picture in (image(seed=seed), np.where(image(seed=seed) > 0.5, 1.0, 0.0)):
         moved = np.abs(denoised(varied.model, picture) - denoised(model, picture)).max(axis=(0, 1))
         assert (moved <= bound).all()
@@ -231,7 +232,7 @@ def test_the_bound_of_a_linear_network_is_reached(name, neurons) -> None:
     outward = 1.0 if middle[0] + slope[0] @ (low + high) / 2 >= 0 else -1.0
     worst = np.where(slope[0] * outward > 0, high, low)
     moved = abs(middle[0] + slope[0] @ worst)
-    (bound, *_) = variants.bound_of(varied, "opencl", "ieee")
+    (bound, *_) = variants.bound_of(plan_model(model, "opencl", variant=name))
     # Its sine is not quite the line that `moved` is computed with: see above.
     curved = 1e-2**3 / 6
     assert moved <= bound + curved
@@ -243,17 +244,18 @@ def test_the_bound_of_a_linear_network_is_reached(name, neurons) -> None:
 def test_a_bound_holds_where_a_weight_is_wrong() -> None:
     """What is not in the bound shows: a kernel's weight that differs moves beyond that of `full`."""
     model = small(omega=0.05)
-    full = variants.bound_of(vary(parse("full"), model), "opencl", "ieee")
-    varied = vary(parse("full"), model)
+    plan = plan_model(model, "opencl")
+    full, varied = variants.bound_of(plan), plan.varied
     weight = varied.weights[0].copy()
     weight[0, 0] += 0.1
     wrong = replace(varied, weights=(weight, *varied.weights[1:]))
-    assert (variants.bound_of(wrong, "opencl", "ieee") > 2 * full).any()
+    assert (variants.bound_of(replace(plan, varied=wrong)) > 2 * full).any()
 
 
 def test_native_sines_have_no_bound_on_numpy() -> None:
-    assert variants.bound_of(vary(parse("rank2"), small()), "numpy", "native") is None
-    manifest = variants.compile_variant(small(), "rank2", "numpy", "native").manifest
+    plan = plan_model(small(), "numpy", "native", variant="rank2")
+    assert variants.bound_of(plan) is None
+    manifest = compile_plan(plan).manifest
     assert manifest["variant"]["bound"]["output"] is None
 
 
@@ -266,14 +268,14 @@ def test_other_degrees_are_other_profiles(monkeypatch) -> None:
 @pytest.mark.parametrize("target", TARGETS)
 def test_manifests_say_what_was_done(target) -> None:
     name = "window3+rank2"
-    found = variants.compile_variant(small(), name, target)
+    found = compile_plan(plan_model(small(), target, variant=name))
     said = found.manifest["variant"]
     assert said["name"] == name
     assert said["approximations"] == ["window3", "rank2"]
     assert said["program"] == variants.digest_of(small())
     assert (said["products"], said["products_of_full"]) == (138, 732)
-    bound = variants.bound_of(vary(parse(name), small()), target, "ieee")
+    bound = variants.bound_of(found.plan)
     assert len(found.kernels) == 2
     assert (np.array(said["bound"]["output"]) >= bound).all()
     assert (np.array(said["bound"]["output"]) <= 1.01 * bound).all()
-    assert "variant" not in variants.compile_variant(small(), "full", target).manifest
+    assert "variant" not in compile_plan(plan_model(small(), target)).manifest

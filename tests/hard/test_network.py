@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler.compile import analysed, bound_over_images, compile_program
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.plan import plan_program
 from wamnet.kernels import denoise_on
 from wamnet.refimpl import dataset, denoise, frame, siren
 from wamnet.refimpl.errors import CompileError
@@ -40,9 +41,7 @@ def test_many_turns(executor, kit):
     """omega_0 = 30 and large weights: sines of arguments of thousands of radians, inside their domain."""
     network = kit.network([27, 8, 3], (30.0, 30.0), scale=60.0)
     program = kit.denoiser(network, CHANNELS, 3, "clamp")
-    turns = max(
-        abs(end) for span in bound_over_images(analysed(program), "ieee", "opencl").sines for end in span
-    )
+    turns = max(abs(end) for span in plan_program(program, "opencl").bound.sines for end in span)
     assert 1_000 < turns < 12_800
     assert kit.excess(executor, program, picture(1)) <= 1
 

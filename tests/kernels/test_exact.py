@@ -10,13 +10,15 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from wamnet.compiler import bounds, factor
-from wamnet.compiler.compile import DENOISERS, analysed, compile_program, sine_contract
+from wamnet.compiler.compile import compile_program
 from wamnet.compiler.encode_kernel import compile_encode
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.ir import LEAST, Gather, Image, Type
 from wamnet.compiler.lower_scene import lower_scene
 from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.profiles import EMITTED_SINE
+from wamnet.compiler.targets import DENOISERS
 from wamnet.compiler.trace import trace
 from wamnet.kernels import denoise_on
 from wamnet.refimpl import dataset, denoise, frame, scenes, siren

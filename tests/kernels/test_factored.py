@@ -10,9 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wamnet.compiler import bounds, factor
-from wamnet.compiler.compile import TARGETS, analysed, compile_program, sine_contract
+from wamnet.compiler.compile import compile_program
 from wamnet.compiler.emit_fourier import Fourier
 from wamnet.compiler.interpret import interpret
+from wamnet.compiler.plan import analysed, sine_contract
+from wamnet.compiler.targets import TARGETS
 from wamnet.kernels import Pipeline, denoise_on, opencl_executor
 from wamnet.refimpl import dataset, factored
 from wamnet.refimpl.denoise import Model
@@ -122,7 +124,7 @@ def test_the_paper_s_network_of_rank_16(executor_named, kit, target, schedule, b
 
 @pytest.mark.parametrize("rank", [1, 4])
 def test_executors_agree_through_denoise_on(executor_named, kit, rank) -> None:
-    """denoise_on(rank=R) is the picture of the model with the expanded cut, up to both bounds of rounding."""
+    """A variant rankR has the picture of the model with the expanded cut, up to both bounds of rounding."""
     network = kit.network([75, 9, 3], (3.0, 3.0))
     model = Model(network, ("color",), dataset.Window(5, "zero"), dataset.Normalization())
     noisy = Frame({"color": np.random.default_rng(2).random((7, 18, 3), dtype=np.float32)})
@@ -131,7 +133,7 @@ def test_executors_agree_through_denoise_on(executor_named, kit, rank) -> None:
     # The sums have at most 75 terms of magnitude below 1 each: 2^-24 * 75 * 4 roundings, times omega_0 = 3
     # and the next layer's row sum, below 1, is less than 2^-12.
     for name in ("numpy", "opencl", "opengl"):
-        found = denoise_on(executor_named(name), model, noisy, rank=rank)
+        found = denoise_on(executor_named(name), model, noisy, variant=f"rank{rank}")
         wanted = denoise_on(executor_named("numpy"), low, noisy)
         assert np.max(np.abs(found.image - wanted.image)) <= 2.0**-12
         assert found.variant.startswith(f"variant rank{rank}: ")
@@ -152,7 +154,7 @@ def test_passes_over_a_picture_hold_both_kernels(executor_named, kit, name) -> N
     """Between a path kernel and a picture that stay on the device: the bits of `run` on the same images."""
     executor, window = executor_named(name), dataset.Window(4, "zero")
     model = Model(kit.network([96, 8, 3], (3.0, 3.0)), ("color", "normal"), window, dataset.Normalization())
-    with Pipeline(executor, canonical("minicubes"), model, (6, 11), rank=6) as pipeline:
+    with Pipeline(executor, canonical("minicubes"), model, (6, 11), variant="rank6") as pipeline:
         assert len(pipeline.denoise.kernels) == 2
         for seed in (2, 1):
             picture = pipeline.run(seed, 2)

@@ -16,9 +16,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wamnet.compiler import emit_fourier
-from wamnet.compiler.compile import DENOISERS, compile_program, target_named
-from wamnet.compiler.expected import expected
+from wamnet.compiler.compile import compile_program
 from wamnet.compiler.ir import attributes
+from wamnet.compiler.plan import plan_program
+from wamnet.compiler.targets import DENOISERS, target_named
 
 EXAMPLES = max(settings.default.max_examples // 10, 1)
 """Each example compiles a kernel: a tenth of what other tests draw."""
@@ -178,9 +179,9 @@ def original(kit):
 def excess(kit, executor, original, variant, border, artifact=None):
     """Return the largest |variant's kernel - original's reference| over the variant's bound."""
     program, reference = variant.program(kit, border), original.program(kit, border)
-    wanted = expected(reference, compile_program(reference, "numpy"), original.images).value
+    wanted = plan_program(reference, "numpy").expected(original.images).value
     artifact = artifact or compile_program(program, executor.name, "ieee", executor.schedule)
-    bound = expected(program, artifact, variant.images).bound
+    bound = artifact.plan.expected(variant.images).bound
     assert np.isfinite(bound).all()
     off = np.abs(executor.run(artifact, variant.images) - np.flip(wanted, variant.mirrored))
     return float(np.max(off / bound))

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from wamnet.compiler import bounds, ir
-from wamnet.compiler.compile import analysed, sine_contract
 from wamnet.compiler.encode_kernel import error_at
 from wamnet.compiler.lower import lower
+from wamnet.compiler.plan import analysed, sine_contract
+from wamnet.compiler.variants import FULL, with_rank
 from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
 from wamnet.kernels.executor import Part
 from wamnet.refimpl import dataset, scenes
@@ -180,7 +181,9 @@ def test_a_wrong_encoding_is_caught(executor_named, model_of, fault):
 def test_nothing_is_read_back_or_uploaded_in_between_on_opencl(executor_named, model_of, monkeypatch, rank):
     executor, model = executor_named("opencl"), model_of(ALL, 3, "clamp")
     module, copied, uploaded = sys.modules[type(executor).__module__], [], []
-    with Pipeline(executor, scene("cornell"), model, (9, 21), settings=SETTINGS, rank=rank) as pipeline:
+    with Pipeline(
+        executor, scene("cornell"), model, (9, 21), settings=SETTINGS, variant=with_rank(FULL, rank)
+    ) as pipeline:
         pipeline.run()
         real_copy, real_buffer = module.cl.enqueue_copy, module.cl.Buffer
 
@@ -211,7 +214,9 @@ def test_nothing_is_read_back_or_uploaded_in_between_on_opengl(
 ):
     executor, model = executor_named(name), model_of(ALL, 3, "clamp")
     module, read, made = sys.modules[type(executor).__module__], [], []
-    with Pipeline(executor, scene("cornell"), model, (9, 21), settings=SETTINGS, rank=rank) as pipeline:
+    with Pipeline(
+        executor, scene("cornell"), model, (9, 21), settings=SETTINGS, variant=with_rank(FULL, rank)
+    ) as pipeline:
         pipeline.run()
         kind, context = module.moderngl.Texture, module.moderngl.Context
         real_read, real_texture = kind.read, context.texture

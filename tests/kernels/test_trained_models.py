@@ -21,12 +21,14 @@ import pytest
 
 from wamnet.cli.inputs import load_model, shipped_models, unlike_training
 from wamnet.compiler.artifact import Artifact
-from wamnet.compiler.compile import DENOISERS, compile_program, schedule_named, sine_contract
-from wamnet.compiler.expected import Expected, expected
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.expected import Expected
 from wamnet.compiler.ir import Program
 from wamnet.compiler.lower import lower
+from wamnet.compiler.plan import sine_contract
 from wamnet.compiler.profiles import PROFILES
 from wamnet.compiler.schedules import Schedule
+from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import denoise_on, registry
 from wamnet.kernels.denoise_on import images_of
 from wamnet.kernels.draws import drawn
@@ -72,11 +74,11 @@ class Trained:
 
     def held(self, artifact: Artifact) -> Expected:
         """Return reference and bound for an artifact of this program, computed once for each promise."""
-        schedule = schedule_named(artifact.target, artifact.manifest["schedule"]["name"])
-        own = "" if shares_bound(schedule) else schedule.name
-        promise = (artifact.profile, sine_contract(artifact.profile, artifact.target), own)
+        plan = artifact.plan
+        own = "" if plan.shares_bound else plan.schedule.name
+        promise = (artifact.profile, plan.sine, own)
         if promise not in self.known:
-            self.known[promise] = expected(self.program, artifact, self.images)
+            self.known[promise] = artifact.plan.expected(self.images)
         return self.known[promise]
 
     def excess(self, executor: Any, artifact: Artifact, promised: Artifact | None = None) -> float:

@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wamnet.compiler.compile import compile_program
-from wamnet.compiler.expected import expected
+from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.lower import lower
+from wamnet.compiler.plan import plan_program
 from wamnet.kernels import apart, triage
 from wamnet.kernels.apart import Apart, Inside, Outcome
 from wamnet.kernels.reduce import Box, Stage, first_stage, reduced, shrink, stage_program, stages
@@ -47,23 +47,26 @@ def runners(executor_named, *ways):
     return [Inside(way, executor_named(way)) for way in dict.fromkeys(("numpy", *ways))]
 
 
-def verdicts_of(ways, model, images, profile="ieee", which="plain", compiled=compile_program):
+def verdicts_of(ways, model, images, profile="ieee", which="plain", compiled=compile_plan):
     program = lower(model)
     kernels = triage.kernels_of(ways, program, profile, SHAPE, which, compiled)
-    return triage.judged(kernels, program, images)
+    return triage.judged(kernels, images)
 
 
 def wrong_weight(target):
     """Return a compiler that gives layer 1's neuron 3 another first weight, for one target."""
 
-    def compiled(program, name, profile, schedule):
-        if name == target and "W1" in program.parameters:
+    def compiled(plan):
+        program = plan.analysed
+        if plan.target.name == target and "W1" in program.parameters:
             weight = program.parameters["W1"].copy()
             # A stage of GLSL's holds four neurons, the next one the fifth alone.
             if len(weight) > 3:
                 weight[3, 0] += 2.0**-6
             program = replace(program, parameters={**program.parameters, "W1": weight})
-        return compile_program(program, name, profile, schedule)
+            # A fault of the kernel alone: the plan that it is judged by stays.
+            return replace(compile_plan(replace(plan, analysed=program)), plan=plan)
+        return compile_plan(plan)
 
     return compiled
 
@@ -71,9 +74,9 @@ def wrong_weight(target):
 def planted(kit, target, text):
     """Return a compiler that plants `text`, {v} being the output vector, in whole kernels for a target."""
 
-    def compiled(program, name, profile, schedule):
-        artifact = compile_program(program, name, profile, schedule)
-        if name != target or "neurons" in artifact.manifest["output"]["encoding"]:
+    def compiled(plan):
+        artifact = compile_plan(plan)
+        if plan.target.name != target or "neurons" in artifact.manifest["output"]["encoding"]:
             return artifact
         vector = re.findall(r"    float (v\d+)\[3\];", artifact.source)[-1]
         (place,) = (match[0] for match in RESULT.finditer(artifact.source))
@@ -174,10 +177,12 @@ def test_without_a_bound_finite_numbers_pass(executor_named, model, images):
 
 def test_if_all_deviate_the_bound_is_suspect(executor_named, model, images):
     """A reference that is not the kernels'."""
-    ways = runners(executor_named, "opencl")
-    kernels = triage.kernels_of(ways, lower(model), "ieee", SHAPE)
-    other = replace(model, siren=replace(model.siren, omega_0_hidden=2.9))
-    found = triage.judged(kernels, lower(other), images)
+    other = lower(replace(model, siren=replace(model.siren, omega_0_hidden=2.9)))
+
+    def compiled(plan):
+        return replace(compile_plan(plan), plan=plan_program(other, plan.target.name))
+
+    found = verdicts_of(runners(executor_named, "opencl"), model, images, compiled=compiled)
     text = "all deviate: the program or the bound is suspect, not an executor"
     assert triage.conclusion(found) == text
     text = "numpy plain deviates, and nothing else ran: run other executors beside it"
@@ -244,10 +249,10 @@ def test_a_crash_is_a_verdict(executor_named, model, images, monkeypatch, way):
 
 
 def test_a_refusal_is_no_deviation(executor_named, model, images):
-    def compiled(program, target, profile, schedule):
-        if target == "opencl":
+    def compiled(plan):
+        if plan.target.name == "opencl":
             raise CompileError("not today")
-        return compile_program(program, target, profile, schedule)
+        return compile_plan(plan)
 
     found = verdicts_of(runners(executor_named, "opencl"), model, images, compiled=compiled)
     assert [v.state for v in found] == ["within", "refused: not today"]
@@ -384,7 +389,7 @@ def test_stages_are_the_network(kit, model, images):
         for sines in (False, True) if layer < 2 else (False,):
             x = np.sin(3.0 * x) if sines else x
             program = stage_program(model, Stage(layer, sines, 1, 3))
-            held = expected(program, compile_program(program, "numpy"), images)
+            held = plan_program(program, "numpy").expected(images)
             # both in float64, of sums of 54 terms at most
             assert np.abs(held.value - x[..., 1:3]).max() <= 1e-12
 

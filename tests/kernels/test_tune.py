@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.compiler.compile import TARGETS
+from wamnet.compiler.targets import TARGETS
+from wamnet.compiler.variants import plan_model
 from wamnet.kernels import Pipeline, cache, denoise_on, tune
 from wamnet.kernels.tune import Row, Table, choose
 from wamnet.refimpl import dataset, denoise, frame, siren
@@ -29,11 +30,15 @@ def model(hidden=(8,), window=3):
     return denoise.Model(network, ("color", "normal"), dataset.Window(window), dataset.Normalization())
 
 
-def keep(executor, table, **where):
+def planned(executor, network=None, **how):
+    """Return the plan of a network, the usual one where none is given."""
+    return plan_model(network or model(), executor.name, **how)
+
+
+def keep(executor, table):
     """Put a table into the cache as if it had been measured."""
     found = {"device": "d", "network": "n", "size": list(SIZE), "day": "2026-01-02", "rows": table}
-    asked = {"profile": "ieee", "rank": 0, **where}
-    assert cache.write_json(tune._entry(executor, model(), SIZE, **asked), found)
+    assert cache.write_json(tune._entry(executor, planned(executor), SIZE), found)
 
 
 def row(schedule, ms, again_s=0.1):
@@ -42,14 +47,14 @@ def row(schedule, ms, again_s=0.1):
 
 def test_every_schedule_is_checked_and_the_fastest_is_taken(executor_named):
     executor = executor_named("opencl")
-    table = tune.tune(executor, model(), SIZE, repeats=1)
+    table = tune.tune(executor, planned(executor), SIZE, repeats=1)
     assert {r.schedule for r in table.rows} == {s.name for s in TARGETS["opencl"].schedules}
     assert all((r.ms is None) == bool(r.note) for r in table.rows)
     assert all(r.again_s > 0 for r in table.rows if r.ms is not None)
     assert table.network == "54-8-3, color + normal, window 3 (clamp)"
-    assert tune.remembered(executor, model(), SIZE) == table
+    assert tune.remembered(executor, planned(executor), SIZE) == table
     best = min((r for r in table.rows if r.ms is not None), key=lambda r: r.ms)
-    found = choose(executor, model(), SIZE, pictures=10**9)
+    found = choose(executor, planned(executor), SIZE, pictures=10**9)
     assert found.schedule == best.schedule
     assert found.reason.startswith(f"tuned on this device on {table.day}: {best.ms:.3g} ms at 20x12, ")
 
@@ -59,10 +64,11 @@ def test_a_rank_is_tuned_by_itself(executor_named, name):
     """A compute shader's first pass is a fragment shader where it writes more than four channels."""
     executor = executor_named(name)
     rank = {"opencl": 2, "opengl-egl": 6}[name]
-    table = tune.tune(executor, model(), SIZE, rank=rank, repeats=1)
+    plan = planned(executor, variant=f"rank{rank}")
+    table = tune.tune(executor, plan, SIZE, repeats=1)
     assert not [r for r in table.rows if "wrong" in r.note]
-    assert choose(executor, model(), SIZE, rank=rank).reason.startswith("tuned on")
-    assert choose(executor, model(), SIZE).reason.startswith("built-in choice for ")
+    assert choose(executor, plan, SIZE).reason.startswith("tuned on")
+    assert choose(executor, planned(executor), SIZE).reason.startswith("built-in choice for ")
 
 
 @pytest.mark.parametrize("fault", [lambda image: image + 0.01, lambda image: image * np.nan])
@@ -74,23 +80,25 @@ def test_a_schedule_with_a_wrong_result_is_not_timed(executor_named, monkeypatch
         wrong if artifact.manifest["schedule"]["name"] == "tile16" else run
     )(artifact, images)
     monkeypatch.setattr(executor, "run", chosen)
-    table = tune.tune(executor, model(), SIZE, repeats=1)
+    table = tune.tune(executor, planned(executor), SIZE, repeats=1)
     (bad,) = [r for r in table.rows if r.schedule == "tile16"]
     assert bad.ms is None
     assert bad.note.startswith("its result is wrong on this device: ")
-    assert choose(executor, model(), SIZE).schedule != "tile16"
+    assert choose(executor, planned(executor), SIZE).schedule != "tile16"
 
 
 def test_what_does_not_hold_the_program_says_why(executor_named, monkeypatch):
     monkeypatch.setattr("wamnet.compiler.emit_group.LARGEST_NUMBERS", 30)
-    table = tune.tune(executor_named("opencl"), model((8, 8), 1), SIZE, repeats=1)
+    executor = executor_named("opencl")
+    table = tune.tune(executor, planned(executor, model((8, 8), 1)), SIZE, repeats=1)
     notes = {r.schedule: r.note for r in table.rows}
     assert notes["group4"].startswith("two layers of 4 pixels are 64 numbers, of at most 30")
     assert "numbers" not in notes["group"]
 
 
 def test_weights_in_the_source_are_compiled_for_each_model(executor_named):
-    table = tune.tune(executor_named("opengl-egl"), model((), 1), SIZE, repeats=1)
+    executor = executor_named("opengl-egl")
+    table = tune.tune(executor, planned(executor, model((), 1)), SIZE, repeats=1)
     (inlined,) = [r for r in table.rows if r.schedule == "inlined"]
     assert inlined.again_s == inlined.first_s
     assert {r.schedule for r in table.rows} == {"plain", "inlined", "compute", "compute4"}
@@ -105,7 +113,7 @@ def test_compilation_counts_for_few_pictures():
 
 
 def test_without_a_table_the_choice_is_built_in(executor):
-    found = choose(executor, model(), SIZE)
+    found = choose(executor, planned(executor), SIZE)
     assert found.schedule == executor.schedule_for(SIZE)
     assert found.reason == executor.schedule_reason
     assert found.reason.startswith("built-in choice" if executor.name != "numpy" else "the only one")
@@ -124,21 +132,21 @@ CHANGES = {
 def test_a_table_of_another_machine_is_not_taken(executor_named, monkeypatch, change):
     executor = executor_named("opencl")
     keep(executor, [row("plain", 1.0)])
-    assert choose(executor, model(), SIZE).schedule == "plain"
+    assert choose(executor, planned(executor), SIZE).schedule == "plain"
     CHANGES[change](executor, monkeypatch)
-    assert choose(executor, model(), SIZE).reason.startswith("built-in")
+    assert choose(executor, planned(executor), SIZE).reason.startswith("built-in")
 
 
 def test_a_table_of_another_network_or_size_is_not_taken(executor_named):
     executor = executor_named("opencl")
     keep(executor, [row("plain", 1.0)])
-    assert choose(executor, model(), (16, 16)).schedule == "plain"  # 240 and 256 pixels: 2^7 to 2^8
+    assert choose(executor, planned(executor), (16, 16)).schedule == "plain"  # 240 and 256 pixels: 2^7 to 2^8
     zero = replace(model(), window=dataset.Window(3, "zero"))
     albedo = replace(model(), features=("color", "albedo"))
     cases = [(model((9,)), SIZE), (zero, SIZE), (albedo, SIZE), (model(), (13, 20)), (model(), (12, 10))]
     for other, size in cases:
-        assert choose(executor, other, size).reason.startswith("built-in")
-    assert choose(executor, model(), SIZE, "native").reason.startswith("built-in")
+        assert choose(executor, planned(executor, other), size).reason.startswith("built-in")
+    assert choose(executor, planned(executor, profile="native"), SIZE).reason.startswith("built-in")
 
 
 @given(height=st.integers(1, 5000), width=st.integers(1, 5000))
@@ -159,8 +167,8 @@ def test_size_classes_are_powers_of_two(height, width):
 )
 def test_an_entry_that_is_no_table_is_none(executor_named, data):
     executor = executor_named("opencl")
-    cache.write_json(tune._entry(executor, model(), SIZE, "ieee", 0), data)
-    assert choose(executor, model(), SIZE).reason.startswith("built-in")
+    cache.write_json(tune._entry(executor, planned(executor), SIZE), data)
+    assert choose(executor, planned(executor), SIZE).reason.startswith("built-in")
 
 
 def test_a_damaged_table_is_measured_anew(executor_named, caplog):
@@ -168,10 +176,10 @@ def test_a_damaged_table_is_measured_anew(executor_named, caplog):
     keep(executor, [row("plain", 1.0)])
     (path,) = cache.folder().iterdir()
     path.write_text(path.read_text().replace("plain", "tile4"))
-    assert choose(executor, model(), SIZE).reason.startswith("built-in")
+    assert choose(executor, planned(executor), SIZE).reason.startswith("built-in")
     assert "is damaged, or no entry of wamnet: it is ignored" in caplog.text
-    table = tune.tune(executor, model(), SIZE, repeats=1)
-    assert tune.remembered(executor, model(), SIZE) == table
+    table = tune.tune(executor, planned(executor), SIZE, repeats=1)
+    assert tune.remembered(executor, planned(executor), SIZE) == table
 
 
 def test_pictures_are_made_with_the_schedule_of_the_table(executor_named):

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from wamnet.compiler import bounds, factor, sine, variants
-from wamnet.compiler.compile import TARGETS, analysed, schedule_named, sine_contract
+from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.lower import lower
-from wamnet.compiler.variants import parse, vary
+from wamnet.compiler.plan import analysed, sine_contract
+from wamnet.compiler.targets import TARGETS, schedule_named
+from wamnet.compiler.variants import parse, plan_model, vary, with_rank
 from wamnet.kernels import denoise_on
 from wamnet.refimpl import dataset, siren
 from wamnet.refimpl.denoise import Model
@@ -62,7 +64,7 @@ def test_a_kernel_is_its_variant(executor_named, target, schedule, name) -> None
     border = "zero" if "+" in name else "clamp"
     model, images, executor = paper_s(border), picture(), executor_named(target)
     varied = vary(parse(name), model)
-    artifact = variants.compile_variant(model, name, target, "ieee", schedule)
+    artifact = compile_plan(plan_model(model, target, "ieee", schedule, name))
     found = executor.run(artifact, {k: images[k] for k in varied.features}).astype(np.float64)
     program, contract = analysed(lower(varied.model)), sine_contract(artifact.profile, target)
     chosen = {k: images[k] for k in varied.features}
@@ -78,7 +80,7 @@ def test_a_kernel_is_its_variant(executor_named, target, schedule, name) -> None
     assert np.isfinite(bound).all()
     assert (np.abs(found - expected) <= bound).all()
     full = float64_of(analysed(lower(model)), images)
-    promise = variants.bound_of(varied, target, "ieee", used)
+    promise = variants.bound_of(artifact.plan)
     assert (np.abs(found - full).max(axis=(0, 1)) <= promise).all()
     if name == "full":
         enclosed = schedule_named(target, used).enclosures(program, contract)
@@ -99,7 +101,13 @@ def test_denoise_on_runs_variants(executor_named) -> None:
     assert np.abs(found.image - denoise_on(executor, small, frame).image).max() <= 1e3 * 54 * 2.0**-24
     assert found.variant.startswith("variant window3+rank2: ")
     assert denoise_on(executor, model, frame).variant == ""
-    ranks = [denoise_on(executor, model, frame, **how).image for how in ({"rank": 2}, {"variant": "rank2"})]
-    assert np.array_equal(*ranks)
+
+
+def test_a_rank_is_short_for_a_variant() -> None:
+    assert [with_rank("full", 0), with_rank("full", 2), with_rank("window3", 0)] == [
+        "full",
+        "rank2",
+        "window3",
+    ]
     with pytest.raises(InputError, match="rank is 2: the variant is window3; name it in the variant"):
-        denoise_on(executor, model, frame, rank=2, variant="window3")
+        with_rank("window3", 2)

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.expected import expected
 from wamnet.compiler.ir import Gather, Image, Program, Type, sha256
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import dataset, siren
@@ -79,7 +78,7 @@ class Kit:
     ) -> float:
         """Return the largest error / bound against the float64 reference: at most 1 for a right kernel."""
         artifact = artifact or compile_program(program, executor.name)
-        held = expected(program, artifact, images)
+        held = artifact.plan.expected(images)
         found = executor.run(artifact, images).astype(np.float64)
         assert np.isfinite(held.bound).all(), "a bound that is infinite holds for every kernel"
         return float(np.max(np.abs(found - held.value) / held.bound))

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....compiler import bounds, ranges
-from ....compiler.compile import analysed
 from ....compiler.ir import Type
 from ....compiler.lower_step import ADAM_INPUTS, lower_adam, step_of
+from ....compiler.plan import analysed
 from ....compiler.profiles import EMITTED_SINE
 from ....compiler.ranges import Range
 from ....compiler.step import SQUARES, sum_errors

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from ....compiler import bounds
-from ....compiler.compile import analysed
 from ....compiler.lower import lower
+from ....compiler.plan import analysed
 from ....compiler.profiles import EMITTED_SINE
 from ....refimpl import dataset, denoise, siren
 from ....refimpl import scene as scene_module

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wamnet.compiler import variants
-from wamnet.compiler.compile import sine_contract
+from wamnet.compiler.plan import sine_contract
 from wamnet.kernels.bench import accuracy, contenders, contest, rates, workload
 from wamnet.kernels.bench.contender import FULL, Contender, Opened, Tools, Variant, parameters_of
 from wamnet.kernels.bench.cost import Stage
@@ -331,7 +331,7 @@ def test_parameters_of_a_rank_are_those_of_its_factors(model) -> None:
 
 
 def test_names_are_unique_and_schedules_complete() -> None:
-    from wamnet.compiler.compile import TARGETS
+    from wamnet.compiler.targets import TARGETS
 
     with Tools() as tools:
         everybody = contenders.of_machine(tools, SIZE)

@@ -11,8 +11,8 @@ import pytest
 from packages import PACKAGES, needed
 
 from wamnet.compiler import bounds
-from wamnet.compiler.compile import analysed
 from wamnet.compiler.lower import lower
+from wamnet.compiler.plan import analysed
 from wamnet.compiler.profiles import SineContract
 from wamnet.kernels.bench import contenders, workload
 from wamnet.kernels.bench.contender import Tools

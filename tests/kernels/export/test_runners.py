@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from wamnet import kernels
-from wamnet.compiler.compile import EXPORTED, compile_program
+from wamnet.compiler.compile import compile_program
 from wamnet.compiler.encode_kernel import compile_encode, error_at
 from wamnet.compiler.lower_encode import layers_of
 from wamnet.compiler.lower_scene import lower_scene
 from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.targets import EXPORTED
 from wamnet.kernels.executor import Part
 from wamnet.kernels.export import check, runners, tools
 from wamnet.refimpl.dataset import Normalization, encode_sums
@@ -65,8 +66,8 @@ def test_denoiser_keeps_its_bound(runner, kit, case):
 
 def test_a_first_layer_in_two_passes(runner, kit, case):
     """The bound of both passes is against the program that was cut."""
-    from wamnet.compiler.compile import analysed
     from wamnet.compiler.interpret import interpret
+    from wamnet.compiler.plan import analysed
 
     program, images = case
     if runner.name == "godot":

@@ -1,0 +1,250 @@
+"""A plan: what is compiled, for which target, with which arithmetic, in which order; resolved once.
+
+1. A plan is made at the door (command line, `denoise_on`, pipeline, export) from names [`plan_program`,
+   `variants.plan_model`]. Behind the door it holds objects: program, target, profile, and both passes of a
+   first layer that is cut to a rank.
+2. It runs the passes once: the program that bounds speak about [`Plan.analysed`], and the one that is emitted
+   [`Plan.emitted`]; and it picks the schedule once [`Plan.picked`].
+3. It bounds the output over all inputs that the images can hold, and refuses a program whose sines may leave
+   the domain on which their error is known, or whose numbers may leave float32 [`Plan.bound`].
+4. It says what a kernel may write for given images: the reference's picture in float64, with the weights that
+   the profile has, and how far each number may be from it: a-posteriori [`Plan.expected`]. Both are computed
+   for a block of rows at a time: all windows of a picture fill the memory.
+
+Everything is computed when it is first needed, and then kept.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..refimpl.errors import CompileError
+from . import bounds, certificate, profiles, schedules
+from .bounds import Enclosure
+from .emit import kernel_gather
+from .factor import Cut, at_images, factor, over_images, product
+from .interpret import interpret
+from .ir import Program
+from .passes import pipeline
+from .profiles import Profile, SineContract
+from .schedules import ALL, PLAIN, Images, Pick, Schedule, pick
+from .targets import Target, target_named
+
+if TYPE_CHECKING:
+    from .variants import Varied
+
+BLOCK_NUMBERS = 2**20
+"""Numbers in the windows of one block of rows: a bound holds some copies of them, 8 MiB each."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A-priori promise: `output` bounds each channel's error, None where an operation promises nothing.
+
+    `sines` holds the range of each sine's argument; `proof` the steps of a certificate, if it has one.
+    """
+
+    output: tuple[float, ...] | None
+    sines: tuple[tuple[float, float], ...]
+    proof: certificate.Proof | None = None
+
+
+@dataclass(frozen=True)
+class Expected:
+    """The reference's picture (H, W, C) in float64, and the most that a kernel may be off (H, W, C)."""
+
+    value: NDArray[np.float64]
+    bound: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a program becomes a kernel, or two.
+
+    `analysed`: the program after the passes that bounds see, each sine one node; `asked`: the name of the
+    schedule that was requested; `cut`: both passes of a first layer of low rank; `varied`: the variant of a
+    network that the program is, if it is one.
+    """
+
+    analysed: Program
+    target: Target
+    profile: Profile
+    asked: str = PLAIN
+    cut: Cut | None = None
+    varied: Varied | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Travel to other processes without what is computed when it is needed."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    def scheduled(self, name: str) -> Plan:
+        """Return the same plan with another schedule."""
+        return replace(self, asked=name)
+
+    @cached_property
+    def sine(self) -> SineContract:
+        """Return what is promised of a sine."""
+        return self.profile.sine or self.target.native_sine
+
+    @cached_property
+    def emitted(self) -> Program:
+        """Return the program that is written as source."""
+        return pipeline.run(self.analysed, self.profile.passes)
+
+    @cached_property
+    def picked(self) -> Pick:
+        """Return the schedule, and why it is not the requested one where it is not."""
+        return pick(self.target.schedules, self.asked, self.emitted)
+
+    @property
+    def schedule(self) -> Schedule:
+        """Return the schedule."""
+        return self.picked.schedule
+
+    @cached_property
+    def passes(self) -> tuple[Plan, ...]:
+        """Return the plan of each kernel in the order in which they run: this one, or those of two passes."""
+        if self.cut is None:
+            return (self,)
+        return tuple(
+            replace(self, analysed=part, cut=None, varied=None)
+            for part in (self.cut.horizontal, self.cut.vertical)
+        )
+
+    def enclosures(
+        self, images: Images | None = None, rows: slice = ALL, of_cut: bool = True
+    ) -> list[Enclosure]:
+        """Return the enclosure of every node of the analysed program, errors being the kernel's.
+
+        For all images in their ranges, or for given ones (H, W, C), then for each pixel of some `rows`; all
+        rows where the first layer is cut. `of_cut`: what the cut leaves out counts as an error.
+        """
+        if self.cut is None:
+            return self.schedule.enclosures(self.analysed, self.sine, images, rows)
+        if images is None:
+            return over_images(self.cut, self.sine, of_cut)
+        return at_images(self.cut, self.sine, images, of_cut)
+
+    @cached_property
+    def bound(self) -> Bound:
+        """Return the bound over all that the images can hold, or refuse the program."""
+        program, found = self.analysed, self.enclosures()
+        if self.profile.sine is not None:
+            _check_sizes(program, found)
+        sines = [index for index, node in enumerate(program.nodes) if node.op == "sin"]
+        ranges = []
+        for number, index in enumerate(sines):
+            argument = found[program.nodes[index].args[0]]
+            ranges.append((float(argument.low.min()), float(argument.high.max())))
+            # What a sine without a contract passes on is unknown: there is no domain to check against.
+            if self.sine.error is not None and not bounds.argument_reach(argument).max() <= self.sine.domain:
+                _refuse_domain(number + 1, len(sines), index, ranges[-1], self.sine)
+        errors = bounds.output_errors(program, found)[program.outputs[0][0]]
+        if not all(math.isfinite(error) for error in errors):
+            return Bound(None, tuple(ranges))
+        proof = None if self.cut else certificate.prove(program, found, self.sine)
+        return Bound(proof.bound if proof else tuple(float(e) for e in errors), tuple(ranges), proof)
+
+    @property
+    def shares_bound(self) -> bool:
+        """Return whether the bound is that of any order of sums: plans that agree so far have one bound."""
+        return self.cut is not None or type(self.schedule).enclosures is Schedule.enclosures
+
+    @property
+    def reference(self) -> Program:
+        """Return what a kernel computes but for rounding; a cut has the factors' product for weights."""
+        return replace(product(self.cut) if self.cut else self.analysed, exact=False)
+
+    def expected(self, images: Images) -> Expected:
+        """Return what a kernel may write for images (H, W, C); any number where a sine promises nothing.
+
+        With a cut the reference is the network that has the factors' product for weights: what is bounded is
+        rounding alone.
+        """
+        height, width = next(iter(images.values())).shape[:2]
+        gather = kernel_gather(self.analysed)
+        rows = height if self.cut else max(1, BLOCK_NUMBERS // (width * gather.n_inputs))
+        values, errors = [], []
+        for top in range(0, height, rows):
+            block = slice(top, min(top + rows, height))
+            windows = schedules.windows(gather, images, block)
+            (value,) = interpret(self.reference, {"window": windows}, np.float64).values()
+            (error,) = bounds.output_errors(self.analysed, self.enclosures(images, block, False)).values()
+            values.append(_per_pixel(value, windows.shape[:2]))
+            errors.append(np.broadcast_to(_per_pixel(error, windows.shape[:2]), values[-1].shape))
+        return Expected(np.concatenate(values), np.concatenate(errors))
+
+
+def analysed(program: Program, profile: str = "ieee") -> Program:
+    """Return the program that bounds speak about: after the common passes, each sine one node."""
+    return pipeline.run(program, (*pipeline.COMMON, *profiles.profile_named(profile).common))
+
+
+def sine_contract(profile: str, target: str) -> SineContract:
+    """Return what is promised of a sine under this profile on this target."""
+    return profiles.profile_named(profile).sine or target_named(target).native_sine
+
+
+def plan_program(
+    program: Program, target: str, profile: str = "ieee", schedule: str = PLAIN, rank: int = 0
+) -> Plan:
+    """Return the plan of a program that reads a window and writes one output, or refuse it.
+
+    With a `rank` the first layer is cut to it, and there are two kernels [factor.py].
+    """
+    chosen, promised = target_named(target), profiles.profile_named(profile)
+    kernel_gather(program)
+    common = analysed(program, profile)
+    if common.exact and chosen.assumes:
+        raise CompileError(
+            f"profile {profile}: {chosen.language} has no word that keeps operations in order; use profile "
+            "ieee, or a target that has one"
+        )
+    if rank and chosen.most is not None and rank > chosen.most:
+        raise CompileError(
+            f"rank {rank}: the image between both passes has as many channels, and {chosen.language} "
+            f"writes at most {chosen.most}; use a smaller rank, or OpenCL or C, which have no such limit"
+        )
+    cut = factor(common, rank, chosen.widest) if rank else None
+    return Plan(common, chosen, promised, schedule, cut)
+
+
+def _check_sizes(program: Program, found: Sequence[Enclosure]) -> None:
+    """Refuse a program whose numbers may overflow, which would leave it without a bound."""
+    layer = -1
+    for index, (node, enclosure) in enumerate(zip(program.nodes, found, strict=True)):
+        layer += node.op == "affine"
+        if enclosure.overflows:
+            place = f"layer {layer}, %{index}" if layer >= 0 else f"%{index}"
+            raise CompileError(
+                f"{node.op} ({place}) may hold numbers up to {np.nanmax(enclosure.size):.3g}: float32 ends "
+                f"at {np.finfo(np.float32).max:.3g}; use smaller weights, a smaller omega_0 or features of a "
+                "smaller range, or profile native, which then promises nothing"
+            )
+
+
+def _refuse_domain(
+    number: int, count: int, index: int, found: tuple[float, float], contract: SineContract
+) -> None:
+    """Raise: a sine may be given an argument for which nothing is proven."""
+    raise CompileError(
+        f"sine {number} of {count} (layer {number - 1}, %{index}) may be given arguments from {found[0]:.6g} "
+        f"to {found[1]:.6g}: the sine ({contract.text}) is proven for |x| <= {contract.domain:g}; "
+        "use a smaller omega_0, smaller weights or features of a smaller range, or profile native, which "
+        "promises less"
+    )
+
+
+def _per_pixel(array: Any, size: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return (H, W, C) of an array that may lack the last axis, or all but it (constants)."""
+    if np.ndim(array) < len(size):
+        array = np.broadcast_to(np.atleast_1d(array), (*size, np.size(array)))
+    found: NDArray[np.float64] = np.reshape(array, (*size, -1))
+    return found

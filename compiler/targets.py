@@ -1,0 +1,120 @@
+"""All targets: what runs kernels, how its source is made, and which schedules it has.
+
+A target that wamnet runs itself is in [`TARGETS`], or in [`DENOISERS`] where it denoises only; one whose
+kernels other programs run is in [`EXPORTED`].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..refimpl.errors import CompileError
+from .c import C
+from .cuda import CUDA
+from .dialect import Dialect
+from .emit_inlined import Inlined
+from .emit_packed import Packed
+from .glsl import GLSL
+from .glsl_buffers import ComputeDenoise, VulkanDenoise
+from .glsl_compute import GLSL_COMPUTE
+from .glsl_es import GLSLES, GLSLESInlined, GLSLESPacked
+from .glsl_inlined import GLSL_LADDER
+from .hosts import GodotDenoise, ShadertoyDenoise
+from .metal import Metal
+from .opencl import OpenCL
+from .opencl_fourier import OPENCL_FOURIER
+from .opencl_group import OPENCL_GROUPS
+from .opencl_tiled import OPENCL_LADDER
+from .profiles import SineContract
+from .schedules import Plain, Printed, Schedule
+from .weight_homes import HOMES
+from .wgsl import WGSL
+
+
+@dataclass(frozen=True)
+class Target:
+    """Something that runs kernels: how its source is made, and what its own sine promises.
+
+    `widest`: most channels of an image that a kernel reads, `most` of all that it writes; None: any number.
+    `assumes`: what a bound rests on that the language does not promise.
+    """
+
+    name: str
+    language: str
+    suffix: str
+    entry: str
+    native_sine: SineContract
+    schedules: tuple[Schedule, ...]
+    widest: int | None = None
+    most: int | None = None
+    assumes: str = ""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel to other processes by name: schedules hold functions."""
+        return target_named, (self.name,)
+
+
+def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
+    """Return the target whose source a dialect makes, with its schedules besides the plain one."""
+    return Target(
+        dialect.target,
+        dialect.language,
+        dialect.suffix,
+        dialect.entry,
+        dialect.native_sine,
+        (Plain(dialect), *ladder),
+        widest=dialect.channels_per_result,
+        most=dialect.max_output_channels,
+        assumes=dialect.assumes,
+    )
+
+
+TARGETS: Mapping[str, Target] = {
+    target.name: target
+    for target in (
+        Target(
+            "numpy",
+            "wamnet IR",
+            ".ir.txt",
+            "program",
+            SineContract("np.sin, whose documentation promises nothing", None),
+            (Printed(),),
+        ),
+        _dialect_target(OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_GROUPS),
+        _dialect_target(GLSL(), *GLSL_LADDER, *GLSL_COMPUTE),
+    )
+}
+"""All targets of paths, encodings and denoisers, by the name of the executor that runs them."""
+
+DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C())}
+"""All targets that an executor of the registry runs: those, and C, whose executor denoises alone."""
+
+EXPORTED: Mapping[str, Target] = {
+    target.name: target
+    for target in (
+        _dialect_target(GLSLES(), Inlined(GLSLESInlined()), Packed(GLSLESPacked())),
+        _dialect_target(ComputeDenoise(), *GLSL_COMPUTE),
+        _dialect_target(VulkanDenoise()),
+        _dialect_target(WGSL()),
+        _dialect_target(CUDA()),
+        _dialect_target(Metal()),
+        replace(_dialect_target(ShadertoyDenoise()), schedules=(Inlined(ShadertoyDenoise()),)),
+        _dialect_target(GodotDenoise()),
+    )
+} | {name: _dialect_target(dialect) for name, dialect in HOMES.items()}
+"""Targets that are written for other programs to run: kernels/export has what runs them in tests."""
+
+
+def target_named(name: str) -> Target:
+    """Return the target, or say which ones there are."""
+    known = {**DENOISERS, **EXPORTED}
+    if name not in known:
+        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(known)}")
+    return known[name]
+
+
+def schedule_named(target: str, name: str) -> Schedule:
+    """Return the schedule of this name of a target."""
+    return {schedule.name: schedule for schedule in target_named(target).schedules}[name]

@@ -37,7 +37,7 @@ MOST_CHANNELS = 4
 OpenCL 1.2 (CL_DEVICE_LOCAL_MEM_SIZE) and OpenGL 4.3 (MAX_COMPUTE_SHARED_MEMORY_SIZE) promise."""
 
 LARGEST_SHARED = 2**15
-"""Most bytes of a tile: what both standards promise."""
+"""Most bytes of a tile where a dialect does not say less: what both standards promise."""
 
 LARGEST_NUMBERS = 1024
 """Most numbers of a layer and the one before it, over an item's pixels: four times the registers that an item
@@ -57,14 +57,71 @@ ORDER = (
 class GroupDialect(Dialect):
     """What a language says besides: its vectors of four, how to `wait` for the group, how a pixel is read.
 
-    `stored`: statements before and after those that store a pixel's numbers.
+    `stored`: statements before and after those that store a pixel's numbers. `strided` opens a loop over a
+    group's share of the tile, `largest_shared` is what a group may share, `first_weight` the name of the
+    place of a tap's first weight. A language whose functions work on
+    numbers only has its functions of vectors made of those [`Lifted`].
     """
 
     kind: str
     wait: str
     literal_zero: str
     pixel_at: str
-    stored: tuple[tuple[str, ...], tuple[str, ...]]
+    stored: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+    strided: str = "for (int {i} = {first}; {i} < {end}; {i} += {step}) {{"
+    largest_shared: int = LARGEST_SHARED
+    first_weight: str = "from"
+
+    def vector(self, name: str, value: str) -> str:
+        """Return the declaration of four numbers that may be added to."""
+        return f"{self.kind} {name} = {value};"
+
+    def truth(self, name: str, value: str) -> str:
+        """Return the declaration of a truth value."""
+        return f"bool {name} = {value};"
+
+    def function(self, name: str, read: Sequence[str], body: Sequence[str], result: str) -> list[str]:
+        """Return a function on vectors: `read` are the names of its operands, `result` that of its value."""
+        operands = ", ".join(f"{self.kind} {each}" for each in read)
+        return [f"{self.kind} {name}({operands})", "{", *_indented(body), f"    return {result};", "}"]
+
+
+class Lifted(GroupDialect):
+    """A language whose functions work on numbers: one of vectors calls that of numbers for each component.
+
+    `function_head`: a function's name and operands, `operand` each of these, `made` a vector of four numbers.
+    """
+
+    function_head: str
+    operand: str
+    made: str
+
+    def function(self, name: str, read: Sequence[str], body: Sequence[str], result: str) -> list[str]:
+        """Return the function of numbers, and that of vectors."""
+        one, number = f"{name}_of_one", self.types["float32"]
+        calls = [f"{one}({', '.join(f'{each}.{part}' for each in read)})" for part in "xyzw"]
+        vector = self.made.format(values=", ".join(calls))
+        return [
+            self._head(one, read, number),
+            "{",
+            *_indented(body),
+            f"    return {result};",
+            "}",
+            self._head(name, read, self.kind),
+            "{",
+            f"    return {vector};",
+            "}",
+        ]
+
+    def _head(self, name: str, read: Sequence[str], kind: str) -> str:
+        """Return the first line of a function."""
+        operands = ", ".join(self.operand.format(kind=kind, name=each) for each in read)
+        return self.function_head.format(kind=kind, name=name, operands=operands)
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    """Return lines of a function's body."""
+    return [f"    {line}" for line in lines]
 
 
 class Grouped(Tiled):
@@ -101,8 +158,8 @@ class Grouped(Tiled):
             )
         if (count := self._statements(program)) > LARGEST_STATEMENTS:
             return f"it unrolls to {count} products, of at most {LARGEST_STATEMENTS}: drivers take minutes"
-        if (shared := self.shared_bytes(program)) > LARGEST_SHARED:
-            return f"its tile takes {shared} bytes that a group shares, of at most {LARGEST_SHARED}"
+        if (shared := self.shared_bytes(program)) > (most := self.words.largest_shared):
+            return f"its tile takes {shared} bytes that a group shares, of at most {most}"
         return ""
 
     def shared_bytes(self, program: Program) -> int:
@@ -187,27 +244,33 @@ class GroupBody(InlinedBody):
             for result in self._results(group)
             for line in self._function_of(group, result)
         ]
+        columns = f"(GROUP_WIDTH * PIXELS + {names.columns} - 1)"
         return [
-            f"#define GROUP_WIDTH {grouped.group[0]} /* items of a group along a row */",
-            f"#define GROUP_HEIGHT {grouped.group[1]}",
-            f"#define PIXELS {grouped.pixels} /* pixels of an item, GROUP_WIDTH columns apart */",
-            f"#define TILE_WIDTH (GROUP_WIDTH * PIXELS + {names.columns} - 1) /* all that windows touch */",
-            f"#define TILE_HEIGHT (GROUP_HEIGHT + {names.rows} - 1)",
-            "#define PLANE (TILE_WIDTH * TILE_HEIGHT) /* numbers of a channel */",
-            f"#define TILE_NUMBERS (PLANE * {channels})",
+            self._define("GROUP_WIDTH", grouped.group[0], "items of a group along a row"),
+            self._define("GROUP_HEIGHT", grouped.group[1]),
+            self._define("PIXELS", grouped.pixels, "pixels of an item, GROUP_WIDTH columns apart"),
+            self._define("TILE_WIDTH", columns, "all that windows touch"),
+            self._define("TILE_HEIGHT", f"(GROUP_HEIGHT + {names.rows} - 1)"),
+            self._define("PLANE", "(TILE_WIDTH * TILE_HEIGHT)", "numbers of a channel"),
+            self._define("TILE_NUMBERS", f"(PLANE * {channels})"),
             *self.functions,
         ]
 
+    def _define(self, name: str, value: object, text: str = "") -> str:
+        """Return the line that names a number."""
+        return self.dialect.define.format(name=name, value=value) + (f" /* {text} */" if text else "")
+
     def _function_of(self, group: tuple[int, ...], result: int) -> list[str]:
         """Return the function that computes one value of a group from other groups' vectors."""
-        kind = self.words.kind
-        read = [f"{kind} {self._element(index, '')}" for index in self._operands(group)]
-        lines = [f"{kind} elementwise_{result}({', '.join(read)})", "{"]
-        for index in group:
-            if index <= result:
-                variable = self.dialect.variable(self.program.nodes[index].type.dtype)
-                lines.append(f"    {variable} t{index} = {self._expression(index, '')};")
-        return [*lines, f"    return t{result};", "}"]
+        read = [self._element(index, "") for index in self._operands(group)]
+        body = [
+            self.dialect.let(
+                self.program.nodes[index].type.dtype, f"t{index}", self._expression(index, ""), kept=True
+            )
+            for index in group
+            if index <= result
+        ]
+        return self.words.function(f"elementwise_{result}", read, body, f"t{result}")
 
     def _elementwise(self, group: tuple[int, ...]) -> None:
         """Write the calls of a group's functions, one for each pixel and vector."""
@@ -217,7 +280,7 @@ class GroupBody(InlinedBody):
             for p, vector in self._places(group[0]):
                 operands = [self._at(index, p, vector) for index in self._operands(group)]
                 name = f"v{result}_{p}_{vector}"
-                self._line(f"{self.words.kind} {name} = elementwise_{result}({', '.join(operands)});")
+                self._line(self.words.vector(name, f"elementwise_{result}({', '.join(operands)})"))
 
     def _places(self, index: int) -> list[tuple[int, int]]:
         """Return all (pixel, vector) of a value."""
@@ -241,7 +304,7 @@ class GroupBody(InlinedBody):
         self._comment(f"%{index}: affine map {node['weight']} from {n_in} to {node.type.shape[0]}")
         for p, j in self._places(index):
             start = self._numbers_at(str(bias), j) if bias else self.words.literal_zero
-            self._line(f"{self.words.kind} v{index}_{p}_{j} = {start};")
+            self._line(self.words.vector(f"v{index}_{p}_{j}", start))
         first = weight.offset // 4
         if source.op == "input":
             for image, begin, end in chunks(self.gather):
@@ -255,23 +318,24 @@ class GroupBody(InlinedBody):
 
     def _prepare(self) -> None:
         """Write where the tile begins."""
-        self._line(f"int left = x - local_x - {self.sides.column};")
-        self._line(f"int top = y - local_y - {self.sides.row};")
+        self._line(self.dialect.index("left", f"x - local_x - {self.sides.column}"))
+        self._line(self.dialect.index("top", f"y - local_y - {self.sides.row}"))
 
     def _load(self, image: Image, begin: int, end: int) -> None:
         """Write the copy of channels [begin, end) of what the group's windows touch, by all its items."""
-        border = self.gather.window.border
+        border, index, clamp = self.gather.window.border, self.dialect.index, self.dialect.clamp
         self._line(self.words.wait)
-        self._open("for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {")
-        self._line("int tile_row = top + i / TILE_WIDTH;")
-        self._line("int tile_column = left + i % TILE_WIDTH;")
-        self._line("int row = clamp(tile_row, 0, height - 1);")
-        self._line("int column = clamp(tile_column, 0, width - 1);")
+        step = "GROUP_WIDTH * GROUP_HEIGHT"
+        self._open(self.words.strided.format(i="i", first="item", end="PLANE", step=step))
+        self._line(index("tile_row", "top + i / TILE_WIDTH"))
+        self._line(index("tile_column", "left + i % TILE_WIDTH"))
+        self._line(index("row", f"{clamp}(tile_row, 0, height - 1)"))
+        self._line(index("column", f"{clamp}(tile_column, 0, width - 1)"))
         if border == "zero":
-            self._line("bool inside = row == tile_row && column == tile_column;")
+            self._line(self.words.truth("inside", "row == tile_row && column == tile_column"))
         for c in range(begin, end):
             pixel = self.words.pixel_at.format(image=image.name, channels=image.channels, c=c)
-            value = {"clamp": pixel, "zero": f"inside ? {pixel} : 0.0f"}[border]
+            value = pixel if border == "clamp" else self.dialect.select("inside", pixel, "0.0f")
             self._line(f"tile[{c - begin} * PLANE + i] = {value};")
         self._close()
         self._line(self.words.wait)
@@ -279,18 +343,21 @@ class GroupBody(InlinedBody):
     def _products_of_taps(self, index: int, first: int, channels: int) -> None:
         """Write the products of the tile's taps with the weights from vector `first` on."""
         step, places = channels * self.vectors(index), self._places(index)
-        self._open(f"for (int dy = 0; dy < {self.sides.rows}; ++dy) {{")
+        self._open(self.dialect.loop("dy", self.sides.rows))
         # A partial sum for each row of taps [sums.py].
         for p, j in places:
-            self._line(f"{self.words.kind} part_{p}_{j} = {self.words.literal_zero};")
-        self._open(f"for (int dx = 0; dx < {self.sides.columns}; ++dx) {{")
-        self._line("int at = (local_y + dy) * TILE_WIDTH + local_x + dx;")
-        self._line(f"int from = {first} + (dy * {self.sides.columns} + dx) * {step};")
+            self._line(self.words.vector(f"part_{p}_{j}", self.words.literal_zero))
+        self._open(self.dialect.loop("dx", self.sides.columns))
+        self._line(self.dialect.index("at", "(local_y + dy) * TILE_WIDTH + local_x + dx"))
+        start = f"{first} + (dy * {self.sides.columns} + dx) * {step}"
+        self._line(self.dialect.index(self.words.first_weight, start))
         for c in range(channels):
             names = [f"x{c}_{p}" for p in range(self.grouped.pixels)]
             for p, name in enumerate(names):
-                self._line(f"float {name} = tile[{c} * PLANE + at + {p} * GROUP_WIDTH];")
-            self._multiply_by(index, f"from + {c * self.vectors(index)}", names, "part")
+                value = f"tile[{c} * PLANE + at + {p} * GROUP_WIDTH]"
+                self._line(self.dialect.single(name, value))
+            first_of = f"{self.words.first_weight} + {c * self.vectors(index)}"
+            self._multiply_by(index, first_of, names, "part")
         self._close()
         for p, j in places:
             self._line(f"v{index}_{p}_{j} += part_{p}_{j};")
@@ -301,7 +368,7 @@ class GroupBody(InlinedBody):
         name = sums_of or f"v{index}"
         for j in range(self.vectors(index)):
             sums = " ".join(f"{name}_{p}_{j} += m * {value};" for p, value in enumerate(values))
-            self._line(f"{{ {self.words.kind} m = w[{first} + {j}]; {sums} }}")
+            self._line(f"{{ {self.words.vector('m', f'w[{first} + {j}]')} {sums} }}")
 
     def _outputs(self) -> None:
         """Write the only output of each pixel that lies in the image."""

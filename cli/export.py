@@ -27,6 +27,8 @@ wamnet export model.safetensors --scene minicubes --target glsl-es -o for-webgl
 
 wamnet export model.safetensors --target c --weights inline --check -o header
 
+wamnet export model.safetensors --target cuda --schedule plain -o to-read
+
 wamnet export model.safetensors --target hlsl --variant window8+rank16 -o for-direct3d
 
 wamnet export model.safetensors --scene minicubes --target html -o page"""
@@ -58,6 +60,16 @@ Place = Annotated[
 ]
 
 
+ScheduleName = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="How the denoiser's work is ordered: plain, the one that is made to be read, or a faster one.",
+        show_default="the fastest that the target has for this model",
+    ),
+]
+
+
 def export(
     model: options.ModelFile,
     target: Annotated[
@@ -84,6 +96,7 @@ def export(
     profile: options.Profile = "ieee",
     variant: options.Variant = None,
     weights: Place = None,
+    schedule: ScheduleName = None,
     check: Annotated[
         bool,
         typer.Option("--check", help="Compile and run it here, and compare with the reference's picture."),
@@ -98,6 +111,7 @@ def export(
     folder = output or Path(target)
     if target == HTML:
         of_kernels = {"--weights": weights, "--variant": variant, "--check": check or None, "--time": time}
+        of_kernels["--schedule"] = schedule
         _refuse(of_kernels, "a web page has its own", "leave it out")
         _write(folder, {PAGE_NAME: webpage.page_of(model, scene, parameters or [], None).encode()})
         return
@@ -108,7 +122,8 @@ def export(
         given = {"--time": time, "--set": parameters, "--sampler": turned, "--max-depth": depth}
         _refuse(given, "there is no scene", "name one with --scene, or leave it out")
     moment, paths = (time, parameters or []), (max_depth, sampler)
-    made = _export(model, target, scene, moment, paths, profile, variant, weights)
+    asked = (variant, weights, schedule)
+    made = _export(model, target, scene, moment, paths, profile, asked)
     _write(folder, made.contents())
     _tell(made)
     if check:
@@ -129,10 +144,9 @@ def _export(
     moment: tuple[float | None, list[str]],
     paths: tuple[int, Sampler],
     profile: str,
-    variant: str | None,
-    weights: str | None,
+    asked: tuple[str | None, str | None, str | None],
 ) -> Export:
-    """Return the export that the options ask for."""
+    """Return the export that the options ask for: `asked` are variant, place of the weights and schedule."""
     from ..compiler.variants import FULL
     from ..kernels.export.package import Request
     from ..kernels.export.package import export as exported
@@ -140,8 +154,9 @@ def _export(
 
     settings = replace(Settings(max_depth=paths[0]), sampler=paths[1].value)
     loaded = load_scene(scene, *moment) if scene else None
-    request = Request(load_model(model), target, loaded, profile, weights or "", variant or FULL, settings)
-    return exported(request)
+    variant, weights, schedule = (text or "" for text in asked)
+    options_of = (weights, variant or FULL, settings, schedule)
+    return exported(Request(load_model(model), target, loaded, profile, *options_of))
 
 
 def _tell(made: Export) -> None:

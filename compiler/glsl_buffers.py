@@ -50,13 +50,13 @@ GROUPS = f"Groups of {GROUP[0]} x {GROUP[1]}: ceil(width / {GROUP[0]}) x ceil({{
 """What is dispatched."""
 
 
-def _buffer(binding: str, access: str, block: str, name: str) -> str:
+def storage(binding: str, access: str, block: str, name: str, of: str = "float") -> str:
     """Return the declaration of a storage buffer; naga knows none that is only written."""
     access = "readonly " if access == "readonly" else ""
-    return f"layout(std430, binding = {binding}) restrict {access}buffer {block} {{{{ float {name}[]; }}}};"
+    return f"layout(std430, binding = {binding}) restrict {access}buffer {block} {{{{ {of} {name}[]; }}}};"
 
 
-def _sized(*more: str) -> str:
+def sized(*more: str) -> str:
     """Return the uniform block with further numbers."""
     return SIZE.replace("{more}", "".join(f"    {text};\n" for text in more))
 
@@ -83,13 +83,13 @@ class VulkanDenoise(_Vulkan):
 
     entry = "main"
     first_binding = FIRST_IMAGE
-    image_declaration = _buffer("{binding}", "readonly", "Image_{image}", "image_{image}")
+    image_declaration = storage("{binding}", "readonly", "Image_{image}", "image_{image}")
     image_separator = "\n"
     begin = f"""\
 {{defines}}
 {INVOCATION}
-{_sized()}{_buffer("1", "readonly", "Weights", "weights")}
-{_buffer("2", "writeonly", "Result", "result")}
+{sized()}{storage("1", "readonly", "Weights", "weights")}
+{storage("2", "writeonly", "Result", "result")}
 {{images}}
 
 {PIXEL}"""
@@ -111,8 +111,8 @@ class VulkanPath(_Vulkan, PathDialect):
     path_begin = f"""\
 #define MAX_DEPTH {{max_depth}}u /* scatterings of a path */
 {INVOCATION}
-{_sized("int first_row", "int rows", "uint first_sample", "int samples", "uint seed_number")}\
-{_buffer("2", "writeonly", "Sums", "sums")}
+{sized("int first_row", "int rows", "uint first_sample", "int samples", "uint seed_number")}\
+{storage("2", "writeonly", "Sums", "sums")}
 {{tables}}
 
 void main()
@@ -154,8 +154,8 @@ class VulkanEncode(_Vulkan, EncodeDialect):
     entry = "main"
     encode_begin = f"""\
 {INVOCATION}
-{_sized("int sample_count")}\
-{_buffer("1", "readonly", "Sums", "sums")}
+{sized("int sample_count")}\
+{storage("1", "readonly", "Sums", "sums")}
 {{outputs}}
 
 {PIXEL}
@@ -164,7 +164,7 @@ class VulkanEncode(_Vulkan, EncodeDialect):
     precise float samples = float(sample_count);"""
     encode_end = "}}"
     input_declaration = ""
-    output_declaration = _buffer("{binding}", "writeonly", "Image_{image}", "image_{image}")
+    output_declaration = storage("{binding}", "writeonly", "Image_{image}", "image_{image}")
     output_separator = "\n"
     load = "precise float {name} = sums[{plane} * plane + at];"
     image_store = "image_{image}[at * {channels} + {channel}] = {value};"

@@ -37,7 +37,7 @@ CALLED = (
 """How all these kernels are called."""
 
 
-def _size(*numbers: str) -> str:
+def sized(*numbers: str) -> str:
     """Return the structure of the sizes."""
     return "struct Size {{\n" + "".join(f"    {number};\n" for number in numbers) + "}};\n"
 
@@ -87,7 +87,7 @@ class Metal(_Metal):
     begin = f"""\
 {TOP}
 {{defines}}
-{_size("int width", "int height")}
+{sized("int width", "int height")}
 kernel void {{entry}}(
     constant Size &size [[buffer(0)]],
     device const float *weights [[buffer(1)]],
@@ -118,7 +118,7 @@ class MetalPath(_Metal, PathDialect):
 #define MAX_DEPTH {{max_depth}}u /* scatterings of a path */
 {TOP}
 {
-        _size(
+        sized(
             "int width",
             "int height",
             "int first_row",
@@ -171,7 +171,7 @@ class MetalEncode(_Metal, EncodeDialect):
     entry = EncodeDialect.entry
     encode_begin = f"""\
 {TOP}
-{_size("int width", "int height", "int sample_count")}
+{sized("int width", "int height", "int sample_count")}
 kernel void {{entry}}(
     constant Size &size [[buffer(0)]],
     device const float *sums [[buffer(1)]],

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..refimpl.errors import CompileError
+from .buffers_group import ComputeGroup, CUDAGroup, MetalGroup, VulkanGroup, WGSLGroup, groups
 from .c import C
 from .cuda import CUDA
 from .dialect import Dialect
@@ -95,11 +96,11 @@ EXPORTED: Mapping[str, Target] = {
     target.name: target
     for target in (
         _dialect_target(GLSLES(), Inlined(GLSLESInlined()), Packed(GLSLESPacked())),
-        _dialect_target(ComputeDenoise(), *GLSL_COMPUTE),
-        _dialect_target(VulkanDenoise()),
-        _dialect_target(WGSL()),
-        _dialect_target(CUDA()),
-        _dialect_target(Metal()),
+        _dialect_target(ComputeDenoise(), *groups(ComputeGroup(), 8)),
+        _dialect_target(VulkanDenoise(), *groups(VulkanGroup(), 8)),
+        _dialect_target(WGSL(), *groups(WGSLGroup(), 8)),
+        _dialect_target(CUDA(), *groups(CUDAGroup())),
+        _dialect_target(Metal(), *groups(MetalGroup())),
         replace(_dialect_target(ShadertoyDenoise()), schedules=(Inlined(ShadertoyDenoise()),)),
         _dialect_target(GodotDenoise()),
     )

@@ -40,14 +40,14 @@ fn main(@builtin(global_invocation_id) invocation: vec3<u32>) {{{{
 """The start of the denoiser and of the encoding."""
 
 
-def _sized(*more: str) -> str:
+def sized(*more: str) -> str:
     """Return the uniform buffer with further numbers."""
     return SIZE.replace("{more}", "".join(f"    {text},\n" for text in more))
 
 
-def _buffer(binding: str, access: str, name: str) -> str:
+def storage(binding: str, access: str, name: str, of: str = "f32") -> str:
     """Return the declaration of a storage buffer."""
-    return f"@group(0) @binding({binding}) var<storage, {access}> {name}: array<f32>;"
+    return f"@group(0) @binding({binding}) var<storage, {access}> {name}: array<{of}>;"
 
 
 class _WGSL(Dialect):
@@ -100,12 +100,12 @@ class WGSL(_WGSL):
     """The dialect's table for denoisers."""
 
     first_binding = FIRST_IMAGE
-    image_declaration = _buffer("{binding}", "read", "image_{image}")
+    image_declaration = storage("{binding}", "read", "image_{image}")
     image_separator = "\n"
     begin = f"""\
 {{defines}}
-{_sized()}{_buffer("1", "read", "weights")}
-{_buffer("2", "read_write", "result")}
+{sized()}{storage("1", "read", "weights")}
+{storage("2", "read_write", "result")}
 {{images}}
 
 {PIXEL}"""
@@ -127,8 +127,8 @@ class WGSLPath(_WGSL, PathDialect):
     bounces = "for (var bounce: u32 = 0u; bounce <= MAX_DEPTH; bounce++) {"
     path_begin = f"""\
 const MAX_DEPTH: u32 = {{max_depth}}u; /* scatterings of a path */
-{_sized("first_row: i32", "rows: i32", "first_sample: u32", "samples: i32", "seed_number: u32")}{
-        _buffer("2", "read_write", "sums")
+{sized("first_row: i32", "rows: i32", "first_sample: u32", "samples: i32", "seed_number: u32")}{
+        storage("2", "read_write", "sums")
     }
 {{tables}}
 
@@ -172,7 +172,7 @@ class WGSLEncode(_WGSL, EncodeDialect):
 
     entry = "main"
     encode_begin = f"""\
-{_sized("sample_count: i32")}{_buffer("1", "read", "sums")}
+{sized("sample_count: i32")}{storage("1", "read", "sums")}
 {{outputs}}
 
 {PIXEL}
@@ -181,7 +181,7 @@ class WGSLEncode(_WGSL, EncodeDialect):
     let samples: f32 = f32(size.sample_count);"""
     encode_end = "}}"
     input_declaration = ""
-    output_declaration = _buffer("{binding}", "read_write", "image_{image}")
+    output_declaration = storage("{binding}", "read_write", "image_{image}")
     output_separator = "\n"
     load = "let {name}: f32 = sums[{plane} * plane + at];"
     image_store = "image_{image}[at * {channels} + {channel}] = {value};"

@@ -108,6 +108,7 @@ def _kernel(
         "entry_point": row.entry or kernel.entry_point,
         "bindings": SLOTS[row.slots](role, kernel.target.partition(":")[0], bound),
         "arguments": kernel.manifest["arguments"],
+        **({"schedule": kernel.manifest["schedule"]} if isinstance(kernel, Artifact) else {}),
     }
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact, OneSource
 from ...compiler.emit import output_channels
 from ...compiler.encode_kernel import EncodeArtifact
-from ...compiler.glsl_buffers import FIRST_IMAGE
+from ...compiler.glsl_buffers import FIRST_IMAGE, GROUP
 from ...compiler.path_kernel import PathArtifact
 from ...compiler.weight_homes import INLINE
 from ...refimpl.errors import InputError
@@ -29,20 +29,33 @@ READ, WRITTEN = 1, 2
 
 @dataclass(frozen=True)
 class Launch:
-    """One call: `sizes` as 32-bit integers, buffers by binding, those that come back, threads (x, y)."""
+    """One call: `sizes` as 32-bit integers, buffers by binding, those that come back, threads (x, y).
+
+    Threads come in groups (x, y), which may be more than are asked for.
+    """
 
     sizes: Sequence[int]
     buffers: Mapping[int, NDArray[np.float32]]
     back: Sequence[int]
     threads: tuple[int, int]
+    group: tuple[int, int] = GROUP
+
+    @property
+    def groups(self) -> tuple[int, int]:
+        """Return the numbers of groups that hold all threads."""
+        (width, height), (columns, rows) = self.threads, self.group
+        return -(-width // columns), -(-height // rows)
 
 
 class BufferRunner(Executor):
     """Runs denoisers, paths and encodings of one target; a subclass runs one kernel [`_launch`]."""
 
     @abstractmethod
-    def _prepare(self, source: str, entry: str, count: int) -> Any:
-        """Return a kernel, built from its source, that takes `count` images."""
+    def _prepare(self, source: str, entry: str, count: int, group: tuple[int, int] | None) -> Any:
+        """Return a kernel, built from its source, that takes `count` images.
+
+        `group`: the threads (x, y) that wait for each other; None where none do.
+        """
 
     @abstractmethod
     def _launch(self, prepared: Any, launch: Launch) -> list[NDArray[np.float32]]:
@@ -53,7 +66,9 @@ class BufferRunner(Executor):
         if not hasattr(self, "_kernels"):
             self._kernels: dict[str, Any] = {}
         if artifact.digest not in self._kernels:
-            self._kernels[artifact.digest] = self._prepare(artifact.source, entry, count)
+            group = artifact.manifest.get("schedule", {}).get("group")
+            shared = None if group is None else (int(group[0]), int(group[1]))
+            self._kernels[artifact.digest] = self._prepare(artifact.source, entry, count, shared)
         return self._kernels[artifact.digest]
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
@@ -72,7 +87,9 @@ class BufferRunner(Executor):
                     kernel.weights, (0, -kernel.weights.size % 4 or 4 * (not kernel.weights.size))
                 )
             buffers |= {FIRST_IMAGE + i: image for i, image in enumerate(found)}
-            launch = Launch((width, height), buffers, (WRITTEN,), (width, height))
+            picked = kernel.manifest["schedule"]
+            threads, group = (-(-width // picked["pixels"]), height), picked.get("group", GROUP)
+            launch = Launch((width, height), buffers, (WRITTEN,), threads, tuple(group))
             prepared = self._kernel(kernel, kernel.entry_point, len(found))
             found = [self._launch(prepared, launch)[0].reshape(shape)]
         return found[0]

@@ -1,4 +1,4 @@
-"""Exported compute shaders on OpenGL 4.3: kernels on buffers, and the grouped denoisers on textures."""
+"""Exported compute shaders, which are kernels on buffers, on OpenGL 4.3."""
 
 from __future__ import annotations
 
@@ -9,44 +9,29 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
-from ...compiler.glsl_buffers import GROUP
 from ...compiler.glsl_compute import SHADER_VERSION
 from ...compiler.weight_homes import UNIFORM
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from ..executor import Images
 from ..opengl_executor import OpenGLExecutor
 from .buffer_runner import READ, BufferRunner, Launch
 
 
 class ComputeRunner(BufferRunner):
-    """One OpenGL context; `textures` runs what has a group in its manifest."""
+    """One OpenGL context."""
 
     name = "glsl-compute"
 
     def __init__(self, context: str | None = None) -> None:
-        self._textures = _Textures(context)
-        self._context = self._textures._context
-        self.device = self._textures.device
+        self._opened = OpenGLExecutor(context)
+        self._context = self._opened._context
+        self.device = self._opened.device
         if self._context.version_code < SHADER_VERSION:
             raise ExecutorUnavailable(
                 f"{self.device} has OpenGL {self._context.version_code / 100:.1f}: compute shaders need "
                 f"{SHADER_VERSION / 100:.1f}"
             )
 
-    def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
-        """Build the kernels."""
-        if "group" in artifact.manifest["schedule"]:
-            self._textures.build(artifact, size)
-        else:
-            super().build(artifact, size)
-
-    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
-        if "group" in artifact.manifest["schedule"]:
-            return self._textures._run(artifact, images)
-        return super()._run(artifact, images)
-
-    def _prepare(self, source: str, entry: str, count: int) -> Any:
+    def _prepare(self, source: str, entry: str, count: int, group: tuple[int, int] | None) -> Any:
         with self._context:
             try:
                 return self._context.compute_shader(source)
@@ -67,16 +52,10 @@ class ComputeRunner(BufferRunner):
                     held[place].bind_to_uniform_block(place)
                 else:
                     held[place].bind_to_storage_buffer(place)
-            prepared.run(*(-(-n // g) for n, g in zip(launch.threads, GROUP, strict=True)), 1)
+            prepared.run(*launch.groups, 1)
             self._context.memory_barrier()
             return [np.frombuffer(held[place].read(), np.float32).copy() for place in launch.back]
 
     def close(self) -> None:
         """Release the context."""
-        self._textures.close()
-
-
-class _Textures(OpenGLExecutor):
-    """The executor of OpenGL, for the grouped kernels of this target."""
-
-    name = "glsl-compute"
+        self._opened.close()

@@ -55,7 +55,7 @@ MANIFEST_NAME, README_NAME = "manifest.json", "README.md"
 
 @dataclass(frozen=True)
 class Request:
-    """What is wanted. `weights`: a place, or the target's usual one where it is empty."""
+    """What is wanted. `weights`: a place, `schedule`: one that has them there; the usual ones where empty."""
 
     model: Model
     target: str
@@ -64,6 +64,7 @@ class Request:
     weights: str = ""
     variant: str = FULL
     settings: Settings = field(default_factory=Settings)
+    schedule: str = ""
 
 
 @dataclass(frozen=True)
@@ -99,9 +100,10 @@ def export(request: Request) -> Export:
         return _graph(request)
     row = TARGETS[request.target]
     how, place = _place(row, request.weights)
-    plan = plan_model(request.model, place.kernel, request.profile, place.schedule, request.variant)
+    schedule = _schedule(row, how, place, request.schedule)
+    plan = plan_model(request.model, place.kernel, request.profile, schedule, request.variant)
     denoiser = compile_plan(plan)
-    limits = _limits(row, place, denoiser)
+    limits = _limits(request, row, place, denoiser)
     files: dict[str, bytes] = {}
     for kernel, folder in _folders(denoiser):
         files |= _written(kernel, folder)
@@ -119,7 +121,7 @@ def export(request: Request) -> Export:
     model, promised = vary(parse(request.variant), request.model).model, plan.bound.output is not None
     pair = check_pair.pair(plan, model, promised, programs)
     files |= {f"check/{name}": data for name, data in pair.files().items()}
-    facts = _facts(request, row, how, denoiser, limits)
+    facts = _facts(request, row, how, denoiser, limits) | {"schedules": list(place.schedules)}
     facts["kernels"] = bindings.kernels(row, denoiser, path, encoder, passes)
     return _finished(request, facts, files, denoiser, path, encoder, passes, pair)
 
@@ -131,6 +133,8 @@ def _graph(request: Request) -> Export:
         raise InputError("--scene", request.scene.name, rule, "leave it out, or choose another target")
     if request.weights not in ("", "inline"):
         raise InputError("--weights", request.weights, "a graph holds its weights", "leave it out")
+    if request.schedule:
+        raise InputError("--schedule", request.schedule, "a runtime orders a graph's work", "leave it out")
     varied = vary(parse(request.variant), request.model)
     data = onnx_export.graph(varied.model)
     pair = check_pair.pair(plan_program(lower(varied.model), "numpy"), varied.model, promised=False)
@@ -150,6 +154,7 @@ def _graph(request: Request) -> Export:
         "certificate": None,
         "weights": {"where": "inline", "count": _count(model), "file": None, "order": "initialisers"},
         "limits": [],
+        "schedules": [],
         "kernels": [onnx_export.kernel(model)],
     }
     return _finished(request, facts, files, None, None, None, {}, pair)
@@ -229,6 +234,14 @@ def _place(row: Row, wanted: str) -> tuple[str, Place]:
     return how, row.places[how]
 
 
+def _schedule(row: Row, how: str, place: Place, wanted: str) -> str:
+    """Return the schedule that is wanted, or the usual one."""
+    if wanted and wanted not in place.schedules:
+        rule = f"target {row.name} with weights in place {how} has: {', '.join(place.schedules)}"
+        raise InputError("--schedule", wanted, rule, "choose one of these, or leave it out")
+    return wanted or place.schedules[0]
+
+
 def _check(limit: Limit | None, needs: float, target: str) -> list[dict[str, Any]]:
     """Return what a manifest says about a limit, or refuse what exceeds it."""
     if limit is None:
@@ -239,20 +252,19 @@ def _check(limit: Limit | None, needs: float, target: str) -> list[dict[str, Any
     return [{"name": limit.name, "needs": int(np.ceil(needs)), "most": limit.most}]
 
 
-def _limits(row: Row, place: Place, denoiser: Artifact) -> list[dict[str, Any]]:
+def _limits(request: Request, row: Row, place: Place, denoiser: Artifact) -> list[dict[str, Any]]:
     """Return the limits that an export keeps, or refuse it."""
     found = []
     for kernel in denoiser.kernels:
-        schedule = {s.name: s for s in target_named(place.kernel).schedules}[place.schedule]
-        picked = kernel.manifest["schedule"]["name"]
         count = sum(array.size for array in weight_layout.weights(kernel.program).values())
         found += _check(place.limit, place.each * count, row.name)
-        reason = schedule.refusal(kernel.program)
-        if picked != place.schedule or reason:
-            reason = reason or kernel.manifest["schedule"].get("reason", "")
-            raise InputError(
-                "--weights", "inline", f"this model's cannot be there: {reason}", "choose another place"
-            )
+        picked = kernel.manifest["schedule"]
+        if "reason" in picked and request.schedule:
+            rule = f"it cannot hold this model: {picked['reason']}"
+            raise InputError("--schedule", request.schedule, rule, "leave it out, or choose another")
+        if picked["name"] not in place.schedules:
+            rule = f"this model's cannot be there: {picked['reason']}"
+            raise InputError("--weights", "inline", rule, "choose another place")
         gather = kernel.program.gather
         assert gather is not None, "kernels have windows"
         found += _check(row.most_images, len(gather.images), row.name)

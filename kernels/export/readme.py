@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ...compiler.schedules import text
 from .targets import ONNX, TARGETS
 
 ONNX_CODE = """\
@@ -80,11 +81,22 @@ def _facts(facts: Mapping[str, Any]) -> list[str]:
         *([f"* This assumes: {facts['assumes']}."] if facts["assumes"] else []),
         f"* Window: {window['size']} x {window['size']} pixels, border rule `{window['border']}`.",
         f"* Weights: {weights['count'] or 'all'} numbers, {weights['where']}.",
+        *_schedule(facts),
         f"* Output: {facts['output']['encoding'] or 'linear'}.",
         *images,
         *_rays(facts),
         *(f"* Limit: {x['name']}: needs {x['needs']} of {x['most']}." for x in facts["limits"]),
     ]
+
+
+def _schedule(facts: Mapping[str, Any]) -> list[str]:
+    """Return the line about the schedule of the denoiser, and those that there are besides."""
+    picked = facts["kernels"][-1].get("schedule")
+    if picked is None:
+        return []
+    others = [name for name in facts["schedules"] if name != picked["name"]]
+    besides = f" Others, by `--schedule`: {', '.join(others)}." if others else ""
+    return [f"* Schedule: {text(picked)}.{besides}"]
 
 
 def _rays(facts: Mapping[str, Any]) -> list[str]:
@@ -132,6 +144,19 @@ def _kernel(kernel: Mapping[str, Any]) -> list[str]:
     ]
 
 
+GROUP = (8, 8)
+"""Threads of a group where a kernel asks for no other number: those that its source declares, or any."""
+
+
+def _started(schedule: Mapping[str, Any]) -> dict[str, int]:
+    """Return the pixels of an item, the items of a group, and the pixels of a group."""
+    columns, rows = schedule["pixels"], schedule.get("rows", 1)
+    width, height = schedule.get("group", GROUP)
+    across, down = width * columns, height * rows
+    found = {"columns": columns, "rows": rows, "group_x": width, "group_y": height}
+    return {**found, "across": across, "down": down}
+
+
 def _code(facts: Mapping[str, Any]) -> str:
     """Return the lines of a program that calls the denoiser."""
     check = facts["check"]
@@ -147,6 +172,7 @@ def _code(facts: Mapping[str, Any]) -> str:
         template = 'material.set_shader_parameter("{name}", ImageTexture.create_from_image({name}))'
     each = [template.format(slot=b["slot"], name=b["name"], number=i) for i, b in enumerate(read)]
     return row.code.format(
+        **_started(kernel["schedule"]),
         images="\n".join(each),
         arguments=", ".join(b["name"] for b in kernel["bindings"]),
         count=len(read),

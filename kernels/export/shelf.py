@@ -23,6 +23,7 @@ import numpy as np
 
 from ...compiler.artifact import Artifact
 from ...compiler.model_file import load_model
+from ...compiler.schedules import PLAIN
 from ...refimpl import siren
 from ...refimpl.dataset import Normalization, Window
 from ...refimpl.denoise import Model
@@ -41,6 +42,9 @@ TIMED = ("opencl", "glsl", "glsl-es", "wgsl", "c", "glsl-vulkan")
 
 TURNS = 3
 """Measurements of each kernel."""
+
+READ = PLAIN
+"""The schedule of all kernels here: the one that is made to be read."""
 
 INDEX = "README.md"
 """The index page."""
@@ -65,7 +69,7 @@ def contents(models: Mapping[str, Model], times: Mapping[str, str] | None = None
     ]
     for name, model in models.items():
         for target in KEPT:
-            made = export(Request(model, target))
+            made = export(Request(model, target, schedule=READ))
             source = _source(made)
             files[f"{name}/{target}/{Path(source).name}"] = made.files[source]
             files[f"{name}/weights.bin"] = made.files["denoise/weights.bin"]
@@ -101,7 +105,7 @@ def measured(models: Mapping[str, Model], size: int) -> dict[str, str]:
         with ExitStack() as stack:
             ways = {}
             for target in TIMED:
-                kernel = export(Request(model, target)).denoiser
+                kernel = export(Request(model, target, schedule=READ)).denoiser
                 assert kernel is not None, "every target of the shelf has a kernel"
                 try:
                     opened = stack.enter_context(runner(target, kernel.target))

@@ -33,13 +33,13 @@ class Limit:
 
 @dataclass(frozen=True)
 class Place:
-    """A place of weights: the compiler's target and schedule, and the limit of what stands there.
+    """A place of weights: the compiler's target, its schedules that can have them there, and a limit.
 
-    `each`: how much of it a weight takes.
+    The first schedule is the usual one. `each`: how much of the limit a weight takes.
     """
 
     kernel: str
-    schedule: str = PLAIN
+    schedules: tuple[str, ...] = (PLAIN,)
     limit: Limit | None = None
     each: float = 4.0
 
@@ -104,9 +104,15 @@ def _texture(side: int) -> Limit:
     return Limit(f"GL_MAX_TEXTURE_SIZE rows of {WEIGHT_TEXTURE_WIDTH}", side, "use a smaller --variant")
 
 
-def _storage(kernel: str, uniform: int = 0, name: str = "") -> dict[str, Place]:
+GROUPED = ("group4", "group", PLAIN)
+"""Schedules of languages for graphics processors, the usual one first."""
+
+
+def _storage(
+    kernel: str, uniform: int = 0, name: str = "", schedules: tuple[str, ...] = GROUPED
+) -> dict[str, Place]:
     """Return the places of a target with storage buffers."""
-    found = {BUFFER: Place(kernel)}
+    found = {BUFFER: Place(kernel, schedules)}
     return found | {UNIFORM: Place(f"{kernel}:{UNIFORM}", limit=_block(uniform, name))} if uniform else found
 
 
@@ -119,7 +125,7 @@ def _fragment(kernel: str, rows: int) -> dict[str, Place]:
     """Return the places of a fragment shader."""
     return {
         TEXTURE: Place(kernel, limit=_texture(rows), each=1 / WEIGHT_TEXTURE_WIDTH),
-        INLINE: Place(kernel, "inlined", limit=INLINED, each=1.0),
+        INLINE: Place(kernel, ("inlined",), limit=INLINED, each=1.0),
         UNIFORM: Place(f"{kernel}:{UNIFORM}", limit=_block(16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE")),
     }
 
@@ -127,8 +133,11 @@ def _fragment(kernel: str, rows: int) -> dict[str, Place]:
 VULKAN_PLACES = _storage("glsl-vulkan", 16 * KILOBYTE, "maxUniformBufferRange")
 """Places of weights for Vulkan, and what is made of its GLSL."""
 
-DISPATCH = "dispatch(ceil(width / 8), ceil(height / 8), 1)"
-"""How kernels on buffers are started."""
+DISPATCH = "dispatch(ceil(width / {across}), ceil(height / {down}), 1)"
+"""How kernels on buffers are started, in groups that compute so many pixels."""
+
+ON_PROCESSORS = ("tile16", "tile8", "tile4", "vector16")
+"""Schedules of OpenCL for processors."""
 
 GL_CODE = """\
 GLuint program = link(fullscreen_triangle, compile(GL_FRAGMENT_SHADER, "denoise.frag"));
@@ -166,13 +175,22 @@ ROWS: tuple[Row, ...] = (
     Row(
         "opencl",
         "OpenCL C 1.2",
-        _storage("opencl", 64 * KILOBYTE, "CL_DEVICE_MAX_CONSTANT_BUFFER_SIZE") | _tabled("opencl"),
+        _storage(
+            "opencl",
+            64 * KILOBYTE,
+            "CL_DEVICE_MAX_CONSTANT_BUFFER_SIZE",
+            (*ON_PROCESSORS, *GROUPED),
+        )
+        | _tabled("opencl"),
         _as(".cl"),
         "arguments",
         'cl_kernel kernel = clCreateKernel(program, "wamnet_denoise", &error);\n'
         "/* Arguments in this order: {arguments}. */\n"
         "set_arguments(kernel, {arguments});\n"
-        "size_t global[2] = {{round_up(width, 16), round_up(height, 4)}}, local[2] = {{16, 4}};\n"
+        "/* An item computes {columns} x {rows} pixels. */\n"
+        "size_t local[2] = {{{group_x}, {group_y}}}, global[2] = {{\n"
+        "    round_up((width + {columns} - 1) / {columns}, {group_x}),\n"
+        "    round_up((height + {rows} - 1) / {rows}, {group_y})}};\n"
         "clEnqueueNDRangeKernel(queue, kernel, 2, NULL, global, local, 0, NULL, NULL);",
     ),
     Row("glsl", "GLSL 3.30, fragment shader", _fragment("opengl", 1024), _as(".frag"), "names", GL_CODE),
@@ -224,7 +242,8 @@ ROWS: tuple[Row, ...] = (
         _as(".metal"),
         "numbered",
         BUFFERS_CODE.replace("{api}", "id<MTLComputePipelineState>").replace(
-            "{dispatch}", "dispatchThreads(width, height)"
+            "{dispatch}",
+            "dispatchThreadgroups(ceil(width / {across}), ceil(height / {down})) of {group_x} x {group_y}",
         ),
     ),
     Row(
@@ -248,12 +267,13 @@ ROWS: tuple[Row, ...] = (
     Row(
         "cuda",
         "CUDA C",
-        {BUFFER: Place("cuda"), **_tabled("cuda")},
+        _storage("cuda") | _tabled("cuda"),
         _as(".cu"),
         "arguments",
         ARGUMENTS_CODE.replace(
             "{call}",
-            "dim3 block(16, 8), grid((width + 15) / 16, (height + 7) / 8);\n"
+            "dim3 block({group_x}, {group_y});\n"
+            "dim3 grid((width + {across} - 1) / {across}, (height + {down} - 1) / {down});\n"
             "wamnet_denoise<<<grid, block>>>({arguments});\n"
             "cudaDeviceSynchronize();",
         ),
@@ -261,7 +281,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         "shadertoy",
         "Shadertoy's tabs",
-        {INLINE: Place("shadertoy", "inlined", limit=INLINED, each=1.0)},
+        {INLINE: Place("shadertoy", ("inlined",), limit=INLINED, each=1.0)},
         _as(".glsl"),
         "channels",
         "1. Make buffers A, B, ... and paste features/feature.<name>.glsl into one each, in this order.\n"

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.glsl_buffers import GROUP
 from ...compiler.weight_homes import UNIFORM
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from . import tools
@@ -70,7 +69,7 @@ class WgpuRunner(BufferRunner):
         self.device = f"{adapter.info['device']}, {adapter.info['backend_type']}"
         self._translate = translate
 
-    def _prepare(self, source: str, entry: str, count: int) -> Any:
+    def _prepare(self, source: str, entry: str, count: int, group: tuple[int, int] | None) -> Any:
         code = self._translate(source)
         try:
             module = self._device.create_shader_module(code=code)
@@ -79,14 +78,14 @@ class WgpuRunner(BufferRunner):
                 {"binding": place, "visibility": self._wgpu.ShaderStage.COMPUTE, "buffer": {"type": kind}}
                 for place, kind in _declared(source).items()
             ]
-            group = self._device.create_bind_group_layout(entries=entries)
-            layout = self._device.create_pipeline_layout(bind_group_layouts=[group])
+            bound = self._device.create_bind_group_layout(entries=entries)
+            layout = self._device.create_pipeline_layout(bind_group_layouts=[bound])
             pipeline = self._device.create_compute_pipeline(
                 layout=layout, compute={"module": module, "entry_point": entry}
             )
         except Exception as error:  # noqa: BLE001 (the package has its own kinds)
             raise CompileError(f"{self.device} does not build the kernel: {error}") from None
-        return pipeline, group, set(_declared(source))
+        return pipeline, bound, set(_declared(source))
 
     def _launch(self, prepared: Any, launch: Launch) -> list[NDArray[np.float32]]:
         usage, device = self._wgpu.BufferUsage, self._device
@@ -110,7 +109,7 @@ class WgpuRunner(BufferRunner):
         compute = encoder.begin_compute_pass()
         compute.set_pipeline(pipeline)
         compute.set_bind_group(0, group)
-        compute.dispatch_workgroups(*(-(-n // g) for n, g in zip(launch.threads, GROUP, strict=True)), 1)
+        compute.dispatch_workgroups(*launch.groups, 1)
         compute.end()
         device.queue.submit([encoder.finish()])
         return [

@@ -168,6 +168,43 @@ def test_other_places_of_weights_keep_the_bound(target, place):
         )
 
 
+@pytest.mark.parametrize(
+    ("target", "schedule"),
+    [
+        (row.name, schedule)
+        for row in targets.TARGETS.values()
+        for schedule in next(iter(row.places.values())).schedules[1:]
+    ],
+)
+def test_other_schedules_keep_the_bound(target, schedule):
+    """EXP-12: each schedule that a target has is compiled by its tools, run, and held to the bound."""
+    try:
+        whole = export(Request(model(), target, schedule=schedule))
+    except ExecutorUnavailable as error:
+        pytest.skip(str(error))
+    kernel = whole.manifest["kernels"][-1]
+    assert kernel["schedule"]["name"] == schedule
+    readme = whole.files["README.md"].decode()
+    assert f"* Schedule: {schedule}: " in readme
+    code = readme.partition("## Integration")[2].partition("## Check")[0]
+    if "group" in kernel["schedule"]:
+        width, height = kernel["schedule"]["group"]
+        columns = kernel["schedule"]["pixels"]
+        numbers = (columns, width, height) if target == "opencl" else (columns * width, height)
+        assert all(str(number) in code for number in numbers)
+    verdict = check.check(whole)
+    assert verdict.holds, verdict.wrong
+
+
+def test_the_usual_schedule_gives_way_and_says_why():
+    """A first layer in two passes has more channels between them than a tile holds."""
+    whole = export(Request(model((96, 8, 3)), "cuda", variant="rank6"))
+    picked = whole.manifest["kernels"][-1]["schedule"]
+    assert (picked["name"], picked["asked"]) == ("plain", "group4")
+    assert "a tile holds 4 channels at once" in picked["reason"]
+    assert picked["reason"] in whole.files["README.md"].decode()
+
+
 @pytest.mark.parametrize("target", ["wgsl", "cuda", "metal", "glsl-es"])
 def test_a_variant_of_low_rank_is_two_kernels(target):
     whole = export(Request(model(), target, variant="rank2"))
@@ -183,6 +220,19 @@ def test_a_variant_of_low_rank_is_two_kernels(target):
         (Request(model(), "wgsl", weights="texture"), "--weights is texture: target wgsl has weights in"),
         (Request(model(), "onnx", SCENE), "--scene is lone_light: a graph denoises"),
         (Request(model(), "onnx", weights="buffer"), "--weights is buffer: a graph holds its weights"),
+        (Request(model(), "onnx", schedule="plain"), "--schedule is plain: a runtime orders a graph's work"),
+        (
+            Request(model(), "wgsl", schedule="tile16"),
+            "--schedule is tile16: target wgsl with weights in",
+        ),
+        (
+            Request(model(), "cuda", weights="inline", schedule="group"),
+            "--schedule is group: target cuda with weights in place inline has: plain",
+        ),
+        (
+            Request(model(), "cuda", variant="rank6", schedule="group4"),
+            "--schedule is group4: it cannot hold this model: a tile holds 4 channels at once",
+        ),
         (
             Request(model((96, 48, 3)), "glsl-es", weights="uniform"),
             "GL_MAX_UNIFORM_BLOCK_SIZE is 19212: glsl-es takes at most 16384; use another place",

@@ -17,7 +17,7 @@ from wamnet.compiler.encode_kernel import compile_encode, error_at
 from wamnet.compiler.lower_encode import layers_of
 from wamnet.compiler.lower_scene import lower_scene
 from wamnet.compiler.path_kernel import compile_path
-from wamnet.compiler.targets import EXPORTED
+from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.kernels.executor import Part
 from wamnet.kernels.export import check, runners, tools
 from wamnet.refimpl.dataset import Normalization, encode_sums
@@ -62,6 +62,41 @@ def traced():
 def test_denoiser_keeps_its_bound(runner, kit, case):
     """EXP-3, and by way of SPIR-V and HLSL EXP-4."""
     assert kit.excess(runner, *case, compile_program(case[0], runner.name)) <= 1
+
+
+@pytest.mark.parametrize("border", ["clamp", "zero"])
+@pytest.mark.parametrize("schedule", ["group", "group4"])
+def test_grouped_kernels_keep_their_bound(runner, kit, schedule, border):
+    """KER-18 in every language that has groups: pictures of several groups, none of them whole.
+
+    A channel more than a tile holds at once, so that the tile is filled twice.
+    """
+    if schedule not in {each.name for each in EXPORTED.get(runner.name, DENOISERS["c"]).schedules}:
+        pytest.skip("its language has no groups")
+    program = kit.denoiser(kit.network([45, 7, 5, 3], (3.0, 5.0)), {"a": 4, "b": 1}, 3, border)
+    artifact = compile_program(program, runner.name, "ieee", schedule)
+    assert artifact.manifest["schedule"]["name"] == schedule
+    width, height = artifact.manifest["schedule"]["group"]
+    random = np.random.default_rng(2)
+    size = (height + 3, artifact.manifest["schedule"]["pixels"] * width + 5)
+    for shape in (size, (1, 1)):
+        images = {
+            name: random.uniform(-2, 2, (*shape, n)).astype(np.float32) for name, n in (("a", 4), ("b", 1))
+        }
+        assert kit.excess(runner, program, images, artifact) <= 1
+
+
+def test_a_group_that_does_not_wait_is_found(runner, kit):
+    """Without the wait between reading a tile and filling it again, items read another image's numbers."""
+    if runner.name not in ("cuda", "metal"):
+        pytest.skip("its device runs the items of a group in step, whatever the source says")
+    program = kit.denoiser(kit.network([45, 7, 3], (3.0, 5.0)), {"a": 4, "b": 1}, 3, "clamp")
+    artifact = compile_program(program, runner.name, "ieee", "group")
+    wait = {"cuda": "__syncthreads();", "metal": "threadgroup_barrier(mem_flags::mem_threadgroup);"}
+    wrong = kit.with_source(artifact, wait[runner.name], "")
+    random = np.random.default_rng(2)
+    images = {name: random.uniform(-2, 2, (9, 21, n)).astype(np.float32) for name, n in (("a", 4), ("b", 1))}
+    assert kit.excess(runner, program, images, wrong) > 1
 
 
 def test_a_first_layer_in_two_passes(runner, kit, case):

@@ -60,6 +60,7 @@ class Renderer(str, Enum):
     numpy = "numpy"
     opencl = "opencl"
     opengl = "opengl"
+    c = "c"
 
 
 class TrainerName(str, Enum):

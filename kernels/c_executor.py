@@ -12,6 +12,7 @@ import os
 import shlex
 import subprocess
 import tempfile
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,6 @@ from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.path_kernel import PathArtifact
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from .executor import INDEX_LIMIT, Executor, Images, Part, gather_of, images_of, keep
-from .passes import Passes
 
 COMPILER_VARIABLE = "CC"
 """Environment variable that names the compiler, with options if need be; else `cc`."""
@@ -134,6 +134,32 @@ void wamnet_rows(const float *const *images, const float *weights, float *result
 """
 """The function that is called: rows [first, end) of a picture."""
 
+PATH_GLUE = """\
+#include "{header}"
+
+void wamnet_rows(const uint32_t *sizes, float *sums, int first, int end)
+{{
+    const wamnet_part part = {{(int)sizes[0], (int)sizes[1], (int)sizes[2], (int)sizes[3], sizes[4],
+                              (int)sizes[5], sizes[6]}};
+    for (int row = first; row < end; ++row) {{
+        for (int column = 0; column < part.width; ++column) {{
+            {entry}(&part, sums, column, row);
+        }}
+    }}
+}}
+"""
+"""The same for the paths of a part of a picture."""
+
+ENCODE_GLUE = """\
+#include "{header}"
+
+void wamnet_rows(const float *sums, float *const *images, int width, int height, int samples)
+{{
+    {entry}(sums, {images}, width, height, samples);
+}}
+"""
+"""The same for an encoding, which takes all rows at once: a thousandth of the time of the paths."""
+
 
 class CExecutor(Executor):
     """The system's C compiler; what it has built stays loaded as long as the process."""
@@ -198,17 +224,22 @@ class CExecutor(Executor):
                 "a thread's stack; use narrower layers, or executor numpy"
             )
         images = ", ".join(f"images[{i}]" for i in range(len(gather_of(artifact).images)))
-        stem, header = artifact.digest[:32], f"{artifact.digest[:32]}.h"
-        (Path(self._folder.name) / header).write_text(artifact.source, encoding="utf-8")
-        glue = GLUE.format(header=header, entry=artifact.entry_point, images=images)
-        library = Path(self._folder.name) / f"{stem}.so"
+        glue = GLUE.format(header=_header(artifact), entry=artifact.entry_point, images=images)
+        function = self._library(artifact, glue)
+        function.argtypes = [*[ctypes.c_void_p] * 3, *[ctypes.c_int] * 4]
+        return function
+
+    def _library(self, kernel: Artifact | PathArtifact | EncodeArtifact, glue: str) -> Any:
+        """Return the function of a kernel's source and the glue around it, compiled and loaded."""
+        folder = Path(self._folder.name)
+        (folder / _header(kernel)).write_text(kernel.source, encoding="utf-8")
+        library = folder / f"{kernel.digest[:32]}.so"
         done = self._compile(library, glue, ["-shared"])
         if done.returncode or not library.is_file():
             told = done.stderr.strip()[:MOST_TOLD] or "it writes no library"
             raise CompileError(f"{self.device} does not build the kernel: {told}; {WAY_OUT}")
         function = ctypes.CDLL(str(library)).wamnet_rows
         function.restype = None
-        function.argtypes = [*[ctypes.c_void_p] * 3, *[ctypes.c_int] * 4]
         return function
 
     def _compile(self, result: Path, text: str, options: list[str]) -> subprocess.CompletedProcess[str]:
@@ -258,26 +289,52 @@ class CExecutor(Executor):
         def rows(first: int, end: int) -> None:
             call(pointers, weights.ctypes.data, result.ctypes.data, width, height, first, end)
 
-        ends = range(0, height, max(1, height // (8 * (os.cpu_count() or 1))))
-        list(self._threads.map(rows, ends, [*ends[1:], height]))
+        self._in_threads(height, rows)
         return result
 
+    def _in_threads(self, height: int, rows: Callable[[int, int], None]) -> None:
+        """Call a function for blocks of rows [first, end), shared out to threads."""
+        firsts = range(0, height, max(1, height // (8 * (os.cpu_count() or 1))))
+        list(self._threads.map(rows, firsts, [*firsts[1:], height]))
+
     def build_path(self, kernel: PathArtifact) -> None:
-        """Refuse: paths have no C."""
-        raise self._denoises_only()
+        """Compile and load the path kernel."""
+        built = self._built.get(kernel.digest) or self._loaded_path(kernel)
+        keep(self._built, kernel.digest, built)
+
+    def _loaded_path(self, kernel: PathArtifact) -> Any:
+        """Return the compiled function of a path kernel."""
+        function = self._library(kernel, PATH_GLUE.format(header=_header(kernel), entry=kernel.entry_point))
+        function.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int] * 2]
+        return function
 
     def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
-        raise self._denoises_only()
+        sums = np.zeros((len(kernel.planes), part.rows, part.width), np.float32)
+        numbers = (part.width, part.height, part.first_row, part.rows, part.first_sample)
+        sizes = (ctypes.c_uint32 * 7)(*(n % 2**32 for n in (*numbers, part.samples, part.seed)))
+        call = self._built[kernel.digest]
+        self._in_threads(part.rows, lambda first, end: call(sizes, sums.ctypes.data, first, end))
+        return sums
 
-    def _passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
-        raise self._denoises_only()
-
-    def _denoises_only(self) -> InputError:
-        """Return what is told to those who want more."""
-        rule = "its kernels denoise; they follow no paths"
-        return InputError("executor that renders", self.name, rule, "use executor opencl, opengl or numpy")
+    def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+        _, height, width = sums.shape
+        images = {i.name: np.empty((height, width, i.channels), np.float32) for i in kernel.images}
+        if kernel.digest not in self._built:
+            arguments = ", ".join(f"images[{i}]" for i in range(len(images)))
+            glue = ENCODE_GLUE.format(header=_header(kernel), entry=kernel.entry_point, images=arguments)
+            function = self._library(kernel, glue)
+            function.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int] * 3]
+            keep(self._built, kernel.digest, function)
+        pointers = (ctypes.c_void_p * len(images))(*(image.ctypes.data for image in images.values()))
+        self._built[kernel.digest](sums.ctypes.data, pointers, width, height, samples)
+        return images
 
     def close(self) -> None:
         """End the threads and remove the folder."""
         self._threads.shutdown()
         self._folder.cleanup()
+
+
+def _header(kernel: Artifact | PathArtifact | EncodeArtifact) -> str:
+    """Return the name of the file that holds a kernel's source."""
+    return f"{kernel.digest[:32]}.h"

@@ -88,9 +88,16 @@ class Executor(ABC):
         """Return the name of the schedule that suits one picture of `size` (height, width)."""
         return self.schedule if size[0] * size[1] >= self.schedule_pixels else PLAIN
 
-    @abstractmethod
     def _passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
-        """Return the passes of checked kernels over a picture."""
+        """Return the passes of checked kernels over a picture: by default their plain composition."""
+        from .passes import HostPasses
+
+        return HostPasses(self, encode, denoise, size)
+
+    def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+        """Return the encoded images of checked sums."""
+        rule = "its encodings run in pipelines only, where nothing leaves the device"
+        raise InputError("executor of an encoding alone", self.name, rule, "use kernels.Pipeline")
 
     def passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
         """Return passes over a picture of `size` (height, width), whose images stay on the device."""
@@ -115,6 +122,11 @@ class Executor(ABC):
         self._check_target(kernel)
         self.build_path(kernel)
         return self._trace(kernel, part)
+
+    def encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+        """Return the encoded images (H, W, C) of sums (planes, H, W) over so many samples, by name."""
+        self._check_target(kernel)
+        return self._encode(kernel, np.ascontiguousarray(sums), samples)
 
     def run(self, artifact: Artifact, inputs: Images) -> NDArray[np.float32]:
         """Return the output (H, W, C) for encoded feature images (H, W, C), float32, by name."""

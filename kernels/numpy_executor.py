@@ -1,7 +1,7 @@
 """The interpreter of the IR as an executor: all windows of a block of rows at once, in float32.
 
 Its path tracer is the skeleton that path kernels have (compiler/emit_path.py), with all paths of a part as
-lanes: it defines what they add up. Its passes are the plain composition of its kernels [`NumpyPasses`].
+lanes: it defines what they add up. Its passes are the plain composition of its kernels [`passes.HostPasses`].
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from ..compiler.lower_encode import SAMPLES, channel_name
 from ..compiler.lower_scene import PathPrograms
 from ..compiler.path_kernel import PathArtifact
 from ..refimpl import dataset
-from .executor import Executor, Images, Part, gather_of, images_of
-from .passes import PICTURE, Passes
+from .executor import Executor, Images, Part, gather_of
 
 BLOCK_NUMBERS = 2**22
 """Numbers in the windows of one block of rows: 16 MiB in float32, for images of any height."""
@@ -60,8 +59,14 @@ class NumpyExecutor(Executor):
                 _add(sums, first, end, np.float32(n))
         return np.stack(list(sums.values()))
 
-    def _passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
-        return NumpyPasses(self, encode, denoise, size)
+    def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+        """Interpret the encoding, all pixels at once."""
+        given = dict(zip(kernel.planes, sums, strict=True))
+        found = interpret(kernel.program, {**given, SAMPLES: np.full(sums.shape[1:], samples, np.float32)})
+        return {
+            image.name: np.stack([found[channel_name(image.name, c)] for c in range(image.channels)], axis=-1)
+            for image in kernel.images
+        }
 
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
         image = np.concatenate(list(images.values()), axis=-1)
@@ -85,39 +90,6 @@ class NumpyExecutor(Executor):
             (value,) = interpret(artifact.program, {"window": windows}).values()
             result[top:bottom] = np.reshape(value, (bottom - top, width, -1)) if np.ndim(value) > 1 else value
         return result
-
-
-class NumpyPasses(Passes):
-    """The definition: what one kernel returns is what the next one is given."""
-
-    def __init__(
-        self, executor: NumpyExecutor, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]
-    ) -> None:
-        super().__init__(encode, denoise, size)
-        self._executor = executor
-        self._sums: dict[str, NDArray[np.float32]] = {}
-        self._images: dict[str, NDArray[np.float32]] = {}
-
-    def trace(self, kernel: PathArtifact, part: Part) -> None:
-        """Keep the sums (H, W) of each plane."""
-        self._sums = dict(zip(kernel.planes, self._executor.trace(kernel, part), strict=True))
-
-    def encode(self, samples: int) -> None:
-        """Interpret the encoding, all pixels at once."""
-        given = {**self._sums, SAMPLES: np.full(self.size, samples, np.float32)}
-        found = interpret(self.encoder.program, given)
-        for image in self.encoder.images:
-            channels = [found[channel_name(image.name, c)] for c in range(image.channels)]
-            self._images[image.name] = np.stack(channels, axis=-1)
-
-    def denoise(self) -> None:
-        """Interpret the denoiser on the images that it reads."""
-        wanted = {image.name: self._images[image.name] for image in images_of(self.denoiser)}
-        self._images[PICTURE] = self._executor.run(self.denoiser, wanted)
-
-    def read(self, name: str) -> NDArray[np.float32]:
-        """Return an image."""
-        return self._images[name]
 
 
 def follow(programs: PathPrograms, given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

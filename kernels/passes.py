@@ -4,6 +4,9 @@
 
 Sums, images and picture are made once for a size and stay on the device; [`Passes.read`] alone copies
 anything to the host. Passes are ordered: each sees what the one before it has written.
+
+On devices whose memory is the host's the passes are the plain composition of the three kernels, which is the
+definition of all others [`HostPasses`].
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from numpy.typing import NDArray
 from ..compiler.artifact import Artifact
 from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.path_kernel import PathArtifact
-from .executor import Part
+from .executor import Executor, Part, images_of
 
 PICTURE = "picture"
 """Name under which the result is read."""
@@ -61,3 +64,32 @@ class Passes(ABC):
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class HostPasses(Passes):
+    """What one kernel returns is what the next one is given."""
+
+    def __init__(
+        self, executor: Executor, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]
+    ) -> None:
+        super().__init__(encode, denoise, size)
+        self._executor = executor
+        self._sums = np.zeros((0, 0, 0), np.float32)
+        self._images: dict[str, NDArray[np.float32]] = {}
+
+    def trace(self, kernel: PathArtifact, part: Part) -> None:
+        """Keep the sums (planes, H, W)."""
+        self._sums = self._executor.trace(kernel, part)
+
+    def encode(self, samples: int) -> None:
+        """Keep the feature images."""
+        self._images = dict(self._executor.encode(self.encoder, self._sums, samples))
+
+    def denoise(self) -> None:
+        """Run the denoiser on the images that it reads."""
+        wanted = {image.name: self._images[image.name] for image in images_of(self.denoiser)}
+        self._images[PICTURE] = self._executor.run(self.denoiser, wanted)
+
+    def read(self, name: str) -> NDArray[np.float32]:
+        """Return an image."""
+        return self._images[name]

@@ -81,8 +81,7 @@ def _by_kernel(name: str) -> RenderRows:
 
 RENDERERS: Mapping[str, Renderer] = {
     "numpy": Renderer(_reference, shares_work=False),
-    "opencl": Renderer(_by_kernel("opencl"), shares_work=True),
-    "opengl": Renderer(_by_kernel("opengl"), shares_work=True),
+    **{name: Renderer(_by_kernel(name), shares_work=True) for name in ("opencl", "opengl", "c")},
 }
 """What traces paths, by the executor's name: a new one is a line here."""
 

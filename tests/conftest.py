@@ -26,10 +26,10 @@ import hypothesis
 import pytest
 from packages import FOUND, PACKAGES, required
 
-PIPELINES = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
+PIPELINES = ("numpy", "opencl", "opengl-egl", "opengl-osmesa", "c")
 """Executors of kernels of all kinds; an OpenGL executor is named with the kind of its context."""
 
-EXECUTORS = (*PIPELINES, "c")
+EXECUTORS = PIPELINES
 """Every way to run a denoiser that the tests know."""
 
 PEERS = ("mitsuba", "chromium")

@@ -19,9 +19,7 @@ from ...compiler.encode_kernel import EncodeArtifact
 from ...compiler.glsl_buffers import FIRST_IMAGE, GROUP
 from ...compiler.path_kernel import PathArtifact
 from ...compiler.weight_homes import INLINE
-from ...refimpl.errors import InputError
 from ..executor import Executor, Images, Part, gather_of
-from ..passes import Passes
 
 READ, WRITTEN = 1, 2
 """Bindings of what is read besides images, and of what is written."""
@@ -106,11 +104,10 @@ class BufferRunner(Executor):
         launch = Launch(numbers, buffers, (WRITTEN,), (part.width, part.rows))
         return self._launch(self._kernel(kernel, kernel.entry_point, 0), launch)[0].reshape(shape)
 
-    def encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
-        """Return the encoded images (H, W, C) of sums (planes, H, W), by name."""
+    def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
         _, height, width = sums.shape
         images = {i.name: np.zeros((height, width, i.channels), np.float32) for i in kernel.images}
-        buffers = {READ: np.ascontiguousarray(sums)}
+        buffers = {READ: sums}
         buffers |= {FIRST_IMAGE + i: image for i, image in enumerate(images.values())}
         places = [place for place in buffers if place >= FIRST_IMAGE]
         launch = Launch((width, height, samples), buffers, places, (width, height))
@@ -118,7 +115,3 @@ class BufferRunner(Executor):
         return {
             name: flat.reshape(image.shape) for (name, image), flat in zip(images.items(), found, strict=True)
         }
-
-    def _passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
-        rule = "it runs exported kernels one by one"
-        raise InputError("executor of pipelines", self.name, rule, "use executor opencl, opengl or numpy")

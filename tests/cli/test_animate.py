@@ -107,7 +107,7 @@ def test_pictures_outside_of_the_ranges_are_told(wamnet, tmp_path) -> None:
     assert np.abs(got - encoding.to_display(noisy["color"])).max() <= 0.5 / 255 + 256 * 2.0**-23
 
 
-@pytest.mark.parametrize("name", ["numpy", "opencl", "opengl"])
+@pytest.mark.parametrize("name", ["numpy", "opencl", "opengl", "c"])
 def test_a_cut_first_layer(wamnet, tmp_path, refused, executor_named, name) -> None:
     """The pictures of the model whose first layer is expanded from its factors, up to one level."""
     executor_named({"opengl": "opengl-egl"}.get(name, name))

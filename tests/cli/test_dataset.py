@@ -73,10 +73,10 @@ def test_a_kernel_makes_the_pictures(wamnet, executor_named, tmp_path) -> None:
     assert wamnet("dataset", "--check", "-o", "a").status == 0
 
 
-@pytest.mark.parametrize("executor", ["opencl", "opengl"])
+@pytest.mark.parametrize("executor", ["opencl", "opengl", "c"])
 def test_kernels_on_a_cluster_give_the_same_bytes(wamnet, executor_named, tmp_path, executor) -> None:
     """A worker opens a device of its own, in a thread that is not its first one."""
-    executor_named({"opencl": "opencl", "opengl": "opengl-egl"}[executor])
+    executor_named({"opengl": "opengl-egl"}.get(executor, executor))
     for folder, workers in (("a", 1), ("b", 2)):
         arguments = ("--executor", executor, "--workers", workers, "-o", folder)
         assert wamnet("dataset", *TINY, *arguments).status == 0

@@ -204,10 +204,10 @@ def test_refusals_of_scene_files(refused, wamnet, tmp_path) -> None:
     assert "its name must end in .json" in refused("scene", "empty", "-o", "c.txt")
 
 
-@pytest.mark.parametrize("name", ["opencl", "opengl"])
+@pytest.mark.parametrize("name", ["opencl", "opengl", "c"])
 def test_a_kernel_renders_the_frame(wamnet, tmp_path, executor_named, name) -> None:
     """At least 95 pixels in 100 have the reference's colour to 1e-5; the others' paths may pass an edge."""
-    executor_named({"opencl": "opencl", "opengl": "opengl-egl"}[name])
+    executor_named({"opengl": "opengl-egl"}.get(name, name))
     outcome = wamnet("render", "cornell", "--width", 20, "--height", 10, "--executor", name, "-o", "a.exr")
     assert outcome.status == 0
     got, want = exr.read_frame(tmp_path / "a.exr"), render(canonical("cornell"), Job(20, 10)).frame

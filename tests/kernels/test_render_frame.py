@@ -16,7 +16,7 @@ from wamnet.refimpl.scenes import canonical
 SCENE = canonical("cornell")
 
 
-REQUIRED = {"numpy": "numpy", "opencl": "opencl", "opengl": "opengl-egl"}
+REQUIRED = {"numpy": "numpy", "opencl": "opencl", "opengl": "opengl-egl", "c": "c"}
 """The executor whose absence skips or fails a renderer's tests, by the renderer's name."""
 
 

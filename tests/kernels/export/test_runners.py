@@ -20,7 +20,9 @@ from wamnet.compiler.path_kernel import compile_path
 from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.kernels.executor import Part
 from wamnet.kernels.export import check, runners, tools
-from wamnet.refimpl.dataset import Normalization, encode_sums
+from wamnet.kernels.export.buffer_runner import BufferRunner
+from wamnet.refimpl.dataset import Normalization, Window, encode_sums
+from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.scenes import canonical
 from wamnet.refimpl.transport import Settings
@@ -127,7 +129,7 @@ def test_paths_are_the_interpreter_s(runner, traced):
 
 
 def test_encoding_keeps_its_bound(runner, traced):
-    if not hasattr(runner, "encode"):
+    if not isinstance(runner, BufferRunner):
         pytest.skip("this runner's encodings run in pipelines")
     kernel, sums = compile_encode(FEATURES, Normalization(), runner.name), traced[2]
     planes = dict(zip(kernel.planes, sums, strict=True))
@@ -139,6 +141,22 @@ def test_encoding_keeps_its_bound(runner, traced):
     held = encode_sums(layers, 1.0, FEATURES, Normalization())
     for name in FEATURES:
         assert (np.abs(found[name] - held[name]) <= bound[name]).all()
+
+
+def test_pipelines_are_the_composition_of_the_kernels(runner, kit):
+    """PPL-7: what one kernel returns is what the next one is given, to the bit."""
+    if not isinstance(runner, BufferRunner):
+        pytest.skip("its images are textures: tests/kernels/test_pipeline.py runs pipelines of OpenGL")
+    model = Model(kit.network([54, 6, 3], (3.0, 3.0)), FEATURES, Window(3, "clamp"), Normalization())
+    with kernels.Pipeline(
+        runner, canonical("lone_light"), model, (6, 9), settings=Settings(max_depth=1)
+    ) as pipeline:
+        found = pipeline.run(seed=3)
+        sums = runner.trace(pipeline.path, pipeline.part(3, 1, 0))
+        wanted = runner.run(pipeline.denoise, runner.encode(pipeline.encode, sums, 1))
+    assert np.array_equal(found, wanted)
+    assert np.isfinite(found).all()
+    assert found.std() > 0, "a picture of one colour would hide what is mixed up"
 
 
 def test_every_exported_language_has_a_runner():

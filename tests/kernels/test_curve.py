@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from wamnet.compiler import variants
+from wamnet.compiler.compile import DENOISERS
 from wamnet.kernels import cache, curve, measure_curve
 from wamnet.kernels.curve import Curve, Limits, Point, choose
 from wamnet.refimpl import siren
@@ -243,6 +244,14 @@ def test_schedules_that_are_named_are_measured(executor_named, model) -> None:
         *(("full", "plain"), ("full", "tile8"), ("rank2", "plain"), ("rank2", "tile8"))
     ]
     assert len(measure_curve.promising(executor_named("opencl"), model, "ieee")) == 2
+
+
+def test_every_target_s_schedules_are_tried(denoiser, model) -> None:
+    """It was a KeyError for C: `compile --target c --max-ms 9 --frames FOLDER`."""
+    found = measure_curve.promising(denoiser, model, "ieee")
+    known = {schedule.name for schedule in DENOISERS[denoiser.name].schedules}
+    assert found
+    assert known.issuperset(found)
 
 
 def test_pictures_that_are_no_numbers_have_no_quality() -> None:

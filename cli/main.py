@@ -10,6 +10,7 @@ Modules that compute are imported when a command runs, so that a help text appea
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -47,6 +48,9 @@ STATUS_TERMINATED = 143
 
 STATUS_INTERRUPTED = 130
 """Exit status after Ctrl-C: 128 + SIGINT, as shells report it."""
+
+AGAIN_S = 0.01
+"""Seconds after which a dropped interrupt is sent again: by then the object is gone."""
 
 app = typer.Typer(
     name="wamnet",
@@ -103,7 +107,7 @@ def root(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line (by default the process's) and return its exit status."""
-    with _ending_on_sigterm() as terminated:
+    with _losing_no_interrupt(), _ending_on_sigterm() as terminated:
         status = _run(arguments)
         return STATUS_TERMINATED if status == STATUS_INTERRUPTED and terminated else status
 
@@ -127,6 +131,27 @@ def _ending_on_sigterm() -> Iterator[list[int]]:
         yield seen
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+@contextmanager
+def _losing_no_interrupt() -> Iterator[None]:
+    """Send an interrupt again that came while an object was deleted: Python prints it there and drops it."""
+
+    def again(unraisable: Any) -> None:
+        if isinstance(unraisable.exc_value, KeyboardInterrupt):
+            # Not from here, where it would be dropped too; the main thread may sleep.
+            clock = threading.Timer(AGAIN_S, signal.pthread_kill, (main, signal.SIGINT))
+            clock.daemon = True
+            clock.start()
+        else:
+            before(unraisable)
+
+    main = threading.main_thread().ident or 0
+    before, sys.unraisablehook = sys.unraisablehook, again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 def _run(arguments: Sequence[str] | None) -> int:

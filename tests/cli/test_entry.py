@@ -56,3 +56,22 @@ def test_the_status_is_the_command_s(tmp_path) -> None:
     found = {**os.environ, "PYTHONPATH": str(tmp_path)}
     done = subprocess.run(command, env=found, cwd=tmp_path, capture_output=True, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (143, b"")
+
+
+def test_an_interrupt_while_an_object_is_deleted_is_not_lost() -> None:
+    """Python printed it with a traceback, dropped it, and the command went on."""
+    program = (
+        "import signal, sys, time\n"
+        "from wamnet.cli import main\n"
+        "class Deleted:\n"
+        "    def __del__(self): signal.raise_signal(signal.SIGINT)\n"
+        "def work(*_, **__):\n"
+        "    Deleted()\n"
+        "    time.sleep(60)\n"
+        "main.app = work\n"
+        "sys.exit(main.main([]))\n"
+    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=50)
+    assert done.returncode == 130
+    assert done.stderr == "wamnet: interrupted\n"

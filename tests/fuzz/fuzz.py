@@ -33,7 +33,9 @@ from random import Random
 from typing import Any
 
 import numpy as np
+from lines import lines
 from mutations import WAYS
+from talks import talks
 from targets import Good, Target, commands, readers
 
 from wamnet.refimpl.errors import WamnetError
@@ -43,9 +45,6 @@ HANG_S = 20.0
 
 MEMORY_BYTES = 512 * 2**20
 """Most memory that an input may take beside the program's own."""
-
-SLICE_S = 2.0
-"""Seconds that a target runs before another has its turn."""
 
 _good: Good | None = None
 _targets: dict[str, Target] = {}
@@ -112,6 +111,11 @@ def _hang(_number: int, _frame: object) -> None:
     raise Hang
 
 
+def every(good: Good) -> list[Target]:
+    """Return all targets."""
+    return [*readers(good), *talks(), *commands(good), *lines(good)]
+
+
 def prepare() -> None:
     """Make the good files and the limits of this process."""
     global _good  # noqa: PLW0603 - the pool's initializer has no other way to reach its tasks
@@ -120,7 +124,7 @@ def prepare() -> None:
     # The log's lines about damaged entries are right, and many.
     logging.getLogger("wamnet").setLevel(logging.CRITICAL)
     _good = Good(Path(tempfile.mkdtemp(prefix="wamnet-fuzz-good-")))
-    _targets.update({target.name: target for target in (*readers(_good), *commands(_good))})
+    _targets.update({target.name: target for target in every(_good)})
     for target in _targets.values():
         for example in target.examples:
             outcome, what = tried(target, example)
@@ -133,7 +137,7 @@ def prepare() -> None:
 def run_slice(name: str, seed: int, first: int, count: int, until: float) -> tuple[Found, int]:
     """Try inputs from number `first` on: `count` of them, or as many as fit; return the next number too."""
     found, target = Found(name), _targets[name]
-    ends = min(until, time.monotonic() + SLICE_S)
+    ends = min(until, time.monotonic() + target.slice_s)
     number = first
     while number < first + count and (time.monotonic() < ends or number == first):
         outcome, what = tried(target, changed(target, seed, number))
@@ -149,18 +153,21 @@ def names_of() -> list[str]:
     return list(_targets)
 
 
-def fuzz(seed: int, seconds: float, count: int, workers: int, only: Sequence[str]) -> dict[str, Found]:
-    """Let all targets take turns; return what was found, by target."""
+def fuzz(
+    seed: int, seconds: float, count: int, workers: int, only: Sequence[str], most: int = 2**60
+) -> dict[str, Found]:
+    """Let all targets take turns, until there were `most` inputs; return what was found, by target."""
     until = time.monotonic() + seconds
     total: dict[str, Found] = {}
     context = get_context("spawn")
     pool = ProcessPoolExecutor(workers, context, prepare)
-    every = pool.submit(names_of).result()
-    names = [name for name in every if not only or any(word in name for word in only)]
+    names = [
+        name for name in pool.submit(names_of).result() if not only or any(word in name for word in only)
+    ]
     following = dict.fromkeys(names, 0)
-    waiting, running = list(names), {}
+    waiting, running, tried_all = list(names), {}, 0
     while waiting or running:
-        while waiting and len(running) < workers and time.monotonic() < until:
+        while waiting and len(running) < workers and time.monotonic() < until and tried_all < most:
             name = waiting.pop(0)
             left = count - following[name]
             running[pool.submit(run_slice, name, seed, following[name], left, until)] = name
@@ -174,9 +181,13 @@ def fuzz(seed: int, seconds: float, count: int, workers: int, only: Sequence[str
                 found, following[name] = future.result()
             except BrokenProcessPool:
                 known.findings.append((following[name], "the process ended (from this number on)"))
-                pool, running = ProcessPoolExecutor(workers, context, prepare), {}
                 following[name] += 1
+                waiting += [name, *running.values()]
+                pool, running = ProcessPoolExecutor(workers, context, prepare), {}
                 break
+            tried_all += sum(found.counts.values())
+            for number, what in found.findings:
+                print(f"FOUND {name}, {number}: {what}", flush=True)
             known.counts += found.counts
             known.findings += found.findings
             if following[name] < count:
@@ -220,6 +231,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--minutes", type=float, default=10.0, help="how long, beside the start")
     parser.add_argument("--count", type=int, default=2**40, help="inputs of each target, at most")
+    parser.add_argument("--inputs", type=int, default=2**60, help="inputs of all targets, at least")
     parser.add_argument("--seed", type=int, default=None, help="repeats a run")
     parser.add_argument("--workers", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--only", nargs="*", default=[], help="targets whose name holds one of these words")
@@ -229,7 +241,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     seed = secrets.randbits(32) if given.seed is None else given.seed
     if given.at is not None:
         return again(" ".join(given.only), seed, given.at)
-    return report(fuzz(seed, given.minutes * 60, given.count, given.workers, given.only), seed, given.output)
+    numbers = (seed, given.minutes * 60, given.count, given.workers)
+    return report(fuzz(*numbers, given.only, given.inputs), seed, given.output)
 
 
 def again(name: str, seed: int, number: int) -> int:

@@ -4,6 +4,7 @@
 2. A JSON text keeps its form while values, keys and lists change [`of_json`]; texts inside that are JSON
    themselves are changed in the same way.
 3. A safetensors file keeps its header's length right while header and numbers change [`of_safetensors`].
+4. A command line keeps its words, some of them with other values, in other places or twice [`of_words`].
 
 All of it is a function of a `random.Random`: the same seed gives the same input.
 """
@@ -16,10 +17,78 @@ from collections.abc import Callable, Mapping
 from random import Random
 from typing import Any
 
+TEXTS = (
+    *(
+        "",
+        "-",
+        "--",
+        "0",
+        "-1",
+        "1",
+        "2",
+        "3",
+        "0.5",
+        "-0.0",
+        "1e-320",
+        "1e30",
+        "1e308",
+        "1e400",
+        "nan",
+        "-inf",
+    ),
+    *("inf", "2147483648", "4294967296", str(2**63), "9" * 30, "1" * 5000, "0x10", "1_0", "x", "y" * 5000),
+    *(
+        "\x1b[2J",
+        "\u202e",
+        "\udcff",
+        "\uff11",
+        "..",
+        ".",
+        "pipe",
+        "folder",
+        "link",
+        "missing/x",
+        "x.exr",
+        "x.png",
+    ),
+    *(
+        "x.html",
+        "1,2,3",
+        "a=1",
+        "=",
+        "1=1,1,1",
+        "1:2",
+        "2:1",
+        "nan:nan",
+        "*",
+        "%s",
+        "{}",
+        "[bold]",
+        "é",
+        "numpy",
+    ),
+    *("c", "exact", "window2", "rank1", "minicubes", "--help", "-h", "-o", "--seed", "--size", "--time"),
+)
+"""Words of a command line that programs have stumbled over; a byte that is no UTF-8 comes as a surrogate."""
+
 VALUES: tuple[Any, ...] = (
     *(None, True, False, 0, -1, 1, 2, 3, 0.5, -0.0, 1e-320, 1e-30, 1e30, 1e308, -1e308),
     *(float("nan"), float("inf"), float("-inf"), 2**31, 2**53 + 1, 2**63, -(2**63), 10**18, 10**400),
-    *("", "x", "0", "nan", "1e999", "\x1b[2J", "\0", "\u202e", "\ud800", "../x", "/dev/zero", "color"),
+    *(
+        "",
+        "x",
+        "0",
+        "nan",
+        "1e999",
+        "\x1b[2J",
+        "\0",
+        "\u202e",
+        "\ud800",
+        "\uffff",
+        "../x",
+        "/dev/zero",
+        "color",
+    ),
     *([], {}, [[]], [0] * 3, [0.0] * 2000, "y" * 5000, [None] * 40),
 )
 """Values that programs have taken for something else."""
@@ -138,9 +207,44 @@ def of_safetensors(random: Random, content: bytes) -> bytes:
     return struct.pack("<Q", len(header)) + header + bytes(data)
 
 
+def of_words(random: Random, content: bytes) -> bytes:
+    """Return a command line, as a JSON list, with one to four words changed, left out, added or exchanged."""
+    command, *words = json.loads(content)
+    for _ in range(random.choice((1, 1, 1, 2, 4))):
+        if not words:
+            break
+        at, other = (random.randrange(len(words)) for _ in range(2))
+        if words[at].startswith("-") and at + 1 < len(words) and random.random() < 0.7:
+            at += 1
+        way = random.random()
+        if way < 0.7:
+            words[at] = _changed_word(random, words[at])
+        elif way < 0.8:
+            del words[at]
+        elif way < 0.9:
+            words.insert(at, random.choice((words[other], random.choice(TEXTS))))
+        else:
+            words[at], words[other] = words[other], words[at]
+    return json.dumps([command, *words]).encode()
+
+
+def _changed_word(random: Random, word: str) -> str:
+    """Return another word, or this one with a part changed."""
+    signs = [sign for sign in ",=:+" if sign in word]
+    if signs and random.random() < 0.5:
+        parts = word.split(random.choice(signs))
+        parts[random.randrange(len(parts))] = random.choice(TEXTS)
+        return random.choice(signs).join(parts)
+    if word and random.random() < 0.2:
+        at = random.randrange(len(word) + 1)
+        return word[:at] + random.choice((*"-.:,=+/0\x01", "\udc80", "\n")) + word[at + random.randrange(2) :]
+    return random.choice(TEXTS)
+
+
 WAYS: Mapping[str, Callable[[Random, bytes], bytes]] = {
     "bytes": of_bytes,
     "json": of_json,
     "safetensors": of_safetensors,
+    "words": of_words,
 }
 """Ways by the form of a file."""

@@ -12,14 +12,14 @@ import json
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from wamnet.cli import dataset_files, exr, images
+from wamnet.cli import dataset_files, demo, exr, images
 from wamnet.cli import inputs as cli_inputs
 from wamnet.cli.main import main
 from wamnet.compiler import artifact, checker, variants
@@ -45,12 +45,16 @@ class CommandRefused(WamnetError):
 
 @dataclass(frozen=True)
 class Target:
-    """A kind of file: how it is changed [mutations.WAYS], good examples, and what is done with one."""
+    """A kind of file: how it is changed [mutations.WAYS], good examples, and what is done with one.
+
+    `slice_s`: how long it is its turn, in seconds.
+    """
 
     name: str
     way: str
     examples: Sequence[bytes]
     use: Callable[[bytes, Path], Any]
+    slice_s: float = 2.0
 
 
 def finite(*arrays: Any) -> None:
@@ -85,6 +89,11 @@ class Good:
         (folder / "curve.json").write_text(json.dumps(tiny_curve(self.model)))
         (folder / "track.json").write_text(report.track_text({"random.block/1": "pass"}, []))
         dataset(folder / "set")
+        (folder / "vectors").mkdir()
+        for name in ("metric.mse.json", "schema.json"):
+            shutil.copy(VECTORS / name, folder / "vectors" / name)
+        (folder / "begun").mkdir()
+        (folder / "begun/plan.json").write_text(json.dumps(asdict(demo.QUICK), indent=2) + "\n")
 
     def read(self, name: str) -> bytes:
         """Return the content of a good file."""
@@ -277,7 +286,7 @@ COMMANDS: Sequence[tuple[str, str, str, str]] = (
 def commands(good: Good) -> list[Target]:
     """Return the commands that read a file, each as a target."""
     return [
-        Target(f"wamnet {name}", way, [good.read(file)], partial(_command, good, file, line))
+        Target(f"wamnet {name}", way, [good.read(file)], partial(_command, good, file, line), 1.0)
         for name, way, file, line in COMMANDS
         if (good.folder / file).exists()
     ]

@@ -1,0 +1,281 @@
+"""Command lines: other values of every option, and commands that want a process of their own.
+
+1. A line runs in a child that is forked from this process, with everything imported [`in_child`], in a folder
+   that has all good files [`Good`], a pipe, a folder and a link.
+2. What has not ended after BEGUN_S has been accepted, and works: it gets Ctrl-C, and must end in 130.
+3. The status must be 0, 1, 2 or 130; 2 comes with one error in one line, and nothing shows a traceback or
+   control characters. What the child has started must end with it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+
+from targets import CommandRefused, Good, Target
+
+from wamnet.cli.main import main
+
+BEGUN_S = 1.5
+"""Seconds after which a command has looked at all its options, and gets Ctrl-C."""
+
+ENDING_S = 15.0
+"""Seconds that it may take to end then; a kernel that is being compiled ends first."""
+
+CRASHED = 99
+"""Status of a child that an exception has ended."""
+
+LINES: Sequence[str] = (
+    "render minicubes --width 2 --height 2 --spp 1 --feature-spp 2 --seed 1 --time 0 --yaw 1 --pitch 1 "
+    "--distance 1.1 --light 1=1,1,1 --max-depth 2 --sampler sobol --dtype float32 --executor numpy "
+    "--workers 1 --exposure 0 -o out.png",
+    "scene minicubes --time 0.5 --set time=0.5 --yaw 3 --pitch 4 --distance 2 --light 1=1,1,0 -o out.json",
+    "dataset minicubes --frames 1 --test 1 --outside 1 --size 4 --spp 1 --test-spp 1 --feature-spp 2 "
+    "--start 0 --seconds 8 --arc 2 --yaw -3:3 --pitch 0:1 --distance 1:1.1 --saturation 0:0.5 --seed 1 "
+    "--max-depth 2 --executor numpy --sampler pcg4d --workers 1 -o out",
+    "train -i frame.exr -t frame.exr --preset short --features color,depth --rank 0 --steps 1 --seed 1 "
+    "--executor numpy -o out.safetensors",
+    "train --dataset set --from model.safetensors --variant rank1 --steps 1 -o out.safetensors",
+    "compile model.safetensors --target c --profile ieee --schedule plain --variant rank1 -o out",
+    "compile furnace --target opencl --time 0 --set albedo=0.5 --max-depth 2 --sampler pcg4d --lanes 1 -o o",
+    "compile model.safetensors --target c --max-error 0.9 --curve curve.json -o out",
+    "compile model.safetensors --target c --max-ms 9 --max-loss-db 9 --frames set --size 16 -o out",
+    "listing model.safetensors --target c --profile ieee -o out.txt",
+    "export model.safetensors --target c --profile ieee --variant rank1 --weights buffer -o out",
+    "export model.safetensors --target glsl --scene minicubes --time 0 --set time=1 --max-depth 2 "
+    "--sampler pcg4d -o out",
+    "certify kernel",
+    "denoise model.safetensors frame.exr --executor numpy --profile ieee --schedule plain --rank 1 -o o.exr",
+    "denoise model.safetensors frame.exr --executor numpy --variant hidden1+rank1 -o out.png",
+    "compare picture.png picture.png --json --exposure 0",
+    "compare --paths minicubes --executor opencl --width 4 --height 4 --sample 0 --spp 2 --seed 1 "
+    "--max-depth 2 --time 0 --set time=1",
+    "triage model.safetensors frame.exr --executor opencl --profile ieee --schedules plain --kernel kernel "
+    "-o out",
+    "animate model.safetensors --scene minicubes --start 0 --seconds 0.2 --fps 5 --size 4 --reference-spp 1 "
+    "--seed 1 --feature-spp 2 --set warm=1,1,1 --yaw 1 --pitch 1 --distance 1 --light 1=1,1,1 "
+    "--executor numpy --renderer numpy --rank 1 -o out.gif",
+    "view model.safetensors --scene minicubes --fast model.safetensors --set warm=1,1,1 --port 0 "
+    "--no-browser -o out.html",
+    "tune model.safetensors --executor numpy --size 4 --rank 1 --force --cache out",
+    "bench model.safetensors --size 8 --sizes 4,8 --only numpy* --executor numpy --repeats 1 --budget 1 "
+    "--steps 1 --frames 1 --reference-spp 1 --quick -o out",
+    "bench paper --synthetic --features color,normal --size 8 --only numpy* -o out",
+    "bench model.safetensors --quick --size 4 --dataset set --only numpy* --budget 1 --repeats 1 -o out",
+    "executors",
+    "conformance --executor reference --profile ieee -k random.block/1 --timeout 3 --json out.json "
+    "--junit out.xml --track track.json",
+    "conformance --executor numpy --vectors vectors --timeout 9",
+    "demo --size 8 -o out",
+    "demo --quick -o out",
+)
+"""A line of each command, with all its options."""
+
+
+class Wrong(Exception):
+    """A line has ended as none may."""
+
+
+def lines(good: Good) -> list[Target]:
+    """Return the commands' options, each command a target, and files that are read by commands apart."""
+    names = dict.fromkeys(line.split()[0] for line in LINES)
+    targets = [
+        Target(
+            f"options, {name}",
+            "words",
+            [_listed(line) for line in LINES if line.split()[0] == name],
+            use,
+            0.7,
+        )
+        for name in names
+        for use in [partial(_options, good)]
+    ]
+    return targets + [
+        Target(f"apart, {name}", way, [good.read(file)], partial(_apart, good, file, line), 0.7)
+        for name, way, file, line in APART
+    ]
+
+
+APART: Sequence[tuple[str, str, str, str]] = (
+    (
+        "triage",
+        "safetensors",
+        "model.safetensors",
+        "triage model.safetensors frame.exr --executor numpy --schedules plain -o out",
+    ),
+    (
+        "triage, kernel",
+        "json",
+        "kernel/manifest.json",
+        "triage model.safetensors frame.exr --executor opencl --kernel kernel -o out",
+    ),
+    (
+        "animate",
+        "safetensors",
+        "model.safetensors",
+        "animate model.safetensors --seconds 0.2 --fps 5 --size 4 -o out.gif",
+    ),
+    ("view", "safetensors", "model.safetensors", "view model.safetensors -o out.html"),
+    ("view, scene", "json", "scene.json", "view model.safetensors --scene scene.json -o out.html"),
+    ("export, scene", "json", "scene.json", "export model.safetensors --target c --scene scene.json -o out"),
+    (
+        "train, from",
+        "safetensors",
+        "model.safetensors",
+        "train --dataset set --from model.safetensors --variant rank1 --steps 1",
+    ),
+    (
+        "tune",
+        "safetensors",
+        "model.safetensors",
+        "tune model.safetensors --executor numpy --size 4 --cache out",
+    ),
+    (
+        "bench",
+        "safetensors",
+        "model.safetensors",
+        "bench model.safetensors --quick --size 8 --frames 1 --reference-spp 1 --repeats 1 --only numpy* "
+        "-o out",
+    ),
+    (
+        "dataset, begun",
+        "json",
+        "set/manifest.json",
+        f"{LINES[2].split(' --frames')[0]} --frames 1 --test 1 "
+        "--size 4 --spp 1 --executor numpy --workers 1 -o set",
+    ),
+    (
+        "conformance --track",
+        "json",
+        "track.json",
+        "conformance --executor reference -k random.block/1 --track track.json",
+    ),
+    (
+        "conformance, vectors",
+        "json",
+        "vectors/metric.mse.json",
+        "conformance --executor reference --vectors vectors",
+    ),
+    ("demo, plan", "json", "begun/plan.json", "demo --quick -o begun"),
+)
+"""Name, way to change, the good file that is changed, and the command, in a folder of good files."""
+
+
+def _listed(line: str) -> bytes:
+    """Return a line as a list of words."""
+    return json.dumps(line.split()).encode()
+
+
+def _options(good: Good, content: bytes, folder: Path) -> None:
+    """Run a line; its words are data."""
+    prepare(good, folder)
+    check(*in_child(json.loads(content), folder, BEGUN_S))
+
+
+def _apart(good: Good, file: str, line: str, content: bytes, folder: Path) -> None:
+    """Run a command on a changed file in the place of a good one."""
+    prepare(good, folder)
+    (folder / file).write_bytes(content)
+    check(*in_child(line.split(), folder, BEGUN_S))
+
+
+def prepare(good: Good, folder: Path) -> None:
+    """Put all good files into a folder, and things that are none."""
+    shutil.copytree(good.folder, folder, dirs_exist_ok=True)
+    os.mkfifo(folder / "pipe")
+    (folder / "folder").mkdir()
+    (folder / "link").symlink_to("picture.png")
+
+
+def in_child(words: Sequence[str], folder: Path, begun_s: float) -> tuple[int, str, bool]:
+    """Run a line in a child; return its status, all that it said, and whether a process of it was left."""
+    said = folder / ".said"
+    child = os.fork()
+    if child == 0:
+        _run(words, said)
+    status = _ended(child, begun_s)
+    left = False
+    # What it has started may end a moment after it.
+    for _ in range(100):
+        left = bool(_alive(child))
+        if not left:
+            break
+        time.sleep(0.1)
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(child, signal.SIGKILL)
+    return status, said.read_text(encoding="utf-8", errors="replace"), left
+
+
+def _run(words: Sequence[str], said: Path) -> None:
+    """Be the child: run the line, with all that is said in a file."""
+    status = CRASHED
+    try:
+        os.setsid()
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+        with said.open("w", buffering=1, encoding="utf-8", errors="backslashreplace") as file:
+            sys.stdout = sys.stderr = file
+            os.dup2(file.fileno(), 1)
+            os.dup2(file.fileno(), 2)
+            os.environ["BROWSER"] = "true"
+            sys.argv = ["wamnet", *words]
+            try:
+                status = main(words)
+            except BaseException:  # noqa: BLE001 - whatever it is, it is none of ours
+                traceback.print_exc()
+            file.flush()
+    finally:
+        os._exit(status)
+
+
+def _ended(child: int, begun_s: float) -> int:
+    """Wait for a child, with Ctrl-C after a while, and again if nothing comes of it; return its status."""
+    began, sent = time.monotonic(), 0
+    while True:
+        pid, status = os.waitpid(child, os.WNOHANG)
+        if pid:
+            return os.waitstatus_to_exitcode(status)
+        passed = time.monotonic() - began
+        if passed > begun_s + ENDING_S:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            raise Wrong(f"it did not end within {ENDING_S:g} s of Ctrl-C")
+        if passed > begun_s + sent * ENDING_S / 3:
+            os.kill(child, signal.SIGINT)
+            sent += 1
+        time.sleep(0.002)
+
+
+def _alive(session: int) -> list[int]:
+    """Return the processes of a session that have not ended."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, _, _, of = path.read_text().rpartition(")")[2].split()[:4]
+            found += [int(path.parent.name)] if int(of) == session and state != "Z" else []
+    return found
+
+
+def check(status: int, said: str, left: bool) -> None:
+    """Insist on an end as commands have it; raise a refusal for status 2, else a finding."""
+    if "Traceback" in said or status not in (0, 1, 2, 130):
+        raise Wrong(f"status {status}, it said {said[-400:]!r}")
+    if status == 2 and (said.count("wamnet: error: ") != 1 or "wamnet: error: " not in said.splitlines()[-1]):
+        raise Wrong(f"no error in one line: {said[-400:]!r}")
+    if left:
+        raise Wrong("a process of it was left")
+    shown = said.replace("\n", "")
+    if not shown.isprintable():
+        raise Wrong(f"control characters reach the terminal: {ascii(shown)[:300]}")
+    if status == 2:
+        raise CommandRefused(said)

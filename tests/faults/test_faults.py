@@ -8,13 +8,25 @@ import pytest
 
 @pytest.mark.parametrize("kind", faults.FAULTS)
 def test_a_fault_loses_nothing(tmp_path, kind) -> None:
-    """A kill, a full disk, a folder that cannot be written, two writers: the next run goes on."""
-    bench, case = faults.Bench(tmp_path), faults.CASES["train"]
+    """A kill, a full disk, a folder that cannot be written, a lost worker, two: the next run goes on."""
+    bench, case = faults.Bench(tmp_path), faults.CASES["render" if kind == "revoked" else "train"]
     bench.undisturbed(case)
-    wrong = bench.fault(case, kind, faults.random.Random(7))
+    wrong = bench.fault(case, kind, faults.random.Random(7), faults.Who())
     if wrong is None:
-        pytest.skip("root may write everywhere, and setpriv is not there")
+        pytest.skip("; ".join(bench.cannot()))
     assert wrong == []
+
+
+def test_a_fault_of_another_user_loses_nothing(tmp_path) -> None:
+    """Who is not root has a folder and a home of its own."""
+    for folder in (tmp_path, *tmp_path.parents[:3]):
+        if folder.owner() == tmp_path.owner():
+            folder.chmod(0o755)
+    bench, case = faults.Bench(tmp_path), faults.CASES["train-often"]
+    if bench.other is None:
+        pytest.skip("; ".join(bench.cannot()) or "this user is not root: all faults are another user's")
+    bench.undisturbed(case)
+    assert bench.fault(case, "KILL", faults.random.Random(8), bench.other) == []
 
 
 @pytest.mark.slow

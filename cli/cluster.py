@@ -100,19 +100,29 @@ def open_client(workers: int, scheduler: str | None) -> Iterator[Any]:
             with _connected(distributed, scheduler) as client:
                 yield client
             return
+        cluster = _local(distributed, workers)
+        try:
+            with distributed.Client(cluster) as client:
+                yield client
+        finally:
+            cluster.close()
+
+
+def _local(distributed: Any, workers: int) -> Any:
+    """Return a cluster of processes of this machine, or say that they did not start."""
+    try:
         with _undisturbed():
-            cluster = distributed.LocalCluster(
+            return distributed.LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
                 dashboard_address="127.0.0.1:0",
                 silence_logs=logging.CRITICAL,
             )
-        try:
-            with distributed.Client(cluster) as client:
-                yield client
-        finally:
-            cluster.close()
+    except (RuntimeError, OSError, TimeoutError):
+        rule = "one of them ended, or did not answer, before it had begun"
+        way_out = "run the same command again to go on, perhaps with fewer --workers"
+        raise InputError("worker processes", workers, rule, way_out) from None
 
 
 @contextmanager

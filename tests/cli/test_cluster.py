@@ -88,6 +88,21 @@ def test_a_worker_that_a_task_kills() -> None:
         cluster.do_on_cluster(client, [9], lambda number: os.kill(os.getpid(), number), lambda *_: None)
 
 
+@pytest.mark.parametrize(
+    "error", [RuntimeError("Nanny failed to start."), OSError("no port"), TimeoutError()]
+)
+def test_workers_that_do_not_start(monkeypatch, error) -> None:
+    """A worker that was killed before it had begun: a traceback of Dask's, and status 1."""
+
+    def fails(**_):
+        raise error
+
+    monkeypatch.setattr("distributed.LocalCluster", fails)
+    rule = "worker processes is 2: one of them ended, .* run the same command again to go on"
+    with pytest.raises(InputError, match=rule), cluster.open_client(2, None):
+        pass
+
+
 def test_a_worker_without_the_package(monkeypatch) -> None:
     """A function whose module only this process has, as where a worker lacks wamnet: a line, no waiting."""
     module = types.ModuleType("only_here")

@@ -182,7 +182,7 @@ def handler_of(page: bytes) -> type[BaseHTTPRequestHandler]:
             """Send the head of an answer; tell whether the page comes after it."""
             port = self.server.server_address[1]  # type: ignore[index]
             hosts = self.headers.get_all("Host") or []
-            if len(hosts) != 1 or hosts[0].strip().lower() not in [f"{name}:{port}" for name in NAMES]:
+            if len(hosts) != 1 or hosts[0].strip(" \t").lower() not in [f"{name}:{port}" for name in NAMES]:
                 self.send_error(HTTPStatus.MISDIRECTED_REQUEST)
                 return False
             if self.path != "/":

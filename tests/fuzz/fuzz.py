@@ -12,6 +12,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import logging
 import os
 import resource
@@ -61,6 +62,30 @@ class Found:
     name: str
     counts: Counter[str] = field(default_factory=Counter)
     findings: list[tuple[int, str]] = field(default_factory=list)
+    following: int = 0
+
+
+def read_state(path: Path, seed: int) -> dict[str, Found]:
+    """Return what earlier runs of this seed have found; nothing where there was none."""
+    if not path.exists():
+        return {}
+    state = json.loads(path.read_text())
+    assert state["seed"] == seed, f"{path} is of seed {state['seed']}"
+    found = state["found"].items()
+    return {name: Found(name, Counter(one["counts"]), *(one[k] for k in KEPT)) for name, one in found}
+
+
+KEPT = ("findings", "following")
+"""What a state keeps besides counts."""
+
+
+def write_state(path: Path, seed: int, total: dict[str, Found]) -> None:
+    """Keep what was found, for runs that go on."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    found = {
+        name: {"counts": one.counts, **{k: getattr(one, k) for k in KEPT}} for name, one in total.items()
+    }
+    path.write_text(json.dumps({"seed": seed, "found": found}, indent=1))
 
 
 def changed(target: Target, seed: int, number: int) -> bytes:
@@ -154,18 +179,27 @@ def names_of() -> list[str]:
 
 
 def fuzz(
-    seed: int, seconds: float, count: int, workers: int, only: Sequence[str], most: int = 2**60
+    seed: int,
+    seconds: float,
+    count: int,
+    workers: int,
+    only: Sequence[str],
+    most: int = 2**60,
+    before: dict[str, Found] | None = None,
 ) -> dict[str, Found]:
-    """Let all targets take turns, until there were `most` inputs; return what was found, by target."""
+    """Let all targets take turns, until there were `most` inputs; return what was found, by target.
+
+    `before`: what earlier runs of this seed have found; this one goes on where they ended.
+    """
     until = time.monotonic() + seconds
-    total: dict[str, Found] = {}
+    total = dict(before or {})
     context = get_context("spawn")
     pool = ProcessPoolExecutor(workers, context, prepare)
     names = [
         name for name in pool.submit(names_of).result() if not only or any(word in name for word in only)
     ]
-    following = dict.fromkeys(names, 0)
-    waiting, running, tried_all = list(names), {}, 0
+    following = {name: total[name].following if name in total else 0 for name in names}
+    waiting, running, tried_all = list(names), {}, sum(sum(found.counts.values()) for found in total.values())
     while waiting or running:
         while waiting and len(running) < workers and time.monotonic() < until and tried_all < most:
             name = waiting.pop(0)
@@ -190,6 +224,7 @@ def fuzz(
                 print(f"FOUND {name}, {number}: {what}", flush=True)
             known.counts += found.counts
             known.findings += found.findings
+            known.following = following[name]
             if following[name] < count:
                 waiting.append(name)
     pool.shutdown()
@@ -235,6 +270,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=None, help="repeats a run")
     parser.add_argument("--workers", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--only", nargs="*", default=[], help="targets whose name holds one of these words")
+    parser.add_argument("--state", type=Path, help="file of counts: a run goes on where the last one ended")
     parser.add_argument("--at", type=int, default=None, help="this one input, with its traceback")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/fuzz"), help="folder of findings")
     given: Any = parser.parse_args(arguments)
@@ -242,7 +278,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given.at is not None:
         return again(" ".join(given.only), seed, given.at)
     numbers = (seed, given.minutes * 60, given.count, given.workers)
-    return report(fuzz(*numbers, given.only, given.inputs), seed, given.output)
+    before = read_state(given.state, seed) if given.state else {}
+    total = fuzz(*numbers, given.only, given.inputs, before)
+    if given.state:
+        write_state(given.state, seed, total)
+    return report(total, seed, given.output)
 
 
 def again(name: str, seed: int, number: int) -> int:

@@ -60,6 +60,9 @@ NAME = re.compile(r"(train|test|outside)/\d{5}-(noisy|target)\.exr")
 BAND = re.compile(r"(train|test|outside)-(\d{5}-(?:noisy|target))\.(\d+)-(\d+)\.([0-9a-f]{64})\.exr")
 """What a band's file is called: its picture, its rows [first, last), its SHA-256."""
 
+DIGEST = re.compile("[0-9a-f]{64}")
+"""A SHA-256."""
+
 SPLITS = ("train", "test", "outside")
 """Folders of the pictures."""
 
@@ -82,15 +85,19 @@ Look = Callable[[int], None]
 """Called with a number of bytes that were just compared."""
 
 
-def sum_of(path: Path) -> Sum:
-    """Return what a file is known by."""
+def sum_of(path: Path, stated: int | None = None) -> Sum:
+    """Return what a file is known by; one of another length than the stated one is not read."""
     digest, length = hashlib.sha256(), 0
     # A pipe of this name must not make us wait, nor a device give bytes without end.
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with os.fdopen(handle, "rb") as file:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
+        found = os.fstat(handle)
+        if not stat.S_ISREG(found.st_mode):
             raise InputError("file", str(path), "it is no regular file", "remove it")
-        while block := file.read(1 << 20):
+        if stated not in (None, found.st_size):
+            return Sum(found.st_size, "")
+        # It may grow while it is read.
+        while length <= found.st_size and (block := file.read(1 << 20)):
             digest.update(block)
             length += len(block)
     return Sum(length, digest.hexdigest())
@@ -111,7 +118,7 @@ def _wrong(folder: Path, names: Sequence[str], sums: Sums, on_look: Look | None)
             wrong[name] = "not made yet"
         elif not path.is_file():
             wrong[name] = "missing"
-        elif path.stat().st_size != known.bytes or sum_of(path) != known:
+        elif sum_of(path, known.bytes) != known:
             wrong[name] = "damaged"
         if on_look is not None and known is not None:
             on_look(known.bytes)
@@ -193,7 +200,15 @@ def _names(manifest: Mapping[str, Any]) -> list[str]:
 def _sums_of(manifest: Mapping[str, Any]) -> dict[str, Sum]:
     """Return what the manifest knows of its finished pictures."""
     pictures = [frame[kind] for frame in manifest["frames"] for kind in KINDS]
-    return {p["file"]: Sum(int(p["bytes"]), str(p["sha256"])) for p in pictures if p["sha256"] is not None}
+    return {p["file"]: _sum_in(p) for p in pictures if p["sha256"] is not None}
+
+
+def _sum_in(entry: Mapping[str, Any]) -> Sum:
+    """Return what an entry of a manifest or a journal states of a file."""
+    length, digest = entry["bytes"], entry["sha256"]
+    if type(length) is not int or length < 0 or not DIGEST.fullmatch(digest):
+        raise ValueError("it states no length and SHA-256 of a file")
+    return Sum(length, digest)
 
 
 # ---- using a data set ------------------------------------------------------------------------------------
@@ -405,7 +420,7 @@ def _read_journal(path: Path) -> dict[str, Sum]:
     for line in text.splitlines():
         try:
             entry = parse_json(line, "journal", "go on")
-            sums[str(entry["file"])] = Sum(int(entry["bytes"]), str(entry["sha256"]))
+            sums[str(entry["file"])] = _sum_in(entry)
         except BROKEN:
             continue
     return sums

@@ -58,8 +58,12 @@ def read_file(
     what: str = "input file",
     way_out: str = "check the path",
     most: int = LARGEST_FILE_BYTES,
+    stated: int | None = None,
 ) -> bytes:
-    """Return the content of a regular file of at most `most` bytes; `what` names it in an error."""
+    """Return the content of a regular file of at most `most` bytes; `what` names it in an error.
+
+    `stated`: the length that a manifest states; a file of another one is refused and not read.
+    """
     shown = os.fspath(path)
     try:
         _check_regular(Path(path).stat(), what, shown)
@@ -68,7 +72,8 @@ def read_file(
         with os.fdopen(handle, "rb") as file:
             found = os.fstat(handle)
             _check_regular(found, what, shown)
-            content = file.read(most + 1) if found.st_size <= most else b""
+            wanted = found.st_size <= most and stated in (None, found.st_size)
+            content = file.read(most + 1 if stated is None else stated) if wanted else b""
             size = max(found.st_size, len(content))
     except InputError:
         raise
@@ -77,6 +82,8 @@ def read_file(
         raise InputError(what, shown, f"it cannot be read ({reason})", way_out) from None
     if size > most:
         raise InputError(f"size of {shown} in bytes", size, f"at most {most} bytes are read", way_out)
+    if stated is not None and not size == len(content) == stated:
+        raise InputError(f"size of {shown} in bytes", size, f"it must be the stated one, {stated}", way_out)
     return content
 
 
@@ -116,6 +123,22 @@ def plain_name(name: Any, what: str, way_out: str) -> str:
     if not isinstance(name, str) or name in ("", ".", "..") or any(sign in name for sign in "/\\\0"):
         raise InputError(what, name, "it must be the plain name of a file in its own folder", way_out)
     return name
+
+
+def stated_bytes(manifest: Mapping[str, Any], name: str, what: str, way_out: str) -> int | None:
+    """Return the length that a manifest states of a file; None where it is an older one that states none."""
+    if SIZES not in manifest:
+        return None
+    sizes = manifest[SIZES]
+    size = sizes.get(name) if isinstance(sizes, dict) else None
+    if type(size) is not int or size < 0:
+        rule = "it must be the file's length in bytes, a whole number"
+        raise InputError(f"{what}: {SIZES}: {name}", size, rule, way_out)
+    return size
+
+
+SIZES = "file_bytes"
+"""Key of a manifest: the length of each of its files, by name."""
 
 
 # ---- JSON -------------------------------------------------------------------------------------------------

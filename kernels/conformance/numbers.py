@@ -52,7 +52,7 @@ def from_file(value: Mapping[str, Any], what: str) -> NDArray[np.float32]:
     rule = "it must name a file of little-endian float32 of its shape"
     with refusing(what, _shortened(value), rule, way_out):
         shape = tuple(int(side) for side in value["shape"])
-        raw = read_file(str(value["file"]), what, way_out)
+        raw = read_file(str(value["file"]), what, way_out, stated=4 * math.prod(shape))
         return np.frombuffer(raw, "<f4").astype(np.float32).reshape(shape)
 
 

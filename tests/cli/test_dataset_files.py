@@ -145,6 +145,19 @@ def test_damage_is_found_and_mended(tmp_path, whole) -> None:
     assert content(tmp_path) == whole
 
 
+def test_a_picture_of_another_length_is_not_read(tmp_path, monkeypatch) -> None:
+    """DSF-8: nor is one that grows while it is read."""
+    path = tmp_path / "a.exr"
+    path.write_bytes(bytes(5))
+    assert files.sum_of(path, 5) == files.sum_of(path)
+    with path.open("r+b") as file:
+        file.truncate(2**40)
+    assert files.sum_of(path, 5) == files.Sum(2**40, "")
+    found = os.stat_result((0o100644, *[0] * 5, 5, *[0] * 3))
+    monkeypatch.setattr(files.os, "fstat", lambda _handle: found)
+    assert files.sum_of(path, 5).bytes == 2**20
+
+
 def test_other_bytes_are_told(tmp_path, whole) -> None:
     """What another machine had made is made again here, and named."""
     make(tmp_path)
@@ -299,6 +312,8 @@ def test_a_journal_that_is_damaged(tmp_path, whole, line) -> None:
         ('"split": "train"', '"split": "rest"', "or damaged"),
         ('"bytes": ', '"bytes": "x", "was": ', "or damaged"),
         ('"bytes": ', '"bytes": 1e999, "was": ', "or damaged"),
+        ('"bytes": ', '"bytes": -1, "was": ', "or damaged"),
+        ('"sha256": "', '"sha256": "A', "or damaged"),
         ("{", 50000 * "[", "or damaged"),
     ],
 )

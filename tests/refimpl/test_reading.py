@@ -133,6 +133,49 @@ def test_no_more_than_the_limit_is_read(tmp_path):
         read_file(path)
 
 
+@pytest.mark.parametrize("stated", [0, 3, 5, 2**70])
+def test_a_file_of_another_length_than_stated_is_not_read(tmp_path, monkeypatch, stated):
+    (tmp_path / "file").write_bytes(b"1234")
+    assert read_file(tmp_path / "file", stated=4) == b"1234"
+    monkeypatch.setattr(reading.os, "fdopen", lambda handle, _mode: Unread(handle))
+    with pytest.raises(InputError, match=f"in bytes is 4: it must be the stated one, {stated}"):
+        read_file(tmp_path / "file", stated=stated)
+
+
+class Unread:
+    """An open file that nobody may read."""
+
+    def __init__(self, handle):
+        self.handle = handle
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        os.close(self.handle)
+
+    def read(self, _size):
+        pytest.fail("it was read")
+
+
+def test_a_file_that_becomes_shorter_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "file").write_bytes(b"123")
+    found = os.stat_result((0o100644, *[0] * 5, 4, *[0] * 3))
+    monkeypatch.setattr(reading.os, "fstat", lambda _handle: found)
+    with pytest.raises(InputError, match="stated one, 4"):
+        read_file(tmp_path / "file", stated=4)
+
+
+@pytest.mark.parametrize("sizes", [None, [], {}, {"a": -1}, {"a": 1.0}, {"a": True}, {"a": "1"}, {"b": 1}])
+def test_lengths_that_a_manifest_does_not_state_are_refused(sizes):
+    assert reading.stated_bytes({"file_bytes": {"a": 7}}, "a", "manifest", "mend it") == 7
+    assert reading.stated_bytes({}, "a", "manifest", "mend it") is None, "an older manifest"
+    with pytest.raises(
+        InputError, match=r"manifest: file_bytes: a is .*: it must be the file's length in bytes"
+    ):
+        reading.stated_bytes({"file_bytes": sizes}, "a", "manifest", "mend it")
+
+
 def test_a_file_that_grows_after_the_look_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "file"
     path.write_bytes(b"12345")

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..refimpl.errors import ExecutorUnavailable, InputError
-from ..refimpl.reading import parse_json, read_file, refusing
+from ..refimpl.reading import SIZES, parse_json, read_file, refusing
 from . import machine, options
 from .inputs import load_model, model_path, need_layers
 from .outputs import check_new_folder, making_folder
@@ -396,7 +396,8 @@ class Kept:
 def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
     """Return the kernel whose manifest and files lie in a folder.
 
-    They may have been changed: their hashes are not asked for. The manifest says of what they are the kernel.
+    They may have been changed: neither their hashes nor their lengths are asked for. The manifest says of
+    what they are the kernel.
     """
     from ..compiler import artifact, ir
     from ..compiler.compile import compile_program
@@ -436,9 +437,10 @@ def _with_files(made: Artifact, folder: Path) -> Artifact:
         source = content.decode("utf-8")
     own = {made.source_name: ir.sha256(content), artifact.WEIGHTS_NAME: ir.sha256(raw)}
     files = {**made.manifest["files"], **own}
+    sizes = {**made.manifest[SIZES], made.source_name: len(content), artifact.WEIGHTS_NAME: len(raw)}
     return replace(
         made,
         source=source,
         weights=np.frombuffer(raw, "<f4").astype(np.float32),
-        manifest={**made.manifest, "digest": ir.sha256(content, raw), "files": files},
+        manifest={**made.manifest, "digest": ir.sha256(content, raw), "files": files, SIZES: sizes},
     )

@@ -1,6 +1,7 @@
 """Check a certificate: derive every number again from the program's text and the kernel's weights.
 
-1. The files beside it have the digests that it states; the text and the weights make the program's [`_read`].
+1. The files beside it have the lengths that the manifest states and the digests that both state; the text
+   and the weights make the program's [`_read`].
 2. The text is that of a network of sines; anything else is refused [`_layers`].
 3. Each layer: magnitudes, rounding of sums in parts, the sine's error [`_layer`]; each output: how far each
    layer's errors reach, by norms that hold for the scalings in the certificate [`_output`].
@@ -22,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from ..refimpl.reading import parse_json, plain_name, read_file, refusing
+from ..refimpl.reading import parse_json, plain_name, read_file, refusing, stated_bytes
 from .opencl import OpenCL
 from .profiles import emitted_sine
 from .sine import POLYNOMIALS
@@ -71,8 +72,10 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, An
     texts = [read_file(p, "certificate") for p in (path, path.parent / "manifest.json")]
     held, manifest = (parse_json(text, "certificate", "restore it") for text in texts)
     _same("schema", held["schema"], "wamnet-certificate-1")
-    names = (plain_name(name, "manifest: name of a file", "restore it") for name in manifest["files"])
-    files = {name: read_file(path.parent / name) for name in names}
+    files = {}
+    for name in (plain_name(name, "manifest: name of a file", "restore it") for name in manifest["files"]):
+        stated = stated_bytes(manifest, name, "manifest", "restore it")
+        files[name] = read_file(path.parent / name, "file", "restore it", stated=stated)
     for name, data in files.items():
         _same(f"digest of {name}", held["files"].get(name), hashlib.sha256(data).hexdigest())
     kernel = [manifest["digest"], manifest["profile"]["name"]]

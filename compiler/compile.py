@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..refimpl.errors import InputError
-from ..refimpl.reading import parse_json
+from ..refimpl.reading import SIZES, parse_json
 from . import artifact, bounds, certificate, ir, schedules
 from .artifact import Artifact
 from .emit import kernel_gather, output_channels
@@ -110,7 +110,9 @@ def _joined(before: Artifact, found: Artifact, report: Mapping[str, Any]) -> Art
     files = {f"{artifact.FIRST_PASS}{name}": value for name, value in before.manifest["files"].items()}
     files = {**files, **found.manifest["files"]}
     bound = {**found.manifest["bound"], "against": "float64 reference of the program that was cut"}
-    own = {"digest": digest, "files": files, "bound": bound, "factored": factored}
+    sizes = {f"{artifact.FIRST_PASS}{name}": size for name, size in before.manifest[SIZES].items()}
+    own = {"digest": digest, "files": files, SIZES: {**sizes, **found.manifest[SIZES]}, "bound": bound}
+    own["factored"] = factored
     manifest = {**found.manifest, **own}
     return replace(found, manifest=manifest, before=before)
 
@@ -215,6 +217,7 @@ def _assemble(plan: Plan, bound: Bound, source: str) -> Artifact:
             source_name: ir.sha256(source.encode()),
             artifact.WEIGHTS_NAME: ir.sha256(raw),
         },
+        SIZES: {source_name: len(source.encode()), artifact.WEIGHTS_NAME: len(raw)},
         "private_bytes": schedule.private_bytes(emitted),
         "schedule": plan.picked.manifest(),
         "weights": {

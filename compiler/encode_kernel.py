@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..refimpl.dataset import FEATURES, Normalization
 from ..refimpl.errors import CompileError
+from ..refimpl.reading import SIZES
 from . import bounds, ir, profiles
 from .artifact import OneSource
 from .c_path import CEncode
@@ -114,6 +115,7 @@ def compile_encode(
         "arguments": arguments,
         "bound": None,
         "files": {name: ir.sha256(text.encode())},
+        SIZES: {name: len(text.encode())},
     }
     return EncodeArtifact(target, profile, entry, text, name, program, planes, images, manifest)
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..refimpl.errors import CompileError
+from ..refimpl.reading import SIZES
 from . import emit_path, ir, opencl_path, profiles
 from .artifact import OneSource
 from .c_path import CPath
@@ -172,6 +173,7 @@ def _identity(programs: PathPrograms, name: str, text: str) -> dict[str, Any]:
         "programs": {part: ir.digest(program) for part, program in programs.parts().items()},
         "bound": None,
         "files": {name: ir.sha256(text.encode())},
+        SIZES: {name: len(text.encode())},
     }
 
 

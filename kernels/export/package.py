@@ -35,6 +35,7 @@ from ...compiler.targets import target_named
 from ...compiler.variants import FULL, parse, plan_model, vary
 from ...refimpl.denoise import Model, learned_feature_spp
 from ...refimpl.errors import InputError
+from ...refimpl.reading import SIZES
 from ...refimpl.scene import Scene
 from ...refimpl.transport import Settings
 from . import bindings, check_pair, onnx_export, readme
@@ -170,12 +171,13 @@ def _finished(
     passes: Mapping[str, str],
     pair: check_pair.Pair,
 ) -> Export:
-    """Return the export with its README and manifest, which carries the hashes of all other files."""
+    """Return the export with its README and manifest, which has hashes and lengths of all other files."""
     facts = {"schema": SCHEMA, "target": request.target, "licence": LICENCE, "check": pair.facts(), **facts}
     files = {**files, README_NAME: readme.readme(facts, sorted(files)).encode()}
     hashes = {name: sha256(data) for name, data in sorted(files.items())}
     digest = sha256(*(value.encode() for value in hashes.values()))
-    manifest = json.loads(json.dumps({**facts, "files": hashes, "digest": digest}, allow_nan=False))
+    named = {"files": hashes, SIZES: {name: len(files[name]) for name in hashes}, "digest": digest}
+    manifest = json.loads(json.dumps({**facts, **named}, allow_nan=False))
     return Export(request, files, manifest, denoiser, path, encoder, passes, pair)
 
 

@@ -61,8 +61,32 @@ def test_a_pipe_beside_a_kernel_is_refused_at_once(refused, kernel):
     path = kernel / "manifest.json"
     manifest = json.loads(path.read_text())
     os.mkfifo(kernel / "pipe")
-    path.write_text(json.dumps({**manifest, "files": {**manifest["files"], "pipe": "0"}}))
+    named = {"files": {**manifest["files"], "pipe": "0"}, "file_bytes": {**manifest["file_bytes"], "pipe": 0}}
+    path.write_text(json.dumps({**manifest, **named}))
     assert "it is no regular file" in refused("certify", kernel)
+
+
+def test_a_file_of_another_length_is_refused(refused, kernel):
+    """RDG-4: the manifest states how long it is."""
+    with (kernel / "weights.bin").open("r+b") as file:
+        file.truncate(8)
+    assert "weights.bin in bytes is 8: it must be the stated one, " in refused("certify", kernel)
+
+
+@pytest.mark.parametrize("size", [None, -1, 1.5, "8", True])
+def test_a_length_is_a_whole_number(refused, kernel, size):
+    path = kernel / "manifest.json"
+    manifest = json.loads(path.read_text())
+    path.write_text(json.dumps({**manifest, "file_bytes": {**manifest["file_bytes"], "weights.bin": size}}))
+    assert "file_bytes: weights.bin is" in refused("certify", kernel)
+
+
+def test_a_manifest_from_before_lengths_is_accepted(wamnet, kernel):
+    path = kernel / "manifest.json"
+    manifest = json.loads(path.read_text())
+    del manifest["file_bytes"]
+    path.write_text(json.dumps(manifest))
+    assert wamnet("certify", kernel).status == 0
 
 
 def test_numbers_that_a_weights_file_does_not_have_are_not_made_room_for(wamnet, kernel):

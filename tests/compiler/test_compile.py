@@ -97,7 +97,10 @@ def test_written_artifact_carries_its_hashes(tmp_path):
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == sorted(path.name for path in written)
     manifest = json.loads((tmp_path / "new" / "manifest.json").read_text())
     for name, digest in manifest["files"].items():
-        assert ir.sha256((tmp_path / "new" / name).read_bytes()) == digest
+        content = (tmp_path / "new" / name).read_bytes()
+        assert ir.sha256(content) == digest
+        assert len(content) == manifest["file_bytes"][name]
+    assert manifest["file_bytes"].keys() == manifest["files"].keys()
     raw = np.fromfile(tmp_path / "new" / "weights.bin", "<f4")
     assert raw.size == manifest["weights"]["count"]
 

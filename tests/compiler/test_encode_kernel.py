@@ -85,6 +85,7 @@ def test_golden_manifest(golden):
 def test_the_manifest_names_what_was_made():
     made = compile_encode(("normal", "depth"), SCALES, "opengl")
     assert made.manifest["files"] == {"encode.frag": ir.sha256(made.source.encode())}
+    assert made.manifest["file_bytes"] == {"encode.frag": len(made.source.encode())}
     assert made.digest == ir.sha256(made.source.encode())
     assert made.planes == ("normal_x", "normal_y", "normal_z", "depth")
     assert [image.name for image in made.images] == ["normal", "depth"]

@@ -122,6 +122,7 @@ def test_manifest_and_files_hold_both_passes(tmp_path) -> None:
     ]
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert sorted(manifest["files"]) == sorted(names[:-1])
+    assert manifest["file_bytes"] == {name: (tmp_path / name).stat().st_size for name in names[:-1]}
     assert manifest["factored"]["rank"] == 5
     assert manifest["factored"]["horizontal"]["window"] == {
         "size": 4,

@@ -61,6 +61,7 @@ def test_compiling_again_gives_the_same_bytes():
 def test_the_manifest_names_what_was_made():
     made = kernel("cornell", "opengl", lanes=1)
     assert made.manifest["files"] == {"path.frag": ir.sha256(made.source.encode())}
+    assert made.manifest["file_bytes"] == {"path.frag": len(made.source.encode())}
     assert made.digest == ir.sha256(made.source.encode())
     assert made.manifest["planes"] == planes(
         ("color", "deviation", "albedo", "normal", "depth", "position", "direction", "unshadowed")

@@ -75,6 +75,7 @@ def test_the_manifest_is_of_the_schema_and_names_every_file(exported):
     jsonschema.Draft202012Validator(schema).validate(manifest)
     hashes = {n: hashlib.sha256(data).hexdigest() for n, data in contents.items() if n != "manifest.json"}
     assert manifest["files"] == hashes
+    assert manifest["file_bytes"] == {name: len(contents[name]) for name in hashes}
     named = {name for kernel in manifest["kernels"] for name in kernel["files"]}
     assert named <= set(hashes)
     assert manifest["kernels"][-1]["role"] == "denoise"

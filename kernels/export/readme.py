@@ -85,6 +85,7 @@ def _facts(facts: Mapping[str, Any]) -> list[str]:
         f"* Output: {facts['output']['encoding'] or 'linear'}.",
         *images,
         *_rays(facts),
+        "* Size: no image, and no buffer of sums, may hold 2^31 numbers or more.",
         *(f"* Limit: {x['name']}: needs {x['needs']} of {x['most']}." for x in facts["limits"]),
     ]
 

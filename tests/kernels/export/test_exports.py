@@ -82,6 +82,7 @@ def test_the_manifest_is_of_the_schema_and_names_every_file(exported):
     assert "are yours" in manifest["licence"]
     readme = contents["README.md"].decode()
     assert all(name in readme for name in named)
+    assert "may hold 2^31 numbers or more" in readme
     assert "{" not in readme.partition("## Integration")[2].partition("```")[0]
 
 

@@ -24,6 +24,7 @@ from ..compiler.writing import remove_temporaries
 from ..refimpl.errors import InputError
 from . import machine, movie, options
 from .alone import working_in
+from .effort import said_of_rendering
 from .inputs import load_model, model_path, unlike_training
 from .options import ExecutorName, Renderer
 from .outputs import check_output, check_parent, check_real_folder
@@ -153,6 +154,8 @@ def _draw(
     # It was another process's until now.
     left = missing(folder, shots)
     remove_temporaries(folder)
+    for line in _said_of(left, renderer):
+        say(line)
     with (
         open_executor(executor.value) as runner,
         progress("drawing", len(left)) as advance,
@@ -161,6 +164,15 @@ def _draw(
         for _ in draw(left, network, runner, renderer.value, with_rank(FULL, rank)):
             advance(1)
     return len(left)
+
+
+def _said_of(shots: Sequence[Shot], renderer: Renderer) -> list[str]:
+    """Return the sentence about large work."""
+    if not shots:
+        return []
+    jobs = [job for shot in shots for job in (shot.noisy, shot.reference) if job is not None]
+    pixels = shots[0].noisy.width * shots[0].noisy.height
+    return said_of_rendering(shots[0].scene, sum(job.samples for job in jobs), pixels, renderer.value, None)
 
 
 def _check_names(output: Path, model: Path, fps: float) -> None:

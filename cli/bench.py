@@ -16,6 +16,7 @@ from ..refimpl.errors import ExecutorUnavailable, InputError
 from . import bench_forms, bench_frames, bench_report, machine, packages
 from .alone import working_in
 from .bench_frames import Frames
+from .effort import said_of_measuring
 from .inputs import load_model
 from .options import ExecutorName, parse_names
 from .outputs import check_output, replacing, unwritable, write_text
@@ -318,6 +319,9 @@ def measure(
     with Tools() as tools, progress("measuring", 1.0) as advance:
         everybody = contenders.of_machine(tools, request.size, request.quick and not only, forms)
         taking_part = contenders.chosen(everybody, only, executors)
+        sizes = sorted({request.size, *request.sizes})
+        for line in said_of_measuring(len(taking_part), sizes, request.budget_s):
+            say(line)
         if output:
             make_folder(output)
         contest = Contest(request, taking_part, tools, told=lambda what, share: advance(share))

@@ -71,7 +71,7 @@ class Frames:
 
 def of_folder(folder: Path, model: Model, split: str = "test") -> Frames:
     """Return a data set's frames of a split; refuse one without any, or whose frames lack a layer."""
-    pairs = dataset_files.read_pairs(folder, split)
+    pairs = dataset_files.read_pairs(folder, split, tell=say)
     if not pairs:
         raise InputError("data set", str(folder), f"it has no {split} frames", "make one with --test 1")
     for noisy, _ in pairs:

@@ -21,7 +21,7 @@ import json
 import os
 import re
 import stat
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -214,10 +214,13 @@ def _sum_in(entry: Mapping[str, Any]) -> Sum:
 # ---- using a data set ------------------------------------------------------------------------------------
 
 
-def read_pairs(folder: Path, split: str = "train") -> list[tuple[Frame, Frame]]:
+def read_pairs(
+    folder: Path, split: str = "train", tell: Callable[[str], None] | None = None
+) -> list[tuple[Frame, Frame]]:
     """Read the pairs (noisy frame, target's colour) of a split; refuse one with a picture that is wrong.
 
-    Nothing but its colour is learnt from a target, so the other layers do not stay in memory.
+    Nothing but its colour is learnt from a target, so the other layers do not stay in memory. `tell` is given
+    what was said of pictures of another program [exr.read_frame], each sentence once.
     """
     from ..refimpl.frame import Frame
     from . import exr
@@ -225,11 +228,22 @@ def read_pairs(folder: Path, split: str = "train") -> list[tuple[Frame, Frame]]:
     manifest = read_manifest(folder)
     frames = [frame for frame in manifest["frames"] if frame["split"] == split]
     refuse_wrong(folder, verify(folder, {**manifest, "frames": frames}))
-    pairs = []
+    pairs, said = [], Counter[str]()
     for frame in frames:
-        noisy, target = (exr.read_frame(folder / frame[kind]["file"]) for kind in KINDS)
+        paths = [folder / frame[kind]["file"] for kind in KINDS]
+        noisy, target = (
+            exr.read_frame(path, tell=lambda text, p=path: _count(said, p, text)) for path in paths
+        )
         pairs.append((noisy, Frame({"color": target["color"]}, target.info)))
+    for text, count in said.items():
+        if tell is not None:
+            tell(f"{folder}, {count} of {2 * len(frames)} pictures: {text}")
     return pairs
+
+
+def _count(said: Counter[str], path: Path, text: str) -> None:
+    """Count a sentence on a picture, whichever it is."""
+    said[text.removeprefix(f"{path}: ")] += 1
 
 
 def refuse_wrong(folder: Path, wrong: Mapping[str, str]) -> None:

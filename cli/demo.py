@@ -32,6 +32,7 @@ from . import bench, bench_forms, bench_frames, dataset, dataset_files, report, 
 from .alone import working_in
 from .compare import Score, measure
 from .compile import write_kernel
+from .effort import said_of_learning
 from .outputs import write_text
 from .packages import need
 from .runs import Run, run_all
@@ -248,6 +249,8 @@ def _check_note(folder: Path, text: str) -> bool:
 def carry_out(plan: Plan, output: Path) -> Results:
     """Do all steps in the folder `output` and return what they have found."""
     seconds: dict[str, float] = {}
+    for line in said_of_learning(plan.train_frames, plan.size_px**2):
+        say(line)
     _timed(seconds, "rendering", lambda: render_frames(plan, output))
     times, pairs = zip(*_pairs(output, "train"), strict=True)
     model, state, per_step = _timed(seconds, "training", lambda: train_network(plan, pairs, output))

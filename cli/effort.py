@@ -3,7 +3,8 @@
 1. Every path meets every primitive at each bounce, so rendering takes a time in proportion to samples times
    primitives; the reference also starts some operations for each primitive and tile [`seconds_of`].
 2. Memory goes into the primitives' tables and the layers of the picture [`bytes_of`].
-3. From a stated size on a sentence says both [`said_of_rendering`], [`said_of_compiling`].
+3. From a stated size on a sentence says both [`said_of_rendering`], [`said_of_compiling`],
+   [`said_of_measuring`], [`said_of_learning`].
 
 The factors of time, and of memory for a primitive, were measured with minicubes and copies of its cubes, 27
 to 27,000 of them: processor time on one core for NumPy and compilation, time on two busy cores for
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -24,6 +26,18 @@ MANY_PRIMITIVES = 100_000
 
 MANY_SAMPLES = 10**9
 """From so many samples (of all pixels and pictures) on a sentence is said."""
+
+MANY_PIXELS = 10**8
+"""From so many pixels that are in memory at once on a sentence is said."""
+
+LONG_S = 1800.0
+"""From so many seconds of measurements on a sentence is said."""
+
+_PAIR_BYTES = 92
+"""Bytes of a pixel to learn from: 20 channels of a noisy frame and the colour of its target, in float32."""
+
+_PICTURE_BYTES = 160
+"""Bytes of a pixel that is denoised: features as rendered and as encoded, at most 40 numbers in float32."""
 
 _NUMPY_SAMPLE_S, _NUMPY_START_S = 2e-7, 1.5e-4
 """Seconds of the reference on a core: for a sample and a primitive, for a tile of samples and a primitive."""
@@ -78,6 +92,25 @@ def said_of_compiling(scene: Scene) -> list[str]:
     if count < MANY_PRIMITIVES:
         return []
     return [f"{count:,} primitives: {_about(count * _COMPILE_S, bytes_of(count, 0))}; Ctrl-C ends it"]
+
+
+def said_of_measuring(contenders: int, sizes: Sequence[int], budget_s: float) -> list[str]:
+    """Return the sentence about a large benchmark of pictures of these sides, if it is large."""
+    seconds, pixels = contenders * len(sizes) * budget_s, max(sizes) ** 2
+    if seconds < LONG_S and pixels < MANY_PIXELS:
+        return []
+    work = f"{contenders} contender{'s' if contenders > 1 else ''} and pictures of up to {pixels:,} pixels"
+    return [
+        f"{work}: {_about(seconds, pixels * _PICTURE_BYTES)} at most, compilation left out; Ctrl-C ends it"
+    ]
+
+
+def said_of_learning(frames: int, pixels: int) -> list[str]:
+    """Return the sentence about the memory of many pixels to learn from, if they are many."""
+    if frames * pixels < MANY_PIXELS:
+        return []
+    size = f"{frames * pixels * _PAIR_BYTES // 2**20:,} MiB of memory"
+    return [f"{frames} frames of {pixels:,} pixels to learn from: by a rule of thumb {size}; Ctrl-C ends it"]
 
 
 def _about(seconds: float, size: int) -> str:

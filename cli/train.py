@@ -276,7 +276,7 @@ def read_training(
     if inputs or targets:
         rule = "the frames come from there"
         raise InputError("--dataset", str(dataset), rule, "leave out --dataset, or -i and -t")
-    return dataset_files.read_pairs(dataset)
+    return dataset_files.read_pairs(dataset, tell=say)
 
 
 def read_pairs(

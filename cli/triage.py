@@ -110,7 +110,7 @@ def triage(
     check_new_folder(output)
     profile_named(profile)
     model = model_path(model)
-    network, noisy = load_model(model), exr.read_frame(frame, finite=False)
+    network, noisy = load_model(model), exr.read_frame(frame, finite=False, tell=say)
     need_layers(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )

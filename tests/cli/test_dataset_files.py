@@ -158,6 +158,17 @@ def test_a_picture_of_another_length_is_not_read(tmp_path, monkeypatch) -> None:
     assert files.sum_of(path, 5).bytes == 2**20
 
 
+def test_layers_of_another_program_are_told_once(tmp_path, monkeypatch) -> None:
+    """`train --dataset` says so as `train -i` does; not for each picture."""
+    make(tmp_path)
+    said: list[str] = []
+    files.read_pairs(tmp_path, tell=said.append)
+    assert said == []
+    monkeypatch.setattr("wamnet.cli.exr._taken", lambda _found: ["color is taken from a, b, c"])
+    pairs = files.read_pairs(tmp_path, tell=said.append)
+    assert said == [f"{tmp_path}, {2 * len(pairs)} of {2 * len(pairs)} pictures: color is taken from a, b, c"]
+
+
 def test_other_bytes_are_told(tmp_path, whole) -> None:
     """What another machine had made is made again here, and named."""
     make(tmp_path)

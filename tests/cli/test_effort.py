@@ -51,6 +51,43 @@ def test_data_sets_say_it_too(started):
     assert line.startswith("30 primitives and 4,096,004,096 samples: by a rule of thumb about ")
 
 
+def test_animations_say_it_too(started, samples):
+    """Noisy and reference pictures together, 5 of each."""
+    few = ("animate", samples / "model.safetensors", "--scene", "minicubes", "--seconds", 1, "--fps", 5)
+    assert started(*few, "--size", 8, "-o", "few") == ""
+    line = started(*few, "--size", 100, "--reference-spp", 20_000, "-o", "many")
+    assert line.startswith("30 primitives and 1,000,050,000 samples: by a rule of thumb about ")
+
+
+def test_demonstrations_say_what_learning_takes(wamnet, capsys, monkeypatch):
+    def stop(*_args):
+        raise StoppedError("the work begins")
+
+    monkeypatch.setattr("wamnet.cli.demo.render_frames", stop)
+    with pytest.raises(StoppedError, match="the work begins"):
+        wamnet("demo", "--size", 2048, "-o", "large")
+    assert "to learn from: by a rule of thumb " in capsys.readouterr().out
+
+
+def test_benchmarks_say_it_too(wamnet, capsys, monkeypatch):
+    def stop(*_args, **_options):
+        raise StoppedError("the work begins")
+
+    monkeypatch.setattr("wamnet.kernels.bench.contest.Contest.run", stop)
+    paper = ("bench", "paper", "--synthetic", "--only", "numpy:plain", "--repeats", 1)
+    for numbers, text in [
+        (("--size", 8), ""),
+        (
+            ("--size", 8, "--sizes", "16,32", "--budget", 1000),
+            "1 contender and pictures of up to 1,024 pixels: by a rule of thumb about 50 minutes and 1 MiB "
+            "of memory at most, compilation left out; Ctrl-C ends it\n",
+        ),
+    ]:
+        with pytest.raises(StoppedError, match="the work begins"):
+            wamnet(*paper, *numbers, "-o", "speed")
+        assert capsys.readouterr().out == text
+
+
 def test_many_primitives_are_said_before_they_start(started, monkeypatch):
     monkeypatch.setattr(effort, "MANY_PRIMITIVES", 30)
     assert started("render", "minicubes").startswith("30 primitives and 65,536 samples: by a rule of thumb")

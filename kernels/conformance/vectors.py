@@ -6,11 +6,13 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ...compiler.writing import write_together
 from ...refimpl.errors import InputError
 from .case import FORMAT, VERSION, Kind, text_of
 from .kinds import KINDS
@@ -167,13 +169,14 @@ def contents() -> Mapping[str, bytes]:
 
 
 def write(folder: Path) -> int:
-    """Write all files of the folder, and return their number."""
-    found = contents()
+    """Write all files of the folder, each whole or not at all, and return their number."""
+    found = {folder / name: content for name, content in contents().items()}
     try:
-        for name, content in found.items():
-            path = folder / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
+        for parent in {path.parent for path in found}:
+            if parent != folder and parent.is_symlink():
+                raise OSError(errno.ELOOP, f"{parent.name} is a link")
+            parent.mkdir(parents=True, exist_ok=True)
+        write_together(found)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(

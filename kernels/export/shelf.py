@@ -12,7 +12,9 @@ which are one file a model, and leaves out what `wamnet export` adds.
 from __future__ import annotations
 
 import argparse
-import shutil
+import os
+import re
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -24,10 +26,11 @@ import numpy as np
 from ...compiler.artifact import Artifact
 from ...compiler.model_file import load_model
 from ...compiler.schedules import PLAIN
+from ...compiler.writing import is_regular, write_together
 from ...refimpl import siren
 from ...refimpl.dataset import Normalization, Window
 from ...refimpl.denoise import Model
-from ...refimpl.errors import ExecutorUnavailable
+from ...refimpl.errors import ExecutorUnavailable, InputError, WamnetError
 from ..bench.cost import products_of
 from ..executor import Executor, Images, black
 from ..measure import in_turns
@@ -48,6 +51,9 @@ READ = PLAIN
 
 INDEX = "README.md"
 """The index page."""
+
+OWN = re.compile(rf"{re.escape(INDEX)}|[^/]+/weights\.bin|[^/]+/({'|'.join(KEPT)})/denoise\.[a-z]+")
+"""Paths of the files of a shelf."""
 
 SMALL = "small"
 """Name of the network of random weights."""
@@ -130,14 +136,34 @@ def random_model() -> Model:
 
 
 def write(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write the shelf in the place of the one that is there."""
-    new = folder.with_name(f".{folder.name}.new")
-    shutil.rmtree(new, ignore_errors=True)
-    for name, data in files.items():
-        (new / name).parent.mkdir(parents=True, exist_ok=True)
-        (new / name).write_bytes(data)
-    shutil.rmtree(folder, ignore_errors=True)
-    new.replace(folder)
+    """Write the shelf over the one that is there; of that, only files that a shelf has are removed."""
+    there = _files_of(folder)
+    for name in files:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+    write_together({folder / name: data for name, data in files.items()})
+    for name in there - files.keys():
+        (folder / name).unlink()
+        for parent in (folder / name).parents:
+            if parent == folder or any(parent.iterdir()):
+                break
+            parent.rmdir()
+
+
+def _files_of(folder: Path) -> set[str]:
+    """Return the files of the shelf in a folder; refuse a folder with anything else."""
+    rule, way_out = "it is not a shelf: {}", "name another folder with -o, or a new one"
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise InputError("output folder", str(folder), rule.format("a link or a file"), way_out)
+    found = set()
+    # Links to folders are listed, not entered.
+    for top, folders, names in os.walk(folder):
+        links = [name for name in folders if (Path(top) / name).is_symlink()]
+        for path in (Path(top) / name for name in (*names, *links)):
+            name = path.relative_to(folder).as_posix()
+            if not OWN.fullmatch(name) or not is_regular(path):
+                raise InputError("output folder", str(folder), rule.format(f"it holds {name}"), way_out)
+            found.add(name)
+    return found
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -149,8 +175,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--measure", type=int, metavar="SIZE", help="time pictures of SIZE x SIZE pixels")
     options = parser.parse_args(arguments)
-    models = {path.stem: load_model(path) for path in options.models} or {SMALL: random_model()}
-    write(options.output, contents(models, measured(models, options.measure) if options.measure else None))
+    try:
+        models = {path.stem: load_model(path) for path in options.models} or {SMALL: random_model()}
+        times = measured(models, options.measure) if options.measure else None
+        write(options.output, contents(models, times))
+    except WamnetError as error:
+        sys.exit(f"shelf: error: {error}")
 
 
 if __name__ == "__main__":

@@ -239,6 +239,28 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
         vectors.write(tmp_path / "file")
 
 
+def test_vectors_are_written_whole_and_through_no_link(tmp_path, monkeypatch):
+    """What was there stays where another file cannot be written; a link is replaced, not followed."""
+    monkeypatch.setattr(vectors, "contents", lambda: {"a.json": b"new", "images/b": b"new"})
+    folder = tmp_path / "vectors"
+    folder.mkdir()
+    (tmp_path / "victim").write_bytes(b"old")
+    (folder / "a.json").symlink_to(tmp_path / "victim")
+    (folder / "images").symlink_to(tmp_path)
+    with pytest.raises(InputError, match=r"it cannot be written .*images is a link"):
+        vectors.write(folder)
+    assert sorted(path.name for path in folder.iterdir()) == ["a.json", "images"]
+    (folder / "images").unlink()
+    (folder / "images").mkdir()
+    (folder / "images/b").mkdir()
+    with pytest.raises(InputError, match="it cannot be written"):
+        vectors.write(folder)
+    (folder / "images/b").rmdir()
+    assert vectors.write(folder) == 2
+    assert (folder / "a.json").read_bytes() == (folder / "images/b").read_bytes() == b"new"
+    assert (tmp_path / "victim").read_bytes() == b"old"
+
+
 def test_a_page_keeps_bars_out_of_tables():
     kind = Kind(
         "k", "t", {"x": "|x|"}, {"y": "float"}, lambda: [Case("k/0", "RNG-3", {}, {"y": Output(0)})], dict

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from wamnet.compiler.model_file import load_model
 from wamnet.kernels.export import shelf
+from wamnet.refimpl.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[3]
 """The repository's root folder."""
@@ -42,11 +45,44 @@ def test_the_shelf_is_what_the_compiler_writes():
 
 def test_the_command_replaces_a_shelf(tmp_path):
     out = tmp_path / "shelf"
-    shelf.write(out, {"old.txt": b"x"})
+    shelf.write(out, {"old/weights.bin": b"x", "old/c/denoise.h": b"y"})
     shelf.main(["-o", str(out), "--measure", "8"])
-    assert not (out / "old.txt").exists()
+    assert not (out / "old").exists()
     index = (out / "README.md").read_text()
     assert all(f"{target}](small/{target}/" in index for target in shelf.KEPT)
     lines = {target: line for line in index.splitlines() for target in shelf.KEPT if f"[{target}]" in line}
     assert all(line.endswith("| not measured |") for t, line in lines.items() if t not in shelf.TIMED)
     assert any(line.endswith(" ms, 8x8 |") for line in lines.values())
+
+
+@pytest.mark.parametrize(
+    "name", ["thesis.txt", "small/thesis.txt", "small/c/notes.h", "linked", "small/linked"]
+)
+def test_a_folder_with_anything_else_is_refused_and_stays(tmp_path, name):
+    """The whole folder that -o named was removed, whatever lay in it."""
+    (tmp_path / "victim").mkdir()
+    (tmp_path / "victim/weights.bin").write_bytes(b"x")
+    out = tmp_path / "shelf"
+    shelf.write(out, {"small/weights.bin": b"x", "small/c/denoise.h": b"y"})
+    if name.endswith("linked"):
+        (out / name).symlink_to(tmp_path / "victim")
+    else:
+        (out / name).write_bytes(b"x")
+    before = sorted(path for path in tmp_path.rglob("*"))
+    with pytest.raises(InputError, match=f"it is not a shelf: it holds {name}; name another"):
+        shelf.write(out, {"README.md": b"new"})
+    assert sorted(path for path in tmp_path.rglob("*")) == before
+
+
+def test_a_link_to_a_folder_is_no_shelf(tmp_path):
+    (tmp_path / "victim").mkdir()
+    (tmp_path / "shelf").symlink_to("victim")
+    with pytest.raises(InputError, match="it is not a shelf: a link or a file"):
+        shelf.write(tmp_path / "shelf", {"README.md": b"new"})
+    assert not list((tmp_path / "victim").iterdir())
+
+
+def test_an_error_is_one_line(tmp_path):
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(SystemExit, match=r"shelf: error: output folder is .*: it is not a shelf"):
+        shelf.main(["-o", str(tmp_path / "file")])

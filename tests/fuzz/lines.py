@@ -94,13 +94,13 @@ def lines(good: Good) -> list[Target]:
             "words",
             [_listed(line) for line in LINES if line.split()[0] == name],
             use,
-            0.7,
+            0.3,
         )
         for name in names
         for use in [partial(_options, good)]
     ]
     return targets + [
-        Target(f"apart, {name}", way, [good.read(file)], partial(_apart, good, file, line), 0.7)
+        Target(f"apart, {name}", way, [good.read(file)], partial(_apart, good, file, line), 0.3)
         for name, way, file, line in APART
     ]
 

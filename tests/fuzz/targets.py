@@ -286,7 +286,7 @@ COMMANDS: Sequence[tuple[str, str, str, str]] = (
 def commands(good: Good) -> list[Target]:
     """Return the commands that read a file, each as a target."""
     return [
-        Target(f"wamnet {name}", way, [good.read(file)], partial(_command, good, file, line), 1.0)
+        Target(f"wamnet {name}", way, [good.read(file)], partial(_command, good, file, line), 0.5)
         for name, way, file, line in COMMANDS
         if (good.folder / file).exists()
     ]

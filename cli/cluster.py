@@ -19,6 +19,7 @@ from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 from ..refimpl.errors import InputError
+from .alone import signals_wait
 from .packages import need
 
 _Task = TypeVar("_Task")
@@ -100,12 +101,17 @@ def open_client(workers: int, scheduler: str | None) -> Iterator[Any]:
             with _connected(distributed, scheduler) as client:
                 yield client
             return
-        cluster = _local(distributed, workers)
+        cluster = None
         try:
+            # Dask leaves a cluster half made, or half closed, that complains when Python ends.
+            with signals_wait():
+                cluster = _local(distributed, workers)
             with distributed.Client(cluster) as client:
                 yield client
         finally:
-            cluster.close()
+            if cluster is not None:
+                with signals_wait():
+                    cluster.close()
 
 
 def _local(distributed: Any, workers: int) -> Any:

@@ -103,6 +103,32 @@ def test_workers_that_do_not_start(monkeypatch, error) -> None:
         pass
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_waits_until_workers_have_started(monkeypatch, number) -> None:
+    """SIGTERM meanwhile: a traceback of Dask's at the end of Python, where it closed what was half made."""
+    done = []
+
+    class Half:
+        def __init__(self, **_):
+            signal.raise_signal(number)
+            done.append("started")
+
+        def close(self):
+            done.append("closed")
+
+    def end(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(number, end)
+    monkeypatch.setattr("distributed.LocalCluster", Half)
+    try:
+        with pytest.raises(KeyboardInterrupt), cluster.open_client(2, None):
+            done.append("works")
+    finally:
+        signal.signal(number, before)
+    assert done == ["started", "closed"]
+
+
 def test_a_worker_without_the_package(monkeypatch) -> None:
     """A function whose module only this process has, as where a worker lacks wamnet: a line, no waiting."""
     module = types.ModuleType("only_here")

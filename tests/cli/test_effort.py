@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from wamnet.cli import effort
 from wamnet.kernels import render_frame
 from wamnet.refimpl import intersection
+from wamnet.refimpl.scene import to_json
 from wamnet.refimpl.scenes import canonical
 
 
@@ -93,6 +95,15 @@ def test_many_primitives_are_said_before_they_start(started, monkeypatch):
     assert started("render", "minicubes").startswith("30 primitives and 65,536 samples: by a rule of thumb")
     line = started("compile", "minicubes", "--target", "opencl")
     assert line.startswith("30 primitives: by a rule of thumb")
+
+
+def test_a_file_of_a_hundred_thousand_boxes_is_read_and_said(started, tmp_path):
+    """It was refused by the reader: 103 values too many."""
+    data = json.loads(to_json(canonical("minicubes", time=1.0)))
+    data["boxes"] = (data["boxes"] * 4000)[:100_000]
+    (tmp_path / "many.json").write_text(json.dumps(data))
+    line = started("render", tmp_path / "many.json", "--width", 4, "--height", 4)
+    assert line.startswith("100,003 primitives and 16 samples: by a rule of thumb about ")
 
 
 def test_many_boxes_are_grouped_in_one_look():

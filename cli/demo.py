@@ -326,8 +326,8 @@ def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Mode
 def _seconds(path: Path) -> float | None:
     """Return the time in a file, or None where there is none: it is told, and nothing depends on it."""
     try:
-        value = float(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        value = float(read_file(path, most=100))
+    except (InputError, ValueError):
         return None
     return value if math.isfinite(value) and value > 0.0 else None
 

@@ -84,13 +84,20 @@ def _even(length: int) -> int:
 
 
 def read_origin(path: Path) -> str | None:
-    """Return the text that names the origin of a PNG; None if the file is damaged, "" if it has no text."""
+    """Return the text that names the origin of a PNG; None if the file is damaged, "" if it has no text.
+
+    What is no regular file is refused: a pipe of this name would make us wait.
+    """
     pillow = need("PIL.Image", "to read PNG files", "files")
+    content = BytesIO(read_file(path, "picture", "move it elsewhere, or choose another output with -o"))
     try:
-        with pillow.open(path, formats=["PNG"]) as picture:
-            picture.load()
-            return str(picture.text.get(ORIGIN, ""))
-    except (OSError, SyntaxError, ValueError):
+        with pillow.open(content, formats=["PNG"]) as picture:
+            origin = str(picture.text.get(ORIGIN, ""))
+            # A picture of another origin is refused anyway, whatever its header says of its size.
+            if origin:
+                picture.load()
+            return origin
+    except (OSError, SyntaxError, ValueError, pillow.DecompressionBombError):
         return None
 
 

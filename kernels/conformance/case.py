@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ...refimpl.errors import InputError
-from ...refimpl.reading import parse_json, read_file, refusing
+from ...refimpl.reading import parse_json, plain_name, read_file, refusing
 from .numbers import from_file, from_json, rounded_up, to_json
 
 VERSION = "1.2.0"
@@ -156,16 +156,26 @@ def _output(data: Mapping[str, Any]) -> Output:
 
 
 def _placed(value: Any, folder: Path) -> Any:
-    """Return an input with the path of its file, if it is one, made absolute."""
-    if isinstance(value, dict) and isinstance(value.get("file"), str):
-        return {**value, "file": str((folder / value["file"]).resolve())}
-    return value
+    """Return an input with the path of its file, if it is one, made absolute: a file below the folder."""
+    if not isinstance(value, dict) or "file" not in value:
+        return value
+    named = value["file"]
+    names = named.split("/") if isinstance(named, str) else [named]
+    path = folder.joinpath(*(plain_name(name, "file of a vector", WAY_OUT) for name in names)).resolve()
+    if not path.is_relative_to(folder.resolve()):
+        rule = "it must lie in the folder of vectors, also where it is a link"
+        raise InputError("file of a vector", named, rule, WAY_OUT)
+    return {**value, "file": str(path)}
+
+
+WAY_OUT = "fetch the vectors again"
+"""What to do with vectors that name other files."""
 
 
 def given(value: Any) -> Any:
     """Return an input as the reference takes it: numbers as arrays, files as what they hold."""
     if isinstance(value, dict) and "file" in value:
-        return from_file(value, "input") if "shape" in value else Path(value["file"]).read_text()
+        return from_file(value, "input") if "shape" in value else read_file(value["file"]).decode()
     if isinstance(value, (dict, bool)):
         return value
     try:

@@ -27,7 +27,7 @@ TRACK = "wamnet-conformance-track"
 SHOWN_CHARACTERS = 300
 """Most characters of a case's input that are shown."""
 
-XML_CONTROL = {code: "?" for code in range(32) if chr(code) not in "\t\n\r"}
+XML_CONTROL = {code: "?" for code in (*range(32), 0xFFFE, 0xFFFF) if chr(code) not in "\t\n\r"}
 """Characters that XML cannot hold; a program's words may."""
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import struct
 import subprocess
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -179,6 +182,23 @@ def test_what_a_killed_run_leaves_is_removed(wamnet, tmp_path) -> None:
     assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a").status == 0
     found = sorted(path.name for path in (tmp_path / "a").iterdir())
     assert found == [".kept", link, "00000.png", "00001.png"]
+
+
+def test_a_pipe_or_a_bomb_in_the_place_of_a_picture(wamnet, refused, tmp_path) -> None:
+    """A pipe was waited for; a header of 60,000 x 60,000 pixels was a traceback of Pillow's."""
+    (tmp_path / "a").mkdir()
+    os.mkfifo(tmp_path / "a/00000.png")
+    assert "it is no regular file (a pipe or a device)" in refused(
+        "animate", "m.safetensors", *SHORT, "-o", "a"
+    )
+    (tmp_path / "a/00000.png").unlink()
+    Image.new("RGB", (2, 2)).save(tmp_path / "a/00000.png")
+    content = bytearray((tmp_path / "a/00000.png").read_bytes())
+    content[16:24] = struct.pack(">II", 60_000, 60_000)
+    content[29:33] = struct.pack(">I", zlib.crc32(bytes(content[12:29])))
+    (tmp_path / "a/00000.png").write_bytes(content)
+    assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a").status == 0
+    assert read_png(tmp_path / "a/00000.png").shape[0] < 100
 
 
 def test_the_folder_of_a_film_s_pictures_is_no_link(refused, tmp_path) -> None:

@@ -11,6 +11,9 @@ from xml.etree import ElementTree
 
 import pytest
 
+from wamnet.kernels.conformance import report
+from wamnet.kernels.conformance.run import Verdict
+
 CHAPTER = Path(__file__).parents[2] / "spec" / "conformance.md"
 
 
@@ -169,3 +172,11 @@ def test_a_file_that_is_no_track_is_refused(wamnet, tmp_path, text):
     done = wamnet("conformance", "--executor", "numpy", "-k", "sine/0", "--track", str(path))
     assert (done.status, path.read_text()) == (2, text)
     assert "error: --track " in done.err
+
+
+@pytest.mark.parametrize("text", ["\ufffe", "\uffff", "\0", "\x1b", "<&>", "\U0001f600"])
+def test_a_report_for_other_programs_is_xml_whatever_a_program_says(text):
+    """U+FFFE and U+FFFF are characters of JSON, and none of XML."""
+    verdict = Verdict("sine/0", "sine", "SIN-1", "fail", text, got=text)
+    found = ElementTree.fromstring(report.to_junit(text, [verdict], text))
+    assert found.findall(".//failure")

@@ -232,6 +232,28 @@ def test_what_is_no_vector_is_refused(tmp_path, text):
         case.load(path)
 
 
+@pytest.mark.parametrize("name", ["../secret", "/dev/zero", "a/../../b", "a//b", "..", "", 3, None])
+def test_vectors_name_files_of_their_own_folder(tmp_path, name):
+    """RDG-4: a stranger's vectors led the reference to any file, and to pipes."""
+    text = (vectors.FOLDER / "image.window.json").read_text()
+    data = json.loads(text)
+    data["cases"][0]["input"]["image"] = {"file": name, "shape": [1]}
+    (tmp_path / "a.json").write_text(json.dumps(data))
+    with pytest.raises(InputError, match="plain name of a file in its own folder"):
+        case.load(tmp_path / "a.json")
+
+
+def test_a_link_out_of_the_folder_of_vectors_is_refused(tmp_path):
+    (tmp_path / "secret").write_text("x")
+    folder = tmp_path / "vectors"
+    folder.mkdir()
+    (folder / "link").symlink_to(tmp_path / "secret")
+    with pytest.raises(InputError, match="it must lie in the folder of vectors, also where it is a link"):
+        case._placed({"file": "link"}, folder)
+    (folder / "a").write_text("text")
+    assert case.given(case._placed({"file": "a"}, folder)) == "text"
+
+
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setattr(vectors, "contents", lambda: {"a.json": b""})

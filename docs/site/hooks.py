@@ -41,6 +41,9 @@ SPEC = ROOT / "spec"
 SECTION = re.compile(r"^## (.+)$|^\* \[.*?\]\((\w+\.md)\)", re.MULTILINE)
 """A heading of the spec's index, or a line of its list."""
 
+GUIDE = re.compile(r"^\| \[.*?\]\(([\w-]+\.md)\)", re.MULTILINE)
+"""A row of the guide's table of pages."""
+
 LEAVING = re.compile(r"\]\(((?:\.\./)+(?:spec|docs)/[\w./-]+)")
 """A link from docs/ to spec/, or back, as it works in the repository."""
 
@@ -67,11 +70,16 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         "index.md",
         {"Tutorial": pages("tutorial")},
         {"Exercises": pages("exercises")},
-        "results.md",
-        "listing.md",
+        {"Guide": ["guide/index.md", "first-kernel.md", *(f"guide/{name}" for name in in_order(docs))]},
+        {"Results": ["results.md", "speed.md", "listing.md"]},
         {"Spec": parts},
     ]
     return config
+
+
+def in_order(docs: Path) -> list[str]:
+    """Return the guide's pages in the order of its table."""
+    return GUIDE.findall((docs / "guide/index.md").read_text())
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:

@@ -322,6 +322,41 @@ def speed_readme(record: str) -> TableOf:
     return table
 
 
+SPEED_SHORT = {
+    ("window6+rank12", "opencl tile16"): "wamnet, window of 6 pixels and rank 12",
+    ("window8+rank16", "opencl tile16"): "wamnet, window of 8 pixels and rank 16",
+    ("whole", "opencl fft32"): "wamnet, first layer from spectra (`fft32`)",
+    ("whole", "opencl tile16"): "wamnet, register tiles (`tile16`)",
+    ("exact", "opencl tile16"): "wamnet, the same bits everywhere (profile `exact`)",
+    ("whole", "opencl plain"): "wamnet, the kernel that is made to be read (`plain`)",
+    ("torch.compile", "–"): "the same network in `torch.compile`",
+    ("onnxruntime", "–"): "the same network in ONNX Runtime",
+    ("oidn:fast", "–"): "Open Image Denoise, fast",
+    ("oidn:high", "–"): "Open Image Denoise, high",
+}
+"""Rows of [`speed_against_error`] that the README shows, by form and schedule, with their names there."""
+
+SPEED_COLUMNS = ("ms", "PSNR, dB", "largest error", "bound, this frame", "bound, all frames")
+"""Columns of [`speed_against_error`] that the README shows."""
+
+
+def speed_short(record: str) -> TableOf:
+    """Return the few rows and columns of [`speed_against_error`] that fit on the first page."""
+
+    def table(records: Records) -> str:
+        found = speed_against_error(record)(records).splitlines()
+        heads, _, *rows = ([cell.strip() for cell in row.split("|")[1:-1]] for row in found)
+        shown = []
+        for row in rows:
+            cells = dict(zip(heads, row, strict=True))
+            name = SPEED_SHORT.get((cells["form"].removesuffix(" *"), cells["executor, schedule"]))
+            if name:
+                shown.append([name, *(cells[column] for column in SPEED_COLUMNS)])
+        return tables.markdown(["by", *SPEED_COLUMNS], shown)
+
+    return table
+
+
 def draw_speed(record: str) -> Callable[[Records], Any]:
     """Return what draws time against loss and against bounds."""
     return lambda records: trade_off_figure(bench_report.panels(bench_of(records[record])), PAPER)
@@ -556,6 +591,7 @@ TABLES: Mapping[str, TableOf] = {
     "sines-speed": as_printed("sines-speed"),
     "speed-against-error": speed_against_error("bench-minicubes"),
     "speed-readme": speed_readme("bench-minicubes"),
+    "speed-short": speed_short("bench-minicubes"),
     "table1": table1,
     "table1-readme": table1_readme,
     "train-speed": train_speed,

@@ -65,6 +65,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
             parts.append({title: (section := [])})
         else:
             section.append(f"spec/{chapter}")
+    parts = [part for part in parts if isinstance(part, str) or any(part.values())]
     parts.append({"Vectors' formats": "spec/vectors/README.md"})
     config.nav = [
         "index.md",

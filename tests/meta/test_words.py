@@ -1,0 +1,180 @@
+"""House rule about words: a text says things plainly, and in the words of its field.
+
+1. Each row of [`WORDS`] is a pattern, the better word, and the reason. A text that matches fails with file,
+   line, word and suggestion [`test_words_are_plain`].
+2. What a reader does not read as prose is blanked: code, comments, addresses, and what is written from
+   records [`prose`]. Of Python, docstrings, comments and texts are prose; `.py` joins [`SUFFIXES`] when its
+   texts have had their pass.
+3. A pattern sees text whose line ends are spaces, so that two words may be on two lines.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import token
+import tokenize
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import pytest
+
+SUFFIXES = (".md",)
+"""The kinds of files that are looked at; `.py` works too [`prose`]."""
+
+GENERATED = ("kernels/shelf/README.md", "spec/vectors/README.md")
+"""Texts that programs write: their words are in the programs."""
+
+
+class Word(NamedTuple):
+    """A pattern, what to write instead, and why."""
+
+    pattern: str
+    better: str
+    reason: str
+
+
+WORDS = (
+    Word(r"told(?! (?:apart|to)\b)", "reported, said", "programs report; people tell"),
+    Word(r"tells? (?:the|all|what)", "reports", "programs report; people tell"),
+    Word(r"anew", "again", "nobody says it"),
+    Word(r"(?<!left)(?<!leave)(?<!leaves) alone", "only, by itself", "after a noun it reads as lonely"),
+    Word(r"(?:come|comes|came|coming) along", "ship with", "software ships"),
+    Word(
+        r"(?:stands?|stood|standing) (?:in(?! for)|on|at|after|before|between|below|beside|there|twice|"
+        r"outside|inside|near|nearer|behind|above|so|around)",
+        "is, appears",
+        "texts and cameras do not stand",
+    ),
+    Word(
+        r"lies?(?! (?:in|on|inside|within|outside|between|strictly)\b)",
+        "is",
+        "points lie in a set, all else just is",
+    ),
+    Word(r"in the place of", "instead of", "shorter"),
+    Word(r"matt", "matte", "the renderer's spelling"),
+    Word(r"(?:go|goes|going|went|gone) on", "resume, continue", "a run resumes, a loop continues"),
+    Word(r"held to", "checked against; clamped to", "numbers are checked or clamped"),
+    Word(r"asked for", "requested", "one verb, no particle to look for"),
+    Word(r"but for", "except for", "idiom that few readers know"),
+    Word(r"gives? way", "is replaced by, does not apply", "idiom"),
+    Word(r"at hand", "available", "idiom"),
+    Word(r"(?<!there\s)(?:is|are) none", "is not one", "none of what?"),
+    Word(r"besides", "also, in addition", "read as beside"),
+    Word(r"mend(?:s|ed|ing)?", "fix", "software is fixed"),
+    Word(r"(?:that|as) there (?:can|may) be", "every possible ...", "shorter"),
+    Word(r"strangers?'?", "untrusted", "the word of the field"),
+    Word(r"truth values?", "boolean", "the word of the field"),
+    Word(r"whole numbers?", "integer", "the word of the field"),
+    Word(r"in turns", "interleaved, in turn", "turns are for dancers"),
+    Word(r"(?:and|then|be) train(?:ed)? on(?= (?:for|from|with)\b|[.,;:])", "trained further", "on what?"),
+    Word(r"(?:to|only|by|from) who", "to those who", "a relative clause needs its noun"),
+)
+"""What no text says, and what it says instead."""
+
+NOT_PROSE = (
+    re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL),
+    re.compile(r"^(?:> )?<!-- table: .*?<!-- end -->", re.MULTILINE | re.DOTALL),
+    re.compile(r"<!--.*?-->", re.DOTALL),
+    re.compile(r"`[^`]+`"),
+    re.compile(r"(?<=\])\([^)]*\)"),
+)
+"""What nobody reads as prose in Markdown."""
+
+
+def blank(text: str) -> str:
+    """Return spaces of the same length and lines."""
+    return re.sub(r"[^\n]", " ", text)
+
+
+def prose(suffix: str, text: str) -> str:
+    """Return a file's prose where it was, and spaces in place of all else."""
+    if suffix == ".py":
+        return prose_of_python(text)
+    for pattern in NOT_PROSE:
+        text = pattern.sub(lambda match: blank(match[0]), text)
+    return text
+
+
+def prose_of_python(text: str) -> str:
+    """Return the comments and texts of Python where they were."""
+    lines, found = text.splitlines(keepends=True), list(blank(text))
+    starts = [0]
+    for line in lines:
+        starts.append(starts[-1] + len(line))
+    kinds = {token.STRING, token.COMMENT, getattr(token, "FSTRING_MIDDLE", token.STRING)}
+    for part in tokenize.generate_tokens(io.StringIO(text).readline):
+        if part.type in kinds:
+            begin = starts[part.start[0] - 1] + part.start[1]
+            found[begin : begin + len(part.string)] = re.sub(r"`[^`]+`", lambda m: blank(m[0]), part.string)
+    return "".join(found)
+
+
+def wrong_words(name: str, text: str) -> Iterator[str]:
+    """Yield `name:line: "word": write ..., for ...` for all that a text should not say."""
+    flat = re.sub(r"\n[> *#|-]*", lambda match: " " * len(match[0]), prose(name[name.rindex(".") :], text))
+    for word in WORDS:
+        spaced = word.pattern.replace(" ", r"\s+")
+        for match in re.finditer(rf"\b(?:{spaced})(?!\w)", flat, re.IGNORECASE):
+            start = match.end() - len(match[0].lstrip())
+            line = text.count("\n", 0, start) + 1
+            said = " ".join(match[0].split())
+            yield f'{name}:{line}: "{said}": write {word.better} ({word.reason})'
+
+
+def test_words_are_plain(house):
+    wrong = []
+    for path in house.files():
+        name = path.relative_to(house.root).as_posix()
+        if path.suffix in SUFFIXES and name not in GENERATED:
+            wrong += wrong_words(name, path.read_text(encoding="utf-8"))
+    house.refuse(sorted(wrong), "A text uses plain words and those of its field: take the better word.")
+
+
+PLANTED = {
+    "What is missing is told.": "told",
+    "The file is written anew.": "anew",
+    "It needs the standard library alone.": "alone",
+    "Models that come\nalong.": "come along",
+    "The camera stands at 0.": "stands at",
+    "It lies beside the kernel.": "lies",
+    "A sum in the place of a product.": "in the place of",
+    "Matt surfaces": "Matt",
+    "The path goes on.": "goes on",
+    "Each is held to its bound.": "held to",
+    "A feature that is asked for.": "asked for",
+    "All frames that there can be.": "that there can be",
+    "Files of strangers.": "strangers",
+}
+"""Sentences with a word that is refused."""
+
+
+@pytest.mark.parametrize("text", PLANTED)
+def test_a_planted_word_is_found(text):
+    found = list(wrong_words("x.md", f"# Title\n\n{text}\n"))
+    assert len(found) == 1, found
+    assert found[0].startswith(f'x.md:3: "{PLANTED[text]}": write ')
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "PSNR stands for a ratio. Leave alone what works. Two runs cannot be told apart.",
+        "A point lies on the sphere, a number lies in [0, 1].",
+        "The option `asked for` and [a link](held to/anew.md).",
+        "```text\nwritten anew\n```",
+        "<!-- table: losses -->\n| held to |\n<!-- end -->",
+    ],
+)
+def test_plain_words_and_code_pass(text):
+    assert list(wrong_words("x.md", text)) == []
+
+
+def test_texts_of_python_are_prose_and_its_names_are_not():
+    text = 'anew = 1  # done anew\n\n\ndef f():\n    """Write it anew."""\n    return f"{x} matt"\n'
+    assert [line.partition(": ")[0] for line in wrong_words("x.py", text)] == ["x.py:1", "x.py:5", "x.py:6"]
+
+
+def test_every_word_has_a_suggestion_and_a_reason():
+    assert all(word.better and word.reason for word in WORDS)
+    assert len({word.pattern for word in WORDS}) == len(WORDS)

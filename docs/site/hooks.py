@@ -74,6 +74,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         {"Guide": ["guide/index.md", "first-kernel.md", *(f"guide/{name}" for name in in_order(docs))]},
         {"Results": ["results.md", "speed.md", "listing.md"]},
         {"Spec": parts},
+        "recipes.md",
     ]
     return config
 

@@ -89,13 +89,20 @@ def outside(asked: list[str]) -> list[str]:
     return [address for address in asked if not address.startswith(("file:", "data:", "about:"))]
 
 
-def test_no_page_is_wider_than_a_telephone(site, chromium):
+CUT = """[...document.querySelectorAll(".highlight code, .output pre")]
+    .filter((piece) => piece.scrollWidth > piece.clientWidth + 1)
+    .map((piece) => piece.textContent.trim().slice(0, 60))"""
+"""The beginnings of the pieces of code of a page that are wider than what is shown of them."""
+
+
+def test_no_page_is_wider_than_a_telephone_and_no_code_is_cut(site, chromium):
     """Without a server, 400 pixels wide; and none asks for anything of another host."""
     with chromium.tab(site / "index.html", viewport={"width": 400, "height": 800}) as tab:
         for path in sorted(site.rglob("*.html")):
             if path.relative_to(site).parts[0] not in ("source", "404.html"):
                 tab.page.goto(path.as_uri())
                 assert tab.page.evaluate("document.documentElement.scrollWidth") <= 400, path
+                assert tab.page.evaluate(CUT) == [], path
     assert outside(tab.asked) == []
     assert tab.said == []
 

@@ -1,4 +1,4 @@
-"""Light on a matt surface, found in two ways and weighed.
+"""Light on a matte surface, found in two ways and weighted.
 
 A Lambertian surface sends f = reflectance / pi of what arrives, times the cosine. Draw the next direction
 by the cosine density and little is left of that: what? Then combine this way to find a light with the other
@@ -11,7 +11,7 @@ from typing import Any
 
 
 def bounce(reflectance: Any, u0: Any, u1: Any) -> tuple[Any, Any, Any]:
-    """Return directions (..., 3) around the normal +z of a matt surface, f cos / pdf (...) and pdf (...)."""
+    """Return directions (..., 3) around the normal +z of a matte surface, f cos / pdf (...) and pdf (...)."""
     raise NotImplementedError("bounce")
 
 

@@ -1,6 +1,6 @@
 """A sine that promises something, in single precision.
 
-Find the whole number k nearest to x / pi and r = x - k pi, then sin(x) = (-1)^k sin(r), and a polynomial is
+Find the integer k nearest to x / pi and r = x - k pi, then sin(x) = (-1)^k sin(r), and a polynomial is
 enough for r in [-pi / 2, pi / 2]. The difficulty is r: k pi rounded to single precision would be off by
 more than the result may be. Subtract pi in three parts of 12 bits each, whose products with k are exact
 (Cody and Waite, 1980). Tutorial: page 8. Clauses: SIN-1, SIN-3, SIN-4.

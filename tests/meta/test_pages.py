@@ -1,0 +1,55 @@
+"""House rules about pages: the first ones are short, and each of the site says what it is good for."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+LONGEST = {"README.md": 120, "CONTRIBUTING.md": 100}
+"""The most lines of what everyone reads first: a few screens."""
+
+WITHOUT_PROMISE = {"docs/index.md", "docs/results.md", "docs/speed.md"}
+"""Pages that lead to others, or are looked up."""
+
+PROMISE = re.compile(
+    r"\*Afterwards you (?:can|understand|have|know)\b[^*]*\*|\*Afterwards a program of yours [^*]*\*"
+)
+"""What a reader can do afterwards, and how long it takes, in italics."""
+
+TIME = re.compile(r"\b(?:minutes?|hours?)\b")
+"""A time in words."""
+
+
+@pytest.mark.parametrize("name", LONGEST)
+def test_what_everyone_reads_first_is_short(house, name):
+    lines = len((house.root / name).read_text(encoding="utf-8").splitlines())
+    assert lines <= LONGEST[name], (
+        f"{name} has {lines} lines of {LONGEST[name]}: move some to a page of docs/"
+    )
+
+
+def test_each_page_says_what_it_is_good_for_and_how_long_it_takes(house):
+    wrong = []
+    for path in sorted((house.root / "docs").rglob("*.md")):
+        name = path.relative_to(house.root).as_posix()
+        promise = PROMISE.search(path.read_text(encoding="utf-8"))
+        if name not in WITHOUT_PROMISE and not (promise and TIME.search(promise[0])):
+            wrong.append(name)
+    house.refuse(
+        wrong,
+        "A page begins with what its reader can do afterwards and how long it takes: *Afterwards you ...*",
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("*Afterwards you can draw. Half an\nhour.*", True),
+        ("*Afterwards you have a file. Ten minutes.*", True),
+        ("Afterwards you can draw. Half an hour.", False),
+        ("*Afterwards it is nine.*", False),
+    ],
+)
+def test_the_pattern(text, found):
+    assert bool(PROMISE.search(text)) is found

@@ -38,7 +38,7 @@ WORDS = (
     Word(r"told(?! (?:apart|to)\b)", "reported, said", "programs report; people tell"),
     Word(r"tells? (?:the|all|what)", "reports", "programs report; people tell"),
     Word(r"anew", "again", "nobody says it"),
-    Word(r"(?<!left)(?<!leave)(?<!leaves) alone", "only, by itself", "after a noun it reads as lonely"),
+    Word(r"(?<!left\s)(?<!leave\s)(?<!leaves\s)alone", "only, by itself", "after a noun it reads as lonely"),
     Word(r"(?:come|comes|came|coming) along", "ship with", "software ships"),
     Word(
         r"(?:stands?|stood|standing) (?:in(?! for)|on|at|after|before|between|below|beside|there|twice|"
@@ -68,6 +68,17 @@ WORDS = (
     Word(r"whole numbers?", "integer", "the word of the field"),
     Word(r"in turns", "interleaved, in turn", "turns are for dancers"),
     Word(r"(?:and|then|be) train(?:ed)? on(?= (?:for|from|with)\b|[.,;:])", "trained further", "on what?"),
+    Word(
+        r"(?<!there\s)(?:is|are|was|were) no (?!longer|more|less|fewer|other|worse|better|\w+er\b)",
+        "is not a ...",
+        "no before a noun says that there is none of it",
+    ),
+    Word(r"lesser", "smaller", "numbers are smaller"),
+    Word(r"but where", "unless", "shorter"),
+    Word(r"likewise", "in the same way, also", "bookish"),
+    Word(r"give or take", "with a tolerance of", "the word of the field"),
+    Word(r"handed (?:to|out|over)", "given, sent", "nothing has hands"),
+    Word(r"has a say", "affects", "idiom"),
     Word(r"(?:to|only|by|from) who", "to those who", "a relative clause needs its noun"),
 )
 """What no text says, and what it says instead."""
@@ -173,6 +184,14 @@ def test_plain_words_and_code_pass(text):
 def test_texts_of_python_are_prose_and_its_names_are_not():
     text = 'anew = 1  # done anew\n\n\ndef f():\n    """Write it anew."""\n    return f"{x} matt"\n'
     assert [line.partition(": ")[0] for line in wrong_words("x.py", text)] == ["x.py:1", "x.py:5", "x.py:6"]
+
+
+def test_no_word_of_the_glossary_has_two_meanings(house):
+    rows = (house.root / "spec/glossary.md").read_text(encoding="utf-8").splitlines()
+    wrong = [
+        row for row in rows if row.startswith("|") and re.search(r"[;,] (?:also|or) (?:a|one|the)\b", row)
+    ]
+    house.refuse(wrong, "A word of the glossary means one thing: rename the other, and give it a row.")
 
 
 def test_every_word_has_a_suggestion_and_a_reason():

@@ -191,7 +191,7 @@ def path_vertex() -> list[str]:
         ["normal n; reflectance", f"{short(surface.normal)}; {short(surface.reflectance)}", "ISC-8"],
         ["shadow ray's origin", short(origin), "ISC-9"],
         ["light's u0, u1 of block 1", f"{exact(u0)}, {exact(u1)}", "RNG-7"],
-        ["wi; distance d", f"{short(way.wi)}; {short(way.distance)}", "LTR-3"],
+        ["wi; distance s", f"{short(way.wi)}; {short(way.distance)}", "LTR-3"],
         ["cos_s, cos_l", f"{short(way.cos_surface)}, {short(way.cos_light)}", "LTR-3"],
         ["density of the light sample", short(way.pdf), "LTR-3"],
         ["radiance L of the light", short(way.radiance), "SCN-5"],

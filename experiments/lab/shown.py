@@ -113,7 +113,7 @@ AHEAD = (
     ),
     ("cornell", "best-16", "`cornell`, camera moves"),
 )
-"""Sets and rows whose differences to Open Image Denoise with the same clean features the README shows."""
+"""Sets and rows that docs/results.md compares with Open Image Denoise, given the same clean features."""
 
 
 def differences(records: Records) -> str:
@@ -182,11 +182,11 @@ PAPER_ROWS = (
     *("input", "dncnn", "wamnet-color", "wamnet-color-own", "wamnet", "wamnet-own", "pix2pix", "svgf", "nlm"),
     *("oidn", "render30"),
 )
-"""Rows of Table 1 that the README shows."""
+"""Rows of Table 1 that docs/results.md shows."""
 
 
 def table1_readme(records: Records) -> str:
-    """Return the README's rows of Table 1, beside what the paper prints."""
+    """Return the rows of Table 1 of docs/results.md, beside what the paper prints."""
     found, rows = records["table1"], importlib.import_module("baselines.rows").ROWS
     cells = []
     for row in (row for row in PAPER_ROWS if row in found.configurations()):

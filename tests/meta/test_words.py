@@ -41,8 +41,8 @@ WORDS = (
     Word(r"(?<!left\s)(?<!leave\s)(?<!leaves\s)alone", "only, by itself", "after a noun it reads as lonely"),
     Word(r"(?:come|comes|came|coming) along", "ship with", "software ships"),
     Word(
-        r"(?:stands?|stood|standing) (?:in(?! for)|on|at|after|before|between|below|beside|there|twice|"
-        r"outside|inside|near|nearer|behind|above|so|around)",
+        r"(?:stands|stood)(?! (?:for|in for|still)\b)|stand (?:in(?! for)|on|at|after|before|between|below|"
+        r"beside|there|twice|outside|inside|near|behind|above|around)",
         "is, appears",
         "texts and cameras do not stand",
     ),
@@ -147,7 +147,7 @@ PLANTED = {
     "The file is written anew.": "anew",
     "It needs the standard library alone.": "alone",
     "Models that come\nalong.": "come along",
-    "The camera stands at 0.": "stands at",
+    "The camera stands at 0.": "stands",
     "It lies beside the kernel.": "lies",
     "A sum in the place of a product.": "in the place of",
     "Matt surfaces": "Matt",

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load as decode_tensors
 
 from ..refimpl import train
+from ..refimpl.activation import SINE, activation_named
 from ..refimpl.dataset import Window, normalization_from_json
 from ..refimpl.denoise import Model, check_model
 from ..refimpl.errors import InputError
@@ -46,6 +47,9 @@ CHECKPOINT_FORMAT = "wamnet-checkpoint"
 
 VERSION = "1"
 """Value of the header's text `version`; it changes when older readers would misread the file."""
+
+ACTIVATION_VERSION = "2"
+"""Version of models that name their activation, which readers of version 1 take to be the sine."""
 
 INFO_PREFIX = "info."
 """Put before the names of a model's own facts in the header, so that they cannot hide a field."""
@@ -68,13 +72,15 @@ def save_model(path: str | os.PathLike[str], model: Model) -> None:
         "normalization": json.dumps(asdict(model.normalization), sort_keys=True),
         **{INFO_PREFIX + name: text for name, text in model.info.items()},
     }
+    if model.siren.activation != SINE:
+        texts |= {"activation": model.siren.activation, "version": ACTIVATION_VERSION}
     _write(Path(path), _encode(MODEL_FORMAT, tensors, texts))
 
 
 def load_model(path: str | os.PathLike[str]) -> Model:
     """Read a model, or raise InputError that says what is wrong with the file."""
     path = Path(path)
-    tensors, texts = _read(path, MODEL_FORMAT)
+    tensors, texts = _read(path, MODEL_FORMAT, (VERSION, ACTIVATION_VERSION))
     n_layers = sum(name.endswith(".weight") for name in tensors)
     model = Model(
         siren=Siren(
@@ -82,6 +88,7 @@ def load_model(path: str | os.PathLike[str]) -> Model:
             tuple(_tensor(path, tensors, f"layer{layer}.bias") for layer in range(max(n_layers, 1))),
             _parsed(path, texts, "omega_0_first", float),
             _parsed(path, texts, "omega_0_hidden", float),
+            _activation(path, texts),
         ),
         features=_parsed(path, texts, "features", _names),
         window=_parsed(path, texts, "window", _window),
@@ -146,8 +153,10 @@ def _write(path: Path, content: bytes) -> None:
         ) from None
 
 
-def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
-    """Return tensors and texts of a file of this kind and version."""
+def _read(
+    path: Path, kind: str, versions: Sequence[str] = (VERSION,)
+) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Return tensors and texts of a file of this kind and one of these versions."""
     content = read_file(path, f"{kind} file")
     way_out = "write it with `wamnet train`"
     try:
@@ -155,7 +164,7 @@ def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, str
     except (SafetensorError, *BROKEN) as error:
         raise InputError(f"{kind} file", str(path), f"not a safetensors file ({error})", way_out) from None
     texts = _header_texts(path, content)
-    _check_kind(path, texts, kind)
+    _check_kind(path, texts, kind, versions)
     return tensors, texts
 
 
@@ -167,14 +176,14 @@ def _header_texts(path: Path, content: bytes) -> dict[str, str]:
     return texts
 
 
-def _check_kind(path: Path, texts: Texts, kind: str) -> None:
+def _check_kind(path: Path, texts: Texts, kind: str, versions: Sequence[str]) -> None:
     """Refuse a file of another kind or version."""
     found = texts.get("format", "missing")
     if found != kind:
         raise InputError(f"{path}: format", found, f"must be {kind}", "give a file that wamnet wrote")
     version = texts.get("version", "missing")
-    if version != VERSION:
-        rule = f"this program reads version {VERSION}"
+    if version not in versions:
+        rule = f"this program reads version {' and '.join(versions)}"
         raise InputError(f"{path}: version", version, rule, "use the wamnet that wrote it")
 
 
@@ -199,6 +208,17 @@ def _parsed(path: Path, texts: Texts, name: str, parse: Callable[[str], Any]) ->
         raise _inside(path, error) from None
     except BROKEN as error:
         raise InputError(f"{path}: {name}", texts[name], f"cannot be read ({error})", "train again") from None
+
+
+def _activation(path: Path, texts: Texts) -> str:
+    """Return the name of the activation; files of version 1 have the sine."""
+    if texts["version"] == VERSION:
+        name = texts.get("activation", SINE)
+        if name != SINE:
+            rule = f"a model of version {VERSION} has the {SINE}"
+            raise InputError(f"{path}: activation", name, rule, "train again")
+        return name
+    return str(_parsed(path, texts, "activation", lambda name: activation_named(name).name))
 
 
 def _window(text: str) -> Window:

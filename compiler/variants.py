@@ -31,7 +31,6 @@ from ..refimpl import factored
 from ..refimpl.dataset import FEATURES, Window
 from ..refimpl.denoise import Model
 from ..refimpl.errors import InputError
-from ..refimpl.siren import Siren
 from . import bounds, ir, sine
 from .bounds import Enclosure
 from .emit import kernel_gather
@@ -80,11 +79,10 @@ class Varied:
         rows = (*self.kept[1:], last)
         parts = zip(self.weights, self.biases, self.kept, rows, strict=True)
         cut = [(w[np.ix_(row, column)], b[row]) for w, b, column, row in parts]
-        found = Siren(
-            tuple(w.astype(siren.dtype) for w, _ in cut),
-            tuple(b.astype(siren.dtype) for _, b in cut),
-            siren.omega_0_first,
-            siren.omega_0_hidden,
+        found = replace(
+            siren,
+            weights=tuple(w.astype(siren.dtype) for w, _ in cut),
+            biases=tuple(b.astype(siren.dtype) for _, b in cut),
         )
         return replace(self.whole, siren=found, window=self.window, features=self.features)
 
@@ -171,7 +169,7 @@ def leave_out_feature(varied: Varied, name: str) -> Varied:
 def remove_neurons(varied: Varied, width: int) -> Varied:
     """Leave `width` neurons in each hidden layer, those that the next one weighs most; others count as 0.
 
-    0 is the middle of what a sine may be.
+    0 is the middle of what a sine may be, and what a rectifier gives that is not active.
     """
     widest = max((len(kept) for kept in varied.kept[1:]), default=0)
     rule = f"the widest hidden layer has {widest} neurons"

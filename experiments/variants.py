@@ -50,6 +50,7 @@ def tuned(device: Executor, model: Model, name: str, steps: int, pairs: Pairs) -
         widths=small.siren.widths[1:-1],
         omega_0_first=small.siren.omega_0_first,
         omega_0_hidden=small.siren.omega_0_hidden,
+        activation=small.siren.activation,
         rank=varied.rank,
         steps=steps,
         seed=2,

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from . import dataset
+from .activation import activation_named
 from .dataset import Normalization, Window
 from .errors import InputError
 from .frame import Frame
@@ -50,6 +51,7 @@ def check_model(model: Model) -> None:
     dataset.check_features(model.features)
     dataset.check_window(model.window)
     dataset.check_normalization(model.normalization)
+    activation_named(model.siren.activation)
     _check_layers(model.siren)
     check_shape(model.siren.widths, model.siren.omega_0_first, model.siren.omega_0_hidden)
     n_inputs = dataset.n_inputs(model.features, model.window)
@@ -114,9 +116,8 @@ def denoise(model: Model, frame: Frame, dtype: DTypeLike = np.float32) -> Array:
 
 def as_dtype(siren: Siren, dtype: DTypeLike) -> Siren:
     """Return the same network with parameters of type `dtype`."""
-    return Siren(
-        tuple(weight.astype(dtype) for weight in siren.weights),
-        tuple(bias.astype(dtype) for bias in siren.biases),
-        siren.omega_0_first,
-        siren.omega_0_hidden,
+    return replace(
+        siren,
+        weights=tuple(weight.astype(dtype) for weight in siren.weights),
+        biases=tuple(bias.astype(dtype) for bias in siren.biases),
     )

@@ -2,7 +2,8 @@
 
 1. Draw the parameters [`init`]: uniform, weights in the ranges of the source (biases: SIR-4), from counters.
 2. Map a vector of `D_in` numbers to `D_out` numbers [`forward`]: all layers but the last are
-   ``sin(omega_0 * (W x + b))``, the last is affine. This function is the one that the compiler traces.
+   ``sin(omega_0 * (W x + b))``, the last is affine. This function is the one that the compiler traces. Other
+   activations than the sine are rows of activation.py.
 3. For training, do the same and keep what the derivative needs [`forward_cached`], then apply the chain rule
    from the last layer to the first [`backward`].
 
@@ -14,7 +15,6 @@ layer and one for the other sine layers, because the large value that suits coor
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from .activation import SINE, activation_named
 from .errors import InputError
 from .rng import counter, random_block, uniform_floats
 
@@ -47,6 +48,7 @@ class Siren:
     biases: tuple[Array, ...]
     omega_0_first: float
     omega_0_hidden: float
+    activation: str = SINE
 
     @property
     def widths(self) -> tuple[int, ...]:
@@ -61,7 +63,7 @@ class Siren:
 
 @dataclass(frozen=True)
 class Cache:
-    """What [`backward`] needs of layer l: `inputs[l]` (N, D_in), `angles[l]` (N, D_out) of its sine."""
+    """What [`backward`] needs of layer l: `inputs[l]` (N, D_in), `angles[l]` (N, D_out) of its activation."""
 
     inputs: tuple[Array, ...]
     angles: tuple[Array, ...]
@@ -82,22 +84,19 @@ def init(
     omega_0_hidden: float,
     seed: int,
     dtype: DTypeLike = np.float32,
+    activation: str = SINE,
 ) -> Siren:
     """Draw the parameters of layers with `widths` (D_in, D_1, ..., D_out); the same bits on every machine."""
     check_shape(widths, omega_0_first, omega_0_hidden)
+    row = activation_named(activation)
     weights, biases = [], []
     for layer, (n_in, n_out) in enumerate(pairwise(widths)):
-        bound = weight_bound(layer, n_in, omega_0_hidden)
+        bound = row.weight_bound(layer, n_in, omega_0_hidden if layer else omega_0_first)
         weight = bound * _signed_uniforms(seed, layer, WEIGHT_TAG, n_out * n_in).reshape(n_out, n_in)
-        bias = _signed_uniforms(seed, layer, BIAS_TAG, n_out) / math.sqrt(n_in)
+        bias = row.biases(_signed_uniforms(seed, layer, BIAS_TAG, n_out), n_in)
         weights.append(weight.astype(dtype))
         biases.append(bias.astype(dtype))
-    return Siren(tuple(weights), tuple(biases), float(omega_0_first), float(omega_0_hidden))
-
-
-def weight_bound(layer: int, n_in: int, omega_0_hidden: float) -> float:
-    """Return the largest initial |weight|: 1 / D_in in layer 0, else sqrt(6 / D_in) / omega_0_hidden."""
-    return 1.0 / n_in if layer == 0 else math.sqrt(6.0 / n_in) / omega_0_hidden
+    return Siren(tuple(weights), tuple(biases), float(omega_0_first), float(omega_0_hidden), activation)
 
 
 def check_shape(widths: Sequence[int], omega_0_first: float, omega_0_hidden: float) -> None:
@@ -120,37 +119,37 @@ def _signed_uniforms(seed: int, layer: int, tag: int, count: int) -> Array:
 
 def forward(siren: Siren, x: Any) -> Any:
     """Map x (..., D_in) to y (..., D_out); `x` may be a tracing value."""
-    last = len(siren.weights) - 1
+    activate, last = activation_named(siren.activation).forward, len(siren.weights) - 1
     for layer, (weight, bias) in enumerate(zip(siren.weights, siren.biases, strict=True)):
         x = np.matmul(x, weight.T) + bias
         if layer < last:
-            x = np.sin(_omega_0(siren, layer) * x)
+            x = activate(_omega_0(siren, layer) * x)
     return x
 
 
 def forward_cached(siren: Siren, x: Array) -> tuple[Array, Cache]:
     """Map x (N, D_in) to y (N, D_out) with the operations of [`forward`], and keep inputs and angles."""
-    last = len(siren.weights) - 1
+    activate, last = activation_named(siren.activation).forward, len(siren.weights) - 1
     inputs, angles = [], []
     for layer, (weight, bias) in enumerate(zip(siren.weights, siren.biases, strict=True)):
         inputs.append(x)
         x = np.matmul(x, weight.T) + bias
         if layer < last:
             angles.append(_omega_0(siren, layer) * x)
-            x = np.sin(angles[layer])
+            x = activate(angles[layer])
     return x, Cache(tuple(inputs), tuple(angles))
 
 
 def backward(siren: Siren, cache: Cache, dy: Array, with_dx: bool = True) -> Gradients:
     """Turn dy (N, D_out), the loss's derivative by y, into the derivatives by every parameter and by x."""
-    last = len(siren.weights) - 1
+    derivative, last = activation_named(siren.activation).derivative, len(siren.weights) - 1
     dweights, dbiases = [], []
     dx = None
     for layer in range(last, -1, -1):
-        # y = sin(a), a = omega_0 z: dz = dy cos(a) omega_0. The last layer has y = z.
+        # y = f(a), a = omega_0 z: dz = dy f'(a) omega_0, with f' = cos of a sine. The last layer has y = z.
         dz = dy
         if layer < last:
-            dz = dy * np.cos(cache.angles[layer]) * _omega_0(siren, layer)
+            dz = dy * derivative(cache.angles[layer]) * _omega_0(siren, layer)
         # z = x W^T + b, summed over the N rows.
         dweights.append(np.matmul(dz.T, cache.inputs[layer]))
         dbiases.append(np.sum(dz, axis=0))
@@ -162,5 +161,5 @@ def backward(siren: Siren, cache: Cache, dy: Array, with_dx: bool = True) -> Gra
 
 
 def _omega_0(siren: Siren, layer: int) -> float:
-    """Return the factor of the layer's sine argument."""
+    """Return the factor of the argument of the layer's activation."""
     return siren.omega_0_first if layer == 0 else siren.omega_0_hidden

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from . import adam, dataset, factored, siren
+from .activation import SINE, activation_named
 from .adam import AdamState
 from .dataset import Dataset, Normalization, Window
 from .denoise import OUTPUT_CHANNELS, Model
@@ -61,7 +62,7 @@ SCHEDULES: Mapping[str, Callable[[int, int], float]] = {"constant": constant, "c
 
 @dataclass(frozen=True)
 class Recipe:
-    """All choices of a training run; `widths` are those of the hidden layers.
+    """All choices of a training run; `widths` are those of the hidden layers, `activation` is theirs.
 
     `n_windows` is the size of the pool that minibatches are picked from; 0 draws new pixels every step.
     `log_every` is in steps. `rank` is that of the first layer, 0 for no restriction.
@@ -80,6 +81,7 @@ class Recipe:
     seed: int = 0
     log_every: int = 100
     rank: int = 0
+    activation: str = SINE
 
     @property
     def layer_widths(self) -> tuple[int, ...]:
@@ -137,14 +139,24 @@ def check_recipe(recipe: Recipe) -> None:
         raise InputError("recipe: learning_rate", recipe.learning_rate, "finite and > 0", "try 0.001")
     if recipe.rank > 0:
         factored.check_rank(recipe.rank, recipe.window.size, *recipe.layer_widths[:2])
+    activation_named(recipe.activation)
     if recipe.schedule not in SCHEDULES:
         known = ", ".join(SCHEDULES)
         raise InputError("recipe: schedule", recipe.schedule, "not a known schedule", f"use one of {known}")
 
 
+def with_activation(recipe: Recipe, name: str) -> Recipe:
+    """Return the recipe with another activation, and with the omegas that belong to it, if some do."""
+    first, hidden = activation_named(name).omegas or (recipe.omega_0_first, recipe.omega_0_hidden)
+    return replace(recipe, activation=name, omega_0_first=first, omega_0_hidden=hidden)
+
+
 def recipe_to_json(recipe: Recipe) -> str:
-    """Return the recipe as JSON text with sorted keys."""
-    return json.dumps(asdict(recipe), sort_keys=True)
+    """Return the recipe as JSON text with sorted keys; the sine is not named, as before there were others."""
+    fields = asdict(recipe)
+    if recipe.activation == SINE:
+        del fields["activation"]
+    return json.dumps(fields, sort_keys=True)
 
 
 def recipe_from_json(text: str) -> Recipe:
@@ -215,7 +227,12 @@ def start(
     check_recipe(recipe)
     if network is None:
         network = siren.init(
-            recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden, recipe.seed, dtype
+            recipe.layer_widths,
+            recipe.omega_0_first,
+            recipe.omega_0_hidden,
+            recipe.seed,
+            dtype,
+            recipe.activation,
         )
         factors = recipe.rank and factored.start(network.weights[0], recipe.window.size, recipe.rank)
     else:
@@ -231,11 +248,12 @@ def start(
 
 def _check_network(network: Siren, recipe: Recipe) -> None:
     """Refuse to go on with a network of another shape than the recipe's."""
-    has = (network.widths, network.omega_0_first, network.omega_0_hidden)
-    wants = (recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden)
+    has = (network.widths, network.omega_0_first, network.omega_0_hidden, network.activation)
+    wants = (recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden, recipe.activation)
     if has != wants:
         rule = f"the recipe has {wants}"
-        raise InputError("widths and omegas of the first network", has, rule, "use the recipe that it had")
+        what = "widths, omegas and activation of the first network"
+        raise InputError(what, has, rule, "use the recipe that it had")
 
 
 def train(
@@ -438,6 +456,7 @@ def state_from_arrays(arrays: Mapping[str, NDArray[Any]], text: Mapping[str, str
         tuple(arrays[f"layer{layer}.bias"] for layer in layers),
         recipe.omega_0_first,
         recipe.omega_0_hidden,
+        recipe.activation,
     )
     factors = None
     if recipe.rank > 0:

@@ -56,6 +56,20 @@ def test_a_model_comes_back_to_the_bit(
     assert same(model_file.load_model(path), model)
 
 
+def test_a_model_names_its_activation_unless_it_is_the_sine(tmp_path: Path) -> None:
+    """A reader of version 1, for which all are sines, refuses version 2."""
+    path, model = tmp_path / "model.safetensors", model_of()
+    model = replace(model, siren=replace(model.siren, activation="relu"))
+    model_file.save_model(path, model)
+    assert same(model_file.load_model(path), model)
+    with safe_open(path, framework="numpy") as file:
+        assert (file.metadata()["version"], file.metadata()["activation"]) == ("2", "relu")
+    model_file.save_model(path, model_of())
+    with safe_open(path, framework="numpy") as file:
+        assert file.metadata()["version"] == "1"
+        assert "activation" not in file.metadata()
+
+
 def test_equal_models_are_equal_bytes_whatever_the_order_of_their_facts(tmp_path: Path) -> None:
     facts = {f"fact{n}": str(n) for n in range(20)}
     backwards = dict(reversed(facts.items()))
@@ -133,9 +147,9 @@ def without(name: str) -> Callable[[Any, Any], None]:
     return edit
 
 
-def with_text(name: str, text: str) -> Callable[[Any, Any], None]:
-    """Return an edit that sets a text."""
-    return lambda tensors, texts: texts.update({name: text})
+def with_text(name: str, text: str, **others: str) -> Callable[[Any, Any], None]:
+    """Return an edit that sets a text, and others."""
+    return lambda tensors, texts: texts.update({name: text, **others})
 
 
 def with_tensor(name: str, values: Any) -> Callable[[Any, Any], None]:
@@ -180,7 +194,16 @@ DAMAGE = {
     "shape": (with_tensor("layer1.weight", np.zeros((3, 5), np.float32)), r"layer 1 is weights \(3, 5\)"),
     "type": (with_tensor("layer1.bias", np.zeros(3, np.int64)), "types of the parameters is float32, int64"),
     "format": (with_text("format", "other"), "format is other: must be wamnet-model"),
-    "version": (with_text("version", "2"), "version is 2: this program reads version 1; use the wamnet that"),
+    "version": (with_text("version", "3"), "version is 3: this program reads version 1 and 2; use the"),
+    "activation missing": (with_text("version", "2"), "'activation' must be among them"),
+    "activation in version 1": (
+        with_text("activation", "relu"),
+        "model: activation is relu: a model of version 1 has the sine; train again",
+    ),
+    "activation unknown": (
+        with_text("activation", "tanh", version="2"),
+        "model: activation is tanh: not a known activation; use one of sine, relu",
+    ),
 }
 
 

@@ -1,5 +1,6 @@
 """Sharper bounds: rounding of sums in parts, sensitivities and scaled norms, against what happens."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -14,6 +15,7 @@ from wamnet.compiler.plan import analysed
 from wamnet.compiler.profiles import EMITTED_SINE
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import siren
+from wamnet.refimpl.activation import ACTIVATIONS
 from wamnet.refimpl.dataset import Normalization, Window
 from wamnet.refimpl.denoise import Model
 
@@ -93,11 +95,11 @@ def test_many_terms_count_as_large_as_their_sum():
     assert (large <= sums.gamma(66) * (np.abs(x) @ np.abs(weight).T)).all()
 
 
-def network(seed, widths, omega_0, scale):
-    found = siren.init(widths, omega_0, omega_0, seed)
+def network(seed, widths, omega_0, scale, activation="sine"):
+    found = siren.init(widths, omega_0, omega_0, seed, activation=activation)
     weights = tuple((w * np.float32(scale)).astype(np.float32) for w in found.weights)
     return Model(
-        siren.Siren(weights, found.biases, omega_0, omega_0),
+        replace(found, weights=weights),
         ("color", "normal"),
         Window(2, "clamp"),
         Normalization(),
@@ -108,10 +110,11 @@ def network(seed, widths, omega_0, scale):
     seed=st.integers(0, 2**31 - 1),
     omega_0=st.sampled_from([1.0, 3.0, 10.0, 30.0]),
     scale=st.sampled_from([1e-20, 0.1, 1.0, 4.0]),
+    activation=st.sampled_from(sorted(ACTIVATIONS)),
 )
-def test_float32_is_within_both_bounds(seed, omega_0, scale):
+def test_float32_is_within_both_bounds(seed, omega_0, scale, activation):
     """Random networks, tiny and large weights, inputs at the ends of their ranges (a firefly is 1)."""
-    model = network(seed, (24, 7, 6, 5, 3), omega_0, scale)
+    model = network(seed, (24, 7, 6, 5, 3), omega_0, scale, activation)
     program = analysed(lower(model))
     random = np.random.default_rng(seed)
     low, high = bounds.window_box(program.gather)

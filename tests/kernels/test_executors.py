@@ -23,6 +23,7 @@ from wamnet.compiler.trace import trace
 from wamnet.kernels import denoise_on, open_executor
 from wamnet.kernels.executor import black
 from wamnet.refimpl import dataset, denoise, frame
+from wamnet.refimpl.activation import ACTIVATIONS
 from wamnet.refimpl.errors import CompileError, InputError
 
 EXAMPLES = settings.default.max_examples // 10
@@ -31,7 +32,7 @@ EXAMPLES = settings.default.max_examples // 10
 
 @st.composite
 def cases(draw):
-    """Draw (widths, omegas, seed, scale, channels, size, border, images); in long runs half are wide."""
+    """Draw a network, how its images look, and images; in long runs half of the networks are wide."""
     channels = draw(st.sampled_from([{"a": 3}, {"a": 3, "b": 1}, {"a": 1, "b": 4, "c": 2}]))
     size = draw(st.integers(1, 12))
     hidden = draw(st.lists(st.integers(1, 9), min_size=0, max_size=4))
@@ -56,6 +57,7 @@ def cases(draw):
         "omegas": draw(st.tuples(st.floats(1, 30), st.floats(1, 30))),
         "seed": seed,
         "scale": draw(st.sampled_from([0.25, 1.0, 3.0])),
+        "activation": draw(st.sampled_from(sorted(ACTIVATIONS))),
         "channels": channels,
         "size": size,
         "border": draw(st.sampled_from(["clamp", "zero"])),
@@ -66,7 +68,7 @@ def cases(draw):
 @settings(max_examples=EXAMPLES)
 @given(case=cases())
 def test_error_is_within_the_bound(denoiser, kit, case):
-    network = kit.network(case["widths"], case["omegas"], case["seed"], case["scale"])
+    network = kit.network(case["widths"], case["omegas"], case["seed"], case["scale"], case["activation"])
     program = kit.denoiser(network, case["channels"], case["size"], case["border"])
     (seen,) = interpret(program, {"window": kit.windows(program, case["images"])}, np.float64).values()
     assert ((seen > 0) & (seen < 1)).all()

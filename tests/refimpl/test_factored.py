@@ -169,7 +169,9 @@ def test_a_trained_network_is_cut_and_gone_on_with(pairs) -> None:
     assert all((a == b).all() for a, b in zip(begin.siren.weights[1:], full.siren.weights[1:], strict=True))
     assert train.train(replace(RECIPE, rank=0), pairs, network=full.siren, until=0).siren is full.siren
     other = siren.init((6 * 6 * 6, 9, 8, 3), 1.0, 10.0, 1)
-    with pytest.raises(InputError, match=r"widths and omegas of the first network is \(\(216, 9, 8, 3\)"):
+    with pytest.raises(
+        InputError, match=r"widths, omegas and activation of the first network is \(\(216, 9, 8, 3\)"
+    ):
         train.train(RECIPE, pairs, network=other)
     arrays, text = train.state_to_arrays(begin)
     arrays["layer0.vertical"] = arrays["layer0.vertical"][:, :, :2]

@@ -125,7 +125,9 @@ def test_without_a_pool_every_step_draws_new_pixels() -> None:
 # ---- resume ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("changes", [{}, {"n_windows": 50, "schedule": "constant"}])
+@pytest.mark.parametrize(
+    "changes", [{}, {"n_windows": 50, "schedule": "constant"}, {"activation": "relu", "omega_0_hidden": 1.0}]
+)
 def test_twenty_steps_are_ten_and_ten(changes: Any) -> None:
     recipe = replace(SMALL, steps=20, log_every=3, **changes)
     whole = train.train(recipe, PAIRS)
@@ -274,12 +276,22 @@ def test_best_is_short_for_longer() -> None:
         ({"widths": (0,)}, "widths is"),
         ({"omega_0_first": 0.0}, "omega_0_first is"),
         ({"features": ("glow",)}, "feature name is glow"),
+        ({"activation": "tanh"}, "activation is tanh: not a known activation; use one of sine, relu"),
         ({"window": Window(0)}, "window size is 0"),
     ],
 )
 def test_recipes_are_checked(changes: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         train.train(replace(SMALL, **changes), PAIRS)
+
+
+def test_recipes_name_every_activation_but_the_sine() -> None:
+    """Texts of recipes are what they were before there was another: digests of models rest on them."""
+    assert "activation" not in train.recipe_to_json(SMALL)
+    recipe = train.with_activation(SMALL, "relu")
+    assert (recipe.activation, recipe.omega_0_first, recipe.omega_0_hidden) == ("relu", 1.0, 1.0)
+    assert train.recipe_from_json(train.recipe_to_json(recipe)) == recipe
+    assert train.with_activation(SMALL, "sine") == SMALL
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"features": 1, "widths": []}', "3"])

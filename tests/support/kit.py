@@ -15,6 +15,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.ir import Gather, Image, Program, Type, sha256
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import dataset, siren
+from wamnet.refimpl.activation import SINE
 from wamnet.refimpl.denoise import denoise_pixel
 
 LONG = os.environ.get("HYPOTHESIS_PROFILE") == "long"
@@ -37,18 +38,26 @@ class Kit:
     """What the tests of this folder share."""
 
     def network(
-        self, widths: list[int], omegas: tuple[float, float], seed: int = 1, scale: float = 1.0
+        self,
+        widths: list[int],
+        omegas: tuple[float, float],
+        seed: int = 1,
+        scale: float = 1.0,
+        activation: str = SINE,
     ) -> siren.Siren:
         """Return a network with weights and biases that are `scale` times the initial ones, float32.
 
         The last layer is made such that outputs lie within 0.5 +- 0.45, for inputs in [-2, 2]: clipped ones
         would hide errors.
         """
-        drawn = siren.init(widths, *omegas, seed=seed, dtype=np.float32)
+        drawn = siren.init(widths, *omegas, seed, np.float32, activation)
         factor = np.float32(scale)
         *weights, last = (w * factor for w in drawn.weights)
         *biases, middle = (b * factor for b in drawn.biases)
-        largest = 1.0 if weights else 2.0
+        largest = 2.0
+        for layer, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
+            sums = np.abs(weight).sum(axis=1) * largest + np.abs(bias)
+            largest = 1.0 if activation == SINE else float(omegas[layer > 0] * sums.max())
         last = last * np.float32(0.45 / largest / np.abs(last).sum(axis=1).max())
         return replace(drawn, weights=(*weights, last), biases=(*biases, np.full_like(middle, 0.5)))
 

@@ -1,7 +1,7 @@
 """The certificate beside a kernel: every step of the proof of its bound, for a checker that trusts none.
 
-1. A network of sines [scaled.py] over the box of its images, layer by layer: the magnitudes of its sums, what
-   rounding and the sine add to each number [`_layers`].
+1. A network of sines or rectifiers [scaled.py] over the box of its images, layer by layer: the magnitudes of
+   its sums, what rounding and sines add to each number [`_layers`].
 2. From each layer to each output: norms of the scaled matrices, or products of magnitudes, whichever is less
    [`_outputs`]. The scalings are data: any are sound, the checker need not find them.
 3. Numbers are rounded up to `DIGITS` digits, as the checker rounds its own. One that is smaller than what the
@@ -63,13 +63,11 @@ def prove(program: Program, found: Sequence[bounds.Enclosure], sine: SineContrac
     low, high = bounds.window_box(program.gather)  # type: ignore[arg-type]
     layers, own = [], []
     for number, layer in enumerate(network):
-        step, errors = _layer(
-            program, layer, low, high, sine, parts(None if number else program.gather, len(low))
-        )
+        blocks = parts(None if number else program.gather, len(low))
+        step, errors, ends = _layer(program, layer, low, high, sine, blocks)
         layers.append({"node": layer.affine, **step})
         own.append(errors)
-        high = np.full(len(errors), 1.0 + sine.error + FLUSH)
-        low = -high
+        low, high = _activated(program, layer, sine, *ends)
     matrices = [layer.scale * _array(program, layer, "weight") for layer in network[1:]]
     if not all(np.isfinite(errors).all() for errors in own) or not scaled.decomposable(matrices):
         return None
@@ -87,8 +85,11 @@ def _array(program: Program, layer: scaled.Layer, name: str) -> Array:
 
 def _layer(
     program: Program, layer: scaled.Layer, low: Array, high: Array, sine: SineContract, blocks: Sequence[Any]
-) -> tuple[dict[str, Any], Array]:
-    """Return the step of one layer for inputs (n,) in [low, high], and what it adds to the errors (m,)."""
+) -> tuple[dict[str, Any], Array, tuple[Array, Array]]:
+    """Return the step of one layer for inputs (n,) in [low, high], what it adds to the errors (m,), and more.
+
+    That is between which numbers (m,) the arguments of its activation lie.
+    """
     weight, bias = _array(program, layer, "weight"), _array(program, layer, "bias")
     omega = abs(layer.scale)
     up, down, largest = (
@@ -99,13 +100,19 @@ def _layer(
     own = rounding(weight, bias, low - FLUSH, high + FLUSH, blocks)
     own = own + FLUSH * (np.sum(up + down, axis=1) + largest.sum() + 4 * (len(low) + 1))
     sizes = (up + down) @ (largest + FLUSH) + np.abs(bias)
-    reach = (
-        np.maximum(up @ high - down @ low + bias, up @ -low - down @ -high - bias) + own + 2.0**-40 * sizes
-    )
+    slack = own + 2.0**-40 * sizes
+    most, negated = up @ high - down @ low + bias + slack, up @ -low - down @ -high - bias + slack
+    reach = np.maximum(most, negated)
     if layer.multiply != layer.affine:
-        own = omega * own + UNIT_ROUNDOFF * omega * reach + 2 * FLUSH
+        rounded = UNIT_ROUNDOFF * omega * reach + 2 * FLUSH
+        own = omega * own + rounded
         reach, sizes = omega * reach, np.maximum(omega, 1.0) * sizes
-    added = 0.0 if layer.sine is None else float(sine.error or 0.0) + 2 * FLUSH
+        if layer.scale < 0:
+            most, negated = negated, most
+        most, negated = omega * most + rounded, omega * negated + rounded
+    added = 0.0
+    if layer.activation is not None:
+        added = 2 * FLUSH + (float(sine.error or 0.0) if _is_sine(program, layer) else 0.0)
     errors = (own + added) * WIDER
     step = {
         "size_bound": _up(float(sizes.max()) * (1 + 2.0**-10)),
@@ -113,7 +120,24 @@ def _layer(
         "rounding_bound": [_up(float(value) * WIDER) for value in own],
         "error_bound": [_up(float(value)) for value in errors],
     }
-    return step, errors
+    return step, errors, (-negated, most)
+
+
+def _is_sine(program: Program, layer: scaled.Layer) -> bool:
+    """Return whether a layer ends in a sine."""
+    return layer.activation is not None and program.nodes[layer.activation].op == "sin"
+
+
+def _activated(
+    program: Program, layer: scaled.Layer, sine: SineContract, least: Array, most: Array
+) -> tuple[Array, Array]:
+    """Return between which numbers (m,) a kernel's activations of arguments in [least, most] lie."""
+    if layer.activation is None or _is_sine(program, layer):
+        high = np.full(len(most), 1.0 + float(sine.error or 0.0) + FLUSH)
+        return -high, high
+    operands = (program.nodes[arg] for arg in program.nodes[layer.activation].args)
+    (floor,) = (float(node["value"]) for node in operands if node.op == "constant")  # type: ignore[arg-type]
+    return np.maximum(least, floor), np.maximum(most, floor)
 
 
 def _outputs(matrices: Sequence[Array], own: Sequence[Array], rows: Sequence[int]) -> list[dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 1. The files beside it have the lengths that the manifest states and the digests that both state; the text
    and the weights make the program's [`_read`].
-2. The text is that of a network of sines; anything else is refused [`_layers`].
+2. The text is that of a network of sines or rectifiers; anything else is refused [`_layers`].
 3. Each layer: magnitudes, rounding of sums in parts, the sine's error [`_layer`]; each output: how far each
    layer's errors reach, by norms that hold for the scalings in the certificate [`_output`].
 4. That a matrix has a norm of at most N is proven in whole numbers, by elimination [`norm_is_below`].
@@ -56,10 +56,9 @@ def check(path: Path) -> dict[str, Any]:
         _same("layers", len(held["layers"]), len(layers))
         matrices, own = [], []
         for number, layer in enumerate(layers):
-            own.append(_layer(f"layer {number}", held["layers"][number], layer, box, arrays, promise))
-            matrices.append(arrays[layer["weight"]] * layer["scale"])
-            high = np.full(len(own[-1]), 1 + promise.error + TINY)
-            box = (-high, high, None)
+            errors, box = _layer(f"layer {number}", held["layers"][number], layer, box, arrays, promise)
+            own.append(errors)
+            matrices.append(arrays[layer["weight"]] * (layer["scale"] or 1.0))
         _same("outputs", [o["output"] for o in held["outputs"]], list(range(len(own[-1]))))
         found = [_output(f"output {o['output']}", o, matrices[1:], own) for o in held["outputs"]]
         _at_least("bound: output", held["bound"]["output"], found)
@@ -100,7 +99,7 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, An
 
 
 def _layers(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
-    """Return the layers of a network of sines, first to last, and (low, high, parts) of its windows."""
+    """Return the layers of a network, first to last, and (low, high, parts) of its windows."""
     nodes = {int(m[1]): m for m in map(NODE.fullmatch, text.splitlines()) if m}
 
     def arguments(m: Any) -> list[Any]:
@@ -117,17 +116,16 @@ def _layers(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
         at, _ = other(at)
     layers: list[dict[str, Any]] = []
     while at[2] != "input":
-        scale = None
-        if layers and at[2] == "sin":
-            (at,) = arguments(at)
+        scale, floor, end = None, -np.inf, at[2] if layers else None
+        if end in ("sin", "maximum"):
+            at, floor = (*arguments(at), floor) if end == "sin" else other(at)
             if at[2] == "multiply":
                 at, scale = other(at)
-        elif layers:
-            raise Refused(f"program: %{at[1]} is {at[2]}, no sine of a layer")
+        elif end:
+            raise Refused(f"program: %{at[1]} is {end}, no activation of a layer")
         _same(f"program: operation of %{at[1]}", at[2], "affine")
         names = dict(pair.split("=") for pair in at[4].split(", "))
-        known = {"node": int(at[1]), "scale": scale or 1.0, "scaled": scale is not None, "last": not layers}
-        layers.insert(0, {**names, **known})
+        layers.insert(0, {**names, "node": int(at[1]), "scale": scale, "end": end, "floor": floor})
         (at,) = arguments(at)
     (taps,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", text)
     images = re.findall(r"(?m)^  image \w+: (\d+) in \[(\S+), (\S+)\]$", text)
@@ -143,27 +141,33 @@ def _layers(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
 
 
 def _layer(name: str, stated: Any, layer: Any, given: Any, arrays: Any, promise: Any) -> Any:
-    """Check the step of one layer; return what it adds to the errors of its numbers (m,)."""
+    """Check a layer's step; return what it adds to its numbers' errors (m,), and the next one's `given`."""
     low, high, parts = given
-    weight, scale = arrays[layer["weight"]], abs(layer["scale"])
+    weight, scale = arrays[layer["weight"]], abs(layer["scale"] or 1.0)
     bias = arrays[layer["bias"]] if "bias" in layer else np.zeros(len(weight))
     own, least, most = _sum(weight, bias, low - TINY, high + TINY, parts)
     largest = np.maximum(-low, high)
     own = own + TINY * (np.abs(weight).sum(axis=1) + largest.sum() + 4 * (len(low) + 1))
     sizes = np.abs(weight) @ (largest + TINY) + np.abs(bias)
-    reach = np.maximum(most, -least) + own + 2.0**-40 * sizes
-    if layer["scaled"]:
-        own, reach = scale * own + U * scale * reach + 2 * TINY, scale * reach
+    ends = np.stack([least, most]) + np.outer([-1, 1], own + 2.0**-40 * sizes)
+    reach = np.abs(ends).max(axis=0)
+    if layer["scale"] is not None:
+        rounded = U * scale * reach + 2 * TINY
+        ends = np.sort(layer["scale"] * ends, axis=0) + np.outer([-1, 1], rounded)
+        own, reach = scale * own + rounded, scale * reach
     _same(f"{name}: node", stated["node"], layer["node"])
     size, argument = sizes.max() * max(scale, 1.0) * (1 + 2.0**-10), reach.max() * (1 + 2.0**-20)
-    if size >= 3.4e38 or not (layer["last"] or argument <= promise.domain):
+    sine = layer["end"] == "sin"
+    if size >= 3.4e38 or (sine and not argument <= promise.domain):
         raise Refused(f"{name}: numbers up to {size:.3g}, arguments up to {argument:.6g} of a sine")
-    errors = (own + (0.0 if layer["last"] else promise.error + 2 * TINY)) * WIDER
+    errors = (own + (promise.error if sine else 0.0) + (2 * TINY if layer["end"] else 0.0)) * WIDER
     _at_least(f"{name}: size_bound", [stated["size_bound"]], [size])
     _at_least(f"{name}: argument_bound", [stated["argument_bound"]], [argument])
     _at_least(f"{name}: rounding_bound", stated["rounding_bound"], own * WIDER)
     _at_least(f"{name}: error_bound", stated["error_bound"], errors)
-    return errors
+    if sine:
+        ends = np.outer([-1, 1], np.full(len(own), 1 + promise.error + TINY))
+    return errors, (*np.maximum(ends, layer["floor"]), None)
 
 
 def _sum(weight: Any, bias: Any, low: Any, high: Any, parts: Any) -> tuple[Any, Any, Any]:

@@ -1,8 +1,8 @@
 """Errors of a network's outputs over a box, by norms of its layers between scaled vectors.
 
-A network of sines is e_l = D_l (A_l e_(l-1) + p_l) + q_l: errors after layer l, A_l = omega_0 W_l, D_l a
-diagonal of slopes of at most 1, of which nothing else is known, p_l and q_l the errors that the operations
-add themselves.
+A network of sines or rectifiers is e_l = D_l (A_l e_(l-1) + p_l) + q_l: errors after layer l, A_l = omega_0
+W_l, D_l a diagonal of slopes of at most 1, of which nothing else is known, p_l and q_l the errors that the
+operations add themselves.
 
 1. Find the layers of a program whose output is such a network, if it is one [`network`].
 2. For any positive scalings s_l of the values after layer l, |s_l D x| <= |s_l x| in the 2-norm, diagonals
@@ -57,26 +57,26 @@ DIGITS_BITS = 8
 class Layer:
     """One affine map of a network and what follows, as indices of nodes; `scale` is omega_0.
 
-    `read` is what it maps; `multiply` omega_0 times the map, or the map itself; `sine` None at the end.
+    `read` is what it maps; `multiply` omega_0 times the map, or the map itself; `activation` None at the end.
     """
 
     read: int
     affine: int
     multiply: int
-    sine: int | None
+    activation: int | None
     scale: float
 
 
 def network(program: Program, found: Sequence[Enclosure], output: int) -> list[Layer]:
-    """Return the layers whose last one makes this value, first to last; none if it is no network of sines."""
+    """Return the layers whose last one makes this value, first to last; none if it is no such network."""
     index = unclamped(program, found, output)
     layers: list[Layer] = []
     if program.nodes[index].op != "affine":
         return []
     layers.append(Layer(program.nodes[index].args[0], index, index, None, 1.0))
-    while program.nodes[layers[0].read].op == "sin":
-        sine = layers[0].read
-        multiply = affine = program.nodes[sine].args[0]
+    while (argument := argument_of(program, found, layers[0].read)) is not None:
+        activation = layers[0].read
+        multiply = affine = argument
         scale = 1.0
         if program.nodes[affine].op == "multiply":
             constants = [arg for arg in program.nodes[affine].args if program.nodes[arg].op == "constant"]
@@ -86,8 +86,22 @@ def network(program: Program, found: Sequence[Enclosure], output: int) -> list[L
             (affine,) = (arg for arg in program.nodes[affine].args if arg != constants[0])
         if program.nodes[affine].op != "affine":
             return []
-        layers.insert(0, Layer(program.nodes[affine].args[0], affine, multiply, sine, scale))
+        layers.insert(0, Layer(program.nodes[affine].args[0], affine, multiply, activation, scale))
     return layers
+
+
+def argument_of(program: Program, found: Sequence[Enclosure], index: int) -> int | None:
+    """Return what this activation is of, a sine, or a rectifier: the larger of a value and an exact constant.
+
+    Both have slopes of at most 1. None for other operations.
+    """
+    node = program.nodes[index]
+    if node.op == "sin":
+        return node.args[0]
+    if node.op != "maximum":
+        return None
+    others = [arg for arg in node.args if program.nodes[arg].op != "constant" or np.any(found[arg].error)]
+    return others[0] if len(others) == 1 and program.nodes[others[0]].type == node.type else None
 
 
 def output_error(program: Program, found: Sequence[Enclosure], output: int) -> Array | None:
@@ -134,8 +148,8 @@ def own_error(found: Sequence[Enclosure], layer: Layer) -> Array:
     for index, factor in indices.items():
         e = found[index]
         total = total + factor * (e.error if e.own is None else e.own)
-    if layer.sine is not None:
-        total = total + found[layer.sine].own
+    if layer.activation is not None:
+        total = total + found[layer.activation].own
     return total
 
 

@@ -135,6 +135,14 @@ Trainer = Annotated[
         "--executor", help="What trains: the reference, or its step compiled, which is much faster."
     ),
 ]
+ActivationName = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="What hidden layers do with their sums: sine or relu.",
+        show_default="the preset's: sine",
+    ),
+]
 CutRank = Annotated[
     int,
     typer.Option(

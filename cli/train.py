@@ -110,6 +110,7 @@ def train(
     rank: Rank = None,
     begin: Begin = None,
     variant: Cut = None,
+    activation: options.ActivationName = None,
     steps: Annotated[int | None, typer.Option(help="Training steps.", show_default="the preset's")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first weights and of the draws.")] = None,
     resume: Annotated[
@@ -137,11 +138,10 @@ def train(
     with alone_at(output, "training a model"), alone_at(saved, "training a model"):
         check_begin(saved, preset, resume, restart)
         state = load_checkpoint(saved) if resume else None
-        recipe = _wanted(preset, state, features, steps, seed, rank)
+        recipe = _wanted(preset, state, features, steps, seed, rank, activation)
         network = _first_network(begin, state)
         if variant is not None:
-            if features is not None or rank is not None:
-                raise _chosen_twice(variant, "--features" if rank is None else "--rank")
+            _check_alone(variant, {"--rank": rank, "--features": features, "--activation": activation})
             recipe, network = _begin_varied(recipe, begin, variant)
         pairs = read_training(dataset, inputs, targets, recipe.features)
         state = _fit_to_the_end(recipe, pairs, output, state, network, executor.value)
@@ -155,13 +155,16 @@ def _wanted(
     steps: int | None,
     seed: int | None,
     rank: int | None,
+    activation: str | None,
 ) -> Recipe:
     """Return the recipe that the options ask for, checked."""
-    from ..refimpl.train import check_recipe
+    from ..refimpl.train import check_recipe, with_activation
 
     names = None if features is None else options.parse_names(features)
     choices = {"features": names, "steps": steps, "seed": seed, "rank": rank}
     recipe = choose_recipe((preset or Preset.best).value, state, choices)
+    if activation is not None:
+        recipe = with_activation(recipe, activation)
     check_recipe(recipe)
     return recipe
 
@@ -177,9 +180,11 @@ def _first_network(begin: Path | None, state: TrainState | None) -> Siren | None
     return load_model(begin).siren
 
 
-def _chosen_twice(variant: str, option: str) -> InputError:
-    """Return the refusal of an option beside the name of a variant, which says the same."""
-    return InputError("--variant", variant, f"it chooses what {option} does", f"leave out {option}")
+def _check_alone(variant: str, options: dict[str, Any]) -> None:
+    """Refuse options beside the name of a variant that choose what it chooses."""
+    for option, value in options.items():
+        if value is not None:
+            raise InputError("--variant", variant, f"it chooses what {option} does", f"leave out {option}")
 
 
 def _begin_varied(recipe: Recipe, begin: Path | None, name: str) -> tuple[Recipe, Siren]:
@@ -209,6 +214,7 @@ def varied(recipe: Recipe, model: Model, name: str) -> tuple[Recipe, Siren]:
         omega_0_first=network.omega_0_first,
         omega_0_hidden=network.omega_0_hidden,
         rank=varied.rank,
+        activation=network.activation,
     )
     check_recipe(found)
     return found, network

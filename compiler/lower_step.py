@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..refimpl import adam, siren
+from ..refimpl.activation import SINE
 from ..refimpl.siren import Siren
 from ..refimpl.train import squared_error
 from .ir import Program, Type
@@ -31,7 +32,13 @@ ADAM_INPUTS = ("theta", "g", "m", "v", "learning_rate", "grown_1", "grown_2")
 """Inputs of Adam's program, in order; its outputs are the first, third and fourth, moved on."""
 
 
-def lower_step(widths: Sequence[int], omega_0_first: float, omega_0_hidden: float, batch: int) -> Step:
+def lower_step(
+    widths: Sequence[int],
+    omega_0_first: float,
+    omega_0_hidden: float,
+    batch: int,
+    activation: str = SINE,
+) -> Step:
     """Return the step of a network with layers of `widths` (D_in, D_1, ..., D_out) on `batch` examples."""
     network = Siren(
         tuple(
@@ -41,6 +48,7 @@ def lower_step(widths: Sequence[int], omega_0_first: float, omega_0_hidden: floa
         tuple(np.full(n_out, layer + 1, np.float32) for layer, n_out in enumerate(widths[1:])),
         omega_0_first,
         omega_0_hidden,
+        activation,
     )
     return step_of(lambda window: siren.forward(network, window), widths[0], widths[-1], batch)
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from ..refimpl.activation import SINE
 from . import ir
 from .emit_factors import factors_text
 from .emit_step import WindowForm, step_text, update_text
@@ -50,13 +51,18 @@ class StepKernel:
 
 
 def compile_step(
-    widths: tuple[int, ...], omegas: tuple[float, float], batch: int, size: int, rank: int = 0
+    widths: tuple[int, ...],
+    omegas: tuple[float, float],
+    batch: int,
+    size: int,
+    rank: int = 0,
+    activation: str = SINE,
 ) -> StepKernel:
     """Return the kernels that train layers of `widths` on windows of `size` x `size` pixels.
 
     With a `rank` the factors of the first layer are what is trained.
     """
-    step = lower_step(widths, *omegas, batch)
+    step = lower_step(widths, *omegas, batch, activation)
     if rank:
         step = replace(step, split=Split(FIRST, size, rank))
     return compile_lowered(step, size)

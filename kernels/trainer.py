@@ -172,7 +172,9 @@ def begin(executor: Executor, recipe: Recipe, data: Dataset, state: TrainState) 
         rule = "a device trains in float32"
         raise InputError("type of the state's numbers", str(state.siren.dtype), rule, "use executor numpy")
     omegas = recipe.omega_0_first, recipe.omega_0_hidden
-    kernel = compile_step(recipe.layer_widths, omegas, recipe.batch, recipe.window.size, recipe.rank)
+    kernel = compile_step(
+        recipe.layer_widths, omegas, recipe.batch, recipe.window.size, recipe.rank, recipe.activation
+    )
     device = executor.open_trainer(kernel, data.values, data.targets)
     load(device, state)
     return Run(device, recipe, data, state.step, state.step, state, dict(state.history))

@@ -38,6 +38,11 @@ def _divide(d: Traced, y: Traced, x: tuple[Traced, ...]) -> Slopes:
     return over, -(over * y)
 
 
+def _chosen(first: Traced, d: Traced) -> Slopes:
+    """Return the slopes of two operands: the value is the first where `first` holds, else the second."""
+    return emit(d.builder, "select", first, d, 0.0), emit(d.builder, "select", first, 0.0, d)
+
+
 RULES: Mapping[str, Rule] = {
     "add": lambda d, y, x: (d, d),
     "subtract": lambda d, y, x: (d, -d),
@@ -46,6 +51,8 @@ RULES: Mapping[str, Rule] = {
     "negative": lambda d, y, x: (-d,),
     "reciprocal": lambda d, y, x: (-(d * y * y),),
     "sqrt": lambda d, y, x: (0.5 * d / y,),
+    "minimum": lambda d, y, x: _chosen(x[0] < x[1], d),
+    "maximum": lambda d, y, x: _chosen(x[0] > x[1], d),
     "sin": lambda d, y, x: (d * np.cos(x[0]),),
     "cos": lambda d, y, x: (-(d * np.sin(x[0])),),
 }

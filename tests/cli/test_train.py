@@ -200,7 +200,24 @@ def test_a_model_is_cut_and_trained_on(wamnet, refused, pair, tmp_path) -> None:
     text = "--from is full.safetensors: a resumed run goes on from its checkpoint; leave it out"
     assert text in refused("train", *pair[:4], "--resume", "-o", "cut.safetensors", *more[:2])
     others = (*pair[:4], "--features", "color", *more[:2], "-o", "x.safetensors")
-    assert "widths and omegas of the first network is " in refused("train", *others)
+    assert "widths, omegas and activation of the first network is " in refused("train", *others)
+
+
+def test_another_activation(wamnet, refused, pair, tmp_path, executor_named) -> None:
+    """Trained by the compiled trainer, gone on with by the reference, and run within its bound."""
+    executor_named("opencl")
+    options = ("--activation", "relu", "--steps", 4, "--executor", "opencl", "-o", "m.safetensors")
+    assert wamnet("train", *pair, *options).status == 0
+    assert wamnet("train", *pair[:4], "--resume", "--steps", 6, "-o", "m.safetensors").status == 0
+    assert load_model(tmp_path / "m.safetensors").siren.activation == "relu"
+    assert wamnet("compile", "m.safetensors", "--target", "opencl", "-o", "kernel").status == 0
+    assert wamnet("certify", "kernel/denoise.certificate.json").status == 0
+    assert wamnet("denoise", "m.safetensors", "noisy.exr", "-o", "p.png", "--executor", "opencl").status == 0
+    text = "activation is tanh: not a known activation; use one of sine, relu"
+    assert text in refused("train", *pair, "--activation", "tanh", "-o", "x.safetensors")
+    text = "--variant is rank4: it chooses what --activation does; leave out --activation"
+    more = ("--from", "m.safetensors", "--variant", "rank4", "--activation", "sine", "-o", "x.safetensors")
+    assert text in refused("train", *pair[:4], *more)
 
 
 def test_training_on_a_device(wamnet, refused, pair, tmp_path, executor_named) -> None:

@@ -25,6 +25,7 @@ from wamnet.kernels import trainer
 from wamnet.kernels.opencl_trainer import OpenCLTrainer
 from wamnet.kernels.trainer import train_on
 from wamnet.refimpl import adam, dataset, denoise, metrics, train
+from wamnet.refimpl.activation import ACTIVATIONS
 from wamnet.refimpl.dataset import Dataset, Window
 from wamnet.refimpl.encoding import from_display, to_display
 from wamnet.refimpl.errors import InputError, TrainingError
@@ -89,7 +90,9 @@ def tensors(state: TrainState) -> list[bytes]:
 
 def kernel_of(recipe: Recipe) -> StepKernel:
     omegas = recipe.omega_0_first, recipe.omega_0_hidden
-    return compile_step(recipe.layer_widths, omegas, recipe.batch, recipe.window.size)
+    return compile_step(
+        recipe.layer_widths, omegas, recipe.batch, recipe.window.size, activation=recipe.activation
+    )
 
 
 def data_of(recipe: Recipe, pairs: Any = PAIRS) -> Dataset:
@@ -142,6 +145,7 @@ def gradient_excess(
     window=st.builds(Window, st.integers(1, 7), st.sampled_from(["clamp", "zero"])),
     omega_0_hidden=st.sampled_from([1.0, 10.0]),
     n_windows=st.sampled_from([0, 30]),
+    activation=st.sampled_from(sorted(ACTIVATIONS)),
     seed=st.integers(0, 2**31),
 )
 def test_first_derivatives_are_within_the_bound(
@@ -152,6 +156,7 @@ def test_first_derivatives_are_within_the_bound(
     window: Window,
     omega_0_hidden: float,
     n_windows: int,
+    activation: str,
     seed: int,
 ) -> None:
     """Layers of parts of vectors and of several, tiles that are not full, borders, frames of two sizes."""
@@ -163,6 +168,7 @@ def test_first_derivatives_are_within_the_bound(
         window=window,
         omega_0_hidden=omega_0_hidden,
         n_windows=n_windows,
+        activation=activation,
         seed=seed,
     )
     assert gradient_excess(opencl, recipe) <= 1

@@ -14,6 +14,7 @@ from wamnet.compiler import bounds
 from wamnet.compiler.compile import DENOISERS, EXPORTED, compile_program
 from wamnet.compiler.ir import Type
 from wamnet.compiler.lower import lower
+from wamnet.compiler.lower_step import lower_step
 from wamnet.compiler.profiles import EMITTED_SINE
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import activation, siren
@@ -142,7 +143,7 @@ LEAKY = Activation(
 
 
 def test_one_row_is_all_that_a_new_activation_needs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every target's kernels have a bound."""
+    """Every target's kernels have a bound; the compiled trainer derives the backward pass."""
     monkeypatch.setattr(activation, "ACTIVATIONS", {**ACTIVATIONS, "leaky": LEAKY})
     network = siren.init((27, 6, 5, 3), 1.0, 1.0, 5, activation="leaky")
     program = lower(Model(network, ("color",), Window(3), Normalization()))
@@ -151,3 +152,4 @@ def test_one_row_is_all_that_a_new_activation_needs(monkeypatch: pytest.MonkeyPa
             kernel = compile_program(program, name, schedule=schedule.name)
             errors = kernel.manifest["bound"]["output"]
             assert all(math.isfinite(error) and error > 0 for error in errors), name
+    assert "greater" in {node.op for node in lower_step((27, 6, 5, 3), 1.0, 1.0, 4, "leaky").program.nodes}

@@ -17,6 +17,7 @@ from wamnet.compiler.passes.fuse_bias import fuse_bias
 from wamnet.compiler.passes.gradient import RULES, gradient
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import siren, train
+from wamnet.refimpl.activation import ACTIVATIONS
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.siren import Siren
 
@@ -37,6 +38,8 @@ CASES: dict[str, Any] = {
     "negative": lambda x: -np.sin(-affine(x)),
     "reciprocal": lambda x: np.reciprocal(affine(x) + 6.0),
     "sqrt": lambda x: np.sqrt(affine(x) + 6.0),
+    "minimum": lambda x: np.minimum(affine(x), C) * affine(x),
+    "maximum": lambda x: np.maximum(affine(x), C) * affine(x),
     "sin": lambda x: np.sin(2.0 * affine(x)),
     "cos": lambda x: np.cos(2.0 * affine(x)),
 }
@@ -84,9 +87,10 @@ def test_rule_against_central_differences(op: str) -> None:
     omega_0_first=st.sampled_from([1.0, 2.5]),
     omega_0_hidden=st.sampled_from([1.0, 10.0]),
     seed=st.integers(0, 2**32 - 1),
+    activation=st.sampled_from(sorted(ACTIVATIONS)),
 )
 def test_a_network_against_the_backward_pass_by_hand(
-    widths: list[int], n: int, omega_0_first: float, omega_0_hidden: float, seed: int
+    widths: list[int], n: int, omega_0_first: float, omega_0_hidden: float, seed: int, activation: str
 ) -> None:
     """Both do the same operations in float64; the order of sums may differ: u gamma of the magnitudes.
 
@@ -95,10 +99,10 @@ def test_a_network_against_the_backward_pass_by_hand(
     at most n times the product of all weights' 1-norms times omegas.
     """
     random = np.random.default_rng(seed)
-    network = siren.init(widths, omega_0_first, omega_0_hidden, seed, np.float64)
+    network = siren.init(widths, omega_0_first, omega_0_hidden, seed, np.float64, activation)
     x, t = random.uniform(-1, 1, (n, widths[0])), random.uniform(0, 1, (n, widths[-1]))
     loss, want = train.loss_and_gradients(network, x, t)
-    lowered = lower_step(widths, omega_0_first, omega_0_hidden, n)
+    lowered = lower_step(widths, omega_0_first, omega_0_hidden, n, activation)
     found = step.sums(step.with_parameters(lowered, arrays_of(network)), x, t)
     largest = max(omega_0_first, omega_0_hidden)
     gain = np.prod([1 + np.abs(w).sum() * largest + np.abs(b).sum() for w, b in layers(network)])

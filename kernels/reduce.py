@@ -22,6 +22,7 @@ from ..compiler.ir import OUTPUT_ENCODING, Program, Type
 from ..compiler.lower import lower
 from ..compiler.targets import target_named
 from ..compiler.trace import trace
+from ..refimpl.activation import SINE, activation_named
 from ..refimpl.denoise import Model, as_dtype
 from ..refimpl.siren import Siren, forward
 from .apart import Runner
@@ -128,17 +129,19 @@ def _shorter(axis: str, box: Box, step: int) -> tuple[Box, Box]:
 
 @dataclass(frozen=True)
 class Stage:
-    """A layer's sums, or its sines, of neurons [first, end)."""
+    """A layer's sums, or its sines or other activations, of neurons [first, end)."""
 
     layer: int
     sines: bool
     first: int
     end: int
+    activation: str = SINE
 
     @property
     def text(self) -> str:
         """Return the stage for a reader."""
-        return f"layer {self.layer}, {'sines' if self.sines else 'sums'}"
+        after = "sines" if self.activation == SINE else f"after {self.activation}"
+        return f"layer {self.layer}, {after if self.sines else 'sums'}"
 
 
 def stages(siren: Siren, most: int) -> Iterator[Stage]:
@@ -147,7 +150,7 @@ def stages(siren: Siren, most: int) -> Iterator[Stage]:
     for layer, weight in enumerate(siren.weights):
         for sines in (False, True) if layer < last else (False,):
             for first in range(0, len(weight), most):
-                yield Stage(layer, sines, first, min(first + most, len(weight)))
+                yield Stage(layer, sines, first, min(first + most, len(weight)), siren.activation)
 
 
 def stage_program(model: Model, stage: Stage) -> Program:
@@ -158,11 +161,12 @@ def stage_program(model: Model, stage: Stage) -> Program:
     biases[-1] = np.ascontiguousarray(biases[-1][stage.first : stage.end])
     part = replace(siren, weights=tuple(weights), biases=tuple(biases))
     omega_0 = siren.omega_0_first if stage.layer == 0 else siren.omega_0_hidden
+    activate = activation_named(siren.activation).forward
 
     def function(window: Any) -> Any:
         """Run the network up to here."""
         sums = forward(part, window)
-        return np.sin(omega_0 * sums) if stage.sines else sums
+        return activate(omega_0 * sums) if stage.sines else sums
 
     assert whole.gather is not None
     info = {**dict(whole.info), OUTPUT_ENCODING: f"{stage.text}, neurons {stage.first} to {stage.end - 1}"}

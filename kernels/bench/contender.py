@@ -7,7 +7,7 @@ against the full network in float64, whatever it leaves out. Another denoiser ha
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -78,6 +78,14 @@ def degree_of(profile: str) -> int | None:
     if profiles.profile_named(profile).sine is None:
         return None
     return int(profile.partition(profiles.DEGREE_WORD)[2] or sine.DEGREE)
+
+
+def activation_in(library: str, table: Mapping[str, Any], model: Model) -> Any:
+    """Return what a library has for the model's activation, from a table by the names of activations."""
+    name = model.siren.activation
+    if name not in table:
+        raise ExecutorUnavailable(f"{library} is not told how to compute {name}, only {', '.join(table)}")
+    return table[name]
 
 
 def parameters_of(model: Model, rank: int = 0) -> int:

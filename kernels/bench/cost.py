@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from ...compiler.artifact import Artifact
 from ...compiler.emit import kernel_gather, output_channels
 from ...compiler.ir import Program
+from ...refimpl.activation import SINE
 from ...refimpl.dataset import channels_of
 from ...refimpl.denoise import Model
 
@@ -96,7 +97,8 @@ def layered(model: Model, fuses: bool) -> tuple[Stage, ...]:
         elementwise = Stage(0, 0, FLOAT_BYTES * 2 * neurons)
         if layer < len(model.siren.weights) - 1:
             stages += [] if fuses else [elementwise]
-            stages.append(Stage(0, neurons, elementwise.bytes))
+            sines = neurons if model.siren.activation == SINE else 0
+            stages.append(Stage(0, sines, elementwise.bytes))
         else:
             stages.append(elementwise)
         read = neurons

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...refimpl.activation import RELU, SINE
 from ...refimpl.dataset import FEATURES
 from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable
-from .contender import Contender, Opened, Tools, told_as_missing
+from .contender import Contender, Opened, Tools, activation_in, told_as_missing
 from .cost import layered
 from .workload import Given
 
@@ -26,6 +27,10 @@ FORMAT = 8
 
 MODES = {"clamp": "edge", "zero": "constant"}
 """Border rules as modes of the operator Pad."""
+
+
+NODES = {SINE: "Sin", RELU: "Relu"}
+"""Activations as operators."""
 
 
 def graph(model: Model) -> bytes:
@@ -50,6 +55,7 @@ def graph(model: Model) -> bytes:
     before, after = model.window.before, model.window.after
     margins = constant("margins", np.array([0, 0, before, before, 0, 0, after, after], np.int64))
     x = node("Pad", [x, margins], "padded", mode=MODES[model.window.border])
+    activate = activation_in("the ONNX graph", NODES, model)
     last = len(model.siren.weights) - 1
     for layer, (weight, bias) in enumerate(zip(model.siren.weights, model.siren.biases, strict=True)):
         side = 1 if layer else size
@@ -59,7 +65,7 @@ def graph(model: Model) -> bytes:
         if layer < last:
             omega = model.siren.omega_0_hidden if layer else model.siren.omega_0_first
             x = node("Mul", [x, constant(f"o{layer}", np.float32(omega))], f"angle{layer}")
-            x = node("Sin", [x], f"sine{layer}")
+            x = node(activate, [x], f"{model.siren.activation}{layer}")
     bounds = [constant("black", np.float32(0.0)), constant("white", np.float32(1.0))]
     x = node("Clip", [x, *bounds], "clipped")
     x = node("Squeeze", [x, axis], "alone")

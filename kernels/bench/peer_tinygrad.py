@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...refimpl.activation import RELU, SINE
 from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable
-from .contender import Contender, Opened, Tools, told_as_missing
+from .contender import Contender, Opened, Tools, activation_in, told_as_missing
 from .cost import layered
 from .workload import Given
 
@@ -47,6 +48,7 @@ def _network(model: Model) -> Any:
         kernels.append(on_device(weight.reshape(len(weight), side, side, -1).transpose(0, 3, 1, 2)))
     biases = [on_device(bias) for bias in model.siren.biases]
     omegas = (model.siren.omega_0_first, *[model.siren.omega_0_hidden] * (len(kernels) - 1))
+    activate = activation_in("tinygrad", {SINE: Tensor.sin, RELU: Tensor.relu}, model)
     margins, mode = (model.window.before, model.window.after) * 2, MODES[model.window.border]
 
     def network(*images: Any) -> Any:
@@ -55,7 +57,7 @@ def _network(model: Model) -> Any:
         for number, (weight, bias) in enumerate(zip(kernels, biases, strict=True)):
             x = x.conv2d(weight, bias)
             if number < len(kernels) - 1:
-                x = (x * omegas[number]).sin()
+                x = activate(x * omegas[number])
         return x.clamp(0.0, 1.0)[0].permute(1, 2, 0).contiguous().realize()
 
     return TinyJit(network), on_device

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...refimpl.activation import RELU, SINE
 from ...refimpl.denoise import Model
-from .contender import Contender, Opened, Tools, told_as_missing
+from .contender import Contender, Opened, Tools, activation_in, told_as_missing
 from .cost import layered
 from .workload import Given
 
@@ -32,6 +33,7 @@ def _open(compiled: bool, model: Model) -> Opened:
     kernels = [kernel.to(memory_format=torch.channels_last) for kernel in kernels]
     biases = [torch.from_numpy(bias.astype(np.float32)) for bias in model.siren.biases]
     omegas = (model.siren.omega_0_first, *[model.siren.omega_0_hidden] * len(others))
+    activate = activation_in("PyTorch", {SINE: torch.sin, RELU: torch.relu}, model)
     margins, mode = (model.window.before, model.window.after) * 2, MODES[model.window.border]
 
     def network(images: Sequence[Any]) -> Any:
@@ -39,7 +41,7 @@ def _open(compiled: bool, model: Model) -> Opened:
         for number, (kernel, bias) in enumerate(zip(kernels, biases, strict=True)):
             x = torch.nn.functional.conv2d(x, kernel, bias)
             if number < len(others):
-                x = torch.sin(omegas[number] * x)
+                x = activate(omegas[number] * x)
         return x.clamp(0.0, 1.0)
 
     function = torch.compile(network) if compiled else network

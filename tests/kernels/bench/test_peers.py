@@ -44,14 +44,14 @@ def opened(peer, model, size):
         pytest.skip(str(error))
 
 
-@pytest.mark.parametrize("border", ["clamp", "zero"])
+@pytest.mark.parametrize(("border", "activation"), [("clamp", "sine"), ("zero", "sine"), ("clamp", "relu")])
 @pytest.mark.parametrize("peer", SAME_FUNCTION, ids=lambda peer: peer.name)
-def test_a_peer_computes_the_network(peer, border) -> None:
+def test_a_peer_computes_the_network(peer, border, activation) -> None:
     """On an oblong picture, smaller than twice the window: the bound is that of the program in float32.
 
     It holds for every order of summation and for fused sums, and so for every library that rounds to nearest.
     """
-    network = siren.init((5 * 5 * 6, 8, 6, 3), 2.0, 3.0, seed=7, dtype=np.float32)
+    network = siren.init((5 * 5 * 6, 8, 6, 3), 2.0, 3.0, 7, np.float32, activation)
     model = Model(network, ("color", "normal"), Window(5, border), Normalization())
     whole = workload.noise(9)
     frame = Frame({name: layer[:7] for name, layer in whole.layers.items()})

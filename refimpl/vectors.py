@@ -9,9 +9,34 @@ it. A loop over the rows of constant tables is [`fold_rows`], so that it can be 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
+
+Floats: TypeAlias = NDArray[np.floating[Any]]
+"""A number each lane, (...). Like all these names it stands for traced values too."""
+
+Points: TypeAlias = NDArray[np.floating[Any]]
+"""Places (..., 3) in scene units."""
+
+Directions: TypeAlias = NDArray[np.floating[Any]]
+"""Directions (..., 3), of length 1 unless said otherwise."""
+
+Normals: TypeAlias = NDArray[np.floating[Any]]
+"""Unit normals (..., 3)."""
+
+Colors: TypeAlias = NDArray[np.floating[Any]]
+"""Linear red, green and blue (..., 3): reflectances, and shares of light."""
+
+Radiance: TypeAlias = NDArray[np.floating[Any]]
+"""Light (..., 3) in W / (sr m^2) per channel."""
+
+Truths: TypeAlias = NDArray[np.bool_]
+"""Decisions (...)."""
+
+Ids: TypeAlias = NDArray[np.int32]
+"""Surface ids, or indices into a table (...)."""
 
 
 def vector(x: Any, y: Any, z: Any) -> Any:

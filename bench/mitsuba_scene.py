@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
-from wamnet.refimpl.intersection import light_radiance
 from wamnet.refimpl.scene import Box, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.shapes.quad import light_radiance
 from wamnet.refimpl.transport import Settings
 
 LEAST_LLVM = 16

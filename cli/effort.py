@@ -55,8 +55,9 @@ their means, and the frame."""
 
 def primitives_of(scene: Scene) -> int:
     """Return the number of things in a scene that a ray can meet."""
-    found = sum(len(part) for part in (scene.boxes, scene.spheres, scene.quads, scene.lights))
-    return found + (scene.room is not None)
+    from ..refimpl.scene import primitives
+
+    return primitives(scene) + (scene.room is not None)
 
 
 def seconds_of(primitives: int, samples: int, pixels: int, executor: str, workers: int) -> float:

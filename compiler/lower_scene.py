@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from ..refimpl import render, transport, vectors
-from ..refimpl.intersection import Hit, Surface
-from ..refimpl.scene import Scene, scene_digest
+from ..refimpl.intersection import Hit, Surface, reflecting
+from ..refimpl.scene import Scene, primitives, scene_digest
 from ..refimpl.transport import Counters, Path, Settings, World
 from .ir import Program, Type
 from .passes import pipeline
@@ -171,11 +171,6 @@ def _world(laid: dict[str, Any], moving: SceneInputs | None, given: Mapping[str,
     return world
 
 
-def primitives(scene: Scene) -> int:
-    """Return the number of primitives that stand in tables: all but the room."""
-    return len(scene.boxes) + len(scene.spheres) + len(scene.quads) + len(scene.lights)
-
-
 def names(values: Values) -> list[str]:
     """Return the names of all components, in order."""
     return [name + end for name, (ends, _) in values.items() for end in ends]
@@ -216,7 +211,7 @@ def _surface(given: Mapping[str, Any]) -> tuple[Surface, Hit]:
     point, normal, reflectance = (
         _vector(given, name, SURFACE[name][0]) for name in ("point", "normal", "reflectance")
     )
-    return Surface(point, normal, reflectance, None, None), Hit(given["t"], given["surface"])
+    return reflecting(point, normal, reflectance), Hit(given["t"], given["surface"])
 
 
 def _taken(values: Values, *tuples: Any) -> dict[str, Traced]:

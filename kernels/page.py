@@ -38,10 +38,10 @@ from ..compiler.scene_inputs import SceneInputs, varying
 from ..refimpl import factored, rng, transport
 from ..refimpl.denoise import Model, check_model, learned_feature_spp
 from ..refimpl.errors import InputError
-from ..refimpl.intersection import quad_area_pdf
 from ..refimpl.render import Job, render
 from ..refimpl.scene import Scene
 from ..refimpl.scenes import TURN_SECONDS
+from ..refimpl.shapes.quad import quad_area_pdf
 from ..refimpl.transport import Settings
 from ..refimpl.variation import RANGES, ranges_from_json
 from .denoise_on import images_of

@@ -17,23 +17,22 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
 from .errors import InputError
 from .materials import MATERIALS, Material
 from .reading import Special, parse_json, to_dataclass
-
-Vector = tuple[float, float, float]
-Matrix = tuple[Vector, Vector, Vector]
-
-BLACK: Vector = (0.0, 0.0, 0.0)
-"""No light: the default of emissions and of the background, in W / (sr m^2) per channel."""
-
-IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-"""The rotation that leaves a box parallel to the axes."""
+from .shapes import SHAPES, Shape
+from .shapes import Box as Box
+from .shapes import Light as Light
+from .shapes import Quad as Quad
+from .shapes import Sphere as Sphere
+from .shapes.box import IDENTITY as IDENTITY
+from .shapes.shape import BLACK, OMITTED, length, spans_area
+from .shapes.shape import Matrix as Matrix
+from .shapes.shape import Vector as Vector
 
 FORMAT = "wamnet-scene"
 """Value of the JSON key `format`, by which a scene file is recognised."""
@@ -41,15 +40,8 @@ FORMAT = "wamnet-scene"
 VERSION = 1
 """Version of the JSON form; readers refuse others."""
 
-ROTATION_TOLERANCE = 1e-6
-"""Largest entry of R R^T - I that is still taken for a rotation: JSON written with seven digits passes."""
-
 LARGEST_NUMBER = 1e12
 """Largest magnitude of any number of a scene: squares of such distances are far from float32's overflow."""
-
-OMITTED: Mapping[str, bool] = {"omitted at its default": True}
-"""Mark of a field that the canonical text leaves out while it has its default: texts and digests of scenes
-that were made before the field existed stay as they are."""
 
 LARGEST_CONCENTRATION = 1e6
 """Largest concentration of a sun's lobe: it is then 0.05 degrees wide, and float32 still resolves it."""
@@ -80,56 +72,6 @@ class Room:
     reflectances: tuple[Vector, Vector, Vector, Vector, Vector, Vector]
     emission: Vector = BLACK
     materials: tuple[Material | None, ...] = field(default=(), metadata=OMITTED)
-
-
-@dataclass(frozen=True)
-class Box:
-    """Oriented box; `rotation` turns world vectors into the box's own axes (its rows are those axes)."""
-
-    center: Vector
-    half_extent: Vector
-    reflectance: Vector
-    rotation: Matrix = IDENTITY
-    emission: Vector = BLACK
-    material: Material | None = field(default=None, metadata=OMITTED)
-
-
-@dataclass(frozen=True)
-class Sphere:
-    """Sphere of `radius` around `center`."""
-
-    center: Vector
-    radius: float
-    reflectance: Vector
-    emission: Vector = BLACK
-    material: Material | None = field(default=None, metadata=OMITTED)
-
-
-@dataclass(frozen=True)
-class Quad:
-    """Parallelogram corner + a edge_u + b edge_v for a, b in [0, 1]; both sides reflect and emit alike."""
-
-    corner: Vector
-    edge_u: Vector
-    edge_v: Vector
-    reflectance: Vector
-    emission: Vector = BLACK
-    material: Material | None = field(default=None, metadata=OMITTED)
-
-
-@dataclass(frozen=True)
-class Light:
-    """Parallelogram that emits from the side of edge_u x edge_v, and reflects nothing.
-
-    `power` (W) times `color` (relative, linear RGB) is the flux that leaves it, so its radiance per channel
-    is power * color / (pi * area): a Lambertian emitter.
-    """
-
-    corner: Vector
-    edge_u: Vector
-    edge_v: Vector
-    color: Vector
-    power: float
 
 
 @dataclass(frozen=True)
@@ -259,18 +201,31 @@ def validate(scene: Scene) -> Scene:
                 "emission must not be negative",
                 "use 0 or more",
             )
-        if isinstance(part, (Box, Sphere, Quad)):
+        if isinstance(part, Shape):
             _check(part.reflectance, f"{path}.reflectance", _is_share, *_SHARE_RULE)
-            _check_material(part.material, f"{path}.material", has_inside=not isinstance(part, Quad))
-        _CHECKS[type(part)](part, path)
+            _check_material(part.material, f"{path}.material", has_inside=part.closed)
+        if isinstance(part, Room):
+            _check_room(part, path)
+        else:
+            part.check(path)
     return scene
+
+
+def primitives(scene: Scene) -> int:
+    """Return the number of shapes and lights, all but the room."""
+    return sum(len(getattr(scene, kind)) for kind in _lists())
+
+
+def _lists() -> tuple[str, ...]:
+    """Return the names of a scene's lists."""
+    return (*SHAPES, "lights")
 
 
 def _parts(scene: Scene) -> Iterable[tuple[str, Any]]:
     """Yield (path, primitive) for all of the scene's primitives."""
     if scene.room is not None:
         yield "scene.room", scene.room
-    for kind in ("boxes", "spheres", "quads", "lights"):
+    for kind in _lists():
         for i, part in enumerate(getattr(scene, kind)):
             yield f"scene.{kind}[{i}]", part
 
@@ -297,11 +252,11 @@ def _check_camera(camera: Camera) -> None:
             f"{path}.vertical_fov_deg", fov, "it must lie between 0 and 180", "40 is a usual angle"
         )
     forward = _difference(camera.look_at, camera.position)
-    if _length(forward) == 0.0:
+    if length(forward) == 0.0:
         raise InputError(
             f"{path}.look_at", camera.look_at, "it must differ from position", "move one of them"
         )
-    if not _spans_area(forward, camera.up):
+    if not spans_area(forward, camera.up):
         raise InputError(f"{path}.up", camera.up, "it must not be parallel to the view", "choose another up")
 
 
@@ -312,7 +267,7 @@ def _check_sky(sky: Sky, background: Vector) -> None:
         _check(
             getattr(sky, name), f"{path}.{name}", _not_negative, "light must not be negative", "use 0 or more"
         )
-    if _length(sky.sun_direction) == 0.0:
+    if length(sky.sun_direction) == 0.0:
         raise InputError(
             f"{path}.sun_direction", sky.sun_direction, "it must not be zero", "straight up is 0, 1, 0"
         )
@@ -349,45 +304,6 @@ def _check_material(material: Material | None, path: str, has_inside: bool) -> N
     material.check(path)
 
 
-def _check_box(box: Box, path: str) -> None:
-    _check(
-        box.half_extent,
-        f"{path}.half_extent",
-        lambda h: min(h) > 0.0,
-        "half extents must be positive",
-        "use a quad",
-    )
-    _check(
-        box.rotation, f"{path}.rotation", _is_rotation, "its rows must be orthonormal", "normalise the rows"
-    )
-
-
-def _check_sphere(sphere: Sphere, path: str) -> None:
-    _check(sphere.radius, f"{path}.radius", lambda r: r > 0.0, "it must be positive", "use a positive radius")
-
-
-def _check_quad(quad: Quad | Light, path: str) -> None:
-    if not _spans_area(quad.edge_u, quad.edge_v):
-        raise InputError(
-            f"{path}.edge_v", quad.edge_v, "the edges must span an area", "make it not parallel to edge_u"
-        )
-
-
-def _check_light(light: Light, path: str) -> None:
-    _check_quad(light, path)
-    _check(light.color, f"{path}.color", _not_negative, "a colour must not be negative", "use 0 or more")
-    _check(light.power, f"{path}.power", lambda p: p >= 0.0, "power must not be negative", "use 0 or more")
-
-
-_CHECKS: dict[type, Callable[[Any, str], None]] = {
-    Room: _check_room,
-    Box: _check_box,
-    Sphere: _check_sphere,
-    Quad: _check_quad,
-    Light: _check_light,
-}
-"""The rules of each kind of primitive: a new kind needs a line here."""
-
 _SHARE_RULE = ("a reflectance must lie in [0, 1]", "energy cannot grow: scale it down")
 """Rule and way out for values that are shares of the incoming energy."""
 
@@ -413,28 +329,5 @@ def _is_share(value: Vector) -> bool:
     return min(value) >= 0.0 and max(value) <= 1.0
 
 
-def _is_rotation(rows: Matrix) -> bool:
-    products = ((i, j, _inner(rows[i], rows[j])) for i in range(3) for j in range(3))
-    orthonormal = all(abs(p - (i == j)) <= ROTATION_TOLERANCE for i, j, p in products)
-    return orthonormal and _inner(_cross(rows[0], rows[1]), rows[2]) > 0.0
-
-
-def _inner(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def _length(a: Vector) -> float:
-    return math.sqrt(_inner(a, a))
-
-
 def _difference(a: Vector, b: Vector) -> Vector:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-def _spans_area(a: Vector, b: Vector) -> bool:
-    """Tell whether a and b are clearly not parallel: the sine between them exceeds 1e-6, float32's reach."""
-    return _length(_cross(a, b)) > 1e-6 * _length(a) * _length(b)

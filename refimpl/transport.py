@@ -38,6 +38,8 @@ from .intersection import Geometry, Hit, Surface
 from .materials.material import SINGLE_PDF, Site
 from .scene import Scene
 from .shading import Materials
+from .shapes.quad import light_radiance, quad_area_pdf
+from .shapes.shape import MISS
 
 HEURISTICS = {"balance": 1, "power": 2}
 """Exponent of the densities in the multiple importance sampling weight, by the heuristic's name."""
@@ -198,8 +200,8 @@ def _build_lights(scene: Scene, dtype: DTypeLike, share: float) -> Lights:
         edge_u,
         edge_v,
         normal,
-        [intersection.light_radiance(light) for light in lights],
-        [1.0 / intersection.quad_area_pdf(light) for light in lights],
+        [light_radiance(light) for light in lights],
+        [1.0 / quad_area_pdf(light) for light in lights],
         cumulative,
         share * sampling.discrete_pdf(np.arange(len(lights)), cumulative),
     )
@@ -413,7 +415,7 @@ def _towards_sky(world: World, site: Site, u_choice: Any, u0: Any, u1: Any) -> T
     assert sky is not None
     wi = environment.sample(sky, u_choice, u0, u1)
     cos_surface = np.maximum(vectors.dot(site.normal, wi), 0.0)
-    far = np.full_like(cos_surface, intersection.MISS)
+    far = np.full_like(cos_surface, MISS)
     radiance = environment.radiance(sky, wi)
     return Towards(wi, cos_surface, np.ones_like(cos_surface), _sky_pdf(world, wi), radiance, far)
 

@@ -23,10 +23,14 @@ from wamnet.compiler.listing import Line, lines_of, within
 from wamnet.compiler.lower import lower
 from wamnet.compiler.lower_scene import lower_scene
 from wamnet.compiler.path_kernel import compile_path
-from wamnet.refimpl import denoise, intersection, siren, transport
+from wamnet.refimpl import denoise, siren, transport
 from wamnet.refimpl.dataset import Normalization, Window
 from wamnet.refimpl.scene import Camera, Light, Quad, Scene, Sphere
+from wamnet.refimpl.shapes import sphere
 from wamnet.refimpl.transport import Settings
+
+ROOT = Path(siren.__file__).parents[1]
+"""The folder of which places are told."""
 
 MARK = "<p>LISTING {}</p>"
 """The place of a listing on its page."""
@@ -63,7 +67,7 @@ def listings() -> Iterator[tuple[str, str]]:
         yield f"network-{target}", shown(siren.forward, network_listing(target), f"network-{target}")
     scene = scene_listing("opencl")
     for name, function, part in (
-        ("sphere", intersection.sphere_distance, "arrive"),
+        ("sphere", sphere.sphere_distance, "arrive"),
         ("bounce", transport.scatter, "scatter"),
     ):
         yield name, shown(function, [line for line in scene if line.part == part], name, part != "scatter")
@@ -73,7 +77,7 @@ def shown(function: Callable[..., Any], lines: list[Line], name: str, only: bool
     """Return the HTML of a function beside the lines of a kernel; `only`: those that came from it alone."""
     source, first = inspect.getsourcelines(function)
     file = Path(inspect.getfile(function))
-    path = f"{file.parent.name}/{file.name}"
+    path = file.relative_to(ROOT).as_posix()
     last = first + len(source) - 1
     rows = []
     for line in lines:

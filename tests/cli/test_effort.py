@@ -10,7 +10,7 @@ import pytest
 from wamnet.cli import effort
 from wamnet.kernels import render_frame
 from wamnet.refimpl import intersection
-from wamnet.refimpl.scene import to_json
+from wamnet.refimpl.scene import Box, to_json
 from wamnet.refimpl.scenes import canonical
 
 
@@ -117,7 +117,7 @@ def test_many_boxes_are_grouped_in_one_look():
 
     scene = canonical("minicubes", time=1.0)
     boxes = tuple(replace(box, rotation=Rotation(box.rotation)) for box in scene.boxes * 10)
-    intersection._grouped(replace(scene, boxes=boxes))
+    Box.parts(replace(scene, boxes=boxes))
     assert len(looks) == len(boxes)
 
 

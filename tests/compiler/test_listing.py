@@ -15,10 +15,11 @@ from wamnet.compiler.lower import lower
 from wamnet.compiler.lower_scene import lower_scene
 from wamnet.compiler.path_kernel import compile_path
 from wamnet.compiler.trace import trace
-from wamnet.refimpl import intersection, siren, vectors
+from wamnet.refimpl import siren, vectors
 from wamnet.refimpl.dataset import Normalization, Window
 from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.shapes import quad
 from wamnet.refimpl.transport import Settings
 
 ROOT = Path(siren.__file__).parents[1]
@@ -71,12 +72,12 @@ def test_every_operation_of_a_path_is_asked_for_by_the_reference():
         assert set(bare) <= {"input", "constant", "multiply", "add", "convert"}, bare
     kernel = compile_path(programs, "opencl", "native", groups=("color",))
     lines = lines_of(kernel.source, kernel.programs.parts())
-    source, first = inspect.getsourcelines(intersection.quad_distance)
+    source, first = inspect.getsourcelines(quad.quad_distance)
     own = [
         line
         for line in lines
         if any(
-            within(place, "refimpl/intersection.py", first, first + len(source) - 1) for place in line.places
+            within(place, "refimpl/shapes/quad.py", first, first + len(source) - 1) for place in line.places
         )
     ]
     assert {line.part for line in own} == {"arrive", "scatter"}

@@ -17,6 +17,8 @@ from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.render import Job, Render
 from wamnet.refimpl.scene import Camera, Light, Quad, Scene, Sphere
+from wamnet.refimpl.shapes import quad
+from wamnet.refimpl.shapes.shape import MISS
 from wamnet.refimpl.transport import Settings
 
 VIEW = View(48, 32, seed=5)
@@ -189,12 +191,12 @@ def open_quad(quad, origin, direction):
     """Return the distance of a quad without its edges: < in the place of <=."""
     corner, dual_u, dual_v, _ = quad
     t = right_quad(quad, origin, direction)
-    offset = origin + vectors.scale(direction, np.where(t < intersection.MISS, t, 0.0)) - corner
+    offset = origin + vectors.scale(direction, np.where(t < MISS, t, 0.0)) - corner
     a, b = vectors.dot(offset, dual_u), vectors.dot(offset, dual_v)
-    return np.where((a > 0.0) & (a < 1.0) & (b > 0.0) & (b < 1.0), t, intersection.MISS)
+    return np.where((a > 0.0) & (a < 1.0) & (b > 0.0) & (b < 1.0), t, MISS)
 
 
-right_frame, right_quad = sampling.tangent_frame, intersection.quad_distance
+right_frame, right_quad = sampling.tangent_frame, quad.quad_distance
 right_pdf, right_weight = sampling.cosine_hemisphere_pdf, transport.mis_weight
 
 FAULTS = {
@@ -246,9 +248,7 @@ EDGE_VIEW = View(64, 64)
 def edge_report(monkeypatch, executor, wrong):
     """Compare camera rays near the edge with a kernel that has another distance to a quad."""
     settings = Settings(max_depth=0)
-    return wrong_report(
-        monkeypatch, executor, EDGE, settings, EDGE_VIEW, intersection, "quad_distance", wrong
-    )
+    return wrong_report(monkeypatch, executor, EDGE, settings, EDGE_VIEW, quad, "quad_distance", wrong)
 
 
 def test_an_edge_that_is_off_by_1e_5_is_caught(executor, monkeypatch):
@@ -277,7 +277,7 @@ def longer_quad(quad, origin, direction):
     offset = origin + vectors.scale(direction, t) - corner
     a, b = vectors.dot(offset, dual_u), vectors.dot(offset, dual_v)
     inside = (t > 0.0) & (a >= 0.0) & (a <= 1.0) & (b >= 0.0) & (b <= 1.0)
-    return np.where(inside, t, intersection.MISS)
+    return np.where(inside, t, MISS)
 
 
 def test_a_decision_that_differs_is_counted(executor, monkeypatch):

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from wamnet.refimpl import intersection as I
 from wamnet.refimpl import rng, scenes, vectors
 from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.shapes import box
 
 GREY = (0.5, 0.5, 0.5)
 CAMERA = Camera((0.0, 0.0, 5.0), (0.0, 0.0, 0.0))
@@ -267,7 +268,7 @@ def many_boxes(angles: list[float]) -> Scene:
     """Return boxes turned by the given angles, which overlap in part."""
     random = np.random.default_rng(4)
     places, sizes = random.uniform(-1.5, 1.5, (len(angles), 3)), random.uniform(0.2, 0.6, (len(angles), 3))
-    rotations = [turned(angle) if angle else I.IDENTITY for angle in angles]
+    rotations = [turned(angle) if angle else box.IDENTITY for angle in angles]
     return scene_of(boxes=tuple(Box(p, h, GREY, r) for p, h, r in zip(places, sizes, rotations, strict=True)))
 
 
@@ -294,8 +295,8 @@ def test_boxes_that_share_a_rotation_are_hit_like_those_that_do_not(dtype, monke
     """Distances, surfaces and normals to the bit, whether rays are turned for a group or for each box."""
     scene, (o, d) = many_boxes(SHARING), random_rays(3000, 1.9, dtype)
     answers = []
-    for fewest in (1, I.LEAST_SHARED, 100):
-        monkeypatch.setattr(I, "LEAST_SHARED", fewest)
+    for fewest in (1, box.LEAST_SHARED, 100):
+        monkeypatch.setattr(box, "LEAST_SHARED", fewest)
         geometry = I.build(scene, dtype)
         found = I.closest_hit(geometry, o, d)
         answers.append((len(geometry.groups), *found, I.surface_at(geometry, found, o, d).normal))
@@ -323,13 +324,13 @@ def test_closest_hit_is_the_least_of_single_primitives(name):
 
 @pytest.mark.parametrize("time", [0.0, 0.7, 1.3, 5.9])
 def test_boxes_on_a_turned_grid_share_their_coordinates(time):
-    """27 centres on a 3x3x3 grid have three values on each axis, once turned back, in either type.
+    """ISC-12: 27 centres on a 3x3x3 grid have three values on each axis, turned back, in either type.
 
     Without the rule of noise a zero would be some 1e-17, another one for each box. The values themselves are
     the exact ones to a few roundings: u of float32 for 0.72.
     """
     for dtype in (np.float32, np.float64):
-        (group,) = I.build(scenes.minicubes(time), dtype).groups
+        group, _ = I.build(scenes.minicubes(time), dtype).groups
         centers = np.stack(group.centers)
         if dtype is np.float32:
             assert [len(np.unique(centers[:, k])) for k in range(3)] == [3, 3, 3]

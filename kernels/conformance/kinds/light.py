@@ -6,8 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ....refimpl import camera, intersection, sampling, vectors
+from ....refimpl import camera, sampling, vectors
 from ....refimpl.scene import Camera
+from ....refimpl.shapes.quad import quad_distance
+from ....refimpl.shapes.shape import MISS
+from ....refimpl.shapes.sphere import sphere_distance
 from ..functions import Field, Function, Numbers
 
 CAMERA = Camera((0.5, 1.0, 4.0), (0.0, -0.2, 0.0), (0.0, 1.0, 0.0), 41.0)
@@ -133,7 +136,7 @@ RAY_FIELDS = {
 }
 """What intersections are given."""
 
-T = {"t": Field(f"distance along the ray; {intersection.MISS:g} where nothing is hit")}
+T = {"t": Field(f"distance along the ray; {MISS:g} where nothing is hit")}
 """What they answer."""
 
 SPHERE_CENTER, SPHERE_RADIUS = (0.25, -0.5, 0.125), 0.75
@@ -143,7 +146,7 @@ SPHERE_CENTER, SPHERE_RADIUS = (0.25, -0.5, 0.125), 0.75
 def _sphere(given: Numbers, dtype: Any) -> dict[str, Any]:
     """Return the distance of the sphere."""
     center, radius = np.asarray(SPHERE_CENTER, dtype), dtype(SPHERE_RADIUS)
-    return {"t": intersection.sphere_distance(center, radius, given["origin"], given["direction"])}
+    return {"t": sphere_distance(center, radius, given["origin"], given["direction"])}
 
 
 def _aimed(u: np.ndarray) -> dict[str, Any]:
@@ -188,9 +191,7 @@ def _quad(given: Numbers, dtype: Any) -> dict[str, Any]:
         vectors.normalize(normal),
     )
     corner, dual_u, dual_v, normal = (np.asarray(part, dtype) for part in rows)
-    return {
-        "t": intersection.quad_distance((corner, dual_u, dual_v, normal), given["origin"], given["direction"])
-    }
+    return {"t": quad_distance((corner, dual_u, dual_v, normal), given["origin"], given["direction"])}
 
 
 PLANE = Function(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ....refimpl import environment, transport
-from ....refimpl.intersection import Surface
+from ....refimpl.intersection import reflecting
 from ....refimpl.materials import Conductor, Dielectric, Lambertian, Mirror
 from ....refimpl.materials.material import Site
 from ....refimpl.scene import Sky
@@ -255,7 +255,7 @@ SKY_SAMPLE = Function(
 def _unshadowed(given: Numbers, dtype: Any) -> dict[str, Any]:
     """Return the light of the terrace's lamps at points of its surfaces."""
     world = transport.build(TERRACE, transport.Settings(), dtype)
-    surface = Surface(given["point"], given["normal"], given["reflectance"], None, None)
+    surface = reflecting(given["point"], given["normal"], given["reflectance"])
     return {"unshadowed": transport.unshadowed(world, surface)}
 
 

@@ -22,7 +22,7 @@ from ....compiler.lower_scene import PATH, SURFACE, PathPrograms, Values, kinds,
 from ....compiler.ranges import Range
 from ....refimpl import camera, render, rng, scenes, transport
 from ....refimpl import scene as scene_module
-from ....refimpl.intersection import Hit, Surface, materials_by_id
+from ....refimpl.intersection import Hit, materials_by_id, reflecting
 from ....refimpl.materials import Dielectric
 from ....refimpl.reading import to_dataclass
 from ....refimpl.transport import Counters, Path, Settings
@@ -155,7 +155,7 @@ def scatter(inputs: Mapping[str, Any]) -> State:
     at = world_of(inputs["scene"], inputs["settings"])
     of_surface = _lanes(SURFACE, inputs)
     point, normal, reflectance = (of_surface[name] for name in ("point", "normal", "reflectance"))
-    surface = Surface(point, normal, reflectance, None, None)
+    surface = reflecting(point, normal, reflectance)
     hit = Hit(of_surface["t"], of_surface["surface"])
     path = Path(**_lanes(PATH, inputs))
     found, alive = transport.scatter(

@@ -13,13 +13,13 @@ skirt looks like the glow around a sun in haze."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
 
 from . import sampling, vectors
 from .scene import Sky
+from .vectors import Directions, Floats, Radiance
 
 
 @dataclass(frozen=True)
@@ -29,13 +29,13 @@ class Environment:
     sun_share is the probability with which a sample is drawn for the sun.
     """
 
-    zenith: Any
-    horizon: Any
-    ground: Any
-    sun: Any
-    irradiance: Any
-    concentration: Any
-    sun_share: Any
+    zenith: Radiance
+    horizon: Radiance
+    ground: Radiance
+    sun: Directions
+    irradiance: Radiance
+    concentration: Floats
+    sun_share: Floats
 
 
 def build(sky: Sky, dtype: DTypeLike) -> Environment:
@@ -52,7 +52,7 @@ def build(sky: Sky, dtype: DTypeLike) -> Environment:
     return Environment(*(np.asarray(part, dtype) for part in parts))
 
 
-def radiance(sky: Environment, direction: Any) -> Any:
+def radiance(sky: Environment, direction: Directions) -> Radiance:
     """Return the radiance (..., 3) that comes from unit directions (..., 3)."""
     height = direction[..., 1]
     pole = vectors.choose(height > 0.0, sky.zenith, sky.ground)
@@ -61,20 +61,20 @@ def radiance(sky: Environment, direction: Any) -> Any:
     return gradient + glow[..., np.newaxis] * sky.irradiance
 
 
-def sample(sky: Environment, u_choice: Any, u0: Any, u1: Any) -> Any:
+def sample(sky: Environment, u_choice: Floats, u0: Floats, u1: Floats) -> Directions:
     """Map u_choice, u0, u1 (...) to unit directions (..., 3), towards the sun or from anywhere."""
     concentration = np.where(u_choice < sky.sun_share, sky.concentration, np.zeros_like(u0))
     local = sampling.sample_spherical_cauchy(u0, u1, concentration)
     return sampling.to_world(local, np.zeros_like(local) + sky.sun)
 
 
-def pdf(sky: Environment, direction: Any) -> Any:
+def pdf(sky: Environment, direction: Directions) -> Floats:
     """Return the density (...), in 1/sr, with which [`sample`] finds directions (..., 3)."""
     lobe = sampling.spherical_cauchy_pdf(_versine(sky, direction), sky.concentration)
     return sky.sun_share * lobe + (1.0 - sky.sun_share) * (0.25 * sampling.INV_PI)
 
 
-def _versine(sky: Environment, direction: Any) -> Any:
+def _versine(sky: Environment, direction: Directions) -> Floats:
     """Return 1 - cos (...) of the angle to the sun: half the squared chord, which keeps its digits near 0."""
     chord = direction - sky.sun
     return 0.5 * vectors.dot(chord, chord)

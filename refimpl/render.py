@@ -27,6 +27,7 @@ from .frame import LAYERS, Frame
 from .intersection import Hit, Surface
 from .scene import Scene, scene_digest
 from .transport import Counters, Path, Settings, World
+from .vectors import Directions, Ids
 
 MAX_IMAGE_SIDE_PX = 1 << 16
 """Largest width or height, in pixels: x and y share one 32-bit counter of the random generator."""
@@ -225,7 +226,7 @@ def pixel_counter(x: Any, y: Any) -> Any:
     return rng.counter(x + MAX_IMAGE_SIDE_PX * y)
 
 
-def first_hit_layers(world: World, surface: Surface, hit: Hit, direction: Any) -> dict[str, Any]:
+def first_hit_layers(world: World, surface: Surface, hit: Hit, direction: Directions) -> dict[str, Any]:
     """Return the feature layers (P, C) of camera rays' first hits; 0 where nothing is hit."""
     found = hit.surface < world.geometry.nothing
     return {
@@ -238,7 +239,7 @@ def first_hit_layers(world: World, surface: Surface, hit: Hit, direction: Any) -
     }
 
 
-def _select(values: Any, index: Any) -> Any:
+def _select(values: Any, index: Ids) -> Any:
     """Return the lanes `index` of values (P,) or (P, 3), keeping the planes of vectors apart in memory."""
     if values.ndim == 1:
         return np.take(values, index)

@@ -16,11 +16,10 @@ arguments.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from . import vectors
+from .vectors import Directions, Floats, Ids, Normals, Points
 
 INV_PI = 1.0 / np.pi
 """1 / pi: the normalisation of the cosine density over the hemisphere, in 1 / sr."""
@@ -29,7 +28,7 @@ _TINY = 1e-30
 """Stands in for a zero divisor where the dividend is zero too; any positive normal float32 would do."""
 
 
-def sample_concentric_disk(u0: Any, u1: Any) -> tuple[Any, Any]:
+def sample_concentric_disk(u0: Floats, u1: Floats) -> tuple[Floats, Floats]:
     """Map u0, u1 (...) in [0, 1) to x, y (...) in the unit disk; squares around the centre become circles."""
     a, b = 2.0 * u0 - 1.0, 2.0 * u1 - 1.0
     # In the wedge around the x axis a is the radius, else b; the other one gives the angle.
@@ -41,12 +40,12 @@ def sample_concentric_disk(u0: Any, u1: Any) -> tuple[Any, Any]:
     return radius * np.cos(phi), radius * np.sin(phi)
 
 
-def concentric_disk_pdf(x: Any, y: Any) -> Any:
+def concentric_disk_pdf(x: Floats, y: Floats) -> Floats:
     """Return the density 1 / pi, in 1 / area, at x, y (...) of the unit disk."""
     return 0.0 * (x + y) + INV_PI
 
 
-def invert_concentric_disk_sample(x: Any, y: Any) -> tuple[Any, Any]:
+def invert_concentric_disk_sample(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Return the u0, u1 (...) that [`sample_concentric_disk`] maps to x, y (...)."""
     # The wedge around the x axis holds |y| < |x|; radius and angle are measured from its signed axis.
     around_x = np.abs(x) > np.abs(y)
@@ -59,34 +58,36 @@ def invert_concentric_disk_sample(x: Any, y: Any) -> tuple[Any, Any]:
     return 0.5 * (a + 1.0), 0.5 * (b + 1.0)
 
 
-def sample_cosine_hemisphere(u0: Any, u1: Any) -> Any:
+def sample_cosine_hemisphere(u0: Floats, u1: Floats) -> Directions:
     """Map u0, u1 (...) to unit directions (..., 3) around +z with density cos(theta) / pi."""
     x, y = sample_concentric_disk(u0, u1)
     return vectors.vector(x, y, np.sqrt(np.maximum(0.0, 1.0 - x * x - y * y)))
 
 
-def cosine_hemisphere_pdf(cos_theta: Any) -> Any:
+def cosine_hemisphere_pdf(cos_theta: Floats) -> Floats:
     """Return the density cos(theta) / pi, in 1 / sr, for cos_theta (...) >= 0; below the horizon it is 0."""
     return np.maximum(cos_theta, 0.0) * INV_PI
 
 
-def invert_cosine_hemisphere_sample(wi: Any) -> tuple[Any, Any]:
+def invert_cosine_hemisphere_sample(wi: Directions) -> tuple[Floats, Floats]:
     """Return the u0, u1 (...) that [`sample_cosine_hemisphere`] maps to wi (..., 3)."""
     return invert_concentric_disk_sample(wi[..., 0], wi[..., 1])
 
 
-def sample_quad(u0: Any, u1: Any, corner: Any, edge_u: Any, edge_v: Any) -> Any:
+def sample_quad(u0: Floats, u1: Floats, corner: Points, edge_u: Directions, edge_v: Directions) -> Points:
     """Map u0, u1 (...) to points (..., 3) corner + u0 edge_u + u1 edge_v, uniform in area."""
     return corner + vectors.scale(edge_u, u0) + vectors.scale(edge_v, u1)
 
 
-def quad_pdf(edge_u: Any, edge_v: Any) -> Any:
+def quad_pdf(edge_u: Directions, edge_v: Directions) -> Floats:
     """Return the density 1 / area (...) over the parallelogram that edge_u, edge_v (..., 3) span."""
     normal = vectors.cross(edge_u, edge_v)
     return 1.0 / np.sqrt(vectors.dot(normal, normal))
 
 
-def invert_quad_sample(p: Any, corner: Any, edge_u: Any, edge_v: Any) -> tuple[Any, Any]:
+def invert_quad_sample(
+    p: Points, corner: Points, edge_u: Directions, edge_v: Directions
+) -> tuple[Floats, Floats]:
     """Return the u0, u1 (...) that [`sample_quad`] maps to the points p (..., 3) of the parallelogram."""
     # Solve p - corner = u0 edge_u + u1 edge_v by the vectors dual to the edges.
     offset, normal = p - corner, vectors.cross(edge_u, edge_v)
@@ -96,7 +97,7 @@ def invert_quad_sample(p: Any, corner: Any, edge_u: Any, edge_v: Any) -> tuple[A
     return u0, u1
 
 
-def sample_discrete(u: Any, cumulative: Any) -> Any:
+def sample_discrete(u: Floats, cumulative: Floats) -> Ids:
     """Map u (...) in [0, 1) to indices (...): how many of the bounds cumulative[:-1] are at most u.
 
     cumulative (K,) are the running sums of the probabilities, the last one being 1.
@@ -107,18 +108,18 @@ def sample_discrete(u: Any, cumulative: Any) -> Any:
     return index
 
 
-def discrete_pdf(index: Any, cumulative: Any) -> Any:
+def discrete_pdf(index: Ids, cumulative: Floats) -> Floats:
     """Return the probability (...) of each index (...) under the running sums cumulative (K,)."""
     return vectors.look_up(np.diff(cumulative, prepend=cumulative.dtype.type(0)), index)
 
 
-def invert_discrete_sample(index: Any, cumulative: Any) -> Any:
+def invert_discrete_sample(index: Ids, cumulative: Floats) -> Floats:
     """Return the middle (...) of the uniform numbers that [`sample_discrete`] maps to index (...)."""
     upper = vectors.look_up(cumulative, index)
     return upper - 0.5 * discrete_pdf(index, cumulative)
 
 
-def sample_spherical_cauchy(u0: Any, u1: Any, concentration: Any) -> Any:
+def sample_spherical_cauchy(u0: Floats, u1: Floats, concentration: Floats) -> Directions:
     """Map u0, u1 (...) to unit directions (..., 3) around +z, lobed by the concentration k (...) >= 0.
 
     The share of directions with 1 - cos below v is v (1 + 2 k) / (2 (1 + k v)), which u0 inverts.
@@ -128,20 +129,20 @@ def sample_spherical_cauchy(u0: Any, u1: Any, concentration: Any) -> Any:
     return vectors.vector(sine * np.cos(phi), sine * np.sin(phi), 1.0 - versine)
 
 
-def spherical_cauchy_pdf(versine: Any, concentration: Any) -> Any:
+def spherical_cauchy_pdf(versine: Floats, concentration: Floats) -> Floats:
     """Return the density (...), in 1/sr, where 1 - cos to the axis is versine (...): the lobe's shape."""
     spread = 1.0 + concentration * versine
     return (1.0 + 2.0 * concentration) * (0.25 * INV_PI) / (spread * spread)
 
 
-def invert_spherical_cauchy_sample(wi: Any, concentration: Any) -> tuple[Any, Any]:
+def invert_spherical_cauchy_sample(wi: Directions, concentration: Floats) -> tuple[Floats, Floats]:
     """Return the u0, u1 (...) that [`sample_spherical_cauchy`] maps to wi (..., 3)."""
     versine = 1.0 - wi[..., 2]
     u0 = versine * (1.0 + 2.0 * concentration) / (2.0 * (1.0 + concentration * versine))
     return u0, 0.5 * (np.arctan2(wi[..., 1], wi[..., 0]) / np.pi + 1.0)
 
 
-def tangent_frame(normal: Any) -> tuple[Any, Any]:
+def tangent_frame(normal: Normals) -> tuple[Directions, Directions]:
     """Return two unit tangents (..., 3) that form a right-handed frame with the unit normal (..., 3).
 
     Duff et al., "Building an Orthonormal Basis, Revisited", Journal of Computer Graphics Techniques 6(1),
@@ -156,7 +157,7 @@ def tangent_frame(normal: Any) -> tuple[Any, Any]:
     return tangent, bitangent
 
 
-def to_world(local: Any, normal: Any) -> Any:
+def to_world(local: Directions, normal: Normals) -> Directions:
     """Turn directions local (..., 3), given around +z, into directions around normal (..., 3)."""
     tangent, bitangent = tangent_frame(normal)
     return (
@@ -166,7 +167,7 @@ def to_world(local: Any, normal: Any) -> Any:
     )
 
 
-def to_local(world: Any, normal: Any) -> Any:
+def to_local(world: Directions, normal: Normals) -> Directions:
     """Turn directions world (..., 3) into directions around +z, as [`to_world`] turns them back."""
     tangent, bitangent = tangent_frame(normal)
     return vectors.vector(

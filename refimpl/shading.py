@@ -23,6 +23,7 @@ from . import intersection, vectors
 from .intersection import Hit, Surface
 from .materials import Lambertian, Material, Scattered, Site
 from .scene import Scene
+from .vectors import Colors, Directions, Floats, Truths
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ def _parameters(kind: type[Material], found: list[Material], count: int, dtype: 
     return np.asarray(rows + given[:1] * (count - len(rows)), dtype)
 
 
-def site(materials: Materials, surface: Surface, hit: Hit, direction: Any, beta: Any) -> Site:
+def site(materials: Materials, surface: Surface, hit: Hit, direction: Directions, beta: Colors) -> Site:
     """Return the vertices where rays of the given direction (..., 3) and throughput beta (..., 3) arrived."""
     tinted = beta * surface.reflectance
     outside = None
@@ -80,7 +81,9 @@ def site(materials: Materials, surface: Surface, hit: Hit, direction: Any, beta:
     return Site(-direction, surface.normal, outside, surface.reflectance, beta, tinted, None)
 
 
-def scattered(materials: Materials, at: Site, hit: Hit, u0: Any, u1: Any, u_choice: Any) -> Scattered:
+def scattered(
+    materials: Materials, at: Site, hit: Hit, u0: Floats, u1: Floats, u_choice: Floats
+) -> Scattered:
     """Return how paths go on, each by the material of its surface, for three uniform numbers (...)."""
     first, others = _ask(materials, at, hit, lambda kind, own: kind.sample(own, u0, u1, u_choice))
     direction, beta, pdf, through = first
@@ -93,7 +96,9 @@ def scattered(materials: Materials, at: Site, hit: Hit, u0: Any, u1: Any, u_choi
     return Scattered(direction, beta, pdf, through)
 
 
-def value(materials: Materials, at: Site, hit: Hit, wi: Any, cos_surface: Any) -> tuple[Any, Any]:
+def value(
+    materials: Materials, at: Site, hit: Hit, wi: Directions, cos_surface: Floats
+) -> tuple[Colors, Floats]:
     """Return a colour (..., 3) and a factor (...) whose product is beta f cos for light from wi (..., 3)."""
     (color, factor), others = _ask(materials, at, hit, lambda kind, own: kind.value(own, wi, cos_surface))
     for is_kind, (other_color, other_factor) in others:
@@ -102,8 +107,9 @@ def value(materials: Materials, at: Site, hit: Hit, wi: Any, cos_surface: Any) -
     return color, factor
 
 
-def pdf(materials: Materials, at: Site, hit: Hit, wi: Any, cos_surface: Any) -> Any:
+def pdf(materials: Materials, at: Site, hit: Hit, wi: Directions, cos_surface: Floats) -> Floats:
     """Return the density (...), in 1/sr, with which [`scattered`] finds wi (..., 3)."""
+    density: Floats
     density, others = _ask(materials, at, hit, lambda kind, own: kind.pdf(own, wi, cos_surface))
     for is_kind, other in others:
         density = np.where(is_kind, other, density)
@@ -122,6 +128,6 @@ def _ask(
     return answers[0], [(vectors.look_up(is_kind, hit.surface), answer) for is_kind, answer in others]
 
 
-def _or_nobody(through: Any) -> Any:
+def _or_nobody(through: Truths) -> Any:
     """Return who passes through: nobody, where a material says nothing."""
     return False if through is None else through

@@ -40,6 +40,7 @@ from .scene import Scene
 from .shading import Materials
 from .shapes.quad import light_radiance, quad_area_pdf
 from .shapes.shape import MISS
+from .vectors import Colors, Directions, Floats, Ids, Normals, Points, Radiance, Truths
 
 HEURISTICS = {"balance": 1, "power": 2}
 """Exponent of the densities in the multiple importance sampling weight, by the heuristic's name."""
@@ -122,14 +123,14 @@ class Lights:
     `cumulative` (K,) are the running sums of the probabilities with which light sampling picks each light.
     """
 
-    corner: Any
-    edge_u: Any
-    edge_v: Any
-    normal: Any
-    radiance: Any
-    area: Any
-    cumulative: Any
-    probability: Any
+    corner: Points
+    edge_u: Directions
+    edge_v: Directions
+    normal: Normals
+    radiance: Radiance
+    area: Floats
+    cumulative: Floats
+    probability: Floats
 
 
 @dataclass(frozen=True)
@@ -163,11 +164,11 @@ class Path(NamedTuple):
     origin, direction, beta (throughput), radiance (..., 3); pdf (...) of the direction by the BSDF, in 1/sr.
     """
 
-    origin: Any
-    direction: Any
-    beta: Any
-    radiance: Any
-    pdf: Any
+    origin: Points
+    direction: Directions
+    beta: Colors
+    radiance: Radiance
+    pdf: Floats
 
 
 def build(scene: Scene, settings: Settings, dtype: DTypeLike = np.float32) -> World:
@@ -208,7 +209,7 @@ def _build_lights(scene: Scene, dtype: DTypeLike, share: float) -> Lights:
     return Lights(*(np.asarray(table, dtype) for table in tables))
 
 
-def camera_path(origin: Any, direction: Any) -> Path:
+def camera_path(origin: Points, direction: Directions) -> Path:
     """Return the state of paths that leave the camera."""
     one, zero = np.ones_like(direction), np.zeros_like(direction)
     return Path(origin, direction, one, zero, np.full_like(direction[..., 0], CAMERA_PDF))
@@ -260,7 +261,7 @@ def scatter(
     return Path(origin, direction, beta, radiance, pdf), alive
 
 
-def _roulette(first: int, beta: Any, alive: Any, u: Any, depth: Any) -> tuple[Any, Any]:
+def _roulette(first: int, beta: Colors, alive: Truths, u: Floats, depth: Any) -> tuple[Colors, Truths]:
     """End paths at random from depth `first` on, in proportion to what they carry; scale up the others."""
     survival = np.minimum(vectors.largest(beta), ROULETTE_LIMIT)
     survival = np.where(depth < np.uint32(first), np.ones_like(survival), survival)
@@ -273,7 +274,7 @@ def _uniforms(world: World, counters: Counters, block: Any) -> rng.Block:
     return draw(counters.seed, counters.pixel, counters.sample, block, world.geometry.dtype)
 
 
-def emission_weight(world: World, path: Path, hit: Hit, surface: Surface) -> Any:
+def emission_weight(world: World, path: Path, hit: Hit, surface: Surface) -> Floats:
     """Return the weight (...) of emission that a BSDF sample (or the camera) has found."""
     if not world.samples_lights:
         return np.ones_like(hit.t)
@@ -296,15 +297,17 @@ def emission_weight(world: World, path: Path, hit: Hit, surface: Surface) -> Any
     return weight
 
 
-def _sampled(world: World, hit: Hit, surface: Surface) -> Any:
+def _sampled(world: World, hit: Hit, surface: Surface) -> Truths:
     """Tell (...) whether light samples could have found the same: only lights and the sky can be."""
     if world.environment is None:
-        return surface.light >= 0
-    return (hit.surface == world.geometry.nothing) | (surface.light >= 0)
+        lamps: Truths = surface.light >= 0
+        return lamps
+    either: Truths = (hit.surface == world.geometry.nothing) | (surface.light >= 0)
+    return either
 
 
 def direct_light(
-    world: World, site: Site, hit: Hit, origin: Any, u_pick: Any, u0: Any, u1: Any
+    world: World, site: Site, hit: Hit, origin: Points, u_pick: Floats, u0: Floats, u1: Floats
 ) -> tuple[Any, Any]:
     """Return a colour and light (..., 3); their product is what a sample of the lights or the sky adds."""
     wi, cos_surface, cos_light, pdf, radiance, distance = _towards(world, site, origin, u_pick, u0, u1)
@@ -319,7 +322,7 @@ def direct_light(
     return color, vectors.scale(radiance, np.where(visible, weight, 0.0))
 
 
-def unshadowed(world: World, surface: Surface) -> Any:
+def unshadowed(world: World, surface: Surface) -> Radiance:
     """Return the radiance (..., 3) that the lamps alone would give a surface, were it matt and all in sight.
 
     Each lamp, of area A and radiance L, is taken for a disk of the same area around its middle, in direction
@@ -333,7 +336,9 @@ def unshadowed(world: World, surface: Surface) -> Any:
     lights = world.lights
     middle = lights.corner + (lights.edge_u + lights.edge_v) / 2
 
-    def add(values: tuple[Any, ...], middle: Any, normal: Any, radiance: Any, area: Any) -> tuple[Any, ...]:
+    def add(
+        values: tuple[Any, ...], middle: Points, normal: Normals, radiance: Radiance, area: Floats
+    ) -> tuple[Any, ...]:
         """Add what one lamp gives to each channel's irradiance (...)."""
         offset = middle - surface.point
         square = vectors.dot(offset, offset)
@@ -346,7 +351,8 @@ def unshadowed(world: World, surface: Surface) -> Any:
 
     tables = middle.astype(world.geometry.dtype), lights.normal, lights.radiance, lights.area
     irradiance = vectors.fold_rows(add, tables, (black, black, black))
-    return surface.reflectance * vectors.vector(*irradiance) * world.geometry.dtype.type(1 / np.pi)
+    light: Radiance = surface.reflectance * vectors.vector(*irradiance) * world.geometry.dtype.type(1 / np.pi)
+    return light
 
 
 class Towards(NamedTuple):
@@ -355,15 +361,15 @@ class Towards(NamedTuple):
     pdf (...) of wi in 1/sr, the radiance (..., 3) that comes from there, and the distance (...).
     """
 
-    wi: Any
-    cos_surface: Any
-    cos_light: Any
-    pdf: Any
-    radiance: Any
-    distance: Any
+    wi: Directions
+    cos_surface: Floats
+    cos_light: Floats
+    pdf: Floats
+    radiance: Radiance
+    distance: Floats
 
 
-def _towards(world: World, site: Site, origin: Any, u_pick: Any, u0: Any, u1: Any) -> Towards:
+def _towards(world: World, site: Site, origin: Points, u_pick: Floats, u0: Floats, u1: Floats) -> Towards:
     """Sample a light or the sky, whichever there is; of both, one by the choice's first bit."""
     if world.environment is None:
         return _towards_light(world, site, origin, u_pick, u0, u1)
@@ -385,7 +391,9 @@ def _towards(world: World, site: Site, origin: Any, u_pick: Any, u0: Any, u1: An
     )
 
 
-def _towards_light(world: World, site: Site, origin: Any, u_pick: Any, u0: Any, u1: Any) -> Towards:
+def _towards_light(
+    world: World, site: Site, origin: Points, u_pick: Floats, u0: Floats, u1: Floats
+) -> Towards:
     """Sample a point on a light."""
     lights = world.lights
     assert lights is not None
@@ -409,7 +417,7 @@ def _towards_light(world: World, site: Site, origin: Any, u_pick: Any, u0: Any, 
     )
 
 
-def _towards_sky(world: World, site: Site, u_choice: Any, u0: Any, u1: Any) -> Towards:
+def _towards_sky(world: World, site: Site, u_choice: Floats, u0: Floats, u1: Floats) -> Towards:
     """Sample a direction to the sky; what shines from everywhere faces everything."""
     sky = world.environment
     assert sky is not None
@@ -420,14 +428,14 @@ def _towards_sky(world: World, site: Site, u_choice: Any, u0: Any, u1: Any) -> T
     return Towards(wi, cos_surface, np.ones_like(cos_surface), _sky_pdf(world, wi), radiance, far)
 
 
-def _sky_pdf(world: World, direction: Any) -> Any:
+def _sky_pdf(world: World, direction: Directions) -> Floats:
     """Return the density (...), in 1/sr, with which light sampling finds a direction (..., 3) to the sky."""
     assert world.environment is not None
     pdf = environment.pdf(world.environment, direction)
     return pdf if world.lights is None else SKY_SHARE * pdf
 
 
-def light_pdf(lights: Lights, index: Any, square: Any, cos_light: Any) -> Any:
+def light_pdf(lights: Lights, index: Ids, square: Floats, cos_light: Floats) -> Floats:
     """Return the density (...), in 1/sr, with which light sampling finds a point of light `index` (...).
 
     square is the squared distance (...), cos_light (...) the cosine at the light.
@@ -436,7 +444,7 @@ def light_pdf(lights: Lights, index: Any, square: Any, cos_light: Any) -> Any:
     return probability * square / (area * np.maximum(cos_light, LEAST_DENSITY))
 
 
-def mis_weight(settings: Settings, pdf: Any, other_pdf: Any) -> Any:
+def mis_weight(settings: Settings, pdf: Floats, other_pdf: Floats) -> Floats:
     """Return the weight (...) of samples of density pdf (...) where another technique has other_pdf (...).
 
     Veach's balance (exponent 1) and power (2) heuristics, through the ratio, so that large densities do not

@@ -9,10 +9,13 @@ it. A loop over the rows of constant tables is [`fold_rows`], so that it can be 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+Kind = TypeVar("Kind", bound=np.generic)
+"""Any kind of number."""
 
 Floats: TypeAlias = NDArray[np.floating[Any]]
 """A number each lane, (...). Like all these names it stands for traced values too."""
@@ -35,21 +38,22 @@ Radiance: TypeAlias = NDArray[np.floating[Any]]
 Truths: TypeAlias = NDArray[np.bool_]
 """Decisions (...)."""
 
-Ids: TypeAlias = NDArray[np.int32]
+Ids: TypeAlias = NDArray[np.integer[Any]]
 """Surface ids, or indices into a table (...)."""
 
 
-def vector(x: Any, y: Any, z: Any) -> Any:
+def vector(x: Floats, y: Floats, z: Floats) -> Floats:
     """Join three components (...) into vectors (..., 3)."""
     return np.moveaxis(np.stack((x, y, z)), 0, -1)
 
 
-def dot(a: Any, b: Any) -> Any:
+def dot(a: Floats, b: Floats) -> Floats:
     """Return the inner products (...) of vectors a, b (..., 3), summed in the order x, y, z."""
-    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+    product: Floats = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+    return product
 
 
-def cross(a: Any, b: Any) -> Any:
+def cross(a: Floats, b: Floats) -> Floats:
     """Return the right-handed vector products (..., 3) of a, b (..., 3)."""
     return vector(
         a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
@@ -58,46 +62,47 @@ def cross(a: Any, b: Any) -> Any:
     )
 
 
-def scale(a: Any, s: Any) -> Any:
+def scale(a: Floats, s: Floats) -> Floats:
     """Return vectors a (..., 3) times scalars s (...)."""
     return a * s[..., np.newaxis]
 
 
-def normalize(a: Any) -> Any:
+def normalize(a: Floats) -> Directions:
     """Return a (..., 3) divided by its length; a must not be zero."""
     return a / np.sqrt(dot(a, a))[..., np.newaxis]
 
 
-def rotate(rotation: Any, a: Any) -> Any:
+def rotate(rotation: Any, a: Floats) -> Floats:
     """Return rotation (3, 3) times vectors a (..., 3)."""
     return vector(dot(rotation[0], a), dot(rotation[1], a), dot(rotation[2], a))
 
 
-def choose(condition: Any, a: Any, b: Any) -> Any:
+def choose(condition: Truths, a: Floats | float, b: Floats | float) -> Floats:
     """Return vectors (..., 3): a where condition (...) holds, else b."""
     return np.where(condition[..., np.newaxis], a, b)
 
 
-def look_up(table: Any, index: Any) -> Any:
+def look_up(table: NDArray[Kind], index: Ids) -> NDArray[Kind]:
     """Return the entries (...) of a constant table (K,) at index (...).
 
     NumPy asks the table, not the index, who takes from it; `like` makes it a table of the index's kind, so
     that an index that is traced makes a look-up that is traced.
     """
-    return np.take(np.asarray(table, like=index), index)
+    found: NDArray[Kind] = np.take(np.asarray(table, like=index), index)
+    return found
 
 
-def look_up_rows(table: Any, index: Any) -> Any:
+def look_up_rows(table: Any, index: Ids) -> Floats:
     """Return the rows (..., 3) of a constant table (K, 3) at index (...)."""
     return vector(*(look_up(table[:, i], index) for i in range(3)))
 
 
-def largest(a: Any) -> Any:
+def largest(a: Floats) -> Floats:
     """Return the largest component (...) of a (..., 3)."""
     return np.maximum(np.maximum(a[..., 0], a[..., 1]), a[..., 2])
 
 
-def smallest(a: Any) -> Any:
+def smallest(a: Floats) -> Floats:
     """Return the smallest component (...) of a (..., 3)."""
     return np.minimum(np.minimum(a[..., 0], a[..., 1]), a[..., 2])
 

@@ -27,6 +27,7 @@ import numpy as np
 
 from .. import sampling, vectors
 from ..errors import InputError
+from ..vectors import Colors, Directions, Floats, Normals
 from .material import LEAST_SQUARE, Material, Scattered, Site, unit
 
 LEAST_ROUGHNESS = 1e-3
@@ -58,7 +59,7 @@ class Conductor(Material):
         return self.roughness
 
     @staticmethod
-    def sample(site: Site, u0: Any, u1: Any, u_choice: Any) -> Scattered:
+    def sample(site: Site, u0: Floats, u1: Floats, u_choice: Floats) -> Scattered:
         """Return wo mirrored about a visible normal; paths that would go below the surface carry nothing."""
         wo = _local_wo(site)
         m = sample_visible_normal(u0, u1, wo, site.parameter)
@@ -72,7 +73,7 @@ class Conductor(Material):
         return Scattered(unit(sampling.to_world(wi, site.normal)), beta, pdf, None)
 
     @staticmethod
-    def value(site: Site, wi: Any, cos_surface: Any) -> tuple[Any, Any]:
+    def value(site: Site, wi: Directions, cos_surface: Floats) -> tuple[Colors, Floats]:
         """Return beta F, and D z_i / (2 (q_o z_i + q_i z_o))."""
         wo, local, m = _half(site, wi)
         z_o, q_o, z_i, q_i = _heights(wo, local, site.parameter)
@@ -81,7 +82,7 @@ class Conductor(Material):
         return site.beta * schlick(site.reflectance, vectors.dot(wo, m)), factor
 
     @staticmethod
-    def pdf(site: Site, wi: Any, cos_surface: Any) -> Any:
+    def pdf(site: Site, wi: Directions, cos_surface: Floats) -> Floats:
         """Return D / (2 (q_o + z_o)); 0 below the surface."""
         wo, local, m = _half(site, wi)
         z_o, q_o, _, _ = _heights(wo, local, site.parameter)
@@ -89,20 +90,20 @@ class Conductor(Material):
         return np.where(cos_surface > 0.0, pdf, 0.0)
 
 
-def distribution(m: Any, alpha: Any) -> Any:
+def distribution(m: Normals, alpha: Floats) -> Floats:
     """Return the density D (...), in 1/sr, of unit normals m (..., 3) for the roughness alpha (...)."""
     x, y, az = m[..., 0], m[..., 1], alpha * m[..., 2]
     spread = x * x + y * y + az * az
     return sampling.INV_PI * alpha * alpha / np.maximum(spread * spread, LEAST_SQUARE)
 
 
-def schlick(reflectance: Any, cosine: Any) -> Any:
+def schlick(reflectance: Colors, cosine: Floats) -> Colors:
     """Return the reflectance (..., 3) at an angle, from that at normal incidence: R + (1 - R)(1 - cos)^5."""
     x = np.minimum(np.maximum(1.0 - cosine, 0.0), 1.0)
     return reflectance + vectors.scale(1.0 - reflectance, (x * x) * (x * x) * x)
 
 
-def sample_visible_normal(u0: Any, u1: Any, wo: Any, alpha: Any) -> Any:
+def sample_visible_normal(u0: Floats, u1: Floats, wo: Directions, alpha: Floats) -> Normals:
     """Map u0, u1 (...) to normals (..., 3) as seen from wo (..., 3), which is local with z >= 0."""
     axis, tangent, bitangent, share = _stretched(wo, alpha)
     # Sample the disk that the stretched hemisphere shows to wo: a half disk and a squeezed half.
@@ -115,13 +116,14 @@ def sample_visible_normal(u0: Any, u1: Any, wo: Any, alpha: Any) -> Any:
     return unit(vectors.vector(alpha * n[..., 0], alpha * n[..., 1], np.maximum(n[..., 2], 0.0)))
 
 
-def visible_normal_pdf(m: Any, wo: Any, alpha: Any) -> Any:
+def visible_normal_pdf(m: Normals, wo: Directions, alpha: Floats) -> Floats:
     """Return the density (...), in 1/sr, of m (..., 3) as seen from wo: 2 (wo . m) D / (q_o + z_o)."""
     z_o, q_o, _, _ = _heights(wo, wo, alpha)
-    return 2.0 * np.maximum(vectors.dot(wo, m), 0.0) * distribution(m, alpha) / (q_o + z_o)
+    density: Floats = 2.0 * np.maximum(vectors.dot(wo, m), 0.0) * distribution(m, alpha) / (q_o + z_o)
+    return density
 
 
-def invert_visible_normal_sample(m: Any, wo: Any, alpha: Any) -> tuple[Any, Any]:
+def invert_visible_normal_sample(m: Normals, wo: Directions, alpha: Floats) -> tuple[Floats, Floats]:
     """Return the u0, u1 (...) that [`sample_visible_normal`] maps to the normals m (..., 3)."""
     _, tangent, bitangent, share = _stretched(wo, alpha)
     n = vectors.normalize(vectors.vector(m[..., 0] / alpha, m[..., 1] / alpha, m[..., 2]))
@@ -130,7 +132,7 @@ def invert_visible_normal_sample(m: Any, wo: Any, alpha: Any) -> tuple[Any, Any]
     return sampling.invert_concentric_disk_sample(x, (y - (1.0 - share) * chord) / share)
 
 
-def _stretched(wo: Any, alpha: Any) -> tuple[Any, Any, Any, Any]:
+def _stretched(wo: Directions, alpha: Floats) -> tuple[Any, Any, Any, Any]:
     """Return wo's direction (..., 3) where the lobe is a hemisphere, two tangents, and a share (...).
 
     The share is that of the disk's lower half, seen in full; the upper one is squeezed to the rest. The
@@ -145,24 +147,24 @@ def _stretched(wo: Any, alpha: Any) -> tuple[Any, Any, Any, Any]:
     return axis, tangent, vectors.cross(axis, tangent), 0.5 * (1.0 + z)
 
 
-def _heights(wo: Any, wi: Any, alpha: Any) -> tuple[Any, Any, Any, Any]:
+def _heights(wo: Directions, wi: Directions, alpha: Floats) -> tuple[Any, Any, Any, Any]:
     """Return z and q (...) of wo, then of wi (..., 3), local; a z below 0 counts as 0."""
     return (*_height(wo, alpha), *_height(wi, alpha))
 
 
-def _height(w: Any, alpha: Any) -> tuple[Any, Any]:
+def _height(w: Directions, alpha: Floats) -> tuple[Floats, Floats]:
     """Return z and q = sqrt(z^2 + alpha^2 (x^2 + y^2)), (...), of local directions w (..., 3)."""
     x, y, z = alpha * w[..., 0], alpha * w[..., 1], np.maximum(w[..., 2], 0.0)
     return z, np.sqrt(x * x + y * y + z * z)
 
 
-def _local_wo(site: Site) -> Any:
+def _local_wo(site: Site) -> Directions:
     """Return wo (..., 3) around the normal; by rounding alone it could be below the surface."""
     wo = sampling.to_local(site.wo, site.normal)
     return vectors.vector(wo[..., 0], wo[..., 1], np.maximum(wo[..., 2], LEAST_HEIGHT))
 
 
-def _half(site: Site, wi: Any) -> tuple[Any, Any, Any]:
+def _half(site: Site, wi: Directions) -> tuple[Any, Any, Any]:
     """Return wo, wi and the unit vector between them (..., 3), all around the normal."""
     wo, local = _local_wo(site), sampling.to_local(wi, site.normal)
     return wo, local, unit(wo + local)

@@ -23,6 +23,7 @@ import numpy as np
 
 from .. import vectors
 from ..errors import InputError
+from ..vectors import Floats
 from .material import LEAST_SQUARE, SINGLE_PDF, Scattered, Single, Site, mirrored, unit
 
 LEAST_INDEX, LARGEST_INDEX = 1.0, 4.0
@@ -51,17 +52,18 @@ class Dielectric(Single):
         return self.ior
 
     @staticmethod
-    def sample(site: Site, u0: Any, u1: Any, u_choice: Any) -> Scattered:
+    def sample(site: Site, u0: Floats, u1: Floats, u_choice: Floats) -> Scattered:
         """Return mirrored directions with the probability that Fresnel gives, else refracted ones."""
         mirror, cosine = mirrored(site)
-        ratio = np.where(site.outside, np.reciprocal(site.parameter), site.parameter)
+        ior: Floats = site.parameter
+        ratio = np.where(site.outside, np.reciprocal(ior), ior)
         refracted, cos_far = refract(site, cosine, ratio)
         through = u_choice >= fresnel(cosine, cos_far, ratio)
         direction = vectors.choose(through, refracted, mirror)
         return Scattered(direction, site.tinted, np.full_like(cosine, SINGLE_PDF), through)
 
 
-def refract(site: Site, cosine: Any, ratio: Any) -> tuple[Any, Any]:
+def refract(site: Site, cosine: Floats, ratio: Floats) -> tuple[Any, Any]:
     """Return the refracted directions (..., 3) of wo, and their cosines (...) to the normal behind.
 
     cosine (...) is that of wo; ratio (...) is n_near / n_far.
@@ -72,7 +74,7 @@ def refract(site: Site, cosine: Any, ratio: Any) -> tuple[Any, Any]:
     return unit(along - against), cos_far
 
 
-def fresnel(cosine: Any, cos_far: Any, ratio: Any) -> Any:
+def fresnel(cosine: Floats, cos_far: Floats, ratio: Floats) -> Floats:
     """Return the share (...) of unpolarised light that is mirrored, given the cosines on both sides.
 
     Where cos_far is 0 on the way out, reflection is total.

@@ -9,9 +9,9 @@ Lambert, "Photometria", 1760; Malley's method for the directions (sampling.py).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from .. import sampling
+from ..vectors import Colors, Directions, Floats
 from .material import Material, Scattered, Site
 
 
@@ -22,18 +22,18 @@ class Lambertian(Material):
     kind = "lambertian"
 
     @staticmethod
-    def sample(site: Site, u0: Any, u1: Any, u_choice: Any) -> Scattered:
+    def sample(site: Site, u0: Floats, u1: Floats, u_choice: Floats) -> Scattered:
         """Return cosine-weighted directions around the normal."""
         local = sampling.sample_cosine_hemisphere(u0, u1)
         direction = sampling.to_world(local, site.normal)
         return Scattered(direction, site.tinted, sampling.cosine_hemisphere_pdf(local[..., 2]), None)
 
     @staticmethod
-    def value(site: Site, wi: Any, cos_surface: Any) -> tuple[Any, Any]:
+    def value(site: Site, wi: Directions, cos_surface: Floats) -> tuple[Colors, Floats]:
         """Return beta * reflectance, and cos / pi."""
         return site.tinted, sampling.INV_PI * cos_surface
 
     @staticmethod
-    def pdf(site: Site, wi: Any, cos_surface: Any) -> Any:
+    def pdf(site: Site, wi: Directions, cos_surface: Floats) -> Floats:
         """Return cos / pi."""
         return sampling.cosine_hemisphere_pdf(cos_surface)

@@ -19,6 +19,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from .. import vectors
+from ..vectors import Colors, Directions, Floats, Normals, Truths
 
 SINGLE_PDF = 1e30
 """Density of a direction that is no random one, in 1/sr: a mirror's, and a camera ray's. Light sampling is no
@@ -36,12 +37,12 @@ class Site(NamedTuple):
     reflectance, beta and tinted = beta * reflectance are (..., 3); parameter (...) is the material's own.
     """
 
-    wo: Any
-    normal: Any
+    wo: Directions
+    normal: Normals
     outside: Any
-    reflectance: Any
-    beta: Any
-    tinted: Any
+    reflectance: Colors
+    beta: Colors
+    tinted: Colors
     parameter: Any
 
 
@@ -51,10 +52,10 @@ class Scattered(NamedTuple):
     through (...) tells who passes to the other side of the surface; None where the material lets nobody pass.
     """
 
-    direction: Any
-    beta: Any
-    pdf: Any
-    through: Any
+    direction: Directions
+    beta: Colors
+    pdf: Floats
+    through: Truths | None
 
 
 @dataclass(frozen=True)
@@ -74,12 +75,12 @@ class Material:
         return None
 
     @staticmethod
-    def sample(site: Site, u0: Any, u1: Any, u_choice: Any) -> Scattered:
+    def sample(site: Site, u0: Floats, u1: Floats, u_choice: Floats) -> Scattered:
         """Return how paths go on, for three uniform numbers (...)."""
         raise NotImplementedError
 
     @staticmethod
-    def value(site: Site, wi: Any, cos_surface: Any) -> tuple[Any, Any]:
+    def value(site: Site, wi: Directions, cos_surface: Floats) -> tuple[Colors, Floats]:
         """Return a colour (..., 3) and a factor (...) whose product is beta f cos for light from wi (..., 3).
 
         cos_surface (...) is the cosine between normal and wi, 0 where wi is below the surface.
@@ -87,7 +88,7 @@ class Material:
         raise NotImplementedError
 
     @staticmethod
-    def pdf(site: Site, wi: Any, cos_surface: Any) -> Any:
+    def pdf(site: Site, wi: Directions, cos_surface: Floats) -> Floats:
         """Return the density (...), in 1/sr, with which `sample` finds wi (..., 3)."""
         raise NotImplementedError
 
@@ -98,22 +99,22 @@ class Single(Material):
     single = True
 
     @staticmethod
-    def value(site: Site, wi: Any, cos_surface: Any) -> tuple[Any, Any]:
+    def value(site: Site, wi: Directions, cos_surface: Floats) -> tuple[Colors, Floats]:
         """Return nothing: no direction of positive measure is reflected."""
         return site.tinted, np.zeros_like(cos_surface)
 
     @staticmethod
-    def pdf(site: Site, wi: Any, cos_surface: Any) -> Any:
+    def pdf(site: Site, wi: Directions, cos_surface: Floats) -> Floats:
         """Return 0: the density of all directions but one."""
         return np.zeros_like(cos_surface)
 
 
-def unit(a: Any) -> Any:
+def unit(a: Directions) -> Directions:
     """Return a (..., 3) divided by its length, and vectors that are (nearly) zero as they are."""
     return a / np.sqrt(np.maximum(vectors.dot(a, a), LEAST_SQUARE))[..., np.newaxis]
 
 
-def mirrored(site: Site) -> tuple[Any, Any]:
+def mirrored(site: Site) -> tuple[Directions, Floats]:
     """Return the direction (..., 3) that mirrors wo about the normal, and the cosine (...) between them."""
     cosine = np.minimum(np.maximum(vectors.dot(site.wo, site.normal), 0.0), 1.0)
     return unit(vectors.scale(site.normal, 2.0 * cosine) - site.wo), cosine

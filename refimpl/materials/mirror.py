@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from ..vectors import Floats
 from .material import SINGLE_PDF, Scattered, Single, Site, mirrored
 
 
@@ -17,7 +17,7 @@ class Mirror(Single):
     kind = "mirror"
 
     @staticmethod
-    def sample(site: Site, u0: Any, u1: Any, u_choice: Any) -> Scattered:
+    def sample(site: Site, u0: Floats, u1: Floats, u_choice: Floats) -> Scattered:
         """Return the mirrored directions 2 (n . wo) n - wo."""
         direction, cosine = mirrored(site)
         return Scattered(direction, site.tinted, np.full_like(cosine, SINGLE_PDF), None)

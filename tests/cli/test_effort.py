@@ -9,7 +9,6 @@ import pytest
 
 from wamnet.cli import effort
 from wamnet.kernels import render_frame
-from wamnet.refimpl import intersection
 from wamnet.refimpl.scene import Box, to_json
 from wamnet.refimpl.scenes import canonical
 

@@ -47,11 +47,12 @@ test: setup ## Run all tests (15 minutes at most on two cores)
 long: setup ## Test kernels with other cases each time, many and wide (2 hours on two cores); SEED=n repeats a run
 	@$(ONE_THREAD) PYTEST_OPTIONS="$(PYTEST_OPTIONS)" .ci/long $(TESTS)
 
-fuzz: setup ## Feed changed files to every reader and command; MINUTES=10, SEED=n repeats a run, ONLY=name, AT=n one input
+fuzz: setup ## Feed changed files and options to every reader and command; MINUTES=10, SEED=n repeats a run, ONLY=name, AT=n one input
 	@$(ONE_THREAD) PYTHONPATH=tests/fuzz $(VENV)/bin/python tests/fuzz/fuzz.py --minutes $(MINUTES) \
-		$(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only "$(ONLY)") $(if $(AT),--at $(AT))
+		$(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only "$(ONLY)") $(if $(AT),--at $(AT)) \
+		$(if $(STATE),--state $(STATE)) $(if $(INPUTS),--inputs $(INPUTS))
 
-faults: setup ## Kill commands, fill their disk, start two at once: COUNT=300 times (half an hour); SEED=n repeats
+faults: setup ## Kill commands and workers, fill their disk, start two at once: COUNT=300 times (an hour); SEED=n repeats
 	@$(ONE_THREAD) $(VENV)/bin/python tests/support/faults.py --count $(COUNT) $(if $(SEED),--seed $(SEED))
 
 lint: setup ## Check style, format, types on the installed wheel, and the house rules

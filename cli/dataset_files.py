@@ -25,6 +25,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -231,9 +232,7 @@ def read_pairs(
     pairs, said = [], Counter[str]()
     for frame in frames:
         paths = [folder / frame[kind]["file"] for kind in KINDS]
-        noisy, target = (
-            exr.read_frame(path, tell=lambda text, p=path: _count(said, p, text)) for path in paths
-        )
+        noisy, target = (exr.read_frame(path, tell=partial(_count, said, path)) for path in paths)
         pairs.append((noisy, Frame({"color": target["color"]}, target.info)))
     for text, count in said.items():
         if tell is not None:

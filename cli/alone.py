@@ -6,7 +6,7 @@
 2. A lock is made or opened as itself: a link of its name, anything but a regular file, and a file with
    content are somebody else's, refused, and stay.
 3. While a lock is taken or given back SIGINT and SIGTERM wait, so that none ends a run in between
-   [`signals_wait`].
+   [`signals_wait`, compiler/writing.py].
 """
 
 from __future__ import annotations
@@ -15,14 +15,12 @@ import errno
 import fcntl
 import hashlib
 import os
-import signal
 import stat
-import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from ..compiler.writing import making_parents
+from ..compiler.writing import making_parents, signals_wait
 from ..refimpl.errors import InputError
 from .outputs import unwritable
 
@@ -140,23 +138,3 @@ def _is_file(path: Path, handle: int) -> bool:
         return False
     mine = os.fstat(handle)
     return (found.st_dev, found.st_ino) == (mine.st_dev, mine.st_ino)
-
-
-@contextmanager
-def signals_wait() -> Iterator[None]:
-    """Let SIGINT and SIGTERM wait until the block has ended."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    noted: list[int] = []
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.getsignal(number) for number in numbers]
-    try:
-        for number in numbers:
-            signal.signal(number, lambda number, _frame: noted.append(number))
-        yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
-        for held in noted:
-            signal.raise_signal(held)

@@ -18,8 +18,8 @@ from itertools import islice
 from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
+from ..compiler.writing import signals_wait
 from ..refimpl.errors import InputError
-from .alone import signals_wait
 from .packages import need
 
 _Task = TypeVar("_Task")
@@ -111,7 +111,19 @@ def open_client(workers: int, scheduler: str | None) -> Iterator[Any]:
         finally:
             if cluster is not None:
                 with signals_wait():
-                    cluster.close()
+                    _close(distributed, cluster)
+
+
+def _close(distributed: Any, cluster: Any) -> None:
+    """Close a cluster, whatever its workers do.
+
+    When all else is closed Dask asserts that each worker is, too. One that was to be started in the place
+    of a lost one is not, and has no process; at the end of Python Dask would wait for it once more.
+    """
+    try:
+        cluster.close()
+    except AssertionError:
+        cluster.status = distributed.Status.closed
 
 
 def _local(distributed: Any, workers: int) -> Any:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
+from ..compiler.writing import signals_wait
 from ..refimpl.errors import InputError
 
 
 def need(module: str, purpose: str, extra: str) -> Any:
     """Import an optional module, or say what needs it and which extra of this package installs it."""
     try:
-        return importlib.import_module(module)
+        with signals_wait():
+            return importlib.import_module(module)
     except ImportError:
         rule = f"it is needed {purpose}"
         raise InputError(

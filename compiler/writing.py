@@ -8,6 +8,9 @@
 3. What is removed is a regular file of a name that this project gives; a link is none [`is_regular`],
    [`remove_temporaries`].
 
+4. What must not be torn apart lets SIGINT and SIGTERM wait: locks, and imports of modules in C, some of which
+   end the process if an interrupt reaches them [`signals_wait`].
+
 Errors are the system's (OSError): who calls knows what the user asked for.
 """
 
@@ -16,7 +19,9 @@ from __future__ import annotations
 import os
 import re
 import secrets
+import signal
 import stat
+import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -104,3 +109,23 @@ def remove_temporaries(folder: Path) -> None:
     for path in folder.iterdir():
         if TEMPORARY_NAME.fullmatch(path.name) and is_regular(path):
             path.unlink(missing_ok=True)
+
+
+@contextmanager
+def signals_wait() -> Iterator[None]:
+    """Let SIGINT and SIGTERM wait until the block has ended."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    noted: list[int] = []
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.getsignal(number) for number in numbers]
+    try:
+        for number in numbers:
+            signal.signal(number, lambda number, _frame: noted.append(number))
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+        for held in noted:
+            signal.raise_signal(held)

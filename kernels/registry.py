@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ..compiler.writing import signals_wait
 from ..refimpl.errors import ExecutorUnavailable, InputError
 from .executor import Executor
 
@@ -18,14 +19,16 @@ def _numpy(**options: Any) -> Executor:
 
 def _opencl(**options: Any) -> Executor:
     """Open an OpenCL device; option `device`: a part of its name."""
-    from .opencl_executor import OpenCLExecutor
+    with signals_wait():
+        from .opencl_executor import OpenCLExecutor
 
     return OpenCLExecutor(**options)
 
 
 def _opengl(**options: Any) -> Executor:
     """Open an OpenGL context; option `context`: auto, egl or osmesa."""
-    from .opengl_executor import OpenGLExecutor
+    with signals_wait():
+        from .opengl_executor import OpenGLExecutor
 
     return OpenGLExecutor(**options)
 

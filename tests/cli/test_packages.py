@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
 
 from wamnet.cli.packages import need
@@ -18,3 +20,14 @@ def test_a_missing_package_names_its_extra() -> None:
 def test_a_package_that_is_there_is_returned() -> None:
     """Also a module inside a package."""
     assert need("os.path", "to test", "x").sep == "/"
+
+
+def test_an_interrupt_waits_until_a_module_is_imported(tmp_path, monkeypatch) -> None:
+    """Modules in C++ end the process by SIGABRT if one reaches them: pyopencl's did."""
+    (tmp_path / "interrupting.py").write_text(
+        "import signal\nsignal.raise_signal(signal.SIGINT)\nwhole = True\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        need("interrupting", "to test", "test")
+    assert sys.modules.pop("interrupting").whole

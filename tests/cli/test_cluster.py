@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import socket
@@ -11,6 +12,7 @@ import types
 from functools import partial
 from operator import neg
 
+import distributed
 import pytest
 
 from wamnet.cli import cluster
@@ -127,6 +129,25 @@ def test_a_signal_waits_until_workers_have_started(monkeypatch, number) -> None:
     finally:
         signal.signal(number, before)
     assert done == ["started", "closed"]
+
+
+def test_a_worker_that_is_being_started_keeps_no_cluster_open(monkeypatch) -> None:
+    """An assertion of Dask's in the place of what the command had to say, and a traceback."""
+
+    class Open:
+        def __init__(self, **_):
+            self.status = "running"
+            opened.append(self)
+
+        def close(self):
+            raise AssertionError("Status.init")
+
+    opened: list[Open] = []
+    monkeypatch.setattr("distributed.LocalCluster", Open)
+    monkeypatch.setattr("distributed.Client", contextlib.nullcontext)
+    with pytest.raises(InputError, match="fewer"), cluster.open_client(2, None):
+        raise InputError("cluster", 2, "rule", "use fewer")
+    assert opened[0].status == distributed.Status.closed
 
 
 def test_a_worker_without_the_package(monkeypatch) -> None:

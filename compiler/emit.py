@@ -12,7 +12,7 @@ The language's own words come from the dialect's templates; nothing here asks wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from ..refimpl.errors import CompileError
@@ -22,15 +22,6 @@ from .lines import Lines
 from .ops import LOOPS, OPS
 from .sums import is_split
 from .weights import layout, pack, tables
-
-BORDERS: Mapping[str, tuple[str, str]] = {
-    "clamp": ("", "{pixel}"),
-    "zero": (
-        "bool inside = row == y + dy - {sides.row} && column == x + dx - {sides.column};",
-        "inside ? {pixel} : 0.0f",
-    ),
-}
-"""By border rule: a statement before the channels are read, and one's value; no read leaves the image."""
 
 
 @dataclass(frozen=True)
@@ -335,7 +326,6 @@ class Body(Lines):
         dialect, names = self.dialect, self.sides
         row = f"{dialect.clamp}(y + dy - {names.row}, 0, height - 1)"
         column = f"{dialect.clamp}(x + dx - {names.column}, 0, width - 1)"
-        inside = f"row == y + dy - {names.row} && column == x + dx - {names.column}"
         for group in self.gather.groups:
             self._open(dialect.loop("dy", names.rows))
             self._line(dialect.index("row", row))
@@ -343,7 +333,7 @@ class Body(Lines):
             self._open(dialect.loop("dx", names.columns))
             self._line(dialect.index("column", column))
             if self.gather.window.border == "zero":
-                self._line(dialect.let("bool", "inside", inside))
+                self._line(dialect.let("bool", "inside", self._inside()))
             tap = f"(dy * {names.columns} + dx) * {self.gather.channels}"
             self._line(dialect.index("tap", tap))
             for image, first in group:
@@ -352,11 +342,21 @@ class Body(Lines):
             after()
             self._close()
 
+    def _inside(self) -> str:
+        """Return the text of whether a tap lies in the image; `row` and `column` are clamped."""
+        names = self.sides
+        return f"row == y + dy - {names.row} && column == x + dx - {names.column}"
+
+    def _bordered(self, pixel: str) -> str:
+        """Return the text of a tap's number under the border rule; no read leaves the image."""
+        zero = self.gather.window.border == "zero"
+        return self.dialect.select("inside", pixel, "0.0f") if zero else pixel
+
     def _channels(self, image: Image, lines: list[str]) -> None:
         """Write the loop over an image's channels at a tap."""
         dialect = self.dialect
         pixel = dialect.pixel.format(image=image.name, channels=image.channels)
-        value = dialect.select("inside", pixel, "0.0f") if self.gather.window.border == "zero" else pixel
+        value = self._bordered(pixel)
         kept = [f"value = {dialect.kept('value')};"] if self.program.exact else []
         declared = (dialect.var if self.program.exact else dialect.let)("float32", "value", value)
         self._nest([dialect.loop("c", image.channels)], [declared, *kept, *lines])

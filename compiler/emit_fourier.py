@@ -26,9 +26,10 @@ from numpy.typing import NDArray
 from . import bounds, fourier
 from .bounds import Enclosure
 from .dialect import Dialect
-from .emit import BORDERS, kernel_gather
+from .emit import kernel_gather
 from .emit_tiled import LARGEST_PRIVATE, Tiled, TiledBody, readers_of_window, refused_by_vectors
 from .ir import Node, Program
+from .opencl_tiled import OpenCLTiled
 from .profiles import SineContract
 from .schedules import ALL, Images, windows
 
@@ -250,6 +251,8 @@ class FourierBody(TiledBody):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        assert isinstance(self.dialect, OpenCLTiled), "these statements are OpenCL's"
+        self.vectors = self.dialect
         self.sizes = self.tile.sizes(self.program)
 
     def defines(self) -> list[str]:
@@ -306,7 +309,7 @@ class FourierBody(TiledBody):
             for c in range(image.channels):
                 part, pair = divmod(first + c, self.sizes.pairs)
                 value = f"image_{image.name}[(row_y * width + column) * {image.channels} + {c}]"
-                value = BORDERS[self.gather.window.border][1].format(pixel=value)
+                value = self._bordered(value)
                 self._line(f"row.number[PLACE(tile * PAIRS + {pair}, dx * 2 + {part})] = {value};")
             first += image.channels
         self._close(2)
@@ -323,7 +326,7 @@ class FourierBody(TiledBody):
         self._union("spectra", "INPUTS * POINTS * 4")
         self._line("vector product[TILES * 2][POINTS * 2];")
         self._line("vector back[TILES * NEURONS * OUT * STRIDE];")
-        self._line(f"__global const vector *w = {self._vectors(slot.offset)};")
+        self._line(self.vectors.walk("w", slot.offset))
         self._open("for (int k = 0; k <= POINTS / 2; ++k) {")
         self._line("int opposite = (POINTS - k) % POINTS;")
         self._open("for (int i = 0; i < INPUTS; ++i) {")
@@ -392,7 +395,7 @@ class FourierBody(TiledBody):
         self._declare(index, f"%{index}: the sums, and their bias")
         lines = []
         for j in range(blocks.total):
-            add = f" + {self._bias(str(bias), str(j))}" if bias else ""
+            add = f" + {self.vectors.weights_at(self.slots[str(bias)].offset, str(j))}" if bias else ""
             lines.append(f"v{index}.all[p * {blocks.total} + {j}] = from[p * NEURONS * 2 + {j}]{add};")
         self._line("const vector *from = sums + block * PIXELS * NEURONS * 2;")
         self._nest(["for (int p = 0; p < PIXELS; ++p) {"], lines)

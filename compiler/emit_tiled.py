@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 
 from . import weights
 from .dialect import Dialect
-from .emit import BORDERS, Body, emit, kernel_gather, output_channels, schedule
+from .emit import Body, emit, kernel_gather, output_channels, schedule
 from .ir import Gather, Node, Program
 from .ops import OPS
 from .schedules import Schedule
 from .sums import is_split
+from .tiled_dialect import TiledDialect
 from .weights import Slot
 
 LARGEST_PRIVATE = 2**19
@@ -191,50 +192,53 @@ class TiledBody(Body):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        assert isinstance(self.dialect, TiledDialect), f"{self.dialect.language} has no words for tiles"
+        self.words = self.dialect
         self.slots = self.tile.layout(self.program)
 
     def defines(self) -> list[str]:
         """Return the sizes of the tile and of the patch."""
-        tile = self.tile
-        return [
-            f"#define PIXELS {tile.pixels} /* neighbours in a row that a work item computes */",
-            f"#define LANES {tile.lanes} /* numbers in a vector */",
-            f"#define PATCH_WIDTH ({self.sides.columns} + PIXELS - 1) /* columns that all windows touch */",
-        ]
+        tile, define = self.tile, self.words.define
+        values = {
+            "PIXELS": (tile.pixels, "neighbours in a row that a work item computes"),
+            "LANES": (tile.lanes, "numbers in a vector"),
+            "PATCH_WIDTH": (f"({self.sides.columns} + PIXELS - 1)", "columns that all windows touch"),
+        }
+        sizes = [f"{define.format(name=name, value=n)} /* {what} */" for name, (n, what) in values.items()]
+        return [*self.words.contraction[self.program.exact], *sizes]
 
     def _prepare(self) -> None:
         """Write the copies of the images around the pixels, under the border rule."""
         self._comment("the images around the pixels: what lies beyond the border is filled in here")
-        names = self.sides
+        names, words = self.sides, self.words
         for image in self.gather.images:
-            self._line(f"float patch_{image.name}[{names.rows} * PATCH_WIDTH * {image.channels}];")
-        self._line(f"int left = x - {names.column};")
-        self._line(f"int top = y - {names.row};")
+            self._line(words.singles(f"patch_{image.name}", f"{names.rows} * PATCH_WIDTH * {image.channels}"))
+        self._line(words.index("left", f"x - {names.column}"))
+        self._line(words.index("top", f"y - {names.row}"))
         columns = "left >= 0 && left + PATCH_WIDTH <= width"
-        self._line(f"bool within = {columns} && top >= 0 && top + {names.rows} <= height;")
-        self._open(f"for (int dy = 0; dy < {names.rows}; ++dy) {{")
-        self._line("int row = clamp(top + dy, 0, height - 1);")
+        self._line(words.flag("within", f"{columns} && top >= 0 && top + {names.rows} <= height"))
+        self._open(words.loop("dy", names.rows))
+        self._line(words.index("row", f"{words.clamp}(top + dy, 0, height - 1)"))
         for image in self.gather.images:
             self._copy(image.name, image.channels)
         self._close()
 
     def _copy(self, name: str, channels: int) -> None:
         """Write the copy of a row of the patch: at once inside the image, else pixel by pixel."""
-        before, value = BORDERS[self.gather.window.border]
-        pixel = self.dialect.pixel.format(image=name, channels=channels)
-        self._line(f"float *to_{name} = patch_{name} + dy * PATCH_WIDTH * {channels};")
-        self._open("if (within) {")
+        words = self.words
+        pixel = words.pixel.format(image=name, channels=channels)
+        self._line(words.row(f"to_{name}", f"patch_{name} + dy * PATCH_WIDTH * {channels}", written=True))
+        self._open(words.when("within"))
         source = f"image_{name}[(row * width + left) * {channels} + i]"
-        loop = f"for (int i = 0; i < PATCH_WIDTH * {channels}; ++i) {{"
-        self._nest([loop], self._put(f"to_{name}[i]", source))
+        self._nest([words.loop("i", f"PATCH_WIDTH * {channels}")], self._put(f"to_{name}[i]", source))
         self._close()
-        self._open("else {")
-        self._open("for (int dx = 0; dx < PATCH_WIDTH; ++dx) {")
-        self._line("int column = clamp(left + dx, 0, width - 1);")
-        if before:
-            self._line(before.format(sides=self.sides))
-        loop = f"for (int c = 0; c < {channels}; ++c) {{"
-        self._nest([loop], self._put(f"to_{name}[dx * {channels} + c]", value.format(pixel=pixel)))
+        self._open(words.otherwise())
+        self._open(words.loop("dx", "PATCH_WIDTH"))
+        self._line(words.index("column", f"{words.clamp}(left + dx, 0, width - 1)"))
+        if self.gather.window.border == "zero":
+            self._line(words.flag("inside", self._inside()))
+        put = self._put(f"to_{name}[dx * {channels} + c]", self._bordered(pixel))
+        self._nest([words.loop("c", channels)], put)
         self._close()
         self._close()
 
@@ -242,73 +246,77 @@ class TiledBody(Body):
         """Return the lines that copy one number of an image."""
         if not self.program.exact:
             return [f"{place} = {value};"]
-        return [f"float value = {value};", f"{place} = {self.dialect.kept('value')};"]
+        return [self.words.single("value", value), f"{place} = {self.words.kept('value')};"]
 
     def _affine(self, index: int, node: Node) -> None:
         """Write v = W x + b for all pixels, block by block."""
-        numbers, source = node.type.shape[0], self.program.nodes[node.args[0]]
+        numbers, source, words = node.type.shape[0], self.program.nodes[node.args[0]], self.words
         blocks, weight = self.tile.blocks(numbers), self.slots[str(node["weight"])]
-        n_in = weight.shape[1]
+        n_in, several = weight.shape[1], blocks.count > 1
         self._declare(index, f"%{index}: affine map {node['weight']} from {n_in} to {numbers}")
-        self._open(f"for (int block = 0; block < {blocks.count}; ++block) {{" if blocks.count > 1 else "{")
+        self._open(words.loop("block", blocks.count) if several else "{")
         each = range(blocks.vectors)
-        start = f" + block * {n_in * blocks.vectors}" if blocks.count > 1 else ""
-        self._line(f"__global const vector *w = {self._vectors(weight.offset)}{start};")
-        self._line(f"vector sum[PIXELS][{blocks.vectors}];")
-        bias = node.get("bias")
-        at = f"block * {blocks.vectors} + " if blocks.count > 1 else ""
-        starts = [self._bias(str(bias), f"{at}{j}") if bias else "(vector)(0.0f)" for j in each]
-        self._pixels([f"sum[p][{j}] = {start};" for j, start in zip(each, starts, strict=True)])
+        first = f"block * {n_in * blocks.vectors}" if several else ""
+        self._line(words.walk("w", weight.offset, first))
+        self._line(words.sums("sum", blocks.vectors))
+        at = f"block * {blocks.vectors} + " if several else ""
+        self._pixels([self._start(f"sum[p][{j}]", node.get("bias"), f"{at}{j}") for j in each])
         if source.op == "input":
             self._windowed(blocks)
         else:
             held = self.tile.blocks(source.type.shape[0]).total
-            self._multiply(blocks, str(n_in), f"v{node.args[0]}.number[p * {held} * LANES + i]")
-        self._pixels([f"v{index}.all[p * {blocks.total} + {at}{j}] = sum[p][{j}];" for j in each])
+            self._multiply(blocks, str(n_in), words.at(f"v{node.args[0]}", f"p * {held} * LANES + i"))
+        places = [f"p * {blocks.total} + {at}{j}" for j in each]
+        self._pixels([words.hold(f"v{index}", places[j], f"sum[p][{j}]") for j in each])
         self._close()
+
+    def _start(self, total: str, bias: object, index: str) -> str:
+        """Return the statement that starts a sum."""
+        if not bias:
+            return self.words.set_zero(total)
+        return self.words.set_weights(total, self.slots[str(bias)].offset, index)
 
     def _windowed(self, blocks: Blocks) -> None:
         """Write the sums over the window: a partial sum for each image and row, which stays in registers."""
-        each, split = range(blocks.vectors), is_split(self.gather)
+        each, split, words = range(blocks.vectors), is_split(self.gather), self.words
         for image in self.gather.images:
-            self._open(f"for (int dy = 0; dy < {self.sides.rows}; ++dy) {{")
-            self._line(f"const float *row = patch_{image.name} + dy * PATCH_WIDTH * {image.channels};")
+            self._open(words.loop("dy", self.sides.rows))
+            self._line(words.row("row", f"patch_{image.name} + dy * PATCH_WIDTH * {image.channels}"))
             if split:
-                self._line(f"vector part[PIXELS][{blocks.vectors}];")
-                self._pixels([f"part[p][{j}] = (vector)(0.0f);" for j in each])
+                self._line(words.sums("part", blocks.vectors))
+                self._pixels([words.set_zero(f"part[p][{j}]") for j in each])
             inputs = f"{self.sides.columns} * {image.channels}"
             self._multiply(blocks, inputs, f"row[p * {image.channels} + i]", "part" if split else "sum")
             if split:
-                self._pixels([f"sum[p][{j}] += part[p][{j}];" for j in each])
+                self._pixels([words.add(f"sum[p][{j}]", f"part[p][{j}]") for j in each])
             self._close()
 
     def _multiply(self, blocks: Blocks, inputs: str, value: str, sums: str = "sum") -> None:
         """Write the loop over inputs: each one's row of a block of weights, times its value at each pixel."""
-        each = range(blocks.vectors)
-        self._open(f"for (int i = 0; i < {inputs}; ++i) {{")
+        each, words = range(blocks.vectors), self.words
+        self._open(words.loop("i", inputs))
         for j in each:
-            self._line(f"vector w{j} = w[{j}];")
-        self._line(f"w += {blocks.vectors};")
-        self._pixels([f"float value = {value};", *(f"{sums}[p][{j}] += w{j} * value;" for j in each)])
+            self._line(words.walked(f"w{j}", "w", j))
+        self._line(words.advance("w", blocks.vectors))
+        products = [words.add_product(f"{sums}[p][{j}]", f"w{j}", "value") for j in each]
+        self._pixels([words.single("value", value), *products])
         self._close()
 
     def _pixels(self, lines: list[str]) -> None:
         """Write a loop over pixels that keeps each pixel's sums in registers of their own."""
-        self._line("#pragma unroll")
-        self._nest(["for (int p = 0; p < PIXELS; ++p) {"], lines)
+        if self.words.unroll:
+            self._line(self.words.unroll)
+        self._nest([self.words.loop("p", "PIXELS")], lines)
 
     def _outputs(self) -> None:
         """Write the only output of each pixel that lies in the image."""
         name, index = self.program.outputs[0]
-        channels = self.program.nodes[index].type.shape[0]
+        channels, words = self.program.nodes[index].type.shape[0], self.words
         held = self.tile.blocks(channels).total
         self._comment(f"output {name}")
-        value = f"v{index}.number[p * {held} * LANES + i]"
-        line = self.dialect.store.format(channels=channels, i="i", value=self._written(value))
-        loops = [
-            "for (int p = 0; p < PIXELS && x + p < width; ++p) {",
-            f"for (int i = 0; i < {channels}; ++i) {{",
-        ]
+        value = words.at(f"v{index}", f"p * {held} * LANES + i")
+        line = words.store.format(channels=channels, i="i", value=self._written(value))
+        loops = [words.loop_while("p", "PIXELS", "x + p < width"), words.loop("i", channels)]
         self._nest(loops, [line])
 
     def _fuses(self, index: int) -> bool:
@@ -322,31 +330,25 @@ class TiledBody(Body):
     # ---- values ------------------------------------------------------------------------------------------
 
     def _read(self, index: int, lane: str, group: int | None = None) -> str:
-        """Return the text of vector `lane` of a value, read inside `group`."""
+        """Return the text of element `lane` of a value, read inside `group`."""
         node = self.program.nodes[index]
         if node.op == "parameter":
-            blocks = self.tile.blocks(node.type.shape[0])
-            return self._bias(str(node["name"]), f"{lane} % {blocks.total}")
+            vectors = self.tile.blocks(node.type.shape[0]).total
+            return self.words.parameter(self.slots[str(node["name"])].offset, lane, vectors)
         return super()._read(index, lane, group)
 
-    def _bias(self, name: str, index: str) -> str:
-        """Return the text of one vector of a parameter that is a vector."""
-        return f"{self._vectors(self.slots[name].offset)}[{index}]"
-
-    def _vectors(self, offset: int) -> str:
-        """Return the text of the weights from `offset` on, as vectors."""
-        start = f"(weights + {offset})" if offset else "weights"
-        return f"((__global const vector *){start})"
-
     def _element(self, index: int, lane: str) -> str:
-        """Return the text of a vector of the array of a value."""
-        return f"v{index}.all[{lane}]"
+        """Return the text of an element of the array of a value."""
+        return self.words.element(f"v{index}", lane)
 
-    def _count(self, numbers: int) -> str:
+    def _vectors(self, numbers: int) -> str:
         """Return the text of the number of vectors of all pixels."""
         return f"PIXELS * {self.tile.blocks(numbers).total}"
 
+    def _count(self, numbers: int) -> str:
+        """Return the text of the number of elements of all pixels."""
+        return self.words.elements(self._vectors(numbers))
+
     def _declaration(self, index: int) -> str:
-        """Return the declaration of an array of vectors that can be read number by number."""
-        count = self._count(self.program.nodes[index].type.shape[0])
-        return f"union {{ vector all[{count}]; float number[{count} * LANES]; }} v{index};"
+        """Return the declaration of the array of a value."""
+        return self.words.held(f"v{index}", self._vectors(self.program.nodes[index].type.shape[0]))

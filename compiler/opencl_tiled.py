@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from .emit_tiled import Tiled
 from .opencl import OpenCL
+from .tiled_dialect import TiledDialect
 
 MACROS = """\
 typedef float@lanes@ vector;
@@ -43,9 +44,11 @@ __kernel void {{entry}}(
 """What stands before the statements."""
 
 
-class OpenCLTiled(OpenCL):
+class OpenCLTiled(OpenCL, TiledDialect):
     """The dialect's table for vectors of `lanes` floats."""
 
+    kind = "vector"
+    unroll = "#pragma unroll"
     store = "result[(y * width + x + p) * {channels} + {i}] = {value};"
     arguments = (
         "each image: width * height * channels floats, rows from the top, channels interleaved;\n"
@@ -65,6 +68,63 @@ class OpenCLTiled(OpenCL):
             "floor": "FLOOR({0})",
             "select": "{0} ? (vector)({1}) : (vector)({2})",
         }
+
+    def weights_at(self, offset: int, index: str = "") -> str:
+        """Return the text of the weights from `offset` on as vectors, or of one of them."""
+        start = f"(weights + {offset})" if offset else "weights"
+        return f"((__global const vector *){start})" + (f"[{index}]" if index else "")
+
+    def set_zero(self, total: str) -> str:
+        """Return the statement that gives a sum zeros."""
+        return f"{total} = (vector)(0.0f);"
+
+    def set_weights(self, total: str, offset: int, index: str) -> str:
+        """Return the statement that gives a sum vector `index` of the weights from `offset` on."""
+        return f"{total} = {self.weights_at(offset, index)};"
+
+    def add(self, total: str, term: str) -> str:
+        """Return the statement that adds a vector to a sum."""
+        return f"{total} += {term};"
+
+    def add_product(self, total: str, weight: str, value: str) -> str:
+        """Return the statement that adds a vector times a number to a sum."""
+        return f"{total} += {weight} * {value};"
+
+    def walk(self, name: str, offset: int, first: str = "") -> str:
+        """Return the declaration of a place in the weights: vector `first` of those from `offset` on."""
+        return f"__global const vector *{name} = {self.weights_at(offset)}{first and f' + {first}'};"
+
+    def walked(self, name: str, place: str, index: int) -> str:
+        """Return the declaration of a vector that lies `index` vectors after a place."""
+        return f"vector {name} = {place}[{index}];"
+
+    def advance(self, place: str, vectors: int) -> str:
+        """Return the statement that moves a place on."""
+        return f"{place} += {vectors};"
+
+    def parameter(self, offset: int, element: str, vectors: int) -> str:
+        """Return the text of a parameter's element in a loop over the elements of all pixels."""
+        return self.weights_at(offset, f"{element} % {vectors}")
+
+    def held(self, name: str, count: str) -> str:
+        """Return the declaration of an array of so many vectors."""
+        return f"union {{ vector all[{count}]; float number[{count} * LANES]; }} {name};"
+
+    def hold(self, name: str, index: str, total: str) -> str:
+        """Return the statement that puts a sum into an array, as vector `index`."""
+        return f"{name}.all[{index}] = {total};"
+
+    def at(self, name: str, place: str) -> str:
+        """Return the text of a number of an array."""
+        return f"{name}.number[{place}]"
+
+    def element(self, name: str, index: str) -> str:
+        """Return the text of an element of an array: a vector."""
+        return f"{name}.all[{index}]"
+
+    def elements(self, vectors: str) -> str:
+        """Return the text of the number of elements of so many vectors."""
+        return vectors
 
 
 KEPT = (

@@ -68,6 +68,7 @@ def cases(draw):
 @settings(max_examples=EXAMPLES)
 @given(case=cases())
 def test_error_is_within_the_bound(denoiser, kit, case):
+    """KER-3 too: windows reach beyond every side of these images, under both border rules."""
     network = kit.network(case["widths"], case["omegas"], case["seed"], case["scale"], case["activation"])
     program = kit.denoiser(network, case["channels"], case["size"], case["border"])
     (seen,) = interpret(program, {"window": kit.windows(program, case["images"])}, np.float64).values()

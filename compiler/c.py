@@ -10,14 +10,17 @@ from __future__ import annotations
 from .dialect import Dialect
 from .profiles import SineContract
 
-BEGIN = """\
+HEAD = """\
 #ifndef WAMNET_DENOISE_H
 #define WAMNET_DENOISE_H
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
-{unordered}
+{unordered}"""
+"""The first lines."""
+
+UNFUSED = """\
 /* No product may be fused with a sum. Compilers differ in what they obey, so give them -ffp-contract=off too:
    clang takes the standard's pragma unless it is told -ffp-contract=fast, GCC ignores that and takes its own,
    others may ignore both. */
@@ -26,48 +29,59 @@ BEGIN = """\
 #pragma GCC optimize("fp-contract=off")
 #else
 #pragma STDC FP_CONTRACT OFF
-#endif
-{defines}
-/* One pixel (x, y): its channels are written to `result`, the whole picture's array. */
-static inline void {entry}(
+#endif"""
+"""The lines that forbid fusing."""
+
+ARGUMENTS = """\
 {images},
     const float *restrict weights,
     float *restrict result,
     int width,
-    int height,
+    int height"""
+"""The arguments of the functions; the first also has the place of a pixel."""
+
+
+def functions(what: str, step: str) -> str:
+    """Return the functions up to the statements of the first; `what` it computes, and how a row steps on."""
+    return f"""\
+/* {what} */
+static inline void {{entry}}(
+{ARGUMENTS},
     int x,
     int y);
 
 /* All pixels, one after another. */
 static inline void wamnet_image(
-{images},
-    const float *restrict weights,
-    float *restrict result,
-    int width,
-    int height)
-{{
-    for (int y = 0; y < height; ++y) {{
-        for (int x = 0; x < width; ++x) {{
-            {entry}({names}, weights, result, width, height, x, y);
-        }}
-    }}
-}}
+{ARGUMENTS})
+{{{{
+    for (int y = 0; y < height; ++y) {{{{
+        for (int x = 0; x < width; {step}) {{{{
+            {{entry}}({{names}}, weights, result, width, height, x, y);
+        }}}}
+    }}}}
+}}}}
 
 static inline int wamnet_clamp(int value, int low, int high)
-{{
+{{{{
     return value < low ? low : value > high ? high : value;
-}}
+}}}}
 
-static inline void {entry}(
-{images},
-    const float *restrict weights,
-    float *restrict result,
-    int width,
-    int height,
+static inline void {{entry}}(
+{ARGUMENTS},
     int x,
     int y)
-{{
+{{{{
     (void)weights;"""
+
+
+BEGIN = "\n".join(
+    [
+        *(HEAD, UNFUSED, "{defines}"),
+        functions(
+            "One pixel (x, y): its channels are written to `result`, the whole picture's array.", "++x"
+        ),
+    ]
+)
 """What stands before the statements."""
 
 

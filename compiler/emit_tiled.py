@@ -296,7 +296,8 @@ class TiledBody(Body):
         each, words = range(blocks.vectors), self.words
         self._open(words.loop("i", inputs))
         for j in each:
-            self._line(words.walked(f"w{j}", "w", j))
+            for line in words.walked(f"w{j}", "w", j):
+                self._line(line)
         self._line(words.advance("w", blocks.vectors))
         products = [words.add_product(f"{sums}[p][{j}]", f"w{j}", "value") for j in each]
         self._pixels([words.single("value", value), *products])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from .emit_tiled import Tiled
 from .opencl import OpenCL
-from .tiled_dialect import TiledDialect
+from .tiled_dialect import OPERATIONS, TiledDialect
 
 MACROS = """\
 typedef float@lanes@ vector;
@@ -60,8 +60,9 @@ class OpenCLTiled(OpenCL, TiledDialect):
     def __init__(self, lanes: int) -> None:
         self.begin = BEGIN.replace("@lanes@", str(lanes))
         self.types = {"float32": "vector", "bool": "mask"}
+        # What is written for a vector as for a number; truth is an integer with all bits set.
         self.operations = {
-            **{name: OpenCL.operations[name] for name in KEPT},
+            **{name: OpenCL.operations[name] for name in OPERATIONS},
             "absolute": f"as_float{lanes}(as_int{lanes}({{0}}) & 0x7fffffff)",
             "minimum": "MINIMUM({0}, {1})",
             "maximum": "MAXIMUM({0}, {1})",
@@ -94,9 +95,9 @@ class OpenCLTiled(OpenCL, TiledDialect):
         """Return the declaration of a place in the weights: vector `first` of those from `offset` on."""
         return f"__global const vector *{name} = {self.weights_at(offset)}{first and f' + {first}'};"
 
-    def walked(self, name: str, place: str, index: int) -> str:
-        """Return the declaration of a vector that lies `index` vectors after a place."""
-        return f"vector {name} = {place}[{index}];"
+    def walked(self, name: str, place: str, index: int) -> list[str]:
+        """Return the statements that declare a vector which lies `index` vectors after a place."""
+        return [f"vector {name} = {place}[{index}];"]
 
     def advance(self, place: str, vectors: int) -> str:
         """Return the statement that moves a place on."""
@@ -125,13 +126,6 @@ class OpenCLTiled(OpenCL, TiledDialect):
     def elements(self, vectors: str) -> str:
         """Return the text of the number of elements of so many vectors."""
         return vectors
-
-
-KEPT = (
-    *("add", "subtract", "multiply", "divide", "negative", "reciprocal", "sqrt", "sin", "cos"),
-    *("less", "less_equal", "greater", "greater_equal"),
-)
-"""Operations that are written for a vector as for a number; truth is an integer with all bits set."""
 
 
 def _tiled(name: str, lanes: int, pixels: int, idea: str) -> Tiled:

@@ -13,6 +13,12 @@ from abc import abstractmethod
 
 from .dialect import Dialect
 
+OPERATIONS = (
+    *("add", "subtract", "multiply", "divide", "negative", "absolute", "minimum", "maximum", "floor"),
+    *("reciprocal", "sqrt", "sin", "cos", "less", "less_equal", "greater", "greater_equal", "select"),
+)
+"""Operations of which a language has words for elements."""
+
 
 class TiledDialect(Dialect):
     """The words of one language for tiles; what most of them share with C stands here."""
@@ -76,8 +82,8 @@ class TiledDialect(Dialect):
         """Return the declaration of a place in the weights: vector `first` of those from `offset` on."""
 
     @abstractmethod
-    def walked(self, name: str, place: str, index: int) -> str:
-        """Return the declaration of a vector that lies `index` vectors after a place."""
+    def walked(self, name: str, place: str, index: int) -> list[str]:
+        """Return the statements that declare a vector which lies `index` vectors after a place."""
 
     @abstractmethod
     def advance(self, place: str, vectors: int) -> str:

@@ -13,6 +13,7 @@ from typing import Any
 from ..refimpl.errors import CompileError
 from .buffers_group import ComputeGroup, CUDAGroup, MetalGroup, VulkanGroup, WGSLGroup, groups
 from .c import C
+from .c_tiled import C_LADDER
 from .cuda import CUDA
 from .dialect import Dialect
 from .emit_inlined import Inlined
@@ -89,7 +90,7 @@ TARGETS: Mapping[str, Target] = {
 }
 """All targets of paths, encodings and denoisers, by the name of the executor that runs them."""
 
-DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C())}
+DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C(), *C_LADDER)}
 """All targets that an executor of the registry runs: those, and C, whose executor denoises alone."""
 
 EXPORTED: Mapping[str, Target] = {

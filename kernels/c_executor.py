@@ -3,11 +3,13 @@
 1. Write the kernel's source and a function around it [`GLUE`] into a folder that goes with the executor.
 2. Compile them to a shared object, for this processor where the compiler knows how [`OPTIONS`].
 3. Call it on blocks of rows, one a thread: ctypes lets other threads run meanwhile.
+4. The schedule that suits the processor follows from the registers that the compiler uses [`SCHEDULES`].
 """
 
 from __future__ import annotations
 
 import ctypes
+import itertools
 import os
 import shlex
 import subprocess
@@ -24,6 +26,7 @@ from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
 from ..compiler.encode_kernel import EncodeArtifact
 from ..compiler.path_kernel import PathArtifact
+from ..compiler.schedules import PLAIN
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from .executor import INDEX_LIMIT, Executor, Images, Part, gather_of, images_of, keep
 
@@ -58,6 +61,16 @@ TRIAL = """\
 #include <stdio.h>
 #include <string.h>
 
+#if !defined(__GNUC__)
+#define LANES 1
+#elif defined(__AVX512F__)
+#define LANES 16
+#elif defined(__AVX__)
+#define LANES 8
+#else
+#define LANES 4
+#endif
+
 static void show(float value)
 {
     uint32_t bits;
@@ -81,15 +94,20 @@ int main(int count, char **arguments)
     show(sqrtf(third));
     show(-one * 0.0f + -0.0f);
     show(large * large * large * large * large * large * 0.0f == 0.0f ? one : 0.0f);
+    printf("%d\\n", LANES);
     return 0;
 }
 """
 """A program in which each freedom that a compiler may take shows: order of sums, contraction, reciprocals,
-denormal numbers, signs of zeros, comparison with NaN."""
+denormal numbers, signs of zeros, comparison with NaN. Last it prints the floats in a vector register that
+kernels are compiled for, 1 where the compiler has no vectors."""
+
+SCHEDULES = {16: "tile16", 8: "tile8", 4: "tile4"}
+"""Schedule of a denoiser by the floats in a vector register; without vectors it is the plain one."""
 
 
 def trial_bits() -> list[str]:
-    """Return what the trial prints, by NumPy: the definition of all arithmetic here."""
+    """Return what the trial's arithmetic prints, by NumPy: the definition of all arithmetic here."""
     f = np.float32
     one, large, small = f(1), f(16777216), f(1e-30)
     third, total = one / f(3), f(0)
@@ -126,7 +144,7 @@ void wamnet_rows(const float *const *images, const float *weights, float *result
                  int first, int end)
 {{
     for (int y = first; y < end; ++y) {{
-        for (int x = 0; x < width; ++x) {{
+        for (int x = 0; x < width; x += {pixels}) {{
             {entry}({images}, weights, result, width, height, x, y);
         }}
     }}
@@ -176,6 +194,7 @@ class CExecutor(Executor):
         version = self._call("--version").stdout.strip().partition("\n")[0]
         self.device = f"{' '.join(self._command)}: {version}"
         self._built: dict[str, Any] = {}
+        self._count = itertools.count()
         self._options = list(OPTIONS)
         self._folder = tempfile.TemporaryDirectory(prefix="wamnet-c-")
         try:
@@ -204,16 +223,23 @@ class CExecutor(Executor):
         except (OSError, ValueError, subprocess.TimeoutExpired) as error:
             rule = f"what it compiles does not run here ({type(error).__name__})"
             raise ExecutorUnavailable(f"c: {self.device}: {rule}; {WAY_OUT}") from None
-        if found != trial_bits():
+        *bits, lanes = found or [""]
+        if bits != trial_bits():
             rule = "what it compiles does not compute as IEEE 754 says"
             way_out = f"take options that relax arithmetic out of {COMPILER_VARIABLE}"
             raise ExecutorUnavailable(f"c: {self.device}: {rule}; {way_out}")
+        self.schedule = SCHEDULES.get(int(lanes), PLAIN)
+        self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
         """Compile and load the kernels."""
         for kernel in artifact.kernels:
             built = self._built.get(kernel.digest) or self._loaded(kernel)
             keep(self._built, kernel.digest, built)
+
+    def forget(self) -> None:
+        """Drop the built kernels."""
+        self._built.clear()
 
     def _loaded(self, artifact: Artifact) -> Any:
         """Return the compiled function."""
@@ -224,7 +250,8 @@ class CExecutor(Executor):
                 "a thread's stack; use narrower layers, or executor numpy"
             )
         images = ", ".join(f"images[{i}]" for i in range(len(gather_of(artifact).images)))
-        glue = GLUE.format(header=_header(artifact), entry=artifact.entry_point, images=images)
+        header, pixels = _header(artifact), artifact.manifest["schedule"]["pixels"]
+        glue = GLUE.format(header=header, entry=artifact.entry_point, images=images, pixels=pixels)
         function = self._library(artifact, glue)
         function.argtypes = [*[ctypes.c_void_p] * 3, *[ctypes.c_int] * 4]
         return function
@@ -233,7 +260,8 @@ class CExecutor(Executor):
         """Return the function of a kernel's source and the glue around it, compiled and loaded."""
         folder = Path(self._folder.name)
         (folder / _header(kernel)).write_text(kernel.source, encoding="utf-8")
-        library = folder / f"{kernel.digest[:32]}.so"
+        # A library that was built before may still be loaded: each has a name of its own.
+        library = folder / f"{kernel.digest[:32]}-{next(self._count)}.so"
         done = self._compile(library, glue, ["-shared"])
         if done.returncode or not library.is_file():
             told = done.stderr.strip()[:MOST_TOLD] or "it writes no library"

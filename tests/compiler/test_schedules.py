@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wamnet.compiler import schedules
+from wamnet.compiler.c_tiled import C_LADDER
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.emit_inlined import LARGEST_WEIGHTS
 from wamnet.compiler.emit_tiled import LARGEST_PRIVATE
@@ -48,9 +49,17 @@ SHARED = gathered(lambda x: np.sin(x @ W.T) @ W.T)
 """A program that applies one matrix to the window and to a layer."""
 
 
-@pytest.mark.parametrize(("name", "border"), [("vector16", "clamp"), ("tile16", "zero")])
-def test_golden_tiles(golden, name, border):
-    golden(f"{name}.denoise.cl", compile_program(small(border), "opencl", "ieee", name).source)
+@pytest.mark.parametrize(
+    ("target", "profile", "name", "border"),
+    [
+        ("opencl", "ieee", "vector16", "clamp"),
+        ("opencl", "ieee", "tile16", "zero"),
+        ("c", "ieee", "tile16", "zero"),
+    ],
+)
+def test_golden_tiles(golden, target, profile, name, border):
+    found = compile_program(small(border), target, profile, name)
+    golden(f"{name}.{found.source_name}", found.source)
 
 
 @pytest.mark.parametrize(
@@ -196,10 +205,11 @@ REFUSED = {
 """Programs that the tiled schedule does not hold, and the reason."""
 
 
+@pytest.mark.parametrize("target", ["opencl", "c"])
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case):
+def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case, target):
     program, reason = REFUSED[case]
-    found, plain = (compile_program(program, "opencl", "ieee", name) for name in ("tile16", "plain"))
+    found, plain = (compile_program(program, target, "ieee", name) for name in ("tile16", "plain"))
     assert found.manifest["schedule"]["name"] == "plain"
     assert found.manifest["schedule"]["asked"] == "tile16"
     assert re.match(reason, found.manifest["schedule"]["reason"])
@@ -208,7 +218,7 @@ def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case):
 
 
 @given(
-    schedule=st.sampled_from(OPENCL_LADDER),
+    schedule=st.sampled_from([*OPENCL_LADDER, *C_LADDER]),
     channels=st.lists(st.integers(1, 4), min_size=1, max_size=3),
     size=st.integers(1, 3),
     hidden=st.integers(1, 70),
@@ -245,10 +255,19 @@ def test_every_weight_lies_where_the_kernel_reads_it(schedule, channels, size, h
     assert np.count_nonzero(packed) == used
 
 
-def test_private_bytes_of_a_tile_are_those_of_its_arrays():
-    artifact = compile_program(small(), "opencl", "ieee", "tile16")
+@pytest.mark.parametrize(("target", "array"), [("opencl", "float number"), ("c", r"float v\d+")])
+def test_private_bytes_of_a_tile_are_those_of_its_arrays(target, array):
+    artifact = compile_program(small(), target, "ieee", "tile16")
     sizes = {"PIXELS": 14, "LANES": 16, "WINDOW_SIZE": 2, "PATCH_WIDTH": 15}
-    arrays = re.findall(r"(?:float patch_\w+|float number)\[([^]]+)\];", artifact.source)
+    arrays = re.findall(rf"(?:float patch_\w+|{array})\[([^]]+)\];", artifact.source)
     numbers = [np.prod([sizes.get(word) or int(word) for word in text.split(" * ")]) for text in arrays]
     assert len(numbers) == 2 + 4
     assert artifact.manifest["private_bytes"] == 4 * sum(numbers)
+
+
+def test_only_profiles_that_allow_it_let_products_be_fused_in_c():
+    """PRO-1, PRO-11: the tiled header says so itself, whatever the compiler's default is."""
+    for profile, word in (("ieee", "fast"), ("native", "fast"), ("exact", "off")):
+        source = compile_program(small(), "c", profile, "tile8").source
+        assert f'#pragma GCC optimize("fp-contract={word}")' in source
+        assert f"#pragma STDC FP_CONTRACT {'ON' if word == 'fast' else 'OFF'}" in source

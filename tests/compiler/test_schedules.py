@@ -55,6 +55,7 @@ SHARED = gathered(lambda x: np.sin(x @ W.T) @ W.T)
         ("opencl", "ieee", "vector16", "clamp"),
         ("opencl", "ieee", "tile16", "zero"),
         ("c", "ieee", "tile16", "zero"),
+        ("c", "exact", "tile4", "clamp"),
     ],
 )
 def test_golden_tiles(golden, target, profile, name, border):

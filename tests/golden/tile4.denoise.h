@@ -1,0 +1,371 @@
+/*
+ * wamnet denoiser, C99. Generated: change the compiler, not this text.
+ * program   d85fd24e857516480a7fcd965cfaf43b
+ * images    i0: 2 channels in [-1.0, 1.0]
+ *           i1: 1 channels in [-1.0, 1.0]
+ * window    2 x 2 pixels, the pixel itself is tap 1
+ * border    clamp
+ * output    2 channels
+ * profile   exact: the same bits on every target: one order of summation, every operation rounded, emitted sine
+ * sine      emitted, odd polynomial of degree 11, 0 where the reduced argument is below 9.09495e-13
+ * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
+ * sums      over the window: a partial sum for each image and row of taps, in any order; then these
+ * schedule  tile4: the same for 16 registers of 4 numbers: 6 pixels, 12 vectors of sums
+ * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
+ *           weights; result: width * height * 2 floats in the same order, encoded as `output` says;
+ *           width; height: fewer than 2^31 numbers an image.
+ *           wamnet_image does the whole picture, wamnet_pixel 6 neighbours of a row from (x, y) on:
+ *           call that from your own loops, for each x that is a multiple of 6
+ * weights   W0 (1 x 12 x 8) at 0, b0 (8) at 96, W1 (1 x 5 x 4) at 104; vectors filled up with zeros;
+ *           matrices block by block of neurons: blocks x D_in x neurons; the rows of one that reads
+ *           the window go image by image, then tap by tap in rows, then channel by channel
+ */
+#ifndef WAMNET_DENOISE_H
+#define WAMNET_DENOISE_H
+#include <float.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#if defined(__FAST_MATH__) || !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
+#error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
+#endif
+#define WINDOW_SIZE 2
+#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
+/* No product may be fused with a sum. Compilers differ in what they obey, so give them -ffp-contract=off too:
+   clang takes the standard's pragma unless it is told -ffp-contract=fast, GCC ignores that and takes its own,
+   others may ignore both. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=off")
+#else
+#pragma STDC FP_CONTRACT OFF
+#endif
+#define PIXELS 6 /* neighbours in a row that a work item computes */
+#define LANES 4 /* numbers in a vector */
+#define PATCH_WIDTH (WINDOW_SIZE + PIXELS - 1) /* columns that all windows touch */
+#if defined(__clang__)
+#define WAMNET_UNROLL _Pragma("unroll")
+#elif defined(__GNUC__) && __GNUC__ >= 8
+/* GCC makes no vector instructions of floorf() while it has to raise the standard's exceptions, on which no
+   number depends. Nor may it carry inputs over from one step to the next, in the registers of the sums. */
+#pragma GCC optimize("no-trapping-math", "no-associative-math", "no-predictive-commoning")
+#define WAMNET_UNROLL _Pragma("GCC unroll 16")
+#define WAMNET_ROLLED _Pragma("GCC unroll 1")
+#endif
+#if !defined(WAMNET_UNROLL)
+#define WAMNET_UNROLL
+#endif
+#if !defined(WAMNET_ROLLED)
+#define WAMNET_ROLLED
+#endif
+/* GCC's vectors are fast where the processor has registers of LANES floats, else very slow. */
+#if (LANES <= 4 || (LANES <= 8 && defined(__AVX__)) || defined(__AVX512F__)) && defined(__GNUC__) && \
+    __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
+typedef float wamnet_vector __attribute__((vector_size(4 * LANES), aligned(4), may_alias));
+
+static inline void wamnet_clear(wamnet_vector *to)
+{
+    *to = (wamnet_vector){0};
+}
+
+static inline void wamnet_load(wamnet_vector *to, const float *from)
+{
+    *to = *(const wamnet_vector *)from;
+}
+
+static inline void wamnet_store(float *to, const wamnet_vector *from)
+{
+    *(wamnet_vector *)to = *from;
+}
+
+static inline void wamnet_add(wamnet_vector *sum, const wamnet_vector *term)
+{
+    *sum += *term;
+}
+
+static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *weight, float value)
+{
+    *sum += *weight * value;
+}
+#else
+typedef struct {
+    float lane[LANES];
+} wamnet_vector;
+
+static inline void wamnet_clear(wamnet_vector *to)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        to->lane[i] = 0.0f;
+    }
+}
+
+static inline void wamnet_load(wamnet_vector *to, const float *from)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        to->lane[i] = from[i];
+    }
+}
+
+static inline void wamnet_store(float *to, const wamnet_vector *from)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        to[i] = from->lane[i];
+    }
+}
+
+static inline void wamnet_add(wamnet_vector *restrict sum, const wamnet_vector *restrict term)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        sum->lane[i] += term->lane[i];
+    }
+}
+
+static inline void wamnet_add_product(
+    wamnet_vector *restrict sum,
+    const wamnet_vector *restrict weight,
+    float value)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        sum->lane[i] += weight->lane[i] * value;
+    }
+}
+#endif
+
+/* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written to
+   `result`, the whole picture's array. */
+static inline void wamnet_pixel(
+    const float *restrict image_i0,
+    const float *restrict image_i1,
+    const float *restrict weights,
+    float *restrict result,
+    int width,
+    int height,
+    int x,
+    int y);
+
+/* All pixels, one after another. */
+static inline void wamnet_image(
+    const float *restrict image_i0,
+    const float *restrict image_i1,
+    const float *restrict weights,
+    float *restrict result,
+    int width,
+    int height)
+{
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; x += PIXELS) {
+            wamnet_pixel(image_i0, image_i1, weights, result, width, height, x, y);
+        }
+    }
+}
+
+static inline int wamnet_clamp(int value, int low, int high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
+static inline void wamnet_pixel(
+    const float *restrict image_i0,
+    const float *restrict image_i1,
+    const float *restrict weights,
+    float *restrict result,
+    int width,
+    int height,
+    int x,
+    int y)
+{
+    (void)weights;
+
+    /* the images around the pixels: what lies beyond the border is filled in here */
+    float patch_i0[WINDOW_SIZE * PATCH_WIDTH * 2];
+    float patch_i1[WINDOW_SIZE * PATCH_WIDTH * 1];
+    int left = x - WINDOW_CENTRE;
+    int top = y - WINDOW_CENTRE;
+    bool within = left >= 0 && left + PATCH_WIDTH <= width && top >= 0 && top + WINDOW_SIZE <= height;
+    for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
+        int row = wamnet_clamp(top + dy, 0, height - 1);
+        float *to_i0 = patch_i0 + dy * PATCH_WIDTH * 2;
+        if (within) {
+            for (int i = 0; i < PATCH_WIDTH * 2; ++i) {
+                float value = image_i0[(row * width + left) * 2 + i];
+                to_i0[i] = fabsf(value) < 9.09494702e-13f ? 0.0f : value;
+            }
+        }
+        else {
+            for (int dx = 0; dx < PATCH_WIDTH; ++dx) {
+                int column = wamnet_clamp(left + dx, 0, width - 1);
+                for (int c = 0; c < 2; ++c) {
+                    float value = image_i0[(row * width + column) * 2 + c];
+                    to_i0[dx * 2 + c] = fabsf(value) < 9.09494702e-13f ? 0.0f : value;
+                }
+            }
+        }
+        float *to_i1 = patch_i1 + dy * PATCH_WIDTH * 1;
+        if (within) {
+            for (int i = 0; i < PATCH_WIDTH * 1; ++i) {
+                float value = image_i1[(row * width + left) * 1 + i];
+                to_i1[i] = fabsf(value) < 9.09494702e-13f ? 0.0f : value;
+            }
+        }
+        else {
+            for (int dx = 0; dx < PATCH_WIDTH; ++dx) {
+                int column = wamnet_clamp(left + dx, 0, width - 1);
+                for (int c = 0; c < 1; ++c) {
+                    float value = image_i1[(row * width + column) * 1 + c];
+                    to_i1[dx * 1 + c] = fabsf(value) < 9.09494702e-13f ? 0.0f : value;
+                }
+            }
+        }
+    }
+
+    /* %1: affine map W0 from 12 to 5 */
+    float v1[PIXELS * 2 * LANES];
+    {
+        const float *w = weights;
+        wamnet_vector sum[PIXELS][2];
+        WAMNET_UNROLL
+        for (int p = 0; p < PIXELS; ++p) {
+            wamnet_load(&sum[p][0], weights + 96 + (0) * LANES);
+            wamnet_load(&sum[p][1], weights + 96 + (1) * LANES);
+        }
+        for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
+            const float *row = patch_i0 + dy * PATCH_WIDTH * 2;
+            wamnet_vector part[PIXELS][2];
+            WAMNET_UNROLL
+            for (int p = 0; p < PIXELS; ++p) {
+                wamnet_clear(&part[p][0]);
+                wamnet_clear(&part[p][1]);
+            }
+            for (int i = 0; i < WINDOW_SIZE * 2; ++i) {
+                wamnet_vector w0;
+                wamnet_load(&w0, w + 0 * LANES);
+                wamnet_vector w1;
+                wamnet_load(&w1, w + 1 * LANES);
+                w += 2 * LANES;
+                WAMNET_UNROLL
+                for (int p = 0; p < PIXELS; ++p) {
+                    float value = row[p * 2 + i];
+                    wamnet_add_product(&part[p][0], &w0, value);
+                    wamnet_add_product(&part[p][1], &w1, value);
+                }
+            }
+            WAMNET_UNROLL
+            for (int p = 0; p < PIXELS; ++p) {
+                wamnet_add(&sum[p][0], &part[p][0]);
+                wamnet_add(&sum[p][1], &part[p][1]);
+            }
+        }
+        for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
+            const float *row = patch_i1 + dy * PATCH_WIDTH * 1;
+            wamnet_vector part[PIXELS][2];
+            WAMNET_UNROLL
+            for (int p = 0; p < PIXELS; ++p) {
+                wamnet_clear(&part[p][0]);
+                wamnet_clear(&part[p][1]);
+            }
+            for (int i = 0; i < WINDOW_SIZE * 1; ++i) {
+                wamnet_vector w0;
+                wamnet_load(&w0, w + 0 * LANES);
+                wamnet_vector w1;
+                wamnet_load(&w1, w + 1 * LANES);
+                w += 2 * LANES;
+                WAMNET_UNROLL
+                for (int p = 0; p < PIXELS; ++p) {
+                    float value = row[p * 1 + i];
+                    wamnet_add_product(&part[p][0], &w0, value);
+                    wamnet_add_product(&part[p][1], &w1, value);
+                }
+            }
+            WAMNET_UNROLL
+            for (int p = 0; p < PIXELS; ++p) {
+                wamnet_add(&sum[p][0], &part[p][0]);
+                wamnet_add(&sum[p][1], &part[p][1]);
+            }
+        }
+        WAMNET_UNROLL
+        for (int p = 0; p < PIXELS; ++p) {
+            wamnet_store(v1 + (p * 2 + 0) * LANES, &sum[p][0]);
+            wamnet_store(v1 + (p * 2 + 1) * LANES, &sum[p][1]);
+        }
+    }
+
+    /* %3 to %50: elementwise on 5 numbers */
+    float v50[PIXELS * 2 * LANES];
+    for (int i = 0; i < PIXELS * 2 * LANES; ++i) {
+        float t5 = v1[i] * 0.318309873f + 0.5f;
+        float t6 = floorf(t5);
+        float t9 = v1[i] - t6 * 3.14160156f;
+        float t12 = t9 - t6 * (-8.9071691e-06f);
+        float t15 = t12 - t6 * (-1.74122761e-09f);
+        float t16 = fabsf(t15);
+        float t18 = t16 * 1.09951163e+12f;
+        float t19 = floorf(t18);
+        float t21 = 1.0f < t19 ? 1.0f : t19;
+        float t22 = t15 * t21;
+        float t23 = 0.5f * t6;
+        float t24 = floorf(t23);
+        float t27 = t6 - 2.0f * t24;
+        float t29 = 1.0f - 2.0f * t27;
+        float t30 = t22 * t22;
+        float t34 = t30 * (-2.51969432e-08f) + 2.76094511e-06f;
+        float t37 = t30 * t34 + (-0.000198427704f);
+        float t40 = t30 * t37 + 0.00833334867f;
+        float t43 = t30 * t40 + (-0.166666672f);
+        float t44 = t30 * t43;
+        float t46 = t22 + t22 * t44;
+        float t47 = t29 * t46;
+        float t48 = 1.0f < t47 ? 1.0f : t47;
+        float t50 = (-1.0f) > t48 ? (-1.0f) : t48;
+        v50[i] = t50;
+    }
+
+    /* %51: affine map W1 from 5 to 2 */
+    float v51[PIXELS * 1 * LANES];
+    {
+        const float *w = weights + 104;
+        wamnet_vector sum[PIXELS][1];
+        WAMNET_UNROLL
+        for (int p = 0; p < PIXELS; ++p) {
+            wamnet_clear(&sum[p][0]);
+        }
+        for (int i = 0; i < 5; ++i) {
+            wamnet_vector w0;
+            wamnet_load(&w0, w + 0 * LANES);
+            w += 1 * LANES;
+            WAMNET_UNROLL
+            for (int p = 0; p < PIXELS; ++p) {
+                float value = v50[p * 2 * LANES + i];
+                wamnet_add_product(&sum[p][0], &w0, value);
+            }
+        }
+        WAMNET_UNROLL
+        for (int p = 0; p < PIXELS; ++p) {
+            wamnet_store(v51 + (p * 1 + 0) * LANES, &sum[p][0]);
+        }
+    }
+
+    /* %53 to %54: elementwise on 2 numbers */
+    float v54[PIXELS * 1 * LANES];
+    for (int i = 0; i < PIXELS * 1 * LANES; ++i) {
+        float t53 = 0.0f > v51[i] ? 0.0f : v51[i];
+        float t54 = 1.0f < t53 ? 1.0f : t53;
+        v54[i] = t54;
+    }
+
+    /* output color */
+    for (int p = 0; p < PIXELS && x + p < width; ++p) {
+        for (int i = 0; i < 2; ++i) {
+            result[(y * width + x + p) * 2 + i] = v54[p * 1 * LANES + i] == 0.0f ? 0.0f : v54[p * 1 * LANES + i];
+        }
+    }
+}
+
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC pop_options
+#endif
+#endif

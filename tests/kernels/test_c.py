@@ -57,10 +57,11 @@ def array(name, values):
     return f"static const float {name}[{np.size(values)}] = {{{text}}};\n"
 
 
-def built(folder: Path, case, profile, options):
+def built(folder: Path, case, profile, options, schedule="plain"):
     """Compile a program around the kernel with the compiler of the executor, and return what it prints."""
     program, images, expected = case
-    artifact = compile_program(program, "c", profile)
+    artifact = compile_program(program, "c", profile, schedule)
+    assert artifact.manifest["schedule"]["name"] == schedule
     (folder / artifact.source_name).write_text(artifact.source)
     data = array("numbers", artifact.weights) + "".join(array(f"in_{n}", x) for n, x in images.items())
     height, width, _ = expected.shape
@@ -85,6 +86,44 @@ def test_source_is_clean_under_warnings_and_sanitizers(executor_named, case, tmp
         assert (np.abs(found - case[2]) <= np.sum(both, axis=0)).all()
 
 
+WAYS = (["-march=native"], ["-DWAMNET_PORTABLE"])
+TILES = [(name, way) for name in ("tile16", "tile8", "tile4") for way in WAYS]
+"""The tiled schedules, with the vectors of GCC and clang, where the processor has those, and without."""
+
+
+@pytest.fixture(
+    scope="module", params=[("clamp", (1, 1)), ("zero", (1, 1)), ("zero", (3, 31)), ("clamp", (2, 9))]
+)
+def bordered(request, kit):
+    """A denoiser as above whose layers fill no vector, and pictures that fill no tile; what comes out."""
+    border, size = request.param
+    program = kit.denoiser(kit.network([100, 37, 5, 3], (3.0, 5.0)), {"a": 3, "b": 1}, 5, border)
+    random = np.random.default_rng(3)
+    images = {name: random.uniform(-2, 2, (*size, n)).astype(np.float32) for name, n in (("a", 3), ("b", 1))}
+    exact = compile_program(program, "numpy", "exact").program
+    (expected,) = interpret(exact, {"window": kit.windows(program, images)}).values()
+    return program, images, expected
+
+
+@pytest.mark.parametrize(("schedule", "way"), TILES)
+def test_tiles_are_clean_and_exact(executor_named, bordered, tmp_path, schedule, way):
+    """No access leaves an array, at any border; the bits are those of the interpreter (KER-16, PRO-11)."""
+    executor_named("c")
+    options = ["-std=c99", "-O1", "-g", *WARNINGS, *SANITIZERS, *way]
+    found = built(tmp_path, bordered, "exact", options, schedule)
+    assert np.array_equal(found.view(np.uint32), bordered[2].view(np.uint32))
+
+
+@pytest.mark.parametrize("options", [["-O0"], ["-O3"]], ids=["not optimised", "optimised"])
+@pytest.mark.parametrize(("schedule", "way"), TILES)
+def test_tiles_that_may_be_fused_are_near(executor_named, bordered, tmp_path, schedule, way, options):
+    """Profile ieee, without the executor's options: both pictures are that near the float64 reference."""
+    executor_named("c")
+    found = built(tmp_path, bordered, "ieee", ["-std=c99", *options, *WARNINGS, *way], schedule)
+    both = [compile_program(bordered[0], "c", p).manifest["bound"]["output"] for p in ("exact", "ieee")]
+    assert (np.abs(found - bordered[2]) <= np.sum(both, axis=0)).all()
+
+
 @pytest.mark.parametrize(
     "options",
     [
@@ -94,10 +133,11 @@ def test_source_is_clean_under_warnings_and_sanitizers(executor_named, case, tmp
     ],
     ids=["plain", "contraction is the default", "not optimised"],
 )
-def test_pasted_source_is_exact_without_our_options(executor_named, case, tmp_path, options):
+@pytest.mark.parametrize("schedule", ["plain", "tile8"])
+def test_pasted_source_is_exact_without_our_options(executor_named, case, tmp_path, options, schedule):
     """GCC contracts by default where the processor can, and clang within an expression: pragmas forbid it."""
     executor_named("c")
-    found = built(tmp_path, case, "exact", options)
+    found = built(tmp_path, case, "exact", options, schedule)
     assert np.array_equal(found.view(np.uint32), case[2].view(np.uint32))
 
 
@@ -122,6 +162,44 @@ def test_building_again_costs_nothing(executor_named, case, monkeypatch):
     monkeypatch.setattr(executor, "_call", None)
     executor.build(artifact)
     assert executor._built[artifact.digest] is built
+
+
+@pytest.mark.parametrize(
+    ("native", "lanes", "schedule"),
+    [
+        ("-mno-avx", 4, "tile4"),
+        ("-mavx2 -mno-avx512f", 8, "tile8"),
+        ("-mavx512f", 16, "tile16"),
+    ],
+)
+def test_the_schedule_follows_from_the_registers(
+    executor_named, tmp_path, monkeypatch, native, lanes, schedule
+):
+    """The trial tells for what the compiler is told to make code; none of its own needs such registers."""
+    executor_named("c")
+    wrapper = tmp_path / "cc"
+    wrapper.write_text(f'#!/bin/sh\nexec cc "$@" -march=x86-64 {native} -mprefer-vector-width=128\n')
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("CC", str(wrapper))
+    with kernels.open_executor("c") as executor:
+        assert executor.schedule == executor.schedule_for((1, 1)) == schedule
+        assert executor.schedule_reason == f"built-in choice for processors with {lanes} floats in a register"
+
+
+def test_a_compiler_without_vectors_gets_the_plain_schedule(executor_named, monkeypatch):
+    executor_named("c")
+    monkeypatch.setattr(c_executor, "TRIAL", c_executor.TRIAL.replace("!defined(__GNUC__)", "1"))
+    with kernels.open_executor("c") as executor:
+        assert executor.schedule == "plain"
+
+
+def test_a_forgotten_kernel_is_built_again(executor_named, case):
+    executor, artifact = executor_named("c"), compile_program(case[0], "c")
+    first = executor.run(artifact, case[1])
+    built = executor._built[artifact.digest]
+    executor.forget()
+    assert np.array_equal(executor.run(artifact, case[1]), first)
+    assert executor._built[artifact.digest] is not built
 
 
 # ---- refusals ----------------------------------------------------------------------------------------
@@ -160,8 +238,9 @@ def test_options_that_relax_arithmetic_are_taken_back(executor_named, case, monk
     monkeypatch.setenv("CC", f"cc {relaxed}")
     program, images, wanted = case
     with kernels.open_executor("c") as executor:
-        found = executor.run(compile_program(program, "c", "exact"), images)
-    assert np.array_equal(found.view(np.uint32), wanted.view(np.uint32))
+        for schedule in ("plain", "tile16"):
+            found = executor.run(compile_program(program, "c", "exact", schedule), images)
+            assert np.array_equal(found.view(np.uint32), wanted.view(np.uint32))
     # A number below the smallest normal one, 2^-126, which a process that flushes them loses.
     assert np.float32(2.0**-133) * np.float32(1) == np.float32(2.0**-133)
 

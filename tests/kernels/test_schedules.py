@@ -13,7 +13,7 @@ from kit import LONG, trained_sizes
 from wamnet.compiler import emit_fourier
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.lower import lower
-from wamnet.compiler.targets import TARGETS
+from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import denoise_on, opencl_executor, opengl_executor
 from wamnet.refimpl import dataset, denoise, frame
 from wamnet.refimpl.errors import CompileError
@@ -21,7 +21,7 @@ from wamnet.refimpl.errors import CompileError
 EXAMPLES = max(settings.default.max_examples // 10, 1)
 """Each example compiles a kernel, up to a second: a tenth of what other tests draw."""
 
-LADDER = [(t.name, s.name) for t in TARGETS.values() for s in t.schedules[1:]]
+LADDER = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules[1:]]
 """All schedules besides the plain ones, with their targets."""
 
 
@@ -36,7 +36,7 @@ LARGEST_LAYERS = {"group": (12, 30), "group4": (12, 30)}
 UNLIMITED = (12, 70)
 """The same of those that have loops: in long runs half of their networks are as wide as trained ones."""
 
-GROUPED = {s.name: s for t in TARGETS.values() for s in t.schedules if hasattr(s, "group")}
+GROUPED = {s.name: s for t in DENOISERS.values() for s in t.schedules if hasattr(s, "group")}
 """The schedules whose groups share a tile."""
 
 
@@ -137,22 +137,32 @@ FAULTS = {
     "columns": ("clamp(left + dx, 0, width - 1)", "clamp(left + dx, 1, width - 1)"),
     "rows": ("clamp(top + dy, 0, height - 1)", "clamp(top + dy, 1, height - 1)"),
     "place": ("y * width + x + p)", "y * width + x + (p ^ 1))"),
-    "block": ("weights) + block", "weights) + 0 * block"),
-    "bias": ("[block * 2 + 1]", "[block * 2 + 0]"),
     "lanes": ("* LANES + i]", "* LANES + i / 2]"),
+    "block": {
+        "opencl": ("weights) + block", "weights) + 0 * block"),
+        "c": ("= weights + block", "= weights + 0 * block"),
+    },
+    "bias": {
+        "opencl": ("[block * 2 + 1]", "[block * 2 + 0]"),
+        "c": ("(block * 2 + 1) * LANES", "(block * 2 + 0) * LANES"),
+    },
 }
-"""Pieces of a tiled kernel, and what makes it wrong; none leaves an array."""
+"""Pieces of a tiled kernel, and what makes it wrong, in each language where they differ; none leaves an
+array."""
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("schedule", ["tile16", "tile4"])
-def test_a_wrong_tile_is_caught(executor_named, kit, schedule, fault):
-    executor = executor_named("opencl")
+@pytest.mark.parametrize("target", ["opencl", "c"])
+def test_a_wrong_tile_is_caught(executor_named, kit, target, schedule, fault):
+    executor = executor_named(target)
     program = kit.denoiser(kit.network([48, 70, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
     images = {"a": np.random.default_rng(8).uniform(-2, 2, (9, 34, 3)).astype(np.float32)}
-    artifact = compile_program(program, "opencl", "ieee", schedule)
+    artifact = compile_program(program, target, "ieee", schedule)
     assert kit.excess(executor, program, images, artifact) <= 1
-    assert kit.excess(executor, program, images, kit.with_source(artifact, *FAULTS[fault])) > 1
+    found = FAULTS[fault]
+    old, new = found[target] if isinstance(found, dict) else found
+    assert kit.excess(executor, program, images, kit.with_source(artifact, old, new)) > 1
 
 
 FOURIER_FAULTS = {

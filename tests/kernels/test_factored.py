@@ -14,7 +14,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.emit_fourier import Fourier
 from wamnet.compiler.interpret import interpret
 from wamnet.compiler.plan import analysed, sine_contract
-from wamnet.compiler.targets import TARGETS
+from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import Pipeline, denoise_on, opencl_executor
 from wamnet.refimpl import dataset, factored
 from wamnet.refimpl.denoise import Model
@@ -25,7 +25,7 @@ from wamnet.refimpl.scenes import canonical
 EXAMPLES = max(settings.default.max_examples // 10, 1)
 """Each example compiles two kernels, up to a second: a tenth of what other tests draw."""
 
-WAYS = [(t.name, s.name) for t in TARGETS.values() for s in t.schedules if not isinstance(s, Fourier)]
+WAYS = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules if not isinstance(s, Fourier)]
 """All targets and schedules that hold a first layer in two passes: spectra are of windows along both axes."""
 
 
@@ -81,7 +81,7 @@ def test_error_is_within_both_bounds(executor_named, kit, target, schedule, case
         kit.network(case["widths"], (9.0, 3.0), case["seed"]), case["channels"], case["size"], case["border"]
     )
     images = images_of(case["channels"], case["shape"], case["seed"])
-    rank = min(case["rank"], TARGETS[target].most or case["rank"])
+    rank = min(case["rank"], DENOISERS[target].most or case["rank"])
     artifact = compile_program(program, target, "ieee", schedule, rank)
     for kernel in artifact.kernels:
         picked = kernel.manifest["schedule"]

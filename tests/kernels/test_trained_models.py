@@ -22,10 +22,9 @@ import pytest
 from wamnet.cli.inputs import load_model, shipped_models, unlike_training
 from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.expected import Expected
 from wamnet.compiler.ir import Program
 from wamnet.compiler.lower import lower
-from wamnet.compiler.plan import sine_contract
+from wamnet.compiler.plan import Expected, sine_contract
 from wamnet.compiler.profiles import PROFILES
 from wamnet.compiler.schedules import Schedule
 from wamnet.compiler.targets import DENOISERS

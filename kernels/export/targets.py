@@ -139,6 +139,9 @@ DISPATCH = "dispatch(ceil(width / {across}), ceil(height / {down}), 1)"
 ON_PROCESSORS = ("tile16", "tile8", "tile4", "vector16")
 """Schedules of OpenCL for processors."""
 
+IN_C = ("tile8", "tile16", "tile4", PLAIN)
+"""Schedules of C: most processors have AVX2's registers, or get two instructions for each of its vectors."""
+
 GL_CODE = """\
 GLuint program = link(fullscreen_triangle, compile(GL_FRAGMENT_SHADER, "denoise.frag"));
 glUseProgram(program);
@@ -257,7 +260,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         "c",
         "C99, one header",
-        {BUFFER: Place("c"), **_tabled("c")},
+        {BUFFER: Place("c", IN_C), **_tabled("c")},
         _as(".h"),
         "arguments",
         '#include "denoise.h"\n'

@@ -99,6 +99,7 @@ def animate(
     executor: options.Executor = ExecutorName.numpy,
     renderer: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
     rank: options.CutRank = 0,
+    context: options.OpenGLContext = None,
 ) -> None:
     """Show what a model does over an animation: noisy, denoised and reference side by side.
 

@@ -105,6 +105,7 @@ def dataset(
     parameters: options.Parameters = None,
     max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
     executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    context: options.OpenGLContext = None,
     sampler: options.SamplerName = Sampler.pcg4d,
     workers: Workers = None,
     scheduler: Scheduler = None,

@@ -55,6 +55,7 @@ def denoise(
     schedule: options.Schedule = None,
     rank: options.CutRank = 0,
     variant: options.Variant = None,
+    context: options.OpenGLContext = None,
 ) -> None:
     """Denoise a frame with a trained model.
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import colorsys
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -37,6 +38,26 @@ def _finite(value: float | None) -> float | None:
     return value
 
 
+def _context(command: typer.Context, value: ContextName | None) -> ContextName | None:
+    """Let this command, and the processes that it starts, open OpenGL in this way."""
+    from ..kernels.registry import CONTEXT_VARIABLE
+
+    if value is None:
+        return None
+    before = os.environ.get(CONTEXT_VARIABLE)
+    os.environ[CONTEXT_VARIABLE] = value.value
+
+    def restore() -> None:
+        """Leave the environment as it was."""
+        if before is None:
+            os.environ.pop(CONTEXT_VARIABLE, None)
+        else:
+            os.environ[CONTEXT_VARIABLE] = before
+
+    command.call_on_close(restore)
+    return value
+
+
 def _stops(value: float) -> float:
     """Refuse an exposure that is no number or that leaves no picture."""
     if not abs(value) <= LARGEST_EXPOSURE_STOPS:
@@ -52,6 +73,13 @@ class ExecutorName(str, Enum):
     opencl = "opencl"
     opengl = "opengl"
     c = "c"
+
+
+class ContextName(str, Enum):
+    """How OpenGL gets a context: without a display, or in main memory; as in kernels/opengl_executor.py."""
+
+    egl = "egl"
+    osmesa = "osmesa"
 
 
 class Renderer(str, Enum):
@@ -104,6 +132,15 @@ Executor = Annotated[
     ExecutorName,
     typer.Option(
         "--executor", help="What runs the kernel; see which are there with [bold]wamnet executors[/]."
+    ),
+]
+OpenGLContext = Annotated[
+    ContextName | None,
+    typer.Option(
+        "--context",
+        callback=_context,
+        help="How OpenGL gets a context: [bold]egl[/], without a display; [bold]osmesa[/], in main memory.",
+        show_default="the first of them that is here; WAMNET_OPENGL_CONTEXT names another",
     ),
 ]
 Exposure = Annotated[

@@ -71,6 +71,7 @@ def render(
     sampler: options.SamplerName = Sampler.pcg4d,
     dtype: Annotated[FloatType, typer.Option(help="Arithmetic; files hold float32.")] = FloatType.float32,
     executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    context: options.OpenGLContext = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes that share NumPy's work.", show_default="one per core")
     ] = None,

@@ -48,6 +48,7 @@ def tune(
     executor: options.Executor = ExecutorName.opencl,
     size: Annotated[int, typer.Option(help="Width and height of the picture, in pixels.")] = 512,
     rank: options.CutRank = 0,
+    context: options.OpenGLContext = None,
     force: Annotated[bool, typer.Option("--force", help="Measure again what is known.")] = False,
     cache: Annotated[
         Path | None,

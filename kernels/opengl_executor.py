@@ -32,9 +32,7 @@ from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import osmesa
 from .executor import Executor, Images, Part, black, gather_of, keep
 from .passes import PICTURE, Passes
-
-CONTEXT_VARIABLE = "WAMNET_OPENGL_CONTEXT"
-"""Environment variable that chooses the kind of context where the caller does not."""
+from .registry import CONTEXT_VARIABLE
 
 VERTEX_SHADER = """\
 #version 330 core

@@ -9,6 +9,9 @@ from ..compiler.writing import signals_wait
 from ..refimpl.errors import ExecutorUnavailable, InputError
 from .executor import Executor
 
+CONTEXT_VARIABLE = "WAMNET_OPENGL_CONTEXT"
+"""Environment variable that names the kind of OpenGL's context, egl or osmesa, where the caller does not."""
+
 
 def _numpy(**options: Any) -> Executor:
     """Open the interpreter."""

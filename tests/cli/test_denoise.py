@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 
@@ -13,6 +14,7 @@ from wamnet.cli import denoise, exr
 from wamnet.cli.images import read_png
 from wamnet.compiler.model_file import load_model
 from wamnet.kernels import denoise_on, open_executor
+from wamnet.kernels.registry import CONTEXT_VARIABLE
 from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame
@@ -68,6 +70,19 @@ def test_pixels_that_are_no_numbers_are_named_and_read_by_the_rule(wamnet, here,
     assert np.isfinite(expected).all()
     assert (encoding.to_8bit(read_png(here / "denoised.png")) == encoding.to_8bit(expected)).all()
     assert wamnet("compare", "bad.exr", "noisy.exr").status == 2
+
+
+@pytest.mark.parametrize("kind", ["egl", "osmesa"])
+def test_the_kind_of_context_is_an_option(wamnet, here, executor_named, kind) -> None:
+    """The device's line names it, and the environment is as before."""
+    executor_named(f"opengl-{kind}")
+    before = os.environ.get(CONTEXT_VARIABLE)
+    devices = ("--executor", "opengl", "--context", kind)
+    outcome = wamnet("denoise", "model.safetensors", "noisy.exr", *devices)
+    assert outcome.status == 0
+    assert f" through {kind})" in outcome.out
+    assert os.environ.get(CONTEXT_VARIABLE) == before
+    assert wamnet("denoise", "model.safetensors", "noisy.exr", "--context", "x11").status == 2
 
 
 def test_a_rank_cuts_the_first_layer(wamnet, here) -> None:

@@ -265,7 +265,8 @@ ROWS: tuple[Row, ...] = (
         "arguments",
         '#include "denoise.h"\n'
         + ARGUMENTS_CODE.replace("{call}", "wamnet_image({arguments});")
-        + "\n/* Compile with -ffp-contract=off; wamnet_pixel does one pixel, for loops of your own. */",
+        + "\n/* wamnet_pixel does {columns} pixels of a row, for your own loops. Use -O3 -march=native:\n"
+        "   tile8 wants registers of 8 floats (AVX2); for those of 4 (SSE, NEON) export --schedule tile4. */",
     ),
     Row(
         "cuda",

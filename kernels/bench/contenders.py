@@ -17,7 +17,7 @@ from ...compiler.compile import compile_program
 from ...compiler.emit import kernel_gather
 from ...compiler.plan import analysed
 from ...compiler.schedules import PLAIN
-from ...compiler.targets import TARGETS, schedule_named
+from ...compiler.targets import TARGETS, schedule_named, target_named
 from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ..executor import Images
@@ -60,7 +60,7 @@ QUICK = ("onnxruntime", "oidn:fast")
 def kernel(executor: str, schedule: str, variant: Variant = FULL) -> Contender:
     """Return the contender that is a kernel of this schedule."""
     name = f"{executor}:{schedule}" + ("" if variant is FULL else f":{variant.name}")
-    ideas = {each.name: each.idea for each in TARGETS[executor].schedules}
+    ideas = {each.name: each.idea for each in target_named(executor).schedules}
     text = ideas[schedule] if variant is FULL else variant.text
     open_it = partial(_open_kernel, executor, schedule, variant)
     return Contender(name, text, open_it, variant, executor, schedule, caches=CACHES.get(executor, NO_CACHE))

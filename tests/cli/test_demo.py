@@ -15,6 +15,7 @@ from wamnet.cli import bench, bench_forms, demo, exr, machine, runs
 from wamnet.cli.images import read_png
 from wamnet.cli.main import main
 from wamnet.compiler.model_file import load_model
+from wamnet.compiler.variants import plan_model
 from wamnet.refimpl import encoding, metrics
 from wamnet.refimpl.denoise import denoise
 
@@ -227,8 +228,8 @@ def test_an_executor_that_is_missing_is_told(finished, monkeypatch) -> None:
 
 def test_a_target_that_promises_nothing_has_no_bound(finished) -> None:
     """OpenGL's own sine."""
-    model = load_model(finished / "model.safetensors")
-    assert runs.frame_bound(model, first_noisy(finished), "opengl", "native") is None
+    plan = plan_model(load_model(finished / "model.safetensors"), "opengl", "native")
+    assert runs.frame_bound(plan, first_noisy(finished)) is None
 
 
 def test_refusals(refused, tmp_path) -> None:

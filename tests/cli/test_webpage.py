@@ -181,9 +181,9 @@ def test_the_pictures_keep_their_bound(still, model, data, number):
     network = P.networks_of(model, rank=4)[number]
     draw(still, frame=FRAME, seed=SEED, variant=network.name)
     images = {name: read(still, name)[..., :3].copy() for name in FEATURES}
-    program = P.lower(model)
-    artifact = P.compile_program(program, P.TARGET, "ieee", network.schedule, network.rank)
-    value, bound = P._expected(program, artifact, network.rank, images)
+    plan = P.plan_program(P.lower(model), P.TARGET, "ieee", network.schedule, network.rank)
+    held = plan.expected(images)
+    value, bound = held.value, held.bound
     found = read(still, "picture")[..., :3].astype(np.float64)
     assert 0 < bound.max() < 2**-8, "a step of 8 bits would hold for many wrong kernels"
     assert np.all(np.abs(found - value) <= bound)

@@ -105,7 +105,7 @@ def test_of_equal_operations_the_first_one_s_places_stay():
     program = trace(function, {"x": ir.Type(shape=(3,))}, keep_places=True)
     text = [reference(node.places[-1]) for node in program.nodes if node.op == "multiply"]
     assert len(text) == 3
-    assert all(line.startswith("return a[..., 0] * b[..., 0]") for line in text)
+    assert all("a[..., 0] * b[..., 0]" in line for line in text)
 
 
 def test_a_listing_as_text():

@@ -28,7 +28,7 @@ from wamnet.cli.main import main
 BEGUN_S = 1.5
 """Seconds after which a command has looked at all its options, and gets Ctrl-C."""
 
-ENDING_S = 15.0
+ENDING_S = 60.0
 """Seconds that it may take to end then; a kernel that is being compiled ends first."""
 
 CRASHED = 99

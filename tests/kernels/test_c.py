@@ -13,7 +13,6 @@ from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.interpret import interpret
 from wamnet.kernels import c_executor
-from wamnet.kernels.executor import Part
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror")
@@ -294,16 +293,3 @@ def test_picture_too_large_for_indices(executor_named, kit, monkeypatch):
         InputError, match="size of the picture for C is 4 x 3 with 1 channels: one image must hold"
     ):
         executor_named("c").run(artifact, {"a": np.zeros((3, 4, 1), np.float32)})
-
-
-def test_rendering_is_refused(executor_named, case):
-    executor, artifact = executor_named("c"), compile_program(case[0], "c")
-    for call in (
-        lambda: executor.build_path(None),
-        lambda: executor._trace(None, Part(1, 1, 0, 1, 0, 1, 0)),
-        lambda: executor._passes(None, artifact, (1, 1)),
-    ):
-        with pytest.raises(
-            InputError, match="executor that renders is c: its kernels denoise; they follow no"
-        ):
-            call()

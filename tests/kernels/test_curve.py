@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wamnet.compiler import variants
-from wamnet.compiler.compile import DENOISERS
+from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import cache, curve, measure_curve
 from wamnet.kernels.curve import Curve, Limits, Point, choose
 from wamnet.refimpl import siren

@@ -11,11 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wamnet.compiler import bounds
-from wamnet.compiler.compile import DENOISERS, EXPORTED, compile_program
+from wamnet.compiler.compile import compile_program
 from wamnet.compiler.ir import Type
 from wamnet.compiler.lower import lower
 from wamnet.compiler.lower_step import lower_step
 from wamnet.compiler.profiles import EMITTED_SINE
+from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.compiler.trace import trace
 from wamnet.refimpl import activation, siren
 from wamnet.refimpl.activation import ACTIVATIONS, Activation, activation_named

@@ -1,7 +1,7 @@
 """All targets: what runs kernels, how its source is made, and which schedules it has.
 
-A target that wamnet runs itself is in [`TARGETS`], or in [`DENOISERS`] where it denoises only; one whose
-kernels other programs run is in [`EXPORTED`].
+Targets that an executor of the registry runs are in [`DENOISERS`]; the demo and the benchmark of all targets
+take those in [`TARGETS`]. Targets whose kernels other programs run are in [`EXPORTED`].
 """
 
 from __future__ import annotations
@@ -88,10 +88,10 @@ TARGETS: Mapping[str, Target] = {
         _dialect_target(GLSL(), *GLSL_LADDER, *GLSL_COMPUTE),
     )
 }
-"""All targets of paths, encodings and denoisers, by the name of the executor that runs them."""
+"""The targets that the demo and the benchmark show, by the name of the executor that runs them."""
 
 DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C(), *C_LADDER)}
-"""All targets that an executor of the registry runs: those, and C, whose executor denoises alone."""
+"""All targets that an executor of the registry runs."""
 
 EXPORTED: Mapping[str, Target] = {
     target.name: target

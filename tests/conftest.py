@@ -26,10 +26,11 @@ import hypothesis
 import pytest
 from packages import FOUND, PACKAGES, required
 
-PIPELINES = ("numpy", "opencl", "opengl-egl", "opengl-osmesa", "c")
-"""Executors of kernels of all kinds; an OpenGL executor is named with the kind of its context."""
+PIPELINES = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
+"""Executors on which every test of paths and pipelines runs; an OpenGL executor is named with the kind of its
+context. C compiles each path kernel for seconds: fewer tests run its paths (test_c.py, test_render_frame.py)."""
 
-EXECUTORS = PIPELINES
+EXECUTORS = (*PIPELINES, "c")
 """Every way to run a denoiser that the tests know."""
 
 PEERS = ("mitsuba", "chromium")

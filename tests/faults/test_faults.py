@@ -41,5 +41,5 @@ def test_a_fault_of_another_user_loses_nothing(open_to_all) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(faults.CASES))
 def test_faults_at_every_command(open_to_all, name) -> None:
-    """Three at each."""
-    assert faults.run(3, 11, [name], open_to_all) == 0
+    """One at each: make faults runs hundreds."""
+    assert faults.run(1, 11, [name], open_to_all) == 0

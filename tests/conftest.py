@@ -28,7 +28,7 @@ from packages import FOUND, PACKAGES, required
 
 PIPELINES = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
 """Executors on which every test of paths and pipelines runs; an OpenGL executor is named with the kind of its
-context. C compiles each path kernel for seconds: fewer tests run its paths (test_c.py, test_render_frame.py)."""
+context. C compiles each path kernel for seconds: fewer tests run its paths."""
 
 EXECUTORS = (*PIPELINES, "c")
 """Every way to run a denoiser that the tests know."""

@@ -100,6 +100,7 @@ def tried(target: Target, content: bytes) -> tuple[str, str]:
     folder = Path(tempfile.mkdtemp(prefix="wamnet-fuzz-"))
     try:
         os.chdir(folder)
+        signal.signal(signal.SIGALRM, _hang)
         signal.setitimer(signal.ITIMER_REAL, HANG_S)
         with np.errstate(all="ignore"):
             target.use(content, folder)
@@ -154,7 +155,6 @@ def prepare() -> None:
         for example in target.examples:
             outcome, what = tried(target, example)
             assert outcome != "FOUND", f"{target.name}: a good file gives {what}"
-    signal.signal(signal.SIGALRM, _hang)
     own = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_DATA, (own + MEMORY_BYTES, resource.RLIM_INFINITY))
 

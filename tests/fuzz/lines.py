@@ -1,7 +1,6 @@
 """Command lines: other values of every option, and commands that want a process of their own.
 
-1. A line runs in a child that is forked from this process, with everything imported [`in_child`], in a folder
-   that has all good files [`Good`], a pipe, a folder and a link.
+1. A line runs in a child [forks.py], in a folder that has all good files [`Good`], a pipe, a folder, a link.
 2. What has not ended after BEGUN_S has been accepted, and works: it gets Ctrl-C, and must end in 130.
 3. The status must be 0, 1, 2 or 130; 2 comes with one error in one line, and nothing shows a traceback or
    control characters. What the child has started must end with it.
@@ -12,27 +11,15 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import signal
-import sys
-import time
-import traceback
 from collections.abc import Sequence
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
+from forks import Wrong, in_child
 from targets import CommandRefused, Good, Target
-
-from wamnet.cli.main import main
 
 BEGUN_S = 1.5
 """Seconds after which a command has looked at all its options, and gets Ctrl-C."""
-
-ENDING_S = 60.0
-"""Seconds that it may take to end then; a kernel that is being compiled ends first."""
-
-CRASHED = 99
-"""Status of a child that an exception has ended."""
 
 LINES: Sequence[str] = (
     "render minicubes --width 2 --height 2 --spp 1 --feature-spp 2 --seed 1 --time 0 --yaw 1 --pitch 1 "
@@ -79,10 +66,6 @@ LINES: Sequence[str] = (
     "demo --quick -o out",
 )
 """A line of each command, with all its options."""
-
-
-class Wrong(Exception):
-    """A line has ended as none may."""
 
 
 def lines(good: Good) -> list[Target]:
@@ -194,76 +177,6 @@ def prepare(good: Good, folder: Path) -> None:
     os.mkfifo(folder / "pipe")
     (folder / "folder").mkdir()
     (folder / "link").symlink_to("picture.png")
-
-
-def in_child(words: Sequence[str], folder: Path, begun_s: float) -> tuple[int, str, bool]:
-    """Run a line in a child; return its status, all that it said, and whether a process of it was left."""
-    said = folder / ".said"
-    child = os.fork()
-    if child == 0:
-        _run(words, said)
-    status = _ended(child, begun_s)
-    left = False
-    # What it has started may end a moment after it.
-    for _ in range(100):
-        left = bool(_alive(child))
-        if not left:
-            break
-        time.sleep(0.1)
-    with suppress(ProcessLookupError, PermissionError):
-        os.killpg(child, signal.SIGKILL)
-    return status, said.read_text(encoding="utf-8", errors="replace"), left
-
-
-def _run(words: Sequence[str], said: Path) -> None:
-    """Be the child: run the line, with all that is said in a file."""
-    status = CRASHED
-    try:
-        os.setsid()
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
-        with said.open("w", buffering=1, encoding="utf-8", errors="backslashreplace") as file:
-            sys.stdout = sys.stderr = file
-            os.dup2(file.fileno(), 1)
-            os.dup2(file.fileno(), 2)
-            os.environ["BROWSER"] = "true"
-            sys.argv = ["wamnet", *words]
-            try:
-                status = main(words)
-            except BaseException:  # noqa: BLE001 - whatever it is, it is none of ours
-                traceback.print_exc()
-            file.flush()
-    finally:
-        os._exit(status)
-
-
-def _ended(child: int, begun_s: float) -> int:
-    """Wait for a child, with Ctrl-C after a while, and again if nothing comes of it; return its status."""
-    began, sent = time.monotonic(), 0
-    while True:
-        pid, status = os.waitpid(child, os.WNOHANG)
-        if pid:
-            return os.waitstatus_to_exitcode(status)
-        passed = time.monotonic() - began
-        if passed > begun_s + ENDING_S:
-            os.kill(child, signal.SIGKILL)
-            os.waitpid(child, 0)
-            raise Wrong(f"it did not end within {ENDING_S:g} s of Ctrl-C")
-        if passed > begun_s + sent * ENDING_S / 3:
-            os.kill(child, signal.SIGINT)
-            sent += 1
-        time.sleep(0.002)
-
-
-def _alive(session: int) -> list[int]:
-    """Return the processes of a session that have not ended."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):
-            state, _, _, of = path.read_text().rpartition(")")[2].split()[:4]
-            found += [int(path.parent.name)] if int(of) == session and state != "Z" else []
-    return found
 
 
 def check(status: int, said: str, left: bool) -> None:

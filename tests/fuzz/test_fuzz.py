@@ -7,15 +7,22 @@ put into corpus/TARGET/ [`CORPUS`].
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 from random import Random
 
+import forks
 import fuzz
 import mutations
 import numpy as np
 import pytest
 from targets import Good
 
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.lower import lower
+from wamnet.refimpl import siren
+from wamnet.refimpl.dataset import Normalization, Window
+from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import InputError
 
 CORPUS = sorted(Path(__file__).with_name("corpus").glob("*/*"))
@@ -115,6 +122,36 @@ def test_what_is_a_finding(targets, use, what):
     outcome, told = fuzz.tried(target, b"")
     assert outcome == "FOUND"
     assert what in told
+
+
+def test_a_hang_is_a_finding_and_ends_nothing(monkeypatch):
+    """Nobody has prepared this process: the alarm's own action would end it."""
+    monkeypatch.setattr(fuzz, "HANG_S", 0.05)
+    waits = fuzz.Target("planted", "bytes", [b""], lambda *_: time.sleep(60))
+    assert fuzz.tried(waits, b"") == ("FOUND", "a hang of 0.05 s")
+
+
+def test_lines_run_kernels_whatever_this_process_has_opened(executor_named, tmp_path):
+    """A fork of a process with OpenCL's threads lacks them, and would wait for its first kernel forever."""
+    program = compile_program(lower(tiny()), "opencl")
+    executor_named("opencl").run(program, {"color": np.zeros((2, 2, 3), np.float32)})
+    line = "compare --paths furnace --executor opencl --width 2 --height 2 --spp 2 --max-depth 1"
+    status, said, left = forks.in_child(line.split(), tmp_path, 60.0)
+    assert (status, left) == (0, False), said
+
+
+def test_a_line_that_does_not_end_is_a_finding(tmp_path):
+    """The server tells it, and answers the next line."""
+    with pytest.raises(forks.Wrong, match="did not end within"):
+        forks.in_child(["executors"], tmp_path, -2 * forks.ENDING_S)
+    status, said, _ = forks.in_child(["render", "nowhere"], tmp_path, 60.0)
+    assert status == 2, said
+
+
+def tiny():
+    """A model of one pixel's colour."""
+    network = siren.init((3, 4, 3), 1.0, 1.0, 1, np.float32)
+    return Model(network, ("color",), Window(1, "clamp"), Normalization())
 
 
 def test_what_is_none(targets):

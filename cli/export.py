@@ -160,7 +160,11 @@ def _export(
 
 
 def _tell(made: Export) -> None:
-    """Say which limits an export keeps, and what its bound rests on."""
+    """Say which schedule an export has, which limits it keeps, and what its bound rests on."""
+    from ..compiler.schedules import text
+
+    for picked in filter(None, (kernel.get("schedule") for kernel in made.manifest["kernels"])):
+        say(f"schedule {text(picked)}")
     for limit in made.manifest["limits"]:
         say(f"{limit['name']}: {limit['needs']} of {limit['most']}")
     if made.manifest["assumes"]:

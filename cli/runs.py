@@ -88,6 +88,5 @@ def frame_bound(plan: Plan, frame: Frame) -> float | None:
 
     from ..kernels.denoise_on import images_of
 
-    assert plan.varied is not None, "plan_model makes plans of networks"
-    largest = float(plan.expected(images_of(plan.varied.model, frame)).bound.max())
+    largest = float(plan.expected(images_of(plan.model, frame)).bound.max())
     return largest if np.isfinite(largest) else None

@@ -47,7 +47,7 @@ PIXEL_AT = "image_{image}[(row * width + column) * {channels} + {c}]"
 
 
 class _Buffers(Lifted):
-    """What all have in common."""
+    """What all have in common; it comes before a language's plain dialect."""
 
     pixel_at = PIXEL_AT
     store = STORE
@@ -76,13 +76,12 @@ static __device__ inline void operator+=(wamnet_vector &a, wamnet_vector b)
 """Vectors of four, with the two operations that sums need: CUDA's own have none."""
 
 
-class CUDAGroup(CUDA, _Buffers):
+class CUDAGroup(_Buffers, CUDA):
     """CUDA C."""
 
     kind = "wamnet_vector"
     wait = "__syncthreads();"
     literal_zero = "wamnet_made(0.0f, 0.0f, 0.0f, 0.0f)"
-    pixel_at, store = PIXEL_AT, STORE
     function_head = "static __device__ inline {kind} {name}({operands})"
     operand = "{kind} {name}"
     made = "wamnet_made({values})"
@@ -114,13 +113,12 @@ extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) {entry}
     )
 
 
-class MetalGroup(Metal, _Buffers):
+class MetalGroup(_Buffers, Metal):
     """Metal Shading Language."""
 
     kind = "float4"
     wait = "threadgroup_barrier(mem_flags::mem_threadgroup);"
     literal_zero = "float4(0.0f)"
-    pixel_at, store = PIXEL_AT, STORE
     function_head = "static inline {kind} {name}({operands})"
     operand = "{kind} {name}"
     made = "float4({values})"
@@ -150,13 +148,12 @@ kernel void {entry}(
     arguments = f"{BUFFERS.format(sizes='width, height')}{HELD}.\n{GROUPED}"
 
 
-class WGSLGroup(WGSL, _Buffers):
+class WGSLGroup(_Buffers, WGSL):
     """WGSL."""
 
     kind = "vec4<f32>"
     wait = "workgroupBarrier();"
     literal_zero = "vec4<f32>(0.0f)"
-    pixel_at, store = PIXEL_AT, STORE
     largest_shared = LEAST_SHARED
     strided = "for (var {i}: i32 = {first}; {i} < {end}; {i} += {step}) {{"
     function_head = "fn {name}({operands}) -> {kind}"
@@ -191,13 +188,12 @@ fn main(@builtin(local_invocation_id) item_place: vec3<u32>, @builtin(workgroup_
         return self.let("bool", name, value)
 
 
-class VulkanGroup(VulkanDenoise, _Buffers):
+class VulkanGroup(_Buffers, VulkanDenoise):
     """GLSL for Vulkan, of which SPIR-V and HLSL are made."""
 
     kind = "vec4"
     wait = "barrier();"
     literal_zero = "vec4(0.0f)"
-    pixel_at, store = PIXEL_AT, STORE
     largest_shared = LEAST_SHARED
     function_head = "{kind} {name}({operands})"
     operand = "{kind} {name}"

@@ -38,6 +38,7 @@ from .schedules import ALL, PLAIN, Images, Pick, Schedule, pick
 from .targets import Target, target_named
 
 if TYPE_CHECKING:
+    from ..refimpl.denoise import Model
     from .variants import Varied
 
 BLOCK_NUMBERS = 2**20
@@ -87,6 +88,12 @@ class Plan:
     def scheduled(self, name: str) -> Plan:
         """Return the same plan with another schedule."""
         return replace(self, asked=name)
+
+    @property
+    def model(self) -> Model:
+        """Return the network that the program is: of plans that were made of one [variants.plan_model]."""
+        assert self.varied is not None, "the plan was made of a program, not of a network"
+        return self.varied.model
 
     @cached_property
     def sine(self) -> SineContract:

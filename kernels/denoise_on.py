@@ -13,7 +13,7 @@ from ..compiler.artifact import Artifact
 from ..compiler.compile import compile_plan
 from ..compiler.ir import sha256
 from ..compiler.schedules import PLAIN
-from ..compiler.variants import FULL, parse, plan_model, vary
+from ..compiler.variants import FULL, plan_model
 from ..refimpl.dataset import feature_image
 from ..refimpl.denoise import Model
 from ..refimpl.frame import Frame
@@ -66,11 +66,13 @@ def denoise_on(
     Without a `schedule`, it is the one that suits device, size and so many `pictures` to come [tune.py].
     `variant`: with fewer operations [variants.py].
     """
-    varied = vary(parse(variant), model)
-    images = images_of(varied.model, frame)
     start = time.perf_counter()
     size = (frame.height, frame.width)
     plan, reason = plan_model(model, executor.name, profile, schedule or PLAIN, variant), "as asked"
+    planned = time.perf_counter() - start
+    # A frame that lacks a layer is refused before anything is compiled; encoding is no part of compilation.
+    images = images_of(plan.model, frame)
+    start = time.perf_counter() - planned
     if not schedule:
         found = choose(executor, plan, size, pictures)
         plan, reason = found.plan, found.reason

@@ -173,9 +173,8 @@ def _untimed(
     executor: Executor, artifact: Artifact, pairs: Pairs, full: Sequence[NDArray[np.floating]]
 ) -> Point:
     """Return the point of a variant's kernel, which lacks its time."""
-    plan = artifact.plan
+    plan, model = artifact.plan, artifact.plan.model
     assert plan.varied is not None, "plan_model makes plans of variants"
-    model = plan.varied.model
     pictures = [executor.run(artifact, images_of(model, noisy)) for noisy, _ in pairs]
     targets = [dataset.target_image(clean, model.normalization) for _, clean in pairs]
     found, bound = quality(pictures, full, targets), variants.bound_of(plan)

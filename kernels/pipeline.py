@@ -24,7 +24,7 @@ from ..compiler.encode_kernel import compile_encode
 from ..compiler.lower_encode import layers_of
 from ..compiler.lower_scene import lower_scene
 from ..compiler.path_kernel import PathArtifact, compile_path, most_unrolled
-from ..compiler.variants import FULL, parse, plan_model, vary
+from ..compiler.variants import FULL, plan_model
 from ..refimpl.dataset import check_features
 from ..refimpl.denoise import Model, check_model
 from ..refimpl.errors import InputError
@@ -64,7 +64,7 @@ class Pipeline:
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
         plan = plan_model(model, executor.name, profile, variant=variant)
-        model = vary(parse(variant), model).model
+        model = plan.model
         self._height, self._width = size
         Job(self._width, self._height)  # refuses sizes that mean nothing
         self._executor, self._profile = executor, profile

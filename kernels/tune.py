@@ -151,15 +151,9 @@ def tune(
     for name, times in measure.in_turns(ways, repeats or REPEATS).items():
         rows[name] = Row(name, 1e3 * times.median, rows[name].first_s, rows[name].again_s)
     day = datetime.datetime.now(datetime.timezone.utc).date().isoformat()
-    table = Table(executor.device, shape_text(_network(plan)), size, day, tuple(rows.values()))
+    table = Table(executor.device, shape_text(plan.model), size, day, tuple(rows.values()))
     cache.write_json(_entry(executor, plan, size), asdict(table))
     return table
-
-
-def _network(plan: Plan) -> Model:
-    """Return the network of a plan."""
-    assert plan.varied is not None, "plan_model makes plans of networks"
-    return plan.varied.model
 
 
 class WrongResult(Exception):
@@ -238,7 +232,7 @@ def device_parts(executor: Executor) -> list[Any]:
 
 def _entry(executor: Executor, plan: Plan, size: tuple[int, int]) -> str:
     """Return the name of the cache's entry."""
-    model, rank = _network(plan), plan.cut.rank if plan.cut else 0
+    model, rank = plan.model, plan.cut.rank if plan.cut else 0
     network = [list(model.siren.widths), list(model.features), model.window.size, model.window.border]
     parts = [*device_parts(executor), network, plan.profile.name, rank, size_class(size), schedules_version()]
     return f"tuning-{cache.key(*parts)}"

@@ -39,6 +39,18 @@ def test_a_scene_comes_along_and_the_check_is_told(wamnet, samples, tmp_path):
     assert [kernel["role"] for kernel in manifest["kernels"]] == ["path", "encode", "denoise"]
 
 
+@pytest.mark.parametrize(("asked", "name"), [([], "tile8"), (["--schedule", "plain"], "plain")])
+def test_the_schedule_is_the_fastest_or_the_named_one(wamnet, samples, tmp_path, asked, name):
+    """EXP-12: the output, the manifest and the README say which."""
+    outcome = wamnet("export", samples / "model.safetensors", "--target", "c", *asked, "-o", "x")
+    assert outcome.status == 0, outcome.err
+    assert f"schedule {name}: " in outcome.out
+    manifest = json.loads((tmp_path / "x/manifest.json").read_text())
+    assert manifest["kernels"][-1]["schedule"]["name"] == name
+    assert manifest["schedules"] == ["tile8", "tile16", "tile4", "plain"]
+    assert f"* Schedule: {name}: " in (tmp_path / "x/README.md").read_text()
+
+
 def test_a_wrong_export_ends_with_status_1(wamnet, samples, monkeypatch):
     verdict = check.Verdict("c", "buffer", 1, "cc", "cc", wrong="off by 1, 9 times the bound")
     monkeypatch.setattr(check, "check", lambda made: verdict)
@@ -66,6 +78,11 @@ def test_help_names_every_target():
         (["--target", "c", "--time", "2"], "--time is 2.0: there is no scene; name one with --scene"),
         (["--target", "c", "--max-depth", "2"], "--max-depth is 2: there is no scene"),
         (["--target", "html", "--weights", "inline"], "--weights is inline: a web page has its own"),
+        (["--target", "html", "--schedule", "plain"], "--schedule is plain: a web page has its own"),
+        (
+            ["--target", "wgsl", "--schedule", "tile8"],
+            "--schedule is tile8: target wgsl with weights in place",
+        ),
         (["--target", "c", "-o", "noisy.exr"], "output folder is noisy.exr: it is a file"),
     ],
 )

@@ -12,12 +12,8 @@ import pytest
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.interpret import interpret
-from wamnet.kernels import Pipeline, c_executor
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model
+from wamnet.kernels import c_executor
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.transport import Settings
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror")
 """What a careful project compiles with."""
@@ -301,14 +297,4 @@ def test_picture_too_large_for_indices(executor_named, kit, monkeypatch):
 
 def test_a_pipeline_is_the_composition_of_its_kernels(executor_named, kit):
     """PPL-7: paths, encoding and denoiser of one header each, to the bit."""
-    executor = executor_named("c")
-    features = ("color", "normal")
-    model = Model(kit.network([54, 6, 3], (3.0, 3.0)), features, Window(3, "clamp"), Normalization())
-    with Pipeline(
-        executor, canonical("lone_light"), model, (6, 9), settings=Settings(max_depth=1)
-    ) as pipeline:
-        found = pipeline.run(seed=3)
-        sums = executor.trace(pipeline.path, pipeline.part(3, 1, 0))
-        wanted = executor.run(pipeline.denoise, executor.encode(pipeline.encode, sums, 1))
-    assert np.array_equal(found, wanted)
-    assert found.std() > 0, "a picture of one colour would hide what is mixed up"
+    kit.check_composed(executor_named("c"))

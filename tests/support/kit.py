@@ -14,9 +14,13 @@ from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.ir import Gather, Image, Program, Type, sha256
 from wamnet.compiler.trace import trace
+from wamnet.kernels import Pipeline
 from wamnet.refimpl import dataset, siren
 from wamnet.refimpl.activation import SINE
-from wamnet.refimpl.denoise import denoise_pixel
+from wamnet.refimpl.dataset import Normalization, Window
+from wamnet.refimpl.denoise import Model, denoise_pixel
+from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.transport import Settings
 
 LONG = os.environ.get("HYPOTHESIS_PROFILE") == "long"
 """Whether this run draws other cases each time, and wide networks among them."""
@@ -91,6 +95,19 @@ class Kit:
         found = executor.run(artifact, images).astype(np.float64)
         assert np.isfinite(held.bound).all(), "a bound that is infinite holds for every kernel"
         return float(np.max(np.abs(found - held.value) / held.bound))
+
+    def check_composed(self, executor: Any) -> None:
+        """Insist that a pipeline gives to each kernel what the one before it returned, to the bit."""
+        features = ("color", "normal")
+        model = Model(self.network([54, 6, 3], (3.0, 3.0)), features, Window(3, "clamp"), Normalization())
+        scene, settings = canonical("lone_light"), Settings(max_depth=1)
+        with Pipeline(executor, scene, model, (6, 9), settings=settings) as pipeline:
+            found = pipeline.run(seed=3)
+            sums = executor.trace(pipeline.path, pipeline.part(3, 1, 0))
+            wanted = executor.run(pipeline.denoise, executor.encode(pipeline.encode, sums, 1))
+        assert np.array_equal(found, wanted)
+        assert np.isfinite(found).all()
+        assert found.std() > 0, "a picture of one colour would hide what is mixed up"
 
     def with_source(self, artifact: Artifact, old: str, new: str) -> Artifact:
         """Return the artifact with a piece of its source replaced, under a digest of its own."""

@@ -21,8 +21,7 @@ from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.kernels.executor import Part
 from wamnet.kernels.export import check, runners, tools
 from wamnet.kernels.export.buffer_runner import BufferRunner
-from wamnet.refimpl.dataset import Normalization, Window, encode_sums
-from wamnet.refimpl.denoise import Model
+from wamnet.refimpl.dataset import Normalization, encode_sums
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.scenes import canonical
 from wamnet.refimpl.transport import Settings
@@ -147,16 +146,7 @@ def test_pipelines_are_the_composition_of_the_kernels(runner, kit):
     """PPL-7: what one kernel returns is what the next one is given, to the bit."""
     if not isinstance(runner, BufferRunner):
         pytest.skip("its images are textures: tests/kernels/test_pipeline.py runs pipelines of OpenGL")
-    model = Model(kit.network([54, 6, 3], (3.0, 3.0)), FEATURES, Window(3, "clamp"), Normalization())
-    with kernels.Pipeline(
-        runner, canonical("lone_light"), model, (6, 9), settings=Settings(max_depth=1)
-    ) as pipeline:
-        found = pipeline.run(seed=3)
-        sums = runner.trace(pipeline.path, pipeline.part(3, 1, 0))
-        wanted = runner.run(pipeline.denoise, runner.encode(pipeline.encode, sums, 1))
-    assert np.array_equal(found, wanted)
-    assert np.isfinite(found).all()
-    assert found.std() > 0, "a picture of one colour would hide what is mixed up"
+    kit.check_composed(runner)
 
 
 def test_every_exported_language_has_a_runner():

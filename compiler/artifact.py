@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from . import interface
+from .interface import Interface
 from .ir import Program
 from .writing import making_parents, write_together
 
@@ -59,6 +61,15 @@ class Artifact:
     def entry_point(self) -> str:
         """Return the name of the kernel's function."""
         return self.plan.target.entry
+
+    @property
+    def interface(self) -> Interface:
+        """Return what the kernel is bound to, in its language."""
+        dialect, gather = self.plan.target.dialect, self.program.gather
+        assert dialect is not None, "the interpreter binds nothing"
+        assert gather is not None, "kernels have windows"
+        channels, taken = int(self.manifest["output"]["channels"]), dialect.integers[interface.DENOISE]
+        return interface.denoiser(gather.images, self.weights.size, channels, dialect.home, taken)
 
     @property
     def digest(self) -> str:

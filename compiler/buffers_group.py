@@ -8,24 +8,18 @@ half as wide.
 
 from __future__ import annotations
 
-from . import glsl_buffers, metal, wgsl
 from .cuda import CLAMP, CUDA
-from .emit_group import GroupDialect, Grouped, Lifted
-from .glsl_buffers import BUFFERS, ComputeDenoise, VulkanDenoise
-from .metal import TOP, Metal
+from .dialect import Parts
+from .emit_group import BufferGroup, GroupDialect, Grouped, Lifted
+from .glsl_buffers import BUFFERS, Compute, Declared, Vulkan
+from .interface import DENOISE, WEIGHTS, Array, Interface
+from .metal import Metal
+from .openings import IMAGES, WEIGHTS_RESULT
 from .wgsl import WGSL
 
 LEAST_SHARED = 2**14
 """Bytes that a group may share on every device: WebGPU's maxComputeWorkgroupStorageSize, and Vulkan's
 maxComputeSharedMemorySize."""
-
-PLACE = """\
-    int local_x = {local_x};
-    int local_y = {local_y};
-    int item = local_y * GROUP_WIDTH + local_x;
-    int x = {group_x} * (GROUP_WIDTH * PIXELS) + local_x;
-    int y = {group_y} * GROUP_HEIGHT + local_y;"""
-"""Where an item is in its group, and its first pixel in the picture."""
 
 GROUPED = (
     "Start ceil(width / ({pixels} * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of {group} items;\n"
@@ -46,138 +40,116 @@ PIXEL_AT = "image_{image}[(row * width + column) * {channels} + {c}]"
 """How a number of a pixel is read."""
 
 
-class _Buffers(Lifted):
+SAID = {DENOISE: f"{BUFFERS.format(sizes='width, height')}{HELD}.\n{GROUPED}"}
+"""How those are called whose arrays have numbers."""
+
+
+class _Group(Lifted, BufferGroup):
     """What all have in common; it comes before a language's plain dialect."""
 
     pixel_at = PIXEL_AT
     store = STORE
     first_weight = "first"
+    operand = "{kind} {name}"
 
 
 CUDA_VECTOR = """\
 #ifndef WAMNET_VECTOR
 #define WAMNET_VECTOR
-struct __align__(16) wamnet_vector {{ float x, y, z, w; }};
+struct __align__(16) wamnet_vector { float x, y, z, w; };
 static __device__ inline wamnet_vector wamnet_made(float x, float y, float z, float w)
-{{
-    wamnet_vector made = {{x, y, z, w}};
+{
+    wamnet_vector made = {x, y, z, w};
     return made;
-}}
+}
 static __device__ inline wamnet_vector operator*(wamnet_vector a, float b)
-{{
+{
     return wamnet_made(a.x * b, a.y * b, a.z * b, a.w * b);
-}}
+}
 static __device__ inline void operator+=(wamnet_vector &a, wamnet_vector b)
-{{
+{
     a = wamnet_made(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w);
-}}
+}
 #endif
 """
 """Vectors of four, with the two operations that sums need: CUDA's own have none."""
 
 
-class CUDAGroup(_Buffers, CUDA):
+class CUDAGroup(_Group, CUDA):
     """CUDA C."""
 
+    heading = 'extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) {entry}'
     kind = "wamnet_vector"
     wait = "__syncthreads();"
     literal_zero = "wamnet_made(0.0f, 0.0f, 0.0f, 0.0f)"
     function_head = "static __device__ inline {kind} {name}({operands})"
-    operand = "{kind} {name}"
     made = "wamnet_made({values})"
-    begin = (
-        f"{CLAMP}{CUDA_VECTOR}"
-        + """\
-{defines}
-extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) {entry}(
-{images},
-    const float *__restrict__ weights,
-    float *__restrict__ result,
-    int width,
-    int height)
-{{
-    __shared__ float tile[TILE_NUMBERS];
-    const wamnet_vector *w = (const wamnet_vector *)weights;
-"""
-        + PLACE.format(
-            local_x="(int)threadIdx.x",
-            local_y="(int)threadIdx.y",
-            group_x="(int)blockIdx.x",
-            group_y="(int)blockIdx.y",
-        )
-    )
-    arguments = (
-        "each image: width * height * channels floats, rows from the top, channels interleaved;\n"
-        "weights; result: width * height * {channels} floats in the same order, encoded as `output` says;\n"
-        f"width; height. {GROUPED}"
-    )
+    shared_tile = "__shared__ float tile[TILE_NUMBERS];"
+    weights_as_vectors = "const wamnet_vector *w = (const wamnet_vector *)weights;"
+    local = ("threadIdx.x", "threadIdx.y")
+    group = ("blockIdx.x", "blockIdx.y")
+    said = {DENOISE: f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height. {GROUPED}"}
+
+    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what stands above the function."""
+        return [f"{CLAMP}{CUDA_VECTOR}{parts.top}"]
 
 
-class MetalGroup(_Buffers, Metal):
+class MetalGroup(_Group, Metal):
     """Metal Shading Language."""
 
+    threads = (
+        "uint2 item_place [[thread_position_in_threadgroup]]",
+        "uint2 group_place [[threadgroup_position_in_grid]]",
+    )
     kind = "float4"
     wait = "threadgroup_barrier(mem_flags::mem_threadgroup);"
     literal_zero = "float4(0.0f)"
     function_head = "static inline {kind} {name}({operands})"
-    operand = "{kind} {name}"
     made = "float4({values})"
-    begin = (
-        f"{TOP}\n{{defines}}\n{metal.sized('int width', 'int height')}"
-        + """\
-kernel void {entry}(
-    constant Size &size [[buffer(0)]],
-    device const float *weights [[buffer(1)]],
-    device float *result [[buffer(2)]],
-{images},
-    uint2 item_place [[thread_position_in_threadgroup]],
-    uint2 group_place [[threadgroup_position_in_grid]])
-{{
-    threadgroup float tile[TILE_NUMBERS];
-    device const float4 *w = (device const float4 *)weights;
-    int width = size.width;
-    int height = size.height;
-"""
-        + PLACE.format(
-            local_x="int(item_place.x)",
-            local_y="int(item_place.y)",
-            group_x="int(group_place.x)",
-            group_y="int(group_place.y)",
-        )
-    )
-    arguments = f"{BUFFERS.format(sizes='width, height')}{HELD}.\n{GROUPED}"
+    shared_tile = "threadgroup float tile[TILE_NUMBERS];"
+    weights_as_vectors = "device const float4 *w = (device const float4 *)weights;"
+    local = ("item_place.x", "item_place.y")
+    group = ("group_place.x", "group_place.y")
+    said = SAID
+
+    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what stands above the function."""
+        return super().top(kernel, parts)[:-1]
 
 
-class WGSLGroup(_Buffers, WGSL):
+class _Declared(_Group, Declared):
+    """Languages whose weights are declared as vectors, and `group_tile` above the function."""
+
+    largest_shared = LEAST_SHARED
+    said = SAID
+    group_tile: str
+
+    def element(self, array: Array) -> tuple[str, str]:
+        """Return an array's name in the kernel, and the type of its elements."""
+        return ("w", self.kind) if array.name == WEIGHTS else super().element(array)
+
+    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what stands above the function."""
+        return [*super().top(kernel, parts)[:-1], self.group_tile, ""]
+
+
+class WGSLGroup(_Declared, WGSL):
     """WGSL."""
 
+    group_size = "@compute @workgroup_size(GROUP_WIDTH, GROUP_HEIGHT)"
+    places = (
+        "@builtin(local_invocation_id) item_place: vec3<u32>, @builtin(workgroup_id) group_place: vec3<u32>"
+    )
     kind = "vec4<f32>"
     wait = "workgroupBarrier();"
     literal_zero = "vec4<f32>(0.0f)"
-    largest_shared = LEAST_SHARED
     strided = "for (var {i}: i32 = {first}; {i} < {end}; {i} += {step}) {{"
     function_head = "fn {name}({operands}) -> {kind}"
     operand = "{name}: {kind}"
     made = "vec4<f32>({values})"
-    begin = (
-        f"{{defines}}\n{wgsl.sized()}"
-        f"{wgsl.storage('1', 'read', 'w', 'vec4<f32>')}\n"
-        f"{wgsl.storage('2', 'read_write', 'result')}\n"
-        + """\
-{images}
-var<workgroup> tile: array<f32, TILE_NUMBERS>;
-
-@compute @workgroup_size(GROUP_WIDTH, GROUP_HEIGHT)
-fn main(@builtin(local_invocation_id) item_place: vec3<u32>, @builtin(workgroup_id) group_place: vec3<u32>) {{
-    let width: i32 = size.width;
-    let height: i32 = size.height;
-    let local_x: i32 = i32(item_place.x);
-    let local_y: i32 = i32(item_place.y);
-    let item: i32 = local_y * GROUP_WIDTH + local_x;
-    let x: i32 = i32(group_place.x) * (GROUP_WIDTH * PIXELS) + local_x;
-    let y: i32 = i32(group_place.y) * GROUP_HEIGHT + local_y;"""
-    )
-    arguments = MetalGroup.arguments
+    group_tile = "var<workgroup> tile: array<f32, TILE_NUMBERS>;"
+    local, group = MetalGroup.local, MetalGroup.group
 
     def vector(self, name: str, value: str) -> str:
         """Return the declaration of four numbers that may be added to."""
@@ -188,37 +160,22 @@ fn main(@builtin(local_invocation_id) item_place: vec3<u32>, @builtin(workgroup_
         return self.let("bool", name, value)
 
 
-class VulkanGroup(_Buffers, VulkanDenoise):
+class VulkanGroup(_Declared, Vulkan):
     """GLSL for Vulkan, of which SPIR-V and HLSL are made."""
 
+    group_size = ("GROUP_WIDTH", "GROUP_HEIGHT")
     kind = "vec4"
     wait = "barrier();"
     literal_zero = "vec4(0.0f)"
-    largest_shared = LEAST_SHARED
     function_head = "{kind} {name}({operands})"
-    operand = "{kind} {name}"
     made = "vec4({values})"
-    begin = (
-        "{defines}\nlayout(local_size_x = GROUP_WIDTH, local_size_y = GROUP_HEIGHT) in;\n"
-        + glsl_buffers.sized()
-        + glsl_buffers.storage("1", "readonly", "Weights", "w", "vec4")
-        + "\n"
-        + glsl_buffers.storage("2", "writeonly", "Result", "result")
-        + "\n{images}\nshared float tile[TILE_NUMBERS];\n\nvoid main()\n{{\n"
-        + PLACE.format(
-            local_x="int(gl_LocalInvocationID.x)",
-            local_y="int(gl_LocalInvocationID.y)",
-            group_x="int(gl_WorkGroupID.x)",
-            group_y="int(gl_WorkGroupID.y)",
-        )
-    )
-    arguments = MetalGroup.arguments
+    group_tile = "shared float tile[TILE_NUMBERS];"
+    local = ("gl_LocalInvocationID.x", "gl_LocalInvocationID.y")
+    group = ("gl_WorkGroupID.x", "gl_WorkGroupID.y")
 
 
-class ComputeGroup(ComputeDenoise, VulkanGroup):
+class ComputeGroup(Compute, VulkanGroup):
     """The same for OpenGL 4.3, which lets a group share 32 KiB; halves are as fast to start."""
-
-    arguments = VulkanGroup.arguments
 
 
 def groups(dialect: GroupDialect, width: int = 16) -> tuple[Grouped, Grouped]:

@@ -1,4 +1,4 @@
-"""C99: a header of `static inline` functions, to be pasted; images, weights and result are arrays of floats.
+"""C99: headers of `static inline` functions, to be pasted; images, weights, sums and result are arrays.
 
 Contraction (a product fused with a sum) is off in the text itself: by the standard's pragma, which GCC
 ignores, and by GCC's own. An option of the compiler that allows more than the standard does, such as
@@ -7,23 +7,14 @@ ignores, and by GCC's own. An option of the compiler that allows more than the s
 
 from __future__ import annotations
 
-from .dialect import Dialect
+from collections.abc import Sequence
+
+from .dialect import Dialect, Parts
+from .interface import DENOISE, ENCODE, PATH, SUMS, UNSIGNED, Interface
+from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
 from .profiles import SineContract
 
-HEAD = """\
-#ifndef WAMNET_DENOISE_H
-#define WAMNET_DENOISE_H
-#include <float.h>
-#include <math.h>
-#include <stdbool.h>
-#include <stdint.h>
-{unordered}"""
-"""The first lines."""
-
-UNFUSED = """\
-/* No product may be fused with a sum. Compilers differ in what they obey, so give them -ffp-contract=off too:
-   clang takes the standard's pragma unless it is told -ffp-contract=fast, GCC ignores that and takes its own,
-   others may ignore both. */
+PRAGMAS = """\
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=off")
@@ -32,85 +23,87 @@ UNFUSED = """\
 #endif"""
 """The lines that forbid fusing."""
 
-ARGUMENTS = """\
-{images},
-    const float *restrict weights,
-    float *restrict result,
-    int width,
-    int height"""
-"""The arguments of the functions; the first also has the place of a pixel."""
+UNFUSED = f"""\
+/* No product may be fused with a sum. Compilers differ in what they obey, so give them -ffp-contract=off too:
+   clang takes the standard's pragma unless it is told -ffp-contract=fast, GCC ignores that and takes its own,
+   others may ignore both. */
+{PRAGMAS}"""
+"""The same with an explanation."""
 
-
-def functions(what: str, step: str) -> str:
-    """Return the functions up to the statements of the first; `what` it computes, and how a row steps on."""
-    return f"""\
-/* {what} */
-static inline void {{entry}}(
-{ARGUMENTS},
-    int x,
-    int y);
-
-/* All pixels, one after another. */
-static inline void wamnet_image(
-{ARGUMENTS})
-{{{{
-    for (int y = 0; y < height; ++y) {{{{
-        for (int x = 0; x < width; {step}) {{{{
-            {{entry}}({{names}}, weights, result, width, height, x, y);
-        }}}}
-    }}}}
-}}}}
-
-static inline int wamnet_clamp(int value, int low, int high)
-{{{{
-    return value < low ? low : value > high ? high : value;
-}}}}
-
-static inline void {{entry}}(
-{ARGUMENTS},
-    int x,
-    int y)
-{{{{
-    (void)weights;"""
-
-
-BEGIN = "\n".join(
-    [
-        *(HEAD, UNFUSED, "{defines}"),
-        functions(
-            "One pixel (x, y): its channels are written to `result`, the whole picture's array.", "++x"
-        ),
-    ]
-)
-"""What stands before the statements."""
-
-
-class C(Dialect):
-    """The dialect's table."""
-
-    target = "c"
-    language = "C99"
-    suffix = ".h"
-    entry = "wamnet_pixel"
-    image_declaration = "    const float *restrict image_{image}"
-    image_separator = ",\n"
-    begin = BEGIN
-    end = """\
-}}
+POPPED = """\
+}
 
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC pop_options
 #endif
 #endif"""
+"""The last lines of a header."""
+
+IGNORED = """\
+/* What only planes need that are not asked for is computed all the same; compilers leave it out. */
+#if defined(__GNUC__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-variable"
+#pragma GCC diagnostic ignored "-Wunused-but-set-variable"
+#endif
+"""
+"""Around a path kernel: its programs are the same whatever planes it adds up."""
+
+RESTORED = """\
+}
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif"""
+"""What ends [`IGNORED`]."""
+
+ALL_PIXELS = "/* All pixels, one after another. */"
+"""What the function is for that calls the one of a pixel."""
+
+
+def includes(role: str, *names: str) -> list[str]:
+    """Return the guard of a header, and what it includes."""
+    guard = f"WAMNET_{'TRACE' if role == PATH else role.upper()}_H"
+    return [f"#ifndef {guard}", f"#define {guard}", *(f"#include <{name}.h>" for name in names)]
+
+
+class C(Arguments):
+    """The dialect's table; `pixels` is what one call of the denoiser computes, `step` how a row goes on."""
+
+    target = "c"
+    language = "C99"
+    suffix = ".h"
+    entries = {DENOISE: "wamnet_pixel", PATH: "wamnet_trace_pixel", ENCODE: "wamnet_encode"}
+    ends = {
+        DENOISE: POPPED,
+        PATH: f"{RESTORED}{POPPED[1:]}",
+        ENCODE: f"    }}\n{POPPED}",
+    }
+    pixels = "One pixel (x, y): its channels are written to `result`, the whole picture's array."
+    step = "++x"
+    heading = "static inline void {entry}"
+    reads = "const float *restrict {name}"
+    writes = "float *restrict {name}"
     pixel = "image_{image}[(row * width + column) * {channels} + c]"
     weight = "weights[{index}]"
     store = "result[(y * width + x) * {channels} + {i}] = {value};"
-    arguments = (
-        "each image: width * height * channels floats, rows from the top, channels interleaved;\n"
-        "weights; result: width * height * {channels} floats in the same order, encoded as `output` says;\n"
-        "width; height: fewer than 2^31 numbers an image.\n"
-        "wamnet_image does the whole picture, wamnet_pixel one pixel: call that from your own loops"
-    )
+    said = {
+        DENOISE: (
+            f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height: fewer than 2^31 numbers an image.\n"
+            "wamnet_image does the whole picture, wamnet_pixel one pixel: call that from your own loops"
+        ),
+        PATH: (
+            "sums: float, one plane of rows * width numbers for each of:\n"
+            "{planes};\n"
+            f"part: {NUMBERS}; seed_number.\n"
+            "wamnet_trace does all pixels, wamnet_trace_pixel one: call that from your own loops"
+        ),
+        ENCODE: (
+            "sums: float, one plane of width * height numbers for each of:\n"
+            "{planes};\n"
+            f"{IMAGES};\nwidth; height; sample_count"
+        ),
+    }
     max_output_channels = 2**16
     native_sine = SineContract("sinf() of C99, which promises nothing", None)
     magnitude = "fabsf({0})"
@@ -122,7 +115,7 @@ class C(Dialect):
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif""",
     )
-    types = {**Dialect.types, "int32": "int32_t", "uint32": "uint32_t"}
+    types = scalars = {**Dialect.types, "int32": "int32_t", "uint32": "uint32_t"}
     table = "static const {type} {name}[{count}] = {{{values}}};"
     operations = {
         **Dialect.operations,
@@ -136,3 +129,116 @@ class C(Dialect):
         "maximum": "{1} > {0} ? {1} : {0}",
         "convert": "({type}){0}",
     }
+
+    def integer(self, kernel: Interface, name: str) -> str:
+        """Return the text of an integer that the kernel is given: a path's are in one structure."""
+        return f"part->{name}" if kernel.role == PATH else name
+
+    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what stands above the functions."""
+        if kernel.role == DENOISE:
+            names = ("float", "math", "stdbool", "stdint")
+            return [*includes(DENOISE, *names), self.unordered[parts.bounded], UNFUSED, parts.top]
+        head = [*includes(kernel.role, "float", "math", "stdbool", "stddef", "stdint"), PRAGMAS]
+        if kernel.role == ENCODE:
+            return [*head, "", "/* All pixels. */"]
+        fields = [f"    {self.typed(name)};" for name in kernel.integers]
+        said = "/* What all pixels of a launch share. */"
+        part = [said, "typedef struct {", *fields, "} wamnet_part;", ""]
+        return [*head, IGNORED, self.depth(parts), parts.top, *part]
+
+    def typed(self, name: str) -> str:
+        """Return the declaration of an integer, without what ends it."""
+        return f"{'uint32_t' if name in UNSIGNED else 'int'} {name}"
+
+    def head(self, kernel: Interface) -> list[str]:
+        """Return the lines of the functions: one for a pixel, and one that calls it for all pixels."""
+        if kernel.role == ENCODE:
+            return super().head(kernel)
+        return self._of_paths(kernel) if kernel.role == PATH else self._of_denoiser(kernel)
+
+    def _of_paths(self, kernel: Interface) -> list[str]:
+        """Return the functions of a path kernel up to the statements of a pixel."""
+        name = self.entries[PATH]
+        listed = f"const wamnet_part *part, {self.writes.format(name=SUMS)}"
+        one = f"{self.heading.format(entry=name)}({listed}, int column, int row)"
+        return [
+            "/* One pixel, in column `column` of row first_row + `row`. */",
+            f"{one};",
+            "",
+            ALL_PIXELS,
+            f"{self.heading.format(entry='wamnet_trace')}({listed})",
+            "{",
+            *_loops(
+                "row", "part->rows", "column", "part->width", "++column", f"{name}(part, sums, column, row);"
+            ),
+            "}",
+            "",
+            one,
+            "{",
+        ]
+
+    def _of_denoiser(self, kernel: Interface) -> list[str]:
+        """Return the functions of a denoiser up to the statements of a pixel."""
+        whole, name = super().listed(kernel), self.entries[DENOISE]
+        one = self._signature(name, [*whole, "int x", "int y"])
+        given = ", ".join([*(array.name for array in kernel.arrays), *kernel.integers, "x", "y"])
+        return [
+            f"/* {self.pixels} */",
+            *one[:-1],
+            f"{one[-1]};",
+            "",
+            ALL_PIXELS,
+            *self._signature("wamnet_image", whole),
+            "{",
+            *_loops("y", "height", "x", "width", self.step, f"{name}({given});"),
+            "}",
+            "",
+            "static inline int wamnet_clamp(int value, int low, int high)",
+            "{",
+            "    return value < low ? low : value > high ? high : value;",
+            "}",
+            "",
+            *one,
+            "{",
+        ]
+
+    def _signature(self, name: str, listed: Sequence[str]) -> list[str]:
+        """Return the lines of a function's head."""
+        inside = ",\n".join(f"    {each}" for each in listed)
+        return [f"{self.heading.format(entry=name)}(", f"{inside})"]
+
+    def opening(self, kernel: Interface) -> list[str]:
+        """Return the first statements: the functions have the place of a pixel already."""
+        if kernel.role == PATH:
+            return ["    const int samples = part->samples;", *self.path_start(kernel)]
+        if kernel.role == ENCODE:
+            return self.encode_start(kernel)
+        return ["    (void)weights;"] if kernel.named("weights") else [""]
+
+    def encode_start(self, kernel: Interface) -> list[str]:
+        """Return the loop over all pixels."""
+        return [
+            "    const size_t plane = (size_t)width * (size_t)height;",
+            "    const float samples = (float)sample_count;",
+            "    for (size_t at = 0; at < plane; ++at) {",
+        ]
+
+    def offset(self, name: str, value: str) -> str:
+        """Return the declaration of a place in memory."""
+        return f"size_t {name} = {value};"
+
+    def factor(self, text: str) -> str:
+        """Return a number as a factor of a place in memory."""
+        return f"(size_t){text}"
+
+
+def _loops(row: str, rows: str, column: str, columns: str, step: str, call: str) -> list[str]:
+    """Return the loops over all pixels around a call."""
+    return [
+        f"    for (int {row} = 0; {row} < {rows}; ++{row}) {{",
+        f"        for (int {column} = 0; {column} < {columns}; {step}) {{",
+        f"            {call}",
+        "        }",
+        "    }",
+    ]

@@ -12,8 +12,11 @@
 
 from __future__ import annotations
 
-from .c import HEAD, UNFUSED, C, functions
+from .c import UNFUSED, C, includes
+from .dialect import Parts
 from .emit_tiled import Tiled
+from .interface import DENOISE, Interface
+from .openings import IMAGES, WEIGHTS_RESULT
 from .tiled_dialect import OPERATIONS, TiledDialect
 
 FUSED = """\
@@ -53,84 +56,79 @@ VECTORS = """\
 typedef float wamnet_vector __attribute__((vector_size(4 * LANES), aligned(4), may_alias));
 
 static inline void wamnet_clear(wamnet_vector *to)
-{{
-    *to = (wamnet_vector){{0}};
-}}
+{
+    *to = (wamnet_vector){0};
+}
 
 static inline void wamnet_load(wamnet_vector *to, const float *from)
-{{
+{
     *to = *(const wamnet_vector *)from;
-}}
+}
 
 static inline void wamnet_store(float *to, const wamnet_vector *from)
-{{
+{
     *(wamnet_vector *)to = *from;
-}}
+}
 
 static inline void wamnet_add(wamnet_vector *sum, const wamnet_vector *term)
-{{
+{
     *sum += *term;
-}}
+}
 
 static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *weight, float value)
-{{
+{
     *sum += *weight * value;
-}}
+}
 #else
-typedef struct {{
+typedef struct {
     float lane[LANES];
-}} wamnet_vector;
+} wamnet_vector;
 
 static inline void wamnet_clear(wamnet_vector *to)
-{{
+{
     WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {{
+    for (int i = 0; i < LANES; ++i) {
         to->lane[i] = 0.0f;
-    }}
-}}
+    }
+}
 
 static inline void wamnet_load(wamnet_vector *to, const float *from)
-{{
+{
     WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {{
+    for (int i = 0; i < LANES; ++i) {
         to->lane[i] = from[i];
-    }}
-}}
+    }
+}
 
 static inline void wamnet_store(float *to, const wamnet_vector *from)
-{{
+{
     WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {{
+    for (int i = 0; i < LANES; ++i) {
         to[i] = from->lane[i];
-    }}
-}}
+    }
+}
 
 static inline void wamnet_add(wamnet_vector *restrict sum, const wamnet_vector *restrict term)
-{{
+{
     WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {{
+    for (int i = 0; i < LANES; ++i) {
         sum->lane[i] += term->lane[i];
-    }}
-}}
+    }
+}
 
 static inline void wamnet_add_product(
     wamnet_vector *restrict sum,
     const wamnet_vector *restrict weight,
     float value)
-{{
+{
     WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {{
+    for (int i = 0; i < LANES; ++i) {
         sum->lane[i] += weight->lane[i] * value;
-    }}
-}}
+    }
+}
 #endif
 """
 """The type of vectors and what is done with them, by GCC and clang, and by other compilers."""
-
-WHAT = """\
-Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written to
-   `result`, the whole picture's array."""
-"""What one call computes."""
 
 
 def _from(offset: int) -> str:
@@ -144,17 +142,26 @@ class CTiled(C, TiledDialect):
     kind = "wamnet_vector"
     unroll = "WAMNET_UNROLL"
     contraction = (tuple(FUSED.splitlines()), tuple(UNFUSED.splitlines()))
-    begin = "\n".join([HEAD, "{defines}", STRAIGHT, VECTORS, functions(WHAT, "x += PIXELS")])
-    store = "result[(y * width + x + p) * {channels} + {i}] = {value};"
-    arguments = (
-        "each image: width * height * channels floats, rows from the top, channels interleaved;\n"
-        "weights; result: width * height * {channels} floats in the same order, encoded as `output` says;\n"
-        "width; height: fewer than 2^31 numbers an image.\n"
-        "wamnet_image does the whole picture, wamnet_pixel {pixels} neighbours of a row from (x, y) on:\n"
-        "call that from your own loops, for each x that is a multiple of {pixels}"
+    pixels = (
+        "Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written "
+        "to\n   `result`, the whole picture's array."
     )
+    step = "x += PIXELS"
+    store = "result[(y * width + x + p) * {channels} + {i}] = {value};"
+    said = {
+        DENOISE: (
+            f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height: fewer than 2^31 numbers an image.\n"
+            "wamnet_image does the whole picture, wamnet_pixel {pixels} neighbours of a row from (x, y) on:\n"
+            "call that from your own loops, for each x that is a multiple of {pixels}"
+        )
+    }
     types = {"float32": "float", "bool": "bool"}
     operations = {name: C.operations[name] for name in OPERATIONS}
+
+    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what stands above the functions."""
+        head = includes(DENOISE, "float", "math", "stdbool", "stdint")
+        return [*head, self.unordered[parts.bounded], parts.top, STRAIGHT, VECTORS]
 
     def set_zero(self, total: str) -> str:
         """Return the statement that gives a sum zeros."""

@@ -158,7 +158,8 @@ def _header(plan: Plan, bound: Bound) -> list[str]:
 def _arguments(picked: Pick, channels: int) -> str:
     """Return how a kernel is called."""
     columns, rows = picked.extent
-    return picked.schedule.arguments.format(channels=channels, columns=columns, rows=rows)
+    numbers = picked.schedule.called()
+    return picked.schedule.arguments.format(channels=channels, columns=columns, rows=rows, **numbers)
 
 
 def _weight_lines(program: Program, schedule: Schedule) -> list[str]:

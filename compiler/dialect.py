@@ -1,28 +1,28 @@
-"""What a target's language looks like: templates and a table of operations, no decisions.
+"""What a target's language looks like: words, and a table of operations; no decisions.
 
-emit.py fills the templates in. Names in braces: `image`, `channels` and `binding` of a feature image,
-`entry`, `images`, their `names`, `results`, `starts` and `defines` of the whole kernel (`number` and
-`result` of each result), `unordered` (what stands where the language cannot keep operations in order:
-without an error bound, with one), `index` into the weights, `i` and `value` of an output channel, `0`, `1`,
-`2` the operands of one, `type` the type of its result, `table` the name of its table, `name`, `count` and
-`values` of a table's declaration. The text between is the language's own, its braces doubled. An
-operation's template may differ for a kind of operand: `minimum.int32`. More channels than
-`channels_per_result` go into several results.
-`exact` are the lines that an exact kernel needs at its top, `magnitude` the absolute value of a number,
-`clamp` the name of the function that limits an index. `first` are the lines that the language wants before
-any comment; `indexes_results` says whether a variable may choose a result's channel; `counted` opens a loop
-on a counter from 0 on, `define` names a number, `choice` is one between two numbers; `assumes` says what a
-bound rests on that the language itself does not promise.
+A dialect is all that the emitters know of a language, for every role of a kernel:
+
+1. Statements are made by methods [`Dialect.let`, `Dialect.loop`, ...] and by templates of one line. Names in
+   braces: `image` and `channels` of a feature image, `index` into the weights, `i` and `value` of an output
+   channel and `result` its array, `0`, `1`, `2` the operands of an operation, `type` the type of its result,
+   `table` the name of its table, `name`, `count` and `values` of a table's declaration; of sums, `plane` the
+   number of a plane, `buffer` and `component` its place where a texture holds several. An operation's
+   template may differ for a kind of operand: `minimum.int32`. The text between is the language's own, its
+   braces doubled.
+2. A kernel opens with what it is bound to [`Dialect.begin`]: each binding style declares an interface
+   [interface.py] in its own way [openings.py for buffers, glsl.py for textures], and ends with [`ends`].
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .interface import BUFFER, DENOISE, ENCODE, INTEGERS, PATH, Interface
 from .ir import LEAST, Node
 from .profiles import SineContract
 
@@ -30,25 +30,46 @@ LONG_TABLE, TABLE_ROW = 200, 8
 """Numbers of a constant table from which on it stands in rows, and the numbers of a row."""
 
 
+@dataclass(frozen=True)
+class Parts:
+    """What a kernel's first lines hold besides its interface.
+
+    `top`: definitions and constant tables; `bounded`: an error bound is stated, and the language must keep
+    the order of operations; `max_depth`: scatterings of a path; `scene_vectors`: vectors of four that hold
+    the scene's numbers which are inputs.
+    """
+
+    top: str = ""
+    bounded: bool = False
+    max_depth: int = 0
+    scene_vectors: int = 0
+
+
 class Dialect:
-    """One language; a subclass sets every attribute that has no value here."""
+    """One language; a subclass sets every attribute that has no value here.
+
+    `exact`: lines that an exact kernel needs at its top. `unordered`: what stands where the language cannot
+    keep operations in order, without a bound and with one. `assumes`: what a bound rests on that the language
+    does not promise. `first`: lines before any comment. `home`: where weights are [interface.py].
+    More channels than `channels_per_result` go into several results; `indexes_results`: a variable may choose
+    a result's channel. A path kernel follows `lanes` paths at once; where that is more than one, a value has
+    a component for each, and `single` declares what is the same for all. `helpers`: functions that an
+    operation calls, by operation. `scene_number` reads a number of the scene that is an input; a language
+    without it takes no moving scene. `types` are those of values; `scalars` those of single numbers, where
+    values are vectors.
+    """
 
     target: str
     language: str
     suffix: str
-    entry: str
-    image_declaration: str
-    image_separator: str
-    first_binding: int = 0
-    begin: str
-    end = "}}"
+    entries: Mapping[str, str] = {DENOISE: "wamnet_denoise", PATH: "wamnet_trace", ENCODE: "wamnet_encode"}
+    integers: Mapping[str, tuple[str, ...]] = INTEGERS
+    said: Mapping[str, str]
+    ends: Mapping[str, str] = dict.fromkeys((DENOISE, PATH, ENCODE), "}")
+    home: str = BUFFER
     pixel: str
     weight: str
-    weights_table: bool = False
     store: str
-    result_declaration: str = ""
-    result_start: str = ""
-    arguments: str
     max_output_channels: int
     channels_per_result: int | None = None
     indexes_results: bool = True
@@ -63,8 +84,19 @@ class Dialect:
     magnitude: str = "fabs({0})"
     clamp: str = "clamp"
     types: Mapping[str, str] = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "bool"}
+    scalars: Mapping[str, str] = types
     qualifiers: Mapping[str, str] = {}
     table: str
+    lanes: int = 1
+    lane_numbers: str = "0u"
+    any_lane: str = "{mask}"
+    helpers: Mapping[str, str] = {}
+    scene_number: str = ""
+    planes_per_buffer: int = 1
+    max_planes: int = 2**16
+    sum_store: str = "sums[{plane} * plane + at] = {value};"
+    load: str = "float {name} = sums[{plane} * plane + at];"
+    image_store: str = "image_{image}[at * {channels} + {channel}] = {value};"
     operations: Mapping[str, str] = {
         "add": "{0} + {1}",
         "subtract": "{0} - {1}",
@@ -93,6 +125,57 @@ class Dialect:
         "take": "{table}[{0}]",
         "row": "{table}[{0}]",
     }
+
+    def begin(self, kernel: Interface, parts: Parts) -> str:
+        """Return the text of a kernel up to its first statement."""
+        raise NotImplementedError
+
+    @property
+    def arguments(self) -> str:
+        """Return how a denoiser is called."""
+        return self.said[DENOISE]
+
+    def cast(self, dtype: str, text: str) -> str:
+        """Return the text of a number converted to another kind."""
+        return f"{self.scalars[dtype]}({text})"
+
+    def integer(self, kernel: Interface, name: str) -> str:
+        """Return the text of an integer that the kernel is given."""
+        return name
+
+    def place(self, kernel: Interface) -> tuple[str, str]:
+        """Return the texts of an item's column and row."""
+        return kernel.place
+
+    def shared(self, kernel: Interface) -> Mapping[str, str]:
+        """Return the texts of the numbers that all lanes of a path kernel share, by name."""
+        column, row = self.place(kernel)
+        below = f"{row} + {self.integer(kernel, 'first_row')}"
+        texts = {"column": self.cast("uint32", column), "row": self.cast("uint32", below)}
+        texts["seed"] = self.integer(kernel, "seed_number")
+        for name in ("width", "height"):
+            texts[name] = self.cast("float32", self.integer(kernel, name))
+        texts["sample"] = f"{self.integer(kernel, 'first_sample')} + {self.cast('uint32', 'n')}"
+        floats = ("width", "height")
+        return {n: self.splat(text, "float32" if n in floats else "uint32") for n, text in texts.items()}
+
+    def splat(self, value: str, dtype: str) -> str:
+        """Return the text of a number that is the same in all lanes."""
+        return value
+
+    def depth(self, parts: Parts) -> str:
+        """Return the definition of the number of scatterings."""
+        return f"#define MAX_DEPTH {parts.max_depth}u /* scatterings of a path */"
+
+    def bounces(self) -> str:
+        """Return the line that opens the loop over a path's bounces."""
+        return f"for ({self.scalars['uint32']} bounce = 0u; bounce <= MAX_DEPTH; ++bounce) {{"
+
+    def path_start(self, kernel: Interface) -> list[str]:
+        """Return the first statements of a path kernel: pixel and seed, in all lanes."""
+        shared = self.shared(kernel)
+        texts = {"x": f"{shared['column']} + {self.lane_numbers}", "y": shared["row"], "seed": shared["seed"]}
+        return [f"    {self.let('uint32', name, text)}" for name, text in texts.items()]
 
     def results(self, channels: int) -> list[str]:
         """Return what is written into, in order; a language with one result for all channels has one."""

@@ -16,7 +16,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from ..refimpl.errors import CompileError
-from .dialect import Dialect
+from . import interface
+from .dialect import Dialect, Parts
+from .interface import Interface
 from .ir import Gather, Image, Node, Program, users
 from .lines import Lines
 from .ops import LOOPS, OPS
@@ -68,34 +70,29 @@ def emit(
     gather = kernel_gather(program)
     _check_channels(program, dialect)
     body = body or Body(program, dialect, gather)
-    images = [
-        dialect.image_declaration.format(image=i.name, channels=i.channels, binding=binding)
-        for binding, i in enumerate(gather.images, dialect.first_binding)
-    ]
     defines = [*(dialect.exact if program.exact else ()), *_window_defines(gather, dialect), *body.defines()]
     declared = [dialect.table_declaration(name, array) for name, array in tables(program).items()]
     packed = pack(program)
-    if dialect.weights_table:
-        declared.append(dialect.table_declaration("weights", packed))
-    begin = dialect.begin.format(
-        defines="\n".join([*defines, *declared]),
-        entry=dialect.entry,
-        images=dialect.image_separator.join(images),
-        image=gather.images[0].name,
-        names=", ".join(f"image_{i.name}" for i in gather.images),
-        results=_each_result(dialect.result_declaration, program, dialect),
-        starts=_each_result(dialect.result_start, program, dialect),
-        unordered=dialect.unordered[bounded or program.exact],
-        quads=-(-packed.size // 4),
+    if dialect.home == interface.TABLE:
+        declared.append(dialect.table_declaration(interface.WEIGHTS, packed))
+    kernel = interface.denoiser(
+        gather.images,
+        packed.size,
+        output_channels(program),
+        dialect.home,
+        dialect.integers[interface.DENOISE],
     )
+    parts = Parts(top="\n".join([*defines, *declared]), bounded=bounded or program.exact)
+    return framed(dialect, kernel, parts, header, body.text())
+
+
+def framed(
+    dialect: Dialect, kernel: Interface, parts: Parts, header: Sequence[str], lines: Sequence[str]
+) -> str:
+    """Return a kernel's source: a comment, what the kernel is bound to, its statements, its end."""
     comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
-    return "\n".join([*dialect.first, *comment, begin, *body.text(), dialect.end.format()]) + "\n"
-
-
-def _each_result(template: str, program: Program, dialect: Dialect) -> str:
-    """Return a line for each result that a kernel writes."""
-    names = dialect.results(output_channels(program))
-    return "\n".join(template.format(number=number, result=name) for number, name in enumerate(names))
+    begin, end = dialect.begin(kernel, parts), dialect.ends[kernel.role]
+    return "\n".join([*dialect.first, *comment, begin, *lines, end]) + "\n"
 
 
 def private_bytes(program: Program) -> int:

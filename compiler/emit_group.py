@@ -29,7 +29,9 @@ from .dialect import Dialect
 from .emit import kernel_gather
 from .emit_inlined import InlinedBody
 from .emit_tiled import Tiled, refused_by_vectors
+from .interface import Interface
 from .ir import Gather, Image, Node, Program
+from .openings import Buffers
 from .schedules import PLAIN
 
 MOST_CHANNELS = 4
@@ -59,8 +61,9 @@ class GroupDialect(Dialect):
 
     `stored`: statements before and after those that store a pixel's numbers. `strided` opens a loop over a
     group's share of the tile, `largest_shared` is what a group may share, `first_weight` the name of the
-    place of a tap's first weight. A language whose functions work on
-    numbers only has its functions of vectors made of those [`Lifted`].
+    place of a tap's first weight; `local` and `group` are the texts of an item's place in its group, and of
+    its group's. A language whose functions work on numbers only has its functions of vectors made of those
+    [`Lifted`].
     """
 
     kind: str
@@ -71,6 +74,21 @@ class GroupDialect(Dialect):
     strided: str = "for (int {i} = {first}; {i} < {end}; {i} += {step}) {{"
     largest_shared: int = LARGEST_SHARED
     first_weight: str = "from"
+    local: tuple[str, str]
+    group: tuple[str, str]
+
+    def item_place(self) -> list[str]:
+        """Return the statements that declare where an item is in its group, and its first pixel."""
+        inside = [self.cast("int32", text) for text in self.local]
+        column, row = (self.cast("int32", text) for text in self.group)
+        places = {
+            "local_x": inside[0],
+            "local_y": inside[1],
+            "item": "local_y * GROUP_WIDTH + local_x",
+            "x": f"{column} * (GROUP_WIDTH * PIXELS) + local_x",
+            "y": f"{row} * GROUP_HEIGHT + local_y",
+        }
+        return [f"    {self.index(name, text)}" for name, text in places.items()]
 
     def vector(self, name: str, value: str) -> str:
         """Return the declaration of four numbers that may be added to."""
@@ -84,6 +102,22 @@ class GroupDialect(Dialect):
         """Return a function on vectors: `read` are the names of its operands, `result` that of its value."""
         operands = ", ".join(f"{self.kind} {each}" for each in read)
         return [f"{self.kind} {name}({operands})", "{", *_indented(body), f"    return {result};", "}"]
+
+
+class BufferGroup(GroupDialect, Buffers):
+    """A language whose arrays are buffers; it comes before the language's plain dialect.
+
+    `shared_tile`, `weights_as_vectors`: declarations at the top of the function, where they are there.
+    """
+
+    shared_tile: str = ""
+    weights_as_vectors: str = ""
+
+    def opening(self, kernel: Interface) -> list[str]:
+        """Return the first statements: what the group shares, and the item's place."""
+        shared = [f"    {line}" for line in (self.shared_tile, self.weights_as_vectors) if line]
+        variables = [*self.variables(kernel, self.early), *self.variables(kernel, self.late)]
+        return [*shared, *variables, *self.item_place()]
 
 
 class Lifted(GroupDialect):
@@ -140,7 +174,10 @@ class Grouped(Tiled):
     ) -> None:
         super().__init__(name, idea, dialect, lanes=4, pixels=pixels, vectors=LARGEST_NUMBERS)
         self.words, self.group, self.instead = dialect, group, instead
-        self.arguments = self.arguments.replace("{group}", f"{group[0]} x {group[1]}")
+
+    def called(self) -> Mapping[str, str]:
+        """Return the numbers that the text about its arguments has."""
+        return {**super().called(), "group": f"{self.group[0]} x {self.group[1]}"}
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""

@@ -27,11 +27,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..refimpl.errors import CompileError
+from . import interface
+from .dialect import Dialect, Parts
+from .emit import framed
 from .ir import Node, Program, Type, attributes
 from .lines import Lines
 from .loops import Loop, loops
 from .lower_scene import LAYERS, PATH, SURFACE, PathPrograms, Values, kinds, names
-from .path_dialect import PathDialect
 from .weights import tables
 
 FIRST = {layer: names({layer: value}) for layer, value in LAYERS.items()}
@@ -72,9 +74,7 @@ def planes(groups: Sequence[str]) -> list[str]:
     return [plane for group in groups for plane in GROUPS[group]]
 
 
-def emit_path(
-    programs: PathPrograms, dialect: PathDialect, groups: Sequence[str], header: Sequence[str]
-) -> str:
+def emit_path(programs: PathPrograms, dialect: Dialect, groups: Sequence[str], header: Sequence[str]) -> str:
     """Return the kernel's source; `header` are the lines of the comment at its top."""
     return _Kernel(programs, dialect, groups).text(header)
 
@@ -95,7 +95,7 @@ class _Kernel(Lines):
     """The text of one kernel as it is written."""
 
     programs: PathPrograms
-    dialect: PathDialect
+    dialect: Dialect
     groups: Sequence[str]
     lines: list[str] = field(default_factory=list)
     depth: int = 1
@@ -104,6 +104,8 @@ class _Kernel(Lines):
         """Return the whole source."""
         self.tables = renamed_tables(self.programs)
         self.planes = planes(self.groups)
+        self.kernel = interface.paths(len(self.planes), self.dialect.integers[interface.PATH])
+        self.shared = self.dialect.shared(self.kernel)
         if len(self.planes) > self.dialect.max_planes:
             raise CompileError(
                 f"the kernel adds up {len(self.planes)} planes: {self.dialect.language} writes at most "
@@ -114,59 +116,35 @@ class _Kernel(Lines):
                 f"{self.dialect.language}: its path kernels take no numbers of the scene; only those of web "
                 "pages do: compile the scene at one time"
             )
-        comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
         self._sums()
         self._samples()
         self._stores()
-        end = self.dialect.path_end.format()
-        return "\n".join([*self.dialect.first, *comment, self._begin(), *self.lines, end]) + "\n"
+        return framed(self.dialect, self.kernel, self._parts(), header, self.lines)
 
     # ---- the skeleton ------------------------------------------------------------------------------------
 
-    def _begin(self) -> str:
-        """Return the text up to the kernel's first statement."""
+    def _parts(self) -> Parts:
+        """Return what stands above the kernel's function."""
         declared: dict[str, NDArray[np.generic]] = {}
         for (part, name), table in self.tables.items():
             declared[table] = self.programs.parts()[part].parameters[name]
-        uniforms = {
-            name: self._splat(value, "float32" if name in ("width", "height") else "uint32")
-            for name, value in self.dialect.uniforms.items()
-        }
-        return self.dialect.path_begin.format(
-            entry=self.dialect.entry,
-            lanes=self.dialect.lanes,
-            lane_numbers=self.dialect.lane_numbers,
-            tables="\n".join(
-                [
-                    *(self.dialect.table_declaration(name, array) for name, array in declared.items()),
-                    *(text for op, text in self.dialect.helpers.items() if op in self._operations()),
-                ]
-            ),
-            outputs="\n".join(
-                self.dialect.output_declaration.format(output=output)
-                for output in range(-(-len(self.planes) // self.dialect.planes_per_output))
-            ),
+        constants = [self.dialect.table_declaration(name, array) for name, array in declared.items()]
+        helpers = [text for op, text in self.dialect.helpers.items() if op in self._operations()]
+        return Parts(
+            top="\n".join([*constants, *helpers]),
             max_depth=self.programs.settings.max_depth,
-            unordered=self.dialect.unordered[False],
-            scene=self._scene_declaration(),
-            counter=self.dialect.types["uint32"],
-            **uniforms,
+            scene_vectors=-(-len(self.programs.inputs) // 4),
         )
 
     def _operations(self) -> set[str]:
         """Return the names of all operations of the programs."""
         return {node.op for program in self.programs.parts().values() for node in program.nodes}
 
-    def _splat(self, value: str, dtype: str) -> str:
-        """Return the text of a number that is the same in all lanes."""
-        return self.dialect.splat.format(type=self.dialect.types[dtype], value=value)
-
     def _sums(self) -> None:
         """Declare the image's size in lanes, and the sums."""
         zero = self.dialect.number(0.0, "float32")
         for name in ("width", "height"):
-            size = self._splat(self.dialect.uniforms[name], "float32")
-            self._line(self.dialect.let("float32", f"image_{name}", size))
+            self._line(self.dialect.let("float32", f"image_{name}", self.shared[name]))
         for plane in self.planes:
             self._line(self.dialect.var("float32", f"sum_{plane}", zero))
 
@@ -174,14 +152,13 @@ class _Kernel(Lines):
         """Write the loop over the samples."""
         dialect = self.dialect
         self._open(dialect.loop("n", "samples"))
-        sample = self._splat(dialect.uniforms["sample"], "uint32")
-        self._line(dialect.let("uint32", "sample_number", sample))
+        self._line(dialect.let("uint32", "sample_number", self.shared["sample"]))
         self._line(dialect.var("uint32", "pixel"))
         self._declare({**PATH, **SURFACE})
         self._line(dialect.var("bool", "alive", dialect.number(True, "bool")))
         self.block("start", "the path at the camera", {"width": "image_width", "height": "image_height"})
-        self._open(dialect.bounces)
-        self._line(dialect.let("uint32", "depth", self._splat("bounce", "uint32")))
+        self._open(dialect.bounces())
+        self._line(dialect.let("uint32", "depth", dialect.splat("bounce", "uint32")))
         self.block("arrive", "the next surface", masked=("radiance_r", "radiance_g", "radiance_b"))
         if set(self.groups) & set(FIRST):
             self._open("if (bounce == 0u) {")
@@ -210,7 +187,7 @@ class _Kernel(Lines):
         if "deviation" in self.groups:
             # Single numbers, also where paths are vectors.
             share = self.dialect.select("n > 0", "1.0f / (count * (count + 1.0f))", "0.0f")
-            self._line(self.dialect.single("count", self.dialect.scalar_float.format("n")))
+            self._line(self.dialect.single("count", self.dialect.cast("float32", "n")))
             self._line(self.dialect.single("weight", share))
             for c in "rgb":
                 difference = f"radiance_{c} * count - sum_color_{c}"
@@ -238,14 +215,9 @@ class _Kernel(Lines):
         """Write the sums out."""
         self.lines.append("")
         for number, plane in enumerate(self.planes):
-            output, component = divmod(number, self.dialect.planes_per_output)
+            buffer, component = divmod(number, self.dialect.planes_per_buffer)
             store = self.dialect.sum_store
-            self._line(store.format(plane=number, output=output, component=component, value=f"sum_{plane}"))
-
-    def _scene_declaration(self) -> str:
-        """Return the declaration of the scene's numbers that are inputs, if there are any."""
-        vectors = -(-len(self.programs.inputs) // 4)
-        return self.dialect.scene_numbers.format(vectors=vectors) if vectors else ""
+            self._line(store.format(plane=number, buffer=buffer, component=component, value=f"sum_{plane}"))
 
     def _scene_numbers(self) -> dict[str, str]:
         """Return the text of each of the scene's numbers that are inputs."""

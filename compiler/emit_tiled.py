@@ -93,7 +93,11 @@ class Tiled(Schedule):
     def __init__(self, name: str, idea: str, dialect: Dialect, lanes: int, pixels: int, vectors: int) -> None:
         self.name, self.idea, self.dialect = name, idea, dialect
         self.lanes, self.pixels, self.vectors = lanes, pixels, vectors
-        self.arguments = dialect.arguments.replace("{pixels}", str(pixels)).replace("{bytes}", str(4 * lanes))
+        self.arguments = dialect.arguments
+
+    def called(self) -> Mapping[str, str]:
+        """Return the numbers that the text about its arguments has."""
+        return {"pixels": str(self.pixels), "bytes": str(4 * self.lanes)}
 
     def blocks(self, numbers: int) -> Blocks:
         """Return how so many numbers fill vectors."""

@@ -21,36 +21,19 @@ from numpy.typing import NDArray
 from ..refimpl.dataset import FEATURES, Normalization
 from ..refimpl.errors import CompileError
 from ..refimpl.reading import SIZES
-from . import bounds, ir, profiles
+from . import bounds, interface, ir, profiles
 from .artifact import OneSource
-from .c_path import CEncode
-from .cuda import CUDAEncode
-from .encode_dialect import EncodeDialect, GLSLEncode, OpenCLEncode
-from .glsl_buffers import FIRST_IMAGE, ComputeEncode, VulkanEncode
-from .glsl_es import GLSLESEncode
+from .dialect import Dialect, Parts
+from .emit import framed
+from .interface import Interface
 from .ir import Image, Program
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
-from .metal import MetalEncode
 from .passes import pipeline
 from .plan import sine_contract
-from .targets import target_named
-from .wgsl import WGSLEncode
+from .targets import integers_of, target_named
 
 SCHEMA = "wamnet-encode-kernel-1"
 """Name and version of the manifest's form; described in spec/pipeline.md."""
-
-ENCODE_DIALECTS: Mapping[str, EncodeDialect] = {
-    "opencl": OpenCLEncode(),
-    "opengl": GLSLEncode(),
-    "glsl-es": GLSLESEncode(),
-    "glsl-compute": ComputeEncode(),
-    "glsl-vulkan": VulkanEncode(),
-    "wgsl": WGSLEncode(),
-    "cuda": CUDAEncode(),
-    "metal": MetalEncode(),
-    "c": CEncode(),
-}
-"""By target; the interpreter needs the program alone."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +49,12 @@ class EncodeArtifact(OneSource):
     planes: tuple[str, ...]
     images: tuple[Image, ...]
     manifest: Mapping[str, Any]
+
+    @property
+    def interface(self) -> Interface:
+        """Return what the kernel is bound to, in its language."""
+        taken = integers_of(self.target, interface.ENCODE)
+        return interface.encoding(len(self.planes), self.images, taken)
 
 
 def compile_encode(
@@ -90,8 +79,10 @@ def compile_encode(
         )
     known = [FEATURES[name] for name in features]
     images = tuple(Image(f.name, f.channels, f.low, f.high, f.encoding(normalization)) for f in known)
-    dialect = ENCODE_DIALECTS.get(target)
-    arguments = dialect.encode_arguments if dialect else chosen.schedules[0].arguments
+    if not chosen.encodes:
+        raise CompileError(f"target {target} has no kernels that encode features; export with passes instead")
+    dialect = chosen.dialect
+    arguments = dialect.said[interface.ENCODE] if dialect else chosen.schedules[0].arguments
     arguments = arguments.format(planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
     header = _header(program, images, dialect.language if dialect else chosen.language, arguments)
     if dialect is None:
@@ -99,7 +90,8 @@ def compile_encode(
         entry = chosen.entry
     else:
         bounded = promised.sine is not None
-        text, entry = _emit(program, dialect, planes, images, header, bounded), dialect.entry
+        text = _emit(program, dialect, planes, images, header, bounded)
+        entry = dialect.entries[interface.ENCODE]
     name = f"encode{chosen.suffix}"
     manifest = {
         "schema": SCHEMA,
@@ -154,7 +146,7 @@ def _header(program: Program, images: Sequence[Image], language: str, arguments:
 
 def _emit(
     program: Program,
-    dialect: EncodeDialect,
+    dialect: Dialect,
     planes: Sequence[str],
     images: Sequence[Image],
     header: Sequence[str],
@@ -164,31 +156,17 @@ def _emit(
 
     `bounded`: the language must keep the order of operations, on which bounds rest.
     """
-    lines = _body(program, dialect, planes, images)
-    declared = [
-        dialect.output_declaration.format(image=image.name, location=location, binding=location + FIRST_IMAGE)
-        for location, image in enumerate(images)
-    ]
-    inputs = range(-(-len(planes) // dialect.planes_per_input))
-    begin = dialect.encode_begin.format(
-        entry=dialect.entry,
-        inputs="\n".join(dialect.input_declaration.format(buffer=buffer) for buffer in inputs),
-        outputs=dialect.output_separator.join(declared),
-        unordered=dialect.unordered[bounded],
-    )
-    comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
-    body = [f"    {line}" for line in lines]
-    return "\n".join([*dialect.first, *comment, begin, *body, dialect.encode_end.format()]) + "\n"
+    kernel = interface.encoding(len(planes), images, dialect.integers[interface.ENCODE])
+    body = [f"    {line}" for line in _body(program, dialect, planes, images)]
+    return framed(dialect, kernel, Parts(bounded=bounded), header, body)
 
 
-def _body(
-    program: Program, dialect: EncodeDialect, planes: Sequence[str], images: Sequence[Image]
-) -> list[str]:
+def _body(program: Program, dialect: Dialect, planes: Sequence[str], images: Sequence[Image]) -> list[str]:
     """Return the statements: loads of planes, operations, stores of channels."""
     lines = []
     for name in planes_of([image.name for image in images]):
         number = planes.index(name)
-        buffer, component = divmod(number, dialect.planes_per_input)
+        buffer, component = divmod(number, dialect.planes_per_buffer)
         lines.append(dialect.load.format(plane=number, name=name, buffer=buffer, component=component))
     texts = _statements(program, dialect, lines)
     outputs = dict(program.outputs)
@@ -202,7 +180,7 @@ def _body(
 
 
 def encode_source(
-    features: Sequence[str], normalization: Normalization, dialect: EncodeDialect, profile: str = "ieee"
+    features: Sequence[str], normalization: Normalization, dialect: Dialect, profile: str = "ieee"
 ) -> str:
     """Return the statements alone, for a kernel that has the sums of these features in variables."""
     program = pipeline.run(lower_encode(features, normalization), profiles.profile_named(profile).passes)
@@ -211,7 +189,7 @@ def encode_source(
     return "\n".join(f"    {line}" for line in _body(program, dialect, planes_of(features), images))
 
 
-def _statements(program: Program, dialect: EncodeDialect, lines: list[str]) -> list[str]:
+def _statements(program: Program, dialect: Dialect, lines: list[str]) -> list[str]:
     """Write one statement for each operation; return the text of each value."""
     texts: list[str] = []
     for index, node in enumerate(program.nodes):

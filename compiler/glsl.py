@@ -1,18 +1,19 @@
-"""GLSL 3.30 fragment shader: one fragment a pixel; images and weights are textures.
+"""GLSL 3.30 fragment shaders: one fragment a pixel; images, weights and sums are textures.
 
 `precise` (GL_ARB_gpu_shader5) keeps the compiler from rewriting (x - k P1) - k P2 as x - k (P1 + P2), which
 plain GLSL allows and which would undo the sine's range reduction. A kernel with an error bound does not
-compile without it.
+compile without it. What is written are colour buffers of one framebuffer: the result's channels, sums four
+planes a buffer, or one buffer for each image of an encoding.
 """
 
 from __future__ import annotations
 
-from .dialect import Dialect
+from .dialect import Dialect, Parts
+from .interface import BLOCK, DENOISE, ENCODE, PATH, RESULT, UNSIGNED, WEIGHTS, WRITE, Interface
 from .profiles import SineContract
 
 WEIGHT_TEXTURE_WIDTH = 1024
 """Texels in a row of the weight texture: every implementation takes 1024 rows of 1024, a million weights."""
-
 
 MOST_RESULTS = 8
 """Colour buffers that every implementation of OpenGL 3.3 draws into at once (MAX_DRAW_BUFFERS)."""
@@ -31,51 +32,79 @@ PREAMBLE = f"""\
 """First lines of a shader: `PRECISE` stands before temporaries, where the compiler knows it."""
 
 
+WEIGHT_TEXTURE = "uniform sampler2D weight_texture;"
+"""The declaration of the weights."""
+
+
+def fetch(kind: str, index: str, place: str, part: str) -> list[str]:
+    """Return the function that reads the weights' texture: a texel, or a part of it."""
+    width = WEIGHT_TEXTURE_WIDTH
+    return [
+        f"{kind} weights(int {index})",
+        "{",
+        f"    ivec2 {place} = ivec2({index} % {width}, {index} / {width});",
+        f"    return texelFetch(weight_texture, {place}, 0){part};",
+        "}",
+    ]
+
+
+def said_of_denoiser(texture: str = "") -> str:
+    """Return how a denoiser is called; `texture`: the format of the weights' texture, if there is one."""
+    width = WEIGHT_TEXTURE_WIDTH
+    weights = (
+        f"weight_texture: {texture}, {width} texels wide, as many rows as weights fill (the last\n"
+        "padded), row by row; it is read with texelFetch alone, so filters do not matter;\n"
+    )
+    return (
+        "each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel\n"
+        "row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the\n"
+        "bottom, or the window stands on its head;\n"
+        f"{weights if texture else ''}"
+        "result: a float colour buffer of width x height, row 0 again the top row; no sRGB conversion by\n"
+        "the target, the values are encoded already. Draw one triangle that covers it"
+    )
+
+
 class GLSL(Dialect):
-    """The dialect's table."""
+    """The dialect's table; `preamble` are the first lines, in which `{unordered}` has its place."""
 
     target = "opengl"
     language = "GLSL 3.30, fragment shader"
     suffix = ".frag"
-    entry = "main"
-    image_declaration = "uniform sampler2D image_{image};"
-    image_separator = "\n"
-    begin = f"""\
-{PREAMBLE}
-{{defines}}
-{{images}}
-uniform sampler2D weight_texture;
-{{results}}
-
-float weights(int index)
-{{{{
-    ivec2 texel = ivec2(index % {WEIGHT_TEXTURE_WIDTH}, index / {WEIGHT_TEXTURE_WIDTH});
-    return texelFetch(weight_texture, texel, 0).r;
-}}}}
-
-void main()
-{{{{
-    int width = textureSize(image_{{image}}, 0).x;
-    int height = textureSize(image_{{image}}, 0).y;
-    int x = int(gl_FragCoord.x);
-    int y = int(gl_FragCoord.y);
-{{starts}}"""
+    entries = dict.fromkeys((DENOISE, PATH, ENCODE), "main")
+    integers = {
+        DENOISE: (),
+        PATH: ("width", "height", "first_row", "first_sample", "samples", "seed_number"),
+        ENCODE: ("sample_count",),
+    }
+    preamble = PREAMBLE
     pixel = "texelFetch(image_{image}, ivec2(column, row), 0)[c]"
     weight = "weights({index})"
     store = "{result}[{i}] = {value};"
-    result_declaration = "layout(location = {number}) out vec4 {result};"
-    result_start = "    {result} = vec4(0.0, 0.0, 0.0, 1.0);"
-    arguments = (
-        "each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel\n"
-        "row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the\n"
-        "bottom, or the window stands on its head;\n"
-        f"weight_texture: R32F, {WEIGHT_TEXTURE_WIDTH} texels wide, as many rows as weights fill (the last\n"
-        "padded), row by row; it is read with texelFetch alone, so filters do not matter;\n"
-        "result: a float colour buffer of width x height, row 0 again the top row; no sRGB conversion by\n"
-        "the target, the values are encoded already. Draw one triangle that covers it"
-    )
+    said = {
+        DENOISE: said_of_denoiser("R32F"),
+        PATH: (
+            "uniforms width, height of the image; first_row; first_sample; samples to add up; seed_number.\n"
+            "sums_0, sums_1, ...: RGBA float colour buffers as wide as the image; number 4 k + c is "
+            "component c\nof sums_k:\n"
+            "{planes}.\n"
+            "Draw one triangle that covers them: fragment (x, y) follows pixel x of row first_row + y"
+        ),
+        ENCODE: (
+            "sums_0, sums_1, ...: RGBA textures of 32-bit floats; component c of sums_k is number 4 k + c "
+            "of\n{planes};\n"
+            "sample_count;\n"
+            "each image: a float colour buffer of the same size (RGBA; channels that a feature lacks mean\n"
+            "nothing). Draw one triangle that covers them: row 0 stays row 0"
+        ),
+    }
     max_output_channels = 4 * MOST_RESULTS
     channels_per_result = 4
+    planes_per_buffer = 4
+    max_planes = 4 * MOST_RESULTS
+    sum_store = "sums_{buffer}[{component}] = {value};"
+    load = "PRECISE float {name} = texelFetch(sums_{buffer}, at, 0)[{component}];"
+    image_store = "image_{image}[{channel}] = {value};"
     magnitude = "abs({0})"
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
     qualifiers = {"float32": "PRECISE "}
@@ -91,3 +120,92 @@ void main()
         "maximum": "max({0}, {1})",
         "convert": "{type}({0})",
     }
+
+    def begin(self, kernel: Interface, parts: Parts) -> str:
+        """Return the text of a shader up to its first statement."""
+        of_role = {DENOISE: self.denoise_begin, PATH: self.path_begin, ENCODE: self.encode_begin}[kernel.role]
+        return "\n".join(
+            [self.preamble.format(unordered=self.unordered[parts.bounded]), *of_role(kernel, parts)]
+        )
+
+    def denoise_begin(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what follows the first lines of a denoiser."""
+        array = kernel.named(WEIGHTS)
+        weights, function = WEIGHT_TEXTURE, [*fetch("float", "index", "texel", ".r"), ""]
+        if array is not None and array.home == BLOCK:
+            weights, function = f"layout(std140) uniform Weights {{ vec4 weights[{array.quads}]; }};", []
+        first = kernel.images[0].name
+        return [
+            parts.top,
+            *self.images(kernel),
+            weights,
+            *self.declared_results(kernel),
+            "",
+            *function,
+            "void main()",
+            "{",
+            f"    int width = textureSize({first}, 0).x;",
+            f"    int height = textureSize({first}, 0).y;",
+            *self.started(kernel),
+        ]
+
+    def images(self, kernel: Interface) -> list[str]:
+        """Return the declarations of the images that are read."""
+        return [f"uniform sampler2D {image.name};" for image in kernel.images]
+
+    def declared_results(self, kernel: Interface) -> list[str]:
+        """Return the declarations of what a denoiser writes."""
+        names = enumerate(self._results(kernel))
+        return [f"layout(location = {number}) out vec4 {name};" for number, name in names]
+
+    def started(self, kernel: Interface) -> list[str]:
+        """Return the pixel's place, and the values that a result starts with."""
+        starts = [f"    {name} = vec4(0.0, 0.0, 0.0, 1.0);" for name in self._results(kernel)]
+        return ["    int x = int(gl_FragCoord.x);", "    int y = int(gl_FragCoord.y);", *starts]
+
+    def _results(self, kernel: Interface) -> list[str]:
+        """Return the names of a denoiser's results."""
+        result = kernel.named(RESULT)
+        assert result is not None, "denoisers have a result"
+        return self.results(int(result.shape[-1]))
+
+    def path_begin(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what follows the first lines of a path kernel."""
+        planes = int(kernel.arrays[0].shape[0])
+        outputs = range(-(-planes // self.planes_per_buffer))
+        scene = [f"uniform vec4 scene_numbers[{parts.scene_vectors}];"] if parts.scene_vectors else []
+        return [
+            self.depth(parts),
+            parts.top,
+            *(f"layout(location = {number}) out vec4 sums_{number};" for number in outputs),
+            *self.uniforms(kernel),
+            *scene,
+            "",
+            "void main()",
+            "{",
+            *self.path_start(kernel),
+        ]
+
+    def uniforms(self, kernel: Interface) -> list[str]:
+        """Return the declarations of the integers."""
+        kinds = {name: "uint" if name in UNSIGNED else "int" for name in kernel.integers}
+        return [f"uniform {kind} {name};" for name, kind in kinds.items()]
+
+    def encode_begin(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what follows the first lines of an encoding."""
+        inputs = range(-(-int(kernel.arrays[0].shape[0]) // self.planes_per_buffer))
+        written = [image for image in kernel.images if image.access == WRITE]
+        return [
+            *(f"uniform sampler2D sums_{number};" for number in inputs),
+            *(f"layout(location = {number}) out vec4 {image.name};" for number, image in enumerate(written)),
+            *self.uniforms(kernel),
+            "",
+            "void main()",
+            "{",
+            "    ivec2 at = ivec2(gl_FragCoord.xy);",
+            "    PRECISE float samples = float(sample_count);",
+        ]
+
+    def place(self, kernel: Interface) -> tuple[str, str]:
+        """Return the texts of a fragment's column and row."""
+        return ("gl_FragCoord.x", "int(gl_FragCoord.y)")

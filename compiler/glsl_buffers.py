@@ -7,38 +7,17 @@ interleaved. Sizes stand in a uniform block. Translators make SPIR-V, HLSL and M
 
 from __future__ import annotations
 
-from .dialect import Dialect
-from .encode_dialect import EncodeDialect
+from abc import abstractmethod
+
+from .c import C
+from .dialect import Parts
 from .glsl import GLSL
-from .path_dialect import PathDialect
+from .interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Interface
+from .openings import Buffers
 from .profiles import SineContract
 
 GROUP = (8, 8)
 """Invocations (x, y) in a work group: 64, which every implementation of Vulkan and of OpenGL 4.3 takes."""
-
-FIRST_IMAGE = 3
-"""Binding of the first image that is read or encoded: 0 are the sizes, 1 and 2 what is read and written."""
-
-INVOCATION = f"layout(local_size_x = {GROUP[0]}, local_size_y = {GROUP[1]}) in;"
-"""The size of a work group."""
-
-SIZE = """\
-layout(std140, binding = 0) uniform Size {{
-    int width;
-    int height;
-{more}}};
-"""
-"""The uniform block of the sizes; an invocation outside of them ends."""
-
-PIXEL = """\
-void main()
-{{
-    int x = int(gl_GlobalInvocationID.x);
-    int y = int(gl_GlobalInvocationID.y);
-    if (x >= width || y >= height) {{
-        return;
-    }}"""
-"""The start of the denoiser and of the encoding."""
 
 BUFFERS = (
     "Storage buffers of floats, rows from the top, channels interleaved; binding 0 is a uniform block of\n"
@@ -49,20 +28,53 @@ BUFFERS = (
 GROUPS = f"Groups of {GROUP[0]} x {GROUP[1]}: ceil(width / {GROUP[0]}) x ceil({{rows}} / {GROUP[1]})"
 """What is dispatched."""
 
+SAID = {
+    DENOISE: (
+        f"{BUFFERS.format(sizes='width, height')}"
+        "1 the weights, 2 the result (width * height * {channels} floats, encoded as `output` says), 3 and\n"
+        f"on the images in this order. {GROUPS.format(rows='height')}"
+    ),
+    PATH: (
+        f"{BUFFERS.format(sizes='width, height, first_row, rows, first_sample, samples, seed_number')}"
+        "2 the sums, one plane of rows * width floats for each of:\n"
+        "{planes}.\n"
+        f"{GROUPS.format(rows='rows')}; invocation (x, y) follows pixel x of row first_row + y"
+    ),
+    ENCODE: (
+        f"{BUFFERS.format(sizes='width, height, sample_count')}"
+        "1 the sums, one plane of width * height floats for each of:\n"
+        "{planes};\n"
+        f"3 and on the images in this order. {GROUPS.format(rows='height')}"
+    ),
+}
+"""How a kernel of each role is called."""
 
-def storage(binding: str, access: str, block: str, name: str, of: str = "float") -> str:
-    """Return the declaration of a storage buffer; naga knows none that is only written."""
-    access = "readonly " if access == "readonly" else ""
-    return f"layout(std430, binding = {binding}) restrict {access}buffer {block} {{{{ {of} {name}[]; }}}};"
+
+class Declared(Buffers):
+    """Languages whose buffers are declared with numbers, above a function without arguments."""
+
+    entries = dict.fromkeys((DENOISE, PATH, ENCODE), "main")
+    max_output_channels = 2**16
+    pixel, weight, store = C.pixel, C.weight, C.store
+    said = SAID
+
+    @abstractmethod
+    def declared(self, kernel: Interface) -> list[str]:
+        """Return the declarations of the integers and of all arrays."""
+
+    def element(self, array: Array) -> tuple[str, str]:
+        """Return an array's name in the kernel, and the type of its elements."""
+        return array.name, self.types["float32"]
+
+    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what stands above the function."""
+        tables = [parts.top] if kernel.role == PATH else []
+        above = {PATH: [self.depth(parts)], DENOISE: [parts.top]}.get(kernel.role, [])
+        return [*above, *self.declared(kernel), *tables, ""]
 
 
-def sized(*more: str) -> str:
-    """Return the uniform block with further numbers."""
-    return SIZE.replace("{more}", "".join(f"    {text};\n" for text in more))
-
-
-class _Vulkan(Dialect):
-    """What the three kernels have in common."""
+class Vulkan(Declared):
+    """The dialect's table for Vulkan."""
 
     target = "glsl-vulkan"
     language = "GLSL 4.50 for Vulkan, compute shader"
@@ -73,126 +85,42 @@ class _Vulkan(Dialect):
     )
     qualifiers = GLSL.qualifiers
     magnitude = GLSL.magnitude
-    max_output_channels = 2**16
     table = GLSL.table
     operations = GLSL.operations
+    group_size: tuple[int | str, int | str] = GROUP
+    item = ("gl_GlobalInvocationID.x", "gl_GlobalInvocationID.y")
+    word = "precise "
+    load = f"{word}float {{name}} = sums[{{plane}} * plane + at];"
+
+    def declared(self, kernel: Interface) -> list[str]:
+        """Return the declarations of a group's size, of the integers and of all arrays."""
+        numbers = kernel.numbers()
+        return [
+            f"layout(local_size_x = {self.group_size[0]}, local_size_y = {self.group_size[1]}) in;",
+            "layout(std140, binding = 0) uniform Size {",
+            *(f"    {self.typed(name)};" for name in kernel.integers),
+            "};",
+            *(self.storage(array, numbers[array.name]) for array in kernel.by_number()),
+        ]
+
+    def storage(self, array: Array, number: int) -> str:
+        """Return the declaration of an array; naga knows none that is only written."""
+        name, kind = self.element(array)
+        block = f"{array.name[0].upper()}{array.name[1:]}"
+        if array.home == BLOCK:
+            return f"layout(std140, binding = {number}) uniform {block} {{ vec4 {name}[{array.quads}]; }};"
+        access = "" if array.access == WRITE else "readonly "
+        return f"layout(std430, binding = {number}) restrict {access}buffer {block} {{ {kind} {name}[]; }};"
+
+    def head(self, kernel: Interface) -> list[str]:
+        """Return the lines of the function up to its brace."""
+        return ["void main()", "{"]
 
 
-class VulkanDenoise(_Vulkan):
-    """The dialect's table for denoisers."""
-
-    entry = "main"
-    first_binding = FIRST_IMAGE
-    image_declaration = storage("{binding}", "readonly", "Image_{image}", "image_{image}")
-    image_separator = "\n"
-    begin = f"""\
-{{defines}}
-{INVOCATION}
-{sized()}{storage("1", "readonly", "Weights", "weights")}
-{storage("2", "writeonly", "Result", "result")}
-{{images}}
-
-{PIXEL}"""
-    pixel = "image_{image}[(row * width + column) * {channels} + c]"
-    weight = "weights[{index}]"
-    store = "result[(y * width + x) * {channels} + {i}] = {value};"
-    arguments = (
-        f"{BUFFERS.format(sizes='width, height')}"
-        "1 the weights, 2 the result (width * height * {channels} floats, encoded as `output` says), 3 and\n"
-        f"on the images in this order. {GROUPS.format(rows='height')}"
-    )
-
-
-class VulkanPath(_Vulkan, PathDialect):
-    """The dialect's table for paths."""
-
-    entry = "main"
-    lane_numbers = "0u"
-    path_begin = f"""\
-#define MAX_DEPTH {{max_depth}}u /* scatterings of a path */
-{INVOCATION}
-{sized("int first_row", "int rows", "uint first_sample", "int samples", "uint seed_number")}\
-{storage("2", "writeonly", "Sums", "sums")}
-{{tables}}
-
-void main()
-{{{{
-    int column = int(gl_GlobalInvocationID.x);
-    int row = int(gl_GlobalInvocationID.y);
-    if (column >= width || row >= rows) {{{{
-        return;
-    }}}}
-    int plane = rows * width;
-    int at = row * width + column;
-    {{counter}} x = {{column}} + {{lane_numbers}};
-    {{counter}} y = {{row}};
-    {{counter}} seed = {{seed}};"""
-    path_end = "}}"
-    uniforms = {
-        "column": "uint(column)",
-        "row": "uint(row + first_row)",
-        "seed": "seed_number",
-        "width": "float(width)",
-        "height": "float(height)",
-        "sample": "first_sample + uint(n)",
-    }
-    scalar_float = "float({0})"
-    output_declaration = ""
-    sum_store = "sums[{plane} * plane + at] = {value};"
-    max_planes = 2**16
-    path_arguments = (
-        f"{BUFFERS.format(sizes='width, height, first_row, rows, first_sample, samples, seed_number')}"
-        "2 the sums, one plane of rows * width floats for each of:\n"
-        "{planes}.\n"
-        f"{GROUPS.format(rows='rows')}; invocation (x, y) follows pixel x of row first_row + y"
-    )
-
-
-class VulkanEncode(_Vulkan, EncodeDialect):
-    """The dialect's table for encodings."""
-
-    entry = "main"
-    encode_begin = f"""\
-{INVOCATION}
-{sized("int sample_count")}\
-{storage("1", "readonly", "Sums", "sums")}
-{{outputs}}
-
-{PIXEL}
-    int plane = width * height;
-    int at = y * width + x;
-    precise float samples = float(sample_count);"""
-    encode_end = "}}"
-    input_declaration = ""
-    output_declaration = storage("{binding}", "writeonly", "Image_{image}", "image_{image}")
-    output_separator = "\n"
-    load = "precise float {name} = sums[{plane} * plane + at];"
-    image_store = "image_{image}[at * {channels} + {channel}] = {value};"
-    planes_per_input = 1
-    encode_arguments = (
-        f"{BUFFERS.format(sizes='width, height, sample_count')}"
-        "1 the sums, one plane of width * height floats for each of:\n"
-        "{planes};\n"
-        f"3 and on the images in this order. {GROUPS.format(rows='height')}"
-    )
-
-
-class _Compute(_Vulkan):
+class Compute(Vulkan):
     """The same for OpenGL 4.3."""
 
     target = "glsl-compute"
     language = "GLSL 4.30, compute shader"
     first: tuple[str, ...] = ("#version 430 core", "#define PRECISE precise")
     native_sine = SineContract("sin() of GLSL 4.30, which promises nothing", None)
-
-
-class ComputeDenoise(_Compute, VulkanDenoise):
-    """The dialect's table for denoisers."""
-
-
-class ComputePath(_Compute, VulkanPath):
-    """The dialect's table for paths."""
-
-
-class ComputeEncode(_Compute, VulkanEncode):
-    """The dialect's table for encodings."""

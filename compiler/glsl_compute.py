@@ -5,15 +5,17 @@ The result is an image, the weights are a storage buffer of `vec4`: bindings sta
 
 from __future__ import annotations
 
+from .dialect import Parts
 from .emit_group import GroupDialect, Grouped
 from .glsl_inlined import GLSLInlined
+from .interface import DENOISE, Interface
 from .schedules import PLAIN
 
 SHADER_VERSION = 430
 """The version of GLSL, and of OpenGL, that has compute shaders."""
 
 
-class GLSLCompute(GLSLInlined, GroupDialect):
+class GLSLCompute(GroupDialect, GLSLInlined):
     """The dialect's table."""
 
     kind = "vec4"
@@ -21,38 +23,47 @@ class GLSLCompute(GLSLInlined, GroupDialect):
     literal_zero = "vec4(0.0f)"
     max_output_channels = 4
     pixel_at = "texelFetch(image_{image}, ivec2(column, row), 0)[{c}]"
-    begin = f"""\
-#version {SHADER_VERSION} core
-#define PRECISE precise
-{{defines}}
-layout(local_size_x = GROUP_WIDTH, local_size_y = GROUP_HEIGHT) in;
-{{images}}
-layout(std430, binding = 0) restrict readonly buffer weight_buffer {{{{ vec4 w[]; }}}};
-layout(rgba32f, binding = 0) restrict writeonly uniform image2D result;
-shared float tile[TILE_NUMBERS];
-
-void main()
-{{{{
-    int width = textureSize(image_{{image}}, 0).x;
-    int height = textureSize(image_{{image}}, 0).y;
-    int local_x = int(gl_LocalInvocationID.x);
-    int local_y = int(gl_LocalInvocationID.y);
-    int item = local_y * GROUP_WIDTH + local_x;
-    int x = int(gl_WorkGroupID.x) * (GROUP_WIDTH * PIXELS) + local_x;
-    int y = int(gl_WorkGroupID.y) * GROUP_HEIGHT + local_y;"""
+    entries = GLSLInlined.entries
+    local = ("gl_LocalInvocationID.x", "gl_LocalInvocationID.y")
+    group = ("gl_WorkGroupID.x", "gl_WorkGroupID.y")
     stored = (
         ("vec4 color = vec4(0.0, 0.0, 0.0, 1.0);",),
         ("imageStore(result, ivec2(x + {p} * GROUP_WIDTH, y), color);",),
     )
     store = "color[{i}] = {value};"
-    arguments = (
-        "each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel\n"
-        "row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the\n"
-        "bottom, or the window stands on its head;\n"
-        "weight_buffer: a storage buffer at binding 0, all weights;\n"
-        "result: an image of format RGBA32F at binding 0, width x height, row 0 again the top row. Dispatch\n"
-        "ceil(width / ({pixels} * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of {group} items"
-    )
+    said = {
+        DENOISE: (
+            "each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel\n"
+            "row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the\n"
+            "bottom, or the window stands on its head;\n"
+            "weight_buffer: a storage buffer at binding 0, all weights;\n"
+            "result: an image of format RGBA32F at binding 0, width x height, row 0 again the top row. "
+            "Dispatch\nceil(width / ({pixels} * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of "
+            "{group} items"
+        )
+    }
+
+    def begin(self, kernel: Interface, parts: Parts) -> str:
+        """Return the text of a shader up to its first statement."""
+        first = kernel.images[0].name
+        return "\n".join(
+            [
+                f"#version {SHADER_VERSION} core",
+                "#define PRECISE precise",
+                parts.top,
+                "layout(local_size_x = GROUP_WIDTH, local_size_y = GROUP_HEIGHT) in;",
+                *self.images(kernel),
+                "layout(std430, binding = 0) restrict readonly buffer weight_buffer { vec4 w[]; };",
+                "layout(rgba32f, binding = 0) restrict writeonly uniform image2D result;",
+                "shared float tile[TILE_NUMBERS];",
+                "",
+                "void main()",
+                "{",
+                f"    int width = textureSize({first}, 0).x;",
+                f"    int height = textureSize({first}, 0).y;",
+                *self.item_place(),
+            ]
+        )
 
 
 def _compute(name: str, idea: str, pixels: int, instead: str = PLAIN) -> Grouped:

@@ -7,11 +7,11 @@ compiler that keeps the order of operations [`ASSUMES`].
 
 from __future__ import annotations
 
-from .dialect import Dialect
-from .encode_dialect import GLSLEncode
-from .glsl import GLSL, PREAMBLE, WEIGHT_TEXTURE_WIDTH
+from collections.abc import Mapping
+
+from .glsl import GLSL, WEIGHT_TEXTURE, fetch, said_of_denoiser
 from .glsl_inlined import GLSLInlined
-from .glsl_path import GLSLPath
+from .interface import DENOISE
 from .profiles import SineContract
 
 VERSION = "#version 300 es"
@@ -40,20 +40,12 @@ TEXTURES = "float textures to draw into need EXT_color_buffer_float in OpenGL ES
 """What callers of all these shaders must know."""
 
 
-WEIGHTS = f"""\
-{{images}}
-uniform sampler2D weight_texture;
-
-vec4 weights(int texel)
-{{{{
-    ivec2 place = ivec2(texel % {WEIGHT_TEXTURE_WIDTH}, texel / {WEIGHT_TEXTURE_WIDTH});
-    return texelFetch(weight_texture, place, 0);
-}}}}
-"""
-"""What a packed kernel declares besides the images."""
+def _with_textures(said: Mapping[str, str]) -> dict[str, str]:
+    """Return how kernels are called, with what callers must know besides."""
+    return {role: f"{text}.\n{TEXTURES}" for role, text in said.items()}
 
 
-class _ES(Dialect):
+class _ES(GLSL):
     """What the shaders have in common."""
 
     target = "glsl-es"
@@ -62,45 +54,30 @@ class _ES(Dialect):
     assumes = ASSUMES
     unordered = ("", "")
     first: tuple[str, ...] = (VERSION,)
+    preamble = ES_PREAMBLE
     indexes_results = False
+    max_output_channels = 4 * MOST_BUFFERS
+    max_planes = 4 * MOST_BUFFERS
+    scene_number = "scene_numbers[{vector}].{component}"
 
 
-class GLSLES(_ES, GLSL):
+class GLSLES(_ES):
     """The dialect's table."""
 
-    begin = GLSL.begin.replace(PREAMBLE, ES_PREAMBLE)
-    max_output_channels = 4 * MOST_BUFFERS
-    arguments = f"{GLSL.arguments}.\n{TEXTURES}"
+    said = _with_textures(GLSL.said)
 
 
 class GLSLESInlined(_ES, GLSLInlined):
     """The dialect's table for weights in the source."""
 
-    begin = GLSLInlined.begin.replace(PREAMBLE, ES_PREAMBLE)
-    max_output_channels = 4 * MOST_BUFFERS
-    arguments = f"{GLSLInlined.arguments}.\n{TEXTURES}"
+    said = _with_textures(GLSLInlined.said)
 
 
 class GLSLESPacked(_ES, GLSLInlined):
     """The dialect's table for weights in a texture of four floats a texel."""
 
-    begin = GLSLInlined.begin.replace(PREAMBLE, ES_PREAMBLE).replace("{images}", WEIGHTS)
-    max_output_channels = 4 * MOST_BUFFERS
-    arguments = GLSL.arguments.replace("R32F", "RGBA32F") + f".\n{TEXTURES}"
+    said = _with_textures({DENOISE: said_of_denoiser("RGBA32F")})
 
-
-class GLSLESPath(_ES, GLSLPath):
-    """The dialect's table for paths."""
-
-    path_begin = GLSLPath.path_begin.replace(PREAMBLE, ES_PREAMBLE)
-    path_arguments = f"{GLSLPath.path_arguments}.\n{TEXTURES}"
-    max_planes = 4 * MOST_BUFFERS
-    scene_numbers = "uniform vec4 scene_numbers[{vectors}];\n"
-    scene_number = "scene_numbers[{vector}].{component}"
-
-
-class GLSLESEncode(_ES, GLSLEncode):
-    """The dialect's table for encodings."""
-
-    encode_begin = GLSLEncode.encode_begin.replace(PREAMBLE, ES_PREAMBLE)
-    encode_arguments = f"{GLSLEncode.encode_arguments}.\n{TEXTURES}"
+    def weights(self) -> list[str]:
+        """Return the declaration of the weights, and of what reads them."""
+        return [WEIGHT_TEXTURE, "", *fetch("vec4", "texel", "place", ""), ""]

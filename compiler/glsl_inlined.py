@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
+from .dialect import Parts
 from .emit_inlined import Inlined
-from .glsl import GLSL, PREAMBLE
+from .glsl import GLSL, said_of_denoiser
+from .interface import DENOISE, Interface
 
 
 class GLSLInlined(GLSL):
     """The dialect's table: values are `vec4`, no texture holds weights."""
 
-    begin = f"""\
-{PREAMBLE}
-{{images}}
-{{results}}
-{{defines}}
-void main()
-{{{{
-    int x = int(gl_FragCoord.x);
-    int y = int(gl_FragCoord.y);
-{{starts}}"""
     types = {"float32": "vec4", "bool": "bvec4"}
-    arguments = "\n".join(
-        line
-        for line in GLSL.arguments.split("\n")
-        if not any(word in line for word in ("weight_texture", "padded), row by row"))
-    )
+    said = {DENOISE: said_of_denoiser()}
     operations = {
         **{
             name: GLSL.operations[name]
@@ -44,6 +32,15 @@ void main()
         },
         "select": "mix(vec4({2}), vec4({1}), {0})",
     }
+
+    def denoise_begin(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what follows the first lines of a denoiser."""
+        declared = [*self.images(kernel), *self.weights(), *self.declared_results(kernel)]
+        return [*declared, parts.top, "void main()", "{", *self.started(kernel)]
+
+    def weights(self) -> list[str]:
+        """Return the declaration of the weights, and of what reads them: all are in the source."""
+        return []
 
 
 GLSL_LADDER = (Inlined(GLSLInlined()),)

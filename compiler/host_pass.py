@@ -9,47 +9,57 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..refimpl.dataset import Normalization
+from .dialect import Parts
 from .emit_path import emit_path
-from .encode_dialect import EncodeDialect, GLSLEncode
 from .encode_kernel import encode_source
-from .glsl_es import GLSLESPath
-from .hosts import GodotDenoise
+from .glsl_es import GLSLES
+from .hosts import NO_PRECISE, GodotDenoise
+from .interface import PATH, Interface
 from .lower_encode import layers_of
 from .lower_scene import PathPrograms
 
 
-class _ShadertoyPath(GLSLESPath):
-    """The words of a path whose sums stay in a variable."""
+class _ShadertoyPath(GLSLES):
+    """The words of a path whose sums stay in a variable, and of the encoding that follows it."""
 
     target = "shadertoy"
     language = "Shadertoy (GLSL ES 3.00), one buffer a feature"
     suffix = ".glsl"
     first: tuple[str, ...] = ()
+    preamble = NO_PRECISE
     max_planes = 4
-    path_begin = """\
-#define PRECISE /* GLSL ES 3.00 has no `precise` */
-#define MAX_DEPTH {max_depth}u /* scatterings of a path */
-{tables}
-vec4 sums_0;
+    scene_number = ""
+    said = {PATH: "{planes}"}
+    load = "float {name} = sums_0[{component}];"
+    image_store = "image[{channel}] = {value};"
 
-void wamnet_trace(ivec2 at, int width, int height, uint seed_number)
-{{
-    const int first_row = 0;
-    const int samples = 1;
-    const uint first_sample = 0u;
-    {counter} x = {column} + {lane_numbers};
-    {counter} y = {row};
-    {counter} seed = {seed};"""
-    output_declaration = ""
-    uniforms = {**GLSLESPath.uniforms, "column": "uint(at.x)", "row": "uint(at.y + first_row)"}
-    path_arguments = "{planes}"
+    def path_begin(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what follows the first lines of a path kernel."""
+        return [
+            self.depth(parts),
+            parts.top,
+            "vec4 sums_0;",
+            "",
+            "void wamnet_trace(ivec2 at, int width, int height, uint seed_number)",
+            "{",
+            *ONE_SAMPLE,
+            *self.path_start(kernel),
+        ]
 
+    def place(self, kernel: Interface) -> tuple[str, str]:
+        """Return the texts of a pixel's column and row."""
+        return ("at.x", "at.y")
+
+
+ONE_SAMPLE = (
+    "    const int first_row = 0;",
+    "    const int samples = 1;",
+    "    const uint first_sample = 0u;",
+)
+"""What is a uniform elsewhere."""
 
 NUMBERS = (("width", 512), ("height", 512), ("seed_number", 0))
-"""What a script of Godot sets, with values to start with."""
-
-UNIFORMS = "".join(f"uniform int {name} = {value};\n" for name, value in NUMBERS)
-"""What a script sets: the size of the item in pixels, and a number for each frame."""
+"""What a script of Godot sets, with values to start with: the item's size in pixels, a number each frame."""
 
 
 class _GodotPath(_ShadertoyPath):
@@ -60,27 +70,27 @@ class _GodotPath(_ShadertoyPath):
     suffix = ".gdshader"
     first = GodotDenoise.first
     qualifiers = {}
-    path_begin = (
-        _ShadertoyPath.path_begin.replace("#define PRECISE /* GLSL ES 3.00 has no `precise` */\n", "")
-        .replace("vec4 sums_0;\n\nvoid wamnet_trace(ivec2 at,", "vec4 wamnet_trace(ivec2 at,")
-        .replace("{{\n", "{{\n    vec4 sums_0 = vec4(0.0, 0.0, 0.0, 1.0);\n", 1)
-        .replace("{tables}", "{tables}\n" + UNIFORMS)
-        .replace("int width, int height, uint seed_number", "uint seed_value")
-    )
-    uniforms = {**_ShadertoyPath.uniforms, "seed": "seed_value"}
-    path_end = "    return sums_0;\n}}"
+    ends = {PATH: "    return sums_0;\n}"}
 
+    def begin(self, kernel: Interface, parts: Parts) -> str:
+        """Return the text of a shader up to its first statement."""
+        return "\n".join(
+            [
+                self.depth(parts),
+                parts.top,
+                *(f"uniform int {name} = {value};" for name, value in NUMBERS),
+                "",
+                "vec4 wamnet_trace(ivec2 at, uint seed_value)",
+                "{",
+                "    vec4 sums_0 = vec4(0.0, 0.0, 0.0, 1.0);",
+                *ONE_SAMPLE,
+                *self.path_start(kernel),
+            ]
+        )
 
-class _HostEncode(GLSLEncode, EncodeDialect):
-    """The statements of an encoding, between a host's own lines."""
-
-    encode_begin = ""
-    encode_end = ""
-    first = ()
-    qualifiers = {}
-    output_declaration = ""
-    load = "float {name} = sums_0[{component}];"
-    image_store = "image[{channel}] = {value};"
+    def integer(self, kernel: Interface, name: str) -> str:
+        """Return the text of an integer that the kernel is given."""
+        return "seed_value" if name == "seed_number" else name
 
 
 SHADERTOY_END = """\
@@ -110,6 +120,9 @@ void fragment()
 """
 """The end of a feature's shader."""
 
+STATEMENTS = _GodotPath()
+"""The words of an encoding in every host: its statements need no order."""
+
 HOSTS = {"shadertoy": (_ShadertoyPath(), SHADERTOY_END), "godot": (_GodotPath(), GODOT_END)}
 """By target: the words of a path, and what stands behind it."""
 
@@ -120,5 +133,5 @@ def feature_pass(
     """Return the pass that traces one sample a pixel and writes one encoded feature."""
     dialect, end = HOSTS[target]
     text = emit_path(programs, dialect, layers_of((feature,)), header)
-    statements = encode_source((feature,), normalization, _HostEncode())
+    statements = encode_source((feature,), normalization, STATEMENTS)
     return text + end.format(statements=statements)

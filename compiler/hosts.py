@@ -11,8 +11,10 @@ the tab that is shown turns the picture.
 
 from __future__ import annotations
 
+from .dialect import Parts
 from .glsl import GLSL
 from .glsl_es import ASSUMES, GLSLESInlined
+from .interface import DENOISE, WEIGHTS, Interface
 from .profiles import SineContract
 
 CHANNELS = 4
@@ -22,33 +24,66 @@ TURNED = "int(iResolution.y) - 1 - int(fragCoord.y)"
 """The picture's row of a pixel that Shadertoy shows."""
 
 
+NO_PRECISE = "#define PRECISE /* GLSL ES 3.00 has no `precise` */"
+"""The first line of a tab."""
+
+NOTHING_YET = "    vec4 result = vec4(0.0, 0.0, 0.0, 1.0);"
+"""What a result starts with."""
+
+NEAREST = "filter_nearest, repeat_disable"
+"""How Godot reads a texture."""
+
+FETCH = (
+    "float weights(int index)",
+    "{",
+    "    return texelFetch(weight_texture, ivec2(index % 1024, index / 1024), 0).r;",
+    "}",
+)
+"""The function that reads a weight."""
+
+CHANNEL_OF = (
+    "float channel_of(vec4 texel, int c)",
+    "{",
+    "    return c == 0 ? texel.r : c == 1 ? texel.g : c == 2 ? texel.b : texel.a;",
+    "}",
+    "",
+)
+"""The function that picks a channel: the language has no index into a vector."""
+
+
 class ShadertoyDenoise(GLSLESInlined):
     """The dialect's table: the tab Image."""
 
     target = "shadertoy"
     language = "Shadertoy (GLSL ES 3.00), tab Image"
     suffix = ".glsl"
-    entry = "mainImage"
+    entries = {DENOISE: "mainImage"}
+    ends = {DENOISE: "    fragColor = result;\n}"}
     first: tuple[str, ...] = ()
+    preamble = NO_PRECISE
     native_sine = SineContract("sin() of GLSL ES 3.00, which promises nothing", None)
     max_output_channels = 4
-    image_declaration = "#define image_{image} iChannel{binding} /* Buffer */"
-    result_declaration = ""
-    result_start = ""
-    begin = f"""\
-#define PRECISE /* GLSL ES 3.00 has no `precise` */
-{{images}}
-{{defines}}
-void mainImage(out vec4 fragColor, in vec2 fragCoord)
-{{{{
-    int x = int(fragCoord.x);
-    int y = {TURNED};
-    vec4 result = vec4(0.0, 0.0, 0.0, 1.0);"""
-    end = "    fragColor = result;\n}}"
-    arguments = (
-        "iChannel0, iChannel1, ...: the buffers of the images in this order, of the size of the view,\n"
-        "filter nearest. The result is display-encoded already"
-    )
+    said = {
+        DENOISE: (
+            "iChannel0, iChannel1, ...: the buffers of the images in this order, of the size of the view,\n"
+            "filter nearest. The result is display-encoded already"
+        )
+    }
+
+    def denoise_begin(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what follows the first lines of a denoiser."""
+        return [
+            *(
+                f"#define {image.name} iChannel{number} /* Buffer */"
+                for number, image in enumerate(kernel.images)
+            ),
+            parts.top,
+            "void mainImage(out vec4 fragColor, in vec2 fragCoord)",
+            "{",
+            "    int x = int(fragCoord.x);",
+            f"    int y = {TURNED};",
+            NOTHING_YET,
+        ]
 
 
 class GodotDenoise(GLSL):
@@ -57,44 +92,44 @@ class GodotDenoise(GLSL):
     target = "godot"
     language = "Godot 4 shading language, canvas item"
     suffix = ".gdshader"
-    entry = "fragment"
+    entries = {DENOISE: "fragment"}
+    ends = {DENOISE: "    COLOR = result;\n}"}
     native_sine = ShadertoyDenoise.native_sine
     assumes = ASSUMES
     unordered = ("", "")
     qualifiers = {}
     max_output_channels = 4
     first = ("shader_type canvas_item;", "render_mode unshaded, blend_disabled;")
-    image_declaration = "uniform sampler2D image_{image} : filter_nearest, repeat_disable;"
-    result_declaration = ""
-    result_start = ""
     indexes_results = False
-    begin = """\
-{defines}
-{images}
-uniform sampler2D weight_texture : filter_nearest, repeat_disable;
-
-float weights(int index)
-{{
-    return texelFetch(weight_texture, ivec2(index % 1024, index / 1024), 0).r;
-}}
-
-float channel_of(vec4 texel, int c)
-{{
-    return c == 0 ? texel.r : c == 1 ? texel.g : c == 2 ? texel.b : texel.a;
-}}
-
-void fragment()
-{{
-    int width = textureSize(image_{image}, 0).x;
-    int height = textureSize(image_{image}, 0).y;
-    int x = int(UV.x * float(width));
-    int y = int(UV.y * float(height));
-    vec4 result = vec4(0.0, 0.0, 0.0, 1.0);"""
-    end = "    COLOR = result;\n}}"
     pixel = "channel_of(texelFetch(image_{image}, ivec2(column, row), 0), c)"
-    arguments = (
-        "each image: a texture of 32-bit floats (Image.FORMAT_RGBF), row 0 the picture's top row;\n"
-        "weight_texture: Image.FORMAT_RF, 1024 texels wide, as many rows as weights fill, row by row;\n"
-        "the item has the images' size in pixels, and a viewport with HDR 2D, or colours keep 8 bits.\n"
-        "The result is display-encoded already"
-    )
+    said = {
+        DENOISE: (
+            "each image: a texture of 32-bit floats (Image.FORMAT_RGBF), row 0 the picture's top row;\n"
+            "weight_texture: Image.FORMAT_RF, 1024 texels wide, as many rows as weights fill, row by row;\n"
+            "the item has the images' size in pixels, and a viewport with HDR 2D, or colours keep 8 bits.\n"
+            "The result is display-encoded already"
+        )
+    }
+
+    def begin(self, kernel: Interface, parts: Parts) -> str:
+        """Return the text of a shader up to its first statement."""
+        texture = [f"uniform sampler2D weight_texture : {NEAREST};"] if kernel.named(WEIGHTS) else []
+        first = kernel.images[0].name
+        return "\n".join(
+            [
+                parts.top,
+                *(f"uniform sampler2D {image.name} : {NEAREST};" for image in kernel.images),
+                *texture,
+                "",
+                *(FETCH if texture else ()),
+                "",
+                *CHANNEL_OF,
+                "void fragment()",
+                "{",
+                f"    int width = textureSize({first}, 0).x;",
+                f"    int height = textureSize({first}, 0).y;",
+                "    int x = int(UV.x * float(width));",
+                "    int y = int(UV.y * float(height));",
+                NOTHING_YET,
+            ]
+        )

@@ -6,12 +6,12 @@ Metal's compiler relaxes arithmetic unless it is told not to: `MTLCompileOptions
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from .c import C
-from .cuda import CUDA, CUDAEncode, CUDAPath
-from .dialect import Dialect
-from .encode_dialect import EncodeDialect
-from .glsl_buffers import FIRST_IMAGE
-from .path_dialect import PathDialect
+from .dialect import Parts
+from .interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Interface
+from .openings import Buffers
 from .profiles import SineContract
 
 ASSUMES = (
@@ -26,9 +26,6 @@ using namespace metal;
 """
 """The first lines."""
 
-THREAD = "uint2 thread_place [[thread_position_in_grid]]"
-"""The place of a thread."""
-
 CALLED = (
     "Buffer 0 are the sizes, 32-bit integers: {sizes}; then buffers of floats, rows from the top,\n"
     "channels interleaved: {buffers}.\n"
@@ -37,31 +34,19 @@ CALLED = (
 """How all these kernels are called."""
 
 
-def sized(*numbers: str) -> str:
-    """Return the structure of the sizes."""
-    return "struct Size {{\n" + "".join(f"    {number};\n" for number in numbers) + "}};\n"
-
-
-def _outside(column: str, row: str, rows: str) -> str:
-    """Return the start of a kernel: a thread outside of the picture ends."""
-    return f"""\
-    int width = size.width;
-    int {column} = int(thread_place.x);
-    int {row} = int(thread_place.y);
-    if ({column} >= width || {row} >= {rows}) {{{{
-        return;
-    }}}}"""
-
-
-class _Metal(Dialect):
-    """What the three kernels have in common."""
+class Metal(Buffers):
+    """The dialect's table; `threads` are the arguments that give a thread its place."""
 
     target = "metal"
     language = "Metal Shading Language"
     suffix = ".metal"
     native_sine = SineContract("sin() of Metal, 4 ulp in safe mode, less in others", None)
     assumes = ASSUMES
-    types = Dialect.types
+    threads: Sequence[str] = ("uint2 thread_place [[thread_position_in_grid]]",)
+    item = ("thread_place.x", "thread_place.y")
+    size = "size."
+    early = dict.fromkeys((DENOISE, PATH, ENCODE), ("width",))
+    late = {DENOISE: ("height",), PATH: ("samples",)}
     max_output_channels = 2**16
     table = "constant {type} {name}[{count}] = {{{values}}};"
     operations = {
@@ -75,124 +60,50 @@ class _Metal(Dialect):
         "minimum": "min({0}, {1})",
         "maximum": "max({0}, {1})",
     }
-
-
-class Metal(_Metal):
-    """The dialect's table for denoisers."""
-
-    entry = "wamnet_denoise"
-    first_binding = FIRST_IMAGE
-    image_declaration = "    device const float *image_{image} [[buffer({binding})]]"
-    image_separator = ",\n"
-    begin = f"""\
-{TOP}
-{{defines}}
-{sized("int width", "int height")}
-kernel void {{entry}}(
-    constant Size &size [[buffer(0)]],
-    device const float *weights [[buffer(1)]],
-    device float *result [[buffer(2)]],
-{{images}},
-    {THREAD})
-{{{{
-{_outside("x", "y", "size.height")}
-    int height = size.height;"""
-    pixel = CUDA.pixel
-    weight = CUDA.weight
-    store = CUDA.store
-    arguments = CALLED.format(
-        sizes="width, height",
-        buffers="1 the weights, 2 the result (width *\n"
-        "height * {channels} floats, encoded as `output` says), 3 and on the images in this order",
-        width="width",
-        height="height",
-    )
-
-
-class MetalPath(_Metal, PathDialect):
-    """The dialect's table for paths."""
-
-    entry = PathDialect.entry
-    lane_numbers = "0u"
-    path_begin = f"""\
-#define MAX_DEPTH {{max_depth}}u /* scatterings of a path */
-{TOP}
-{
-        sized(
-            "int width",
-            "int height",
-            "int first_row",
-            "int rows",
-            "uint first_sample",
-            "int samples",
-            "uint seed_number",
-        )
-    }
-{{tables}}
-kernel void {{entry}}(
-    constant Size &size [[buffer(0)]],
-    device float *sums [[buffer(2)]],
-    {THREAD})
-{{{{
-{_outside("column", "row", "size.rows")}
-    int samples = size.samples;
-    int plane = size.rows * width;
-    int at = row * width + column;
-    {{counter}} x = {{column}} + {{lane_numbers}};
-    {{counter}} y = {{row}};
-    {{counter}} seed = {{seed}};"""
-    path_end = "}}"
-    uniforms = {
-        "column": "uint(column)",
-        "row": "uint(row + size.first_row)",
-        "seed": "size.seed_number",
-        "width": "float(width)",
-        "height": "float(size.height)",
-        "sample": "size.first_sample + uint(n)",
-    }
-    scalar_float = "float({0})"
-    output_declaration = ""
-    sum_store = CUDAPath.sum_store
-    max_planes = 2**16
-    path_arguments = (
-        CALLED.format(
+    pixel, weight, store = C.pixel, C.weight, C.store
+    said = {
+        DENOISE: CALLED.format(
+            sizes="width, height",
+            buffers="1 the weights, 2 the result (width *\n"
+            "height * {channels} floats, encoded as `output` says), 3 and on the images in this order",
+            width="width",
+            height="height",
+        ),
+        PATH: CALLED.format(
             sizes="width, height, first_row, rows, first_sample, samples,\nseed_number",
             buffers="2 the sums, one plane of rows * width floats for each of:\n{planes}",
             width="width",
             height="rows",
         )
-        + "; thread (x, y) follows pixel x of row first_row + y"
-    )
+        + "; thread (x, y) follows pixel x of row first_row + y",
+        ENCODE: CALLED.format(
+            sizes="width, height, sample_count",
+            buffers="1 the sums, one plane of\nwidth * height floats for each of:\n"
+            "{planes};\n3 and on the images in this order",
+            width="width",
+            height="height",
+        ),
+    }
 
+    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what stands above the function: the structure of the integers is a kernel's own."""
+        sizes = ["struct Size {", *(f"    {self.typed(name)};" for name in kernel.integers), "};", ""]
+        if kernel.role == PATH:
+            return [self.depth(parts), TOP, *sizes, parts.top]
+        return [TOP, *super().top(kernel, parts), *sizes]
 
-class MetalEncode(_Metal, EncodeDialect):
-    """The dialect's table for encodings."""
+    def head(self, kernel: Interface) -> list[str]:
+        """Return the lines of the function up to its brace."""
+        numbers = kernel.numbers()
+        arrays = [
+            f"{self.array_argument(each)} [[buffer({numbers[each.name]})]]" for each in kernel.by_number()
+        ]
+        listed = ["constant Size &size [[buffer(0)]]", *arrays, *self.threads]
+        inside = ",\n".join(f"    {each}" for each in listed)
+        return [f"kernel void {self.entries[kernel.role]}(", f"{inside})", "{"]
 
-    entry = EncodeDialect.entry
-    encode_begin = f"""\
-{TOP}
-{sized("int width", "int height", "int sample_count")}
-kernel void {{entry}}(
-    constant Size &size [[buffer(0)]],
-    device const float *sums [[buffer(1)]],
-{{outputs}},
-    {THREAD})
-{{{{
-{_outside("x", "y", "size.height")}
-    int plane = width * size.height;
-    int at = y * width + x;
-    float samples = float(size.sample_count);"""
-    encode_end = "}}"
-    input_declaration = ""
-    output_declaration = "    device float *image_{image} [[buffer({binding})]]"
-    output_separator = ",\n"
-    load = CUDAEncode.load
-    image_store = CUDAEncode.image_store
-    planes_per_input = 1
-    encode_arguments = CALLED.format(
-        sizes="width, height, sample_count",
-        buffers="1 the sums, one plane of\nwidth * height floats for each of:\n"
-        "{planes};\n3 and on the images in this order",
-        width="width",
-        height="height",
-    )
+    def array_argument(self, array: Array) -> str:
+        """Return an argument that is an array, without its number."""
+        if array.home == BLOCK:
+            return f"constant float *{array.name}"
+        return f"device {'' if array.access == WRITE else 'const '}float *{array.name}"

@@ -1,43 +1,52 @@
-"""OpenCL C 1.2: one work item a pixel; images, weights and result are buffers of floats."""
+"""OpenCL C 1.2: one work item a pixel; images, weights, sums and result are buffers of floats.
+
+Places in the planes of sums are of `size_t`: they may lie beyond 2^31. Rows of a launch are the global size,
+so that a path kernel is not given their number; an encoding reads planes of any stride.
+"""
 
 from __future__ import annotations
 
-from .dialect import Dialect
+from .dialect import Dialect, Parts
+from .interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
+from .openings import IMAGES, WEIGHTS_RESULT, Arguments
 from .profiles import UNIT_ROUNDOFF, SineContract
 
 
-class OpenCL(Dialect):
+class OpenCL(Arguments):
     """The dialect's table."""
 
     target = "opencl"
     language = "OpenCL C 1.2"
     suffix = ".cl"
-    entry = "wamnet_denoise"
-    image_declaration = "    __global const float *restrict image_{image}"
-    image_separator = ",\n"
-    begin = """\
-{defines}
-__kernel void {entry}(
-{images},
-    __global const float *restrict weights,
-    __global float *restrict result,
-    int width,
-    int height)
-{{
-    int x = (int)get_global_id(0);
-    int y = (int)get_global_id(1);
-    if (x >= width || y >= height) {{
-        return;
-    }}"""
+    integers = {
+        **INTEGERS,
+        PATH: tuple(name for name in INTEGERS[PATH] if name != "rows"),
+        ENCODE: ("width", "height", "row_stride", "plane_stride", "sample_count"),
+    }
+    heading = "__kernel void {entry}"
+    reads = "__global const float *restrict {name}"
+    writes = "__global float *restrict {name}"
+    item = ("get_global_id(0)", "get_global_id(1)")
     pixel = "image_{image}[(row * width + column) * {channels} + c]"
     weight = "weights[{index}]"
     store = "result[(y * width + x) * {channels} + {i}] = {value};"
-    arguments = (
-        "each image: width * height * channels floats, rows from the top, channels interleaved;\n"
-        "weights; result: width * height * {channels} floats in the same order, encoded as `output` says;\n"
-        "width; height.\n"
-        "Global size: at least (width, height)"
-    )
+    image_store = "image_{image}[pixel * {channels} + {channel}] = {value};"
+    said = {
+        DENOISE: f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height.\nGlobal size: at least (width, height)",
+        PATH: (
+            "sums: float, one plane of global_size(1) rows of global_size(0) * {lanes} numbers for each of:\n"
+            "{planes};\n"
+            "width, height of the image; first_row; first_sample; samples to add up; seed.\n"
+            "Work item (i, j) follows the pixels from {lanes} * i of row first_row + j on"
+        ),
+        ENCODE: (
+            "sums: float, one plane of plane_stride numbers for each of:\n"
+            "{planes};\n"
+            f"{IMAGES};\n"
+            "width; height; row_stride: numbers from row to row of a plane; plane_stride; sample_count.\n"
+            "Global size: at least (width, height)"
+        ),
+    }
     max_output_channels = 2**16
     exact = ("#pragma OPENCL FP_CONTRACT OFF /* every operation is rounded */",)
     native_sine = SineContract(
@@ -56,3 +65,44 @@ __kernel void {entry}(
         },
         "convert": "convert_{type}({0})",
     }
+
+    def array_argument(self, array: Array) -> str:
+        """Return an argument that is an array."""
+        if array.home == BLOCK:
+            size = f"__attribute__((max_constant_size(16 * {array.quads})))"
+            return f"__constant float *restrict {array.name} {size}"
+        return super().array_argument(array)
+
+    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what stands above the function."""
+        lanes = [f"#define LANES {self.lanes}"] if kernel.role == PATH else []
+        return [*lanes, *super().top(kernel, parts)]
+
+    def guard(self, kernel: Interface) -> list[str]:
+        """Return the item's place; items of a path kernel beyond the picture compute on."""
+        if kernel.role != PATH:
+            return super().guard(kernel)
+        return [
+            "    size_t column = get_global_id(0) * LANES;",
+            "    size_t stride = get_global_size(0) * LANES;",
+            "    size_t row = get_global_id(1);",
+            "    size_t plane = get_global_size(1) * stride;",
+            "    size_t at = row * stride + column;",
+        ]
+
+    def path_start(self, kernel: Interface) -> list[str]:
+        """Return the first statements of a path kernel: pixel and seed."""
+        return Dialect.path_start(self, kernel)
+
+    def encode_start(self, kernel: Interface) -> list[str]:
+        """Return the first statements of an encoding: its places in planes and images, and the samples."""
+        return [
+            "    size_t at = (size_t)y * (size_t)row_stride + (size_t)x;",
+            "    size_t plane = (size_t)plane_stride;",
+            "    size_t pixel = (size_t)y * (size_t)width + (size_t)x;",
+            f"    {self.samples(kernel)}",
+        ]
+
+    def place(self, kernel: Interface) -> tuple[str, str]:
+        """Return the texts of an item's column and row."""
+        return ("column", "(int)row")

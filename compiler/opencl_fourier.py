@@ -6,34 +6,35 @@ lie in further ones. Functions take arrays of the work item's own.
 
 from __future__ import annotations
 
+from .dialect import Parts
 from .emit_fourier import Fourier
-from .opencl_tiled import BEGIN, OpenCLTiled
+from .interface import DENOISE, Interface
+from .opencl_tiled import ALIGNED, OpenCLTiled
 
-VECTORS, ENTRY = BEGIN.replace("{defines}\n", "").split("__kernel", 1)
-ARGUMENTS, _ = ENTRY.split("    int x = ", 1)
-
-START = f"""\
-{VECTORS}{{defines}}
+PLACES = """\
 #define PLACE(lane, i) (((lane) / LANES * POINTS * 2 + (i)) * LANES + (lane) % LANES)
-#define SPECTRUM(lane, f) (((lane) / LANES * POINTS + (f)) * 4 * LANES + (lane) % LANES)
-__kernel{ARGUMENTS}    int tile_x = (int)get_global_id(0) * TILES * OUT;
-    int tile_y = (int)get_global_id(1) * OUT;
-    if (tile_x >= width || tile_y >= height) {{{{
-        return;
-    }}}}"""
-"""What stands before the statements; `@lanes@` is the length of a vector."""
+#define SPECTRUM(lane, f) (((lane) / LANES * POINTS + (f)) * 4 * LANES + (lane) % LANES)"""
+"""Where numbers of a row and of a column are."""
 
 
 class OpenCLFourier(OpenCLTiled):
     """The dialect's table for vectors of `lanes` floats."""
 
-    arguments = OpenCLTiled.arguments.replace(
-        "(ceil(width / {pixels}), height)", "(ceil(width / {columns}), ceil(height / {rows}))"
-    )
+    said = {DENOISE: f"{ALIGNED}\nGlobal size: at least (ceil(width / {{columns}}), ceil(height / {{rows}}))"}
 
-    def __init__(self, lanes: int) -> None:
-        super().__init__(lanes)
-        self.begin = START.replace("@lanes@", str(lanes))
+    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what stands above the function."""
+        return [self.macros, parts.top, PLACES]
+
+    def guard(self, kernel: Interface) -> list[str]:
+        """Return the first pixel of the item's tiles; an item outside of the picture ends."""
+        return [
+            "    int tile_x = (int)get_global_id(0) * TILES * OUT;",
+            "    int tile_y = (int)get_global_id(1) * OUT;",
+            "    if (tile_x >= width || tile_y >= height) {",
+            "        return;",
+            "    }",
+        ]
 
 
 def fourier_schedule(name: str, points: int, tiles: int, lanes: int = 16, pixels: int = 14) -> Fourier:

@@ -16,10 +16,9 @@ from typing import Any
 from numpy.typing import NDArray
 
 from .opencl import OpenCL
-from .path_dialect import PathDialect
 
-VECTORS = (4, 8, 16)
-"""Lengths of vectors for which there is a schedule, besides 1."""
+LANES = (1, 4, 8, 16)
+"""Numbers of paths that a work item follows at once."""
 
 VECTOR_OPERATIONS = {
     "absolute": "as_{{type}}(as_int{lanes}({{0}}) & 0x7fffffff)",
@@ -44,52 +43,9 @@ float{lanes} floor_float{lanes}(float{lanes} x)
 """Floor of vectors: cut off towards zero, and one less where that is above; the bits 0x4b000000 are 2^23."""
 
 
-class OpenCLPath(OpenCL, PathDialect):
+class OpenCLPath(OpenCL):
     """The dialect's table for one path in a work item."""
 
-    entry = PathDialect.entry
-    lanes = 1
-    lane_numbers = "0u"
-    path_begin = """\
-#define LANES {lanes}
-#define MAX_DEPTH {max_depth}u /* scatterings of a path */
-{tables}
-__kernel void {entry}(
-    __global float *restrict sums,
-    int width,
-    int height,
-    int first_row,
-    uint first_sample,
-    int samples,
-    uint seed_number)
-{{
-    size_t column = get_global_id(0) * LANES;
-    size_t stride = get_global_size(0) * LANES;
-    size_t row = get_global_id(1);
-    size_t plane = get_global_size(1) * stride;
-    size_t at = row * stride + column;
-    {counter} x = {column} + {lane_numbers};
-    {counter} y = {row};
-    {counter} seed = {seed};"""
-    path_end = "}}"
-    scalar_float = "(float){0}"
-    output_declaration = ""
-    uniforms = {
-        "column": "(uint)column",
-        "row": "(uint)((int)row + first_row)",
-        "seed": "seed_number",
-        "width": "(float)width",
-        "height": "(float)height",
-        "sample": "first_sample + (uint)n",
-    }
-    path_arguments = (
-        "sums: float, one plane of global_size(1) rows of global_size(0) * {lanes} numbers for each of:\n"
-        "{planes};\n"
-        "width, height of the image; first_row; first_sample; samples to add up; seed.\n"
-        "Work item (i, j) follows the pixels from {lanes} * i of row first_row + j on"
-    )
-    sum_store = "sums[{plane} * plane + at] = {value};"
-    max_planes = 2**16
     operations = {
         **OpenCL.operations,
         "minimum": "min({0}, {1})",
@@ -100,7 +56,6 @@ __kernel void {entry}(
 class OpenCLVectorPath(OpenCLPath):
     """The dialect's table for 4, 8 or 16 paths in a work item."""
 
-    splat = "({type})({value})"
     any_lane = "any({mask})"
 
     def __init__(self, lanes: int) -> None:
@@ -119,10 +74,13 @@ class OpenCLVectorPath(OpenCLPath):
         }
         self.helpers = {"floor": FLOOR.format(lanes=lanes)}
 
+    def splat(self, value: str, dtype: str) -> str:
+        """Return the text of a number that is the same in all lanes."""
+        return f"({self.types[dtype]})({value})"
+
     def number(self, value: Any, dtype: str) -> str:
         """Return the text of a number in all lanes."""
-        element = self._element(value, dtype).removeprefix("(").removesuffix(")")
-        return self.splat.format(type=self.types[dtype], value=element)
+        return self.splat(self._element(value, dtype).removeprefix("(").removesuffix(")"), dtype)
 
     def table_declaration(self, name: str, array: NDArray[Any]) -> str:
         """Return the declaration of a constant table of single numbers."""
@@ -135,6 +93,6 @@ class OpenCLVectorPath(OpenCLPath):
         return ("-1" if value else "0") if dtype == "bool" else super().number(value, dtype)
 
 
-def schedule(lanes: int) -> OpenCLPath:
+def of_lanes(lanes: int) -> OpenCLPath:
     """Return the dialect for a number of paths in a work item."""
     return OpenCLPath() if lanes == 1 else OpenCLVectorPath(lanes)

@@ -7,13 +7,16 @@ instruction that no operator means; clang has a name for it, and other compilers
 
 from __future__ import annotations
 
+from .dialect import Parts
 from .emit_tiled import Tiled
+from .interface import DENOISE, Interface
 from .opencl import OpenCL
+from .openings import IMAGES
 from .tiled_dialect import OPERATIONS, TiledDialect
 
 MACROS = """\
-typedef float@lanes@ vector;
-typedef int@lanes@ mask;
+typedef float{lanes} vector;
+typedef int{lanes} mask;
 #define MINIMUM(a, b) ((vector)(b) < (vector)(a) ? (vector)(b) : (vector)(a))
 #define MAXIMUM(a, b) ((vector)(b) > (vector)(a) ? (vector)(b) : (vector)(a))
 #ifdef __has_builtin
@@ -24,24 +27,15 @@ typedef int@lanes@ mask;
 #ifndef FLOOR
 #define FLOOR(a) floor(a)
 #endif"""
-"""The type of vectors and functions on them; `@lanes@` is the length of a vector."""
+"""The type of vectors of `lanes` numbers, and functions on them."""
 
-BEGIN = f"""\
-{{defines}}
-{MACROS}
-__kernel void {{entry}}(
-{{images}},
-    __global const float *restrict weights,
-    __global float *restrict result,
-    int width,
-    int height)
-{{{{
-    int x = (int)get_global_id(0) * PIXELS;
-    int y = (int)get_global_id(1);
-    if (x >= width || y >= height) {{{{
-        return;
-    }}}}"""
-"""What stands before the statements."""
+
+ALIGNED = (
+    f"{IMAGES};\n"
+    "weights, at an address that is a multiple of {bytes}; result: width * height * {channels} floats\n"
+    "in the order of the images, encoded as `output` says; width; height."
+)
+"""What the arguments are: vectors are read from the weights."""
 
 
 class OpenCLTiled(OpenCL, TiledDialect):
@@ -49,16 +43,12 @@ class OpenCLTiled(OpenCL, TiledDialect):
 
     kind = "vector"
     unroll = "#pragma unroll"
+    reach = " * PIXELS"
     store = "result[(y * width + x + p) * {channels} + {i}] = {value};"
-    arguments = (
-        "each image: width * height * channels floats, rows from the top, channels interleaved;\n"
-        "weights, at an address that is a multiple of {bytes}; result: width * height * {channels} floats\n"
-        "in the order of the images, encoded as `output` says; width; height.\n"
-        "Global size: at least (ceil(width / {pixels}), height)"
-    )
+    said = {DENOISE: f"{ALIGNED}\nGlobal size: at least (ceil(width / {{pixels}}), height)"}
 
     def __init__(self, lanes: int) -> None:
-        self.begin = BEGIN.replace("@lanes@", str(lanes))
+        self.macros = MACROS.format(lanes=lanes)
         self.types = {"float32": "vector", "bool": "mask"}
         # What is written for a vector as for a number; truth is an integer with all bits set.
         self.operations = {
@@ -69,6 +59,10 @@ class OpenCLTiled(OpenCL, TiledDialect):
             "floor": "FLOOR({0})",
             "select": "{0} ? (vector)({1}) : (vector)({2})",
         }
+
+    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what stands above the function."""
+        return [parts.top, self.macros]
 
     def weights_at(self, offset: int, index: str = "") -> str:
         """Return the text of the weights from `offset` on as vectors, or of one of them."""

@@ -1,7 +1,7 @@
 """Compile a scene's paths for a target: passes, source, artifact.
 
 1. Run the passes of the profile on each program (lower_scene.py has run the common ones).
-2. Emit the source by the target's schedule for a number of paths at once [`SCHEDULES`].
+2. Emit the source in the target's dialect for a number of paths at once [targets.py: Target.paths].
 3. Put both together with a manifest [`compile_path`].
 
 A path kernel has no error bound: its decisions may fall differently from the reference's where a path passes
@@ -13,28 +13,21 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from ..refimpl.errors import CompileError
 from ..refimpl.reading import SIZES
-from . import emit_path, ir, opencl_path, profiles
+from . import emit_path, interface, ir, profiles
 from .artifact import OneSource
-from .c_path import CPath
 from .compile import asdict_finite
-from .cuda import CUDAPath
-from .glsl_buffers import ComputePath, VulkanPath
-from .glsl_es import GLSLESPath
-from .glsl_path import GLSLPath
-from .lower_scene import MOST_UNROLLED, PASSES, PathPrograms
-from .metal import MetalPath
+from .interface import Interface
+from .lower_scene import PASSES, PathPrograms
 from .passes import pipeline
-from .path_dialect import PathDialect
 from .plan import sine_contract
 from .profiles import Profile
-from .targets import target_named
-from .wgsl import WGSLPath
+from .targets import integers_of, target_named
 
 SCHEMA = "wamnet-path-kernel-1"
 """Name and version of the manifest's form; described in spec/path_kernel.md."""
@@ -64,36 +57,15 @@ class PathArtifact(OneSource):
     planes: tuple[str, ...]
     manifest: Mapping[str, Any]
 
-
-def _no_dialect(lanes: int) -> None:
-    """The interpreter needs the programs alone."""
-
-
-SCHEDULES: Mapping[str, tuple[Callable[[int], PathDialect | None], tuple[int, ...]]] = {
-    "numpy": (_no_dialect, (1,)),
-    "opencl": (opencl_path.schedule, (1, *opencl_path.VECTORS)),
-    "opengl": (lambda lanes: GLSLPath(), (1,)),
-    "glsl-es": (lambda lanes: GLSLESPath(), (1,)),
-    "glsl-compute": (lambda lanes: ComputePath(), (1,)),
-    "glsl-vulkan": (lambda lanes: VulkanPath(), (1,)),
-    "wgsl": (lambda lanes: WGSLPath(), (1,)),
-    "cuda": (lambda lanes: CUDAPath(), (1,)),
-    "metal": (lambda lanes: MetalPath(), (1,)),
-    "c": (lambda lanes: CPath(), (1,)),
-}
-"""By target: the dialect for a number of paths at once, and the numbers that there are."""
-
-
-UNROLLED: Mapping[str, int] = {"opengl": 128, "glsl-es": 128}
-"""By target, where it is not MOST_UNROLLED: most primitives of a scene that become statements each. llvmpipe
-reads a table at a loop's counter lane by lane, so a loop that Mesa does not unroll itself (it does up to some
-30 trips) is two to four times slower than statements; but it compiles the statements of 100 primitives in 1
-to 5 s, those of 300 in 9 to 60 s (`python bench/primitives.py --executors opengl`)."""
+    @property
+    def interface(self) -> Interface:
+        """Return what the kernel is bound to, in its language."""
+        return interface.paths(len(self.planes), integers_of(self.target, interface.PATH))
 
 
 def most_unrolled(target: str) -> int:
     """Return the number of primitives above which a scene becomes tables and loops on a target."""
-    return UNROLLED.get(target, MOST_UNROLLED)
+    return target_named(target).unrolled
 
 
 def compile_path(
@@ -105,15 +77,13 @@ def compile_path(
 ) -> PathArtifact:
     """Return the kernel that follows the paths of a scene, `lanes` at once, and adds up groups of planes."""
     chosen, promised = target_named(target), profiles.unpinned(profile, "paths")
-    make, known = SCHEDULES[target]
-    if lanes not in known:
-        raise CompileError(
-            f"target {target} does not follow {lanes} paths at once; it can do {', '.join(map(str, known))}"
-        )
-    emitted, dialect = _passed(programs, promised.passes), make(lanes)
+    if lanes not in chosen.paths:
+        known = ", ".join(map(str, chosen.paths)) or "none: it has no path kernels"
+        raise CompileError(f"target {target} does not follow {lanes} paths at once; it can do {known}")
+    emitted, dialect = _passed(programs, promised.passes), chosen.paths[lanes]
     planes = tuple(emit_path.planes(groups))
     header = _header(programs, dialect.language if dialect else chosen.language, promised, lanes)
-    arguments = dialect.path_arguments if dialect else chosen.schedules[0].arguments
+    arguments = dialect.said[interface.PATH] if dialect else chosen.schedules[0].arguments
     arguments = arguments.format(lanes=lanes, planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
     if dialect is None:
         text, suffix, entry = _printed(emitted, header), chosen.suffix, chosen.entry
@@ -121,7 +91,7 @@ def compile_path(
         first, *others = arguments.split("\n")
         header += [f"arguments {first}", *(f"          {line}" for line in others)]
         text = emit_path.emit_path(emitted, dialect, groups, header)
-        suffix, entry = dialect.suffix, dialect.entry
+        suffix, entry = dialect.suffix, dialect.entries[interface.PATH]
     facts = {
         "target": target,
         "language": chosen.language,

@@ -92,6 +92,10 @@ class Schedule(ABC):
     def private_bytes(self, program: Program) -> int:
         """Return the bytes of the arrays that a work item declares."""
 
+    def called(self) -> Mapping[str, str]:
+        """Return the numbers that the text about its arguments has besides, by name."""
+        return {}
+
     def details(self, program: Program) -> Mapping[str, Any]:
         """Return what a caller must know besides, for the manifest."""
         return {}

@@ -19,7 +19,7 @@ from .emit_factors import factors_text
 from .emit_step import WindowForm, step_text, update_text
 from .ir import Program
 from .lower_step import lower_adam, lower_step
-from .opencl_path import schedule
+from .opencl_path import of_lanes
 from .passes import pipeline
 from .profiles import PROFILES
 from .step import Split, Step
@@ -70,7 +70,7 @@ def compile_step(
 
 def compile_lowered(step: Step, size: int) -> StepKernel:
     """Return the kernels of a step; its window has `size` runs."""
-    dialect = schedule(LANES)
+    dialect = of_lanes(LANES)
     emitted = replace(step, program=pipeline.run(step.program, PROFILES["ieee"].passes))
     operations = {node.op for node in emitted.program.nodes}
     helpers = [text for op, text in dialect.helpers.items() if op in operations]

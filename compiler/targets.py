@@ -7,10 +7,11 @@ take those in [`TARGETS`]. Targets whose kernels other programs run are in [`EXP
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..refimpl.errors import CompileError
+from . import opencl_path
 from .buffers_group import ComputeGroup, CUDAGroup, MetalGroup, VulkanGroup, WGSLGroup, groups
 from .c import C
 from .c_tiled import C_LADDER
@@ -19,11 +20,13 @@ from .dialect import Dialect
 from .emit_inlined import Inlined
 from .emit_packed import Packed
 from .glsl import GLSL
-from .glsl_buffers import ComputeDenoise, VulkanDenoise
+from .glsl_buffers import Compute, Vulkan
 from .glsl_compute import GLSL_COMPUTE
 from .glsl_es import GLSLES, GLSLESInlined, GLSLESPacked
 from .glsl_inlined import GLSL_LADDER
 from .hosts import GodotDenoise, ShadertoyDenoise
+from .interface import DENOISE, ENCODE, PATH
+from .lower_scene import MOST_UNROLLED
 from .metal import Metal
 from .opencl import OpenCL
 from .opencl_fourier import OPENCL_FOURIER
@@ -39,8 +42,11 @@ from .wgsl import WGSL
 class Target:
     """Something that runs kernels: how its source is made, and what its own sine promises.
 
-    `widest`: most channels of an image that a kernel reads, `most` of all that it writes; None: any number.
-    `assumes`: what a bound rests on that the language does not promise.
+    `dialect` is the language's, which the interpreter lacks; `paths` are the dialects of path kernels by the
+    number of paths that they follow at once, none where there are no path kernels, and `unrolled` is the most
+    primitives of a scene that become statements each. `widest`: most channels of an image that a kernel
+    reads, `most` of all that it writes; None: any number. `assumes`: what a bound rests on that the language
+    does not promise.
     """
 
     name: str
@@ -49,9 +55,17 @@ class Target:
     entry: str
     native_sine: SineContract
     schedules: tuple[Schedule, ...]
+    dialect: Dialect | None = None
+    paths: Mapping[int, Dialect | None] = field(default_factory=dict)
+    unrolled: int = MOST_UNROLLED
     widest: int | None = None
     most: int | None = None
     assumes: str = ""
+
+    @property
+    def encodes(self) -> bool:
+        """Return whether there are kernels that encode features."""
+        return self.dialect is None or ENCODE in self.dialect.said
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to other processes by name: schedules hold functions."""
@@ -64,14 +78,22 @@ def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
         dialect.target,
         dialect.language,
         dialect.suffix,
-        dialect.entry,
+        dialect.entries[DENOISE],
         dialect.native_sine,
         (Plain(dialect), *ladder),
+        dialect,
+        {1: dialect} if PATH in dialect.said else {},
         widest=dialect.channels_per_result,
         most=dialect.max_output_channels,
         assumes=dialect.assumes,
     )
 
+
+UNROLLED_BY_MESA = 128
+"""Most primitives of a scene that become statements each in fragment shaders. llvmpipe reads a table at a
+loop's counter lane by lane, so a loop that Mesa does not unroll itself (it does up to some 30 trips) is two
+to four times slower than statements; but it compiles the statements of 100 primitives in 1 to 5 s, those of
+300 in 9 to 60 s (`python bench/primitives.py --executors opengl`)."""
 
 TARGETS: Mapping[str, Target] = {
     target.name: target
@@ -83,9 +105,13 @@ TARGETS: Mapping[str, Target] = {
             "program",
             SineContract("np.sin, whose documentation promises nothing", None),
             (Printed(),),
+            paths={1: None},
         ),
-        _dialect_target(OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_GROUPS),
-        _dialect_target(GLSL(), *GLSL_LADDER, *GLSL_COMPUTE),
+        replace(
+            _dialect_target(OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_GROUPS),
+            paths={lanes: opencl_path.of_lanes(lanes) for lanes in opencl_path.LANES},
+        ),
+        replace(_dialect_target(GLSL(), *GLSL_LADDER, *GLSL_COMPUTE), unrolled=UNROLLED_BY_MESA),
     )
 }
 """The targets that the demo and the benchmark show, by the name of the executor that runs them."""
@@ -96,9 +122,12 @@ DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C(), *C_LADDE
 EXPORTED: Mapping[str, Target] = {
     target.name: target
     for target in (
-        _dialect_target(GLSLES(), Inlined(GLSLESInlined()), Packed(GLSLESPacked())),
-        _dialect_target(ComputeDenoise(), *groups(ComputeGroup(), 8)),
-        _dialect_target(VulkanDenoise(), *groups(VulkanGroup(), 8)),
+        replace(
+            _dialect_target(GLSLES(), Inlined(GLSLESInlined()), Packed(GLSLESPacked())),
+            unrolled=UNROLLED_BY_MESA,
+        ),
+        _dialect_target(Compute(), *groups(ComputeGroup(), 8)),
+        _dialect_target(Vulkan(), *groups(VulkanGroup(), 8)),
         _dialect_target(WGSL(), *groups(WGSLGroup(), 8)),
         _dialect_target(CUDA(), *groups(CUDAGroup())),
         _dialect_target(Metal(), *groups(MetalGroup())),
@@ -120,3 +149,9 @@ def target_named(name: str) -> Target:
 def schedule_named(target: str, name: str) -> Schedule:
     """Return the schedule of this name of a target."""
     return {schedule.name: schedule for schedule in target_named(target).schedules}[name]
+
+
+def integers_of(target: str, role: str) -> tuple[str, ...]:
+    """Return the integers that a target's kernels of a role are given."""
+    dialect = target_named(target).dialect
+    return dialect.integers[role] if dialect else ()

@@ -6,10 +6,9 @@ a compiler reorder a sum only where the result is at least as accurate, and a bo
 
 from __future__ import annotations
 
-from .dialect import Dialect
-from .encode_dialect import EncodeDialect
-from .glsl_buffers import BUFFERS, FIRST_IMAGE, GROUP, GROUPS
-from .path_dialect import PathDialect
+from .dialect import Dialect, Parts
+from .glsl_buffers import GROUP, SAID, Declared
+from .interface import BLOCK, DENOISE, ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
 from .profiles import SineContract
 
 ASSUMES = (
@@ -18,54 +17,31 @@ ASSUMES = (
 )
 """What a bound rests on."""
 
-SIZE = """\
-struct Size {{
-    width: i32,
-    height: i32,
-{more}}}
-@group(0) @binding(0) var<uniform> size: Size;
-"""
-"""The uniform buffer of the sizes."""
 
-PIXEL = f"""\
-@compute @workgroup_size({GROUP[0]}, {GROUP[1]})
-fn main(@builtin(global_invocation_id) invocation: vec3<u32>) {{{{
-    let width: i32 = size.width;
-    let height: i32 = size.height;
-    let x: i32 = i32(invocation.x);
-    let y: i32 = i32(invocation.y);
-    if (x >= width || y >= height) {{{{
-        return;
-    }}}}"""
-"""The start of the denoiser and of the encoding."""
-
-
-def sized(*more: str) -> str:
-    """Return the uniform buffer with further numbers."""
-    return SIZE.replace("{more}", "".join(f"    {text},\n" for text in more))
-
-
-def storage(binding: str, access: str, name: str, of: str = "f32") -> str:
-    """Return the declaration of a storage buffer."""
-    return f"@group(0) @binding({binding}) var<storage, {access}> {name}: array<{of}>;"
-
-
-class _WGSL(Dialect):
-    """What the three kernels have in common."""
+class WGSL(Declared):
+    """The dialect's table."""
 
     target = "wgsl"
     language = "WGSL"
     suffix = ".wgsl"
-    entry = "main"
     native_sine = SineContract("sin() of WGSL, which promises 2^-11 on [-pi, pi] alone, absolutely", None)
     assumes = ASSUMES
-    types = {"float32": "f32", "int32": "i32", "uint32": "u32", "bool": "bool"}
+    group_size = f"@compute @workgroup_size({GROUP[0]}, {GROUP[1]})"
+    places = "@builtin(global_invocation_id) invocation: vec3<u32>"
+    item = ("invocation.x", "invocation.y")
+    size = "size."
+    early = {
+        DENOISE: ("width", "height"),
+        PATH: ("width", "samples"),
+        ENCODE: ("width", "height"),
+    }
+    types = scalars = {"float32": "f32", "int32": "i32", "uint32": "u32", "bool": "bool"}
     magnitude = "abs({0})"
     counted = "for (var {i}: i32 = 0; {i} < {count}; {i}++) {{"
     define = "const {name}: i32 = {value};"
     choice = "select({2}, {1}, {0})"
-    max_output_channels = 2**16
     table = "const {name} = array<{type}, {count}>({values});"
+    load = "let {name}: f32 = sums[{plane} * plane + at];"
     operations = {
         **Dialect.operations,
         "absolute": "abs({0})",
@@ -74,6 +50,38 @@ class _WGSL(Dialect):
         "convert": "{type}({0})",
         "select": choice,
     }
+    said = SAID
+
+    def depth(self, parts: Parts) -> str:
+        """Return the definition of the number of scatterings."""
+        return f"const MAX_DEPTH: u32 = {parts.max_depth}u; /* scatterings of a path */"
+
+    def bounces(self) -> str:
+        """Return the line that opens the loop over a path's bounces."""
+        return "for (var bounce: u32 = 0u; bounce <= MAX_DEPTH; bounce++) {"
+
+    def declared(self, kernel: Interface) -> list[str]:
+        """Return the declarations of the integers and of all arrays."""
+        numbers = kernel.numbers()
+        return [
+            "struct Size {",
+            *(f"    {name}: {'u32' if name in UNSIGNED else 'i32'}," for name in kernel.integers),
+            "}",
+            "@group(0) @binding(0) var<uniform> size: Size;",
+            *(self.storage(array, numbers[array.name]) for array in kernel.by_number()),
+        ]
+
+    def storage(self, array: Array, number: int) -> str:
+        """Return the declaration of an array."""
+        name, kind = self.element(array)
+        if array.home == BLOCK:
+            return f"@group(0) @binding({number}) var<uniform> {name}: array<vec4<f32>, {array.quads}>;"
+        access = "read_write" if array.access == WRITE else "read"
+        return f"@group(0) @binding({number}) var<storage, {access}> {name}: array<{kind}>;"
+
+    def head(self, kernel: Interface) -> list[str]:
+        """Return the lines of the function up to its brace."""
+        return [self.group_size, f"fn main({self.places}) {{"]
 
     def let(self, dtype: str, name: str, value: str, kept: bool = False) -> str:
         """Return the declaration of a value."""
@@ -94,101 +102,3 @@ class _WGSL(Dialect):
     def index(self, name: str, value: str) -> str:
         """Return the declaration of a place in an image or a window."""
         return self.let("int32", name, value)
-
-
-class WGSL(_WGSL):
-    """The dialect's table for denoisers."""
-
-    first_binding = FIRST_IMAGE
-    image_declaration = storage("{binding}", "read", "image_{image}")
-    image_separator = "\n"
-    begin = f"""\
-{{defines}}
-{sized()}{storage("1", "read", "weights")}
-{storage("2", "read_write", "result")}
-{{images}}
-
-{PIXEL}"""
-    pixel = "image_{image}[(row * width + column) * {channels} + c]"
-    weight = "weights[{index}]"
-    store = "result[(y * width + x) * {channels} + {i}] = {value};"
-    arguments = (
-        f"{BUFFERS.format(sizes='width, height')}"
-        "1 the weights, 2 the result (width * height * {channels} floats, encoded as `output` says), 3 and\n"
-        f"on the images in this order. {GROUPS.format(rows='height')}"
-    )
-
-
-class WGSLPath(_WGSL, PathDialect):
-    """The dialect's table for paths."""
-
-    entry = "main"
-    lane_numbers = "0u"
-    bounces = "for (var bounce: u32 = 0u; bounce <= MAX_DEPTH; bounce++) {"
-    path_begin = f"""\
-const MAX_DEPTH: u32 = {{max_depth}}u; /* scatterings of a path */
-{sized("first_row: i32", "rows: i32", "first_sample: u32", "samples: i32", "seed_number: u32")}{
-        storage("2", "read_write", "sums")
-    }
-{{tables}}
-
-@compute @workgroup_size({GROUP[0]}, {GROUP[1]})
-fn main(@builtin(global_invocation_id) invocation: vec3<u32>) {{{{
-    let width: i32 = size.width;
-    let samples: i32 = size.samples;
-    let column: i32 = i32(invocation.x);
-    let row: i32 = i32(invocation.y);
-    if (column >= width || row >= size.rows) {{{{
-        return;
-    }}}}
-    let plane: i32 = size.rows * width;
-    let at: i32 = row * width + column;
-    let x: {{counter}} = {{column}} + {{lane_numbers}};
-    let y: {{counter}} = {{row}};
-    let seed: {{counter}} = {{seed}};"""
-    path_end = "}}"
-    uniforms = {
-        "column": "u32(column)",
-        "row": "u32(row + size.first_row)",
-        "seed": "size.seed_number",
-        "width": "f32(width)",
-        "height": "f32(size.height)",
-        "sample": "size.first_sample + u32(n)",
-    }
-    scalar_float = "f32({0})"
-    output_declaration = ""
-    sum_store = "sums[{plane} * plane + at] = {value};"
-    max_planes = 2**16
-    path_arguments = (
-        f"{BUFFERS.format(sizes='width, height, first_row, rows, first_sample, samples, seed_number')}"
-        "2 the sums, one plane of rows * width floats for each of:\n"
-        "{planes}.\n"
-        f"{GROUPS.format(rows='rows')}; invocation (x, y) follows pixel x of row first_row + y"
-    )
-
-
-class WGSLEncode(_WGSL, EncodeDialect):
-    """The dialect's table for encodings."""
-
-    entry = "main"
-    encode_begin = f"""\
-{sized("sample_count: i32")}{storage("1", "read", "sums")}
-{{outputs}}
-
-{PIXEL}
-    let plane: i32 = width * height;
-    let at: i32 = y * width + x;
-    let samples: f32 = f32(size.sample_count);"""
-    encode_end = "}}"
-    input_declaration = ""
-    output_declaration = storage("{binding}", "read_write", "image_{image}")
-    output_separator = "\n"
-    load = "let {name}: f32 = sums[{plane} * plane + at];"
-    image_store = "image_{image}[at * {channels} + {channel}] = {value};"
-    planes_per_input = 1
-    encode_arguments = (
-        f"{BUFFERS.format(sizes='width, height, sample_count')}"
-        "1 the sums, one plane of width * height floats for each of:\n"
-        "{planes};\n"
-        f"3 and on the images in this order. {GROUPS.format(rows='height')}"
-    )

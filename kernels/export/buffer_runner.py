@@ -16,13 +16,10 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact, OneSource
 from ...compiler.emit import output_channels
 from ...compiler.encode_kernel import EncodeArtifact
-from ...compiler.glsl_buffers import FIRST_IMAGE, GROUP
+from ...compiler.glsl_buffers import GROUP
+from ...compiler.interface import IMAGE, RESULT, SUMS, WEIGHTS, Interface
 from ...compiler.path_kernel import PathArtifact
-from ...compiler.weight_homes import INLINE
 from ..executor import Executor, Images, Part, gather_of
-
-READ, WRITTEN = 1, 2
-"""Bindings of what is read besides images, and of what is written."""
 
 
 @dataclass(frozen=True)
@@ -79,15 +76,14 @@ class BufferRunner(Executor):
         for kernel in artifact.kernels:
             height, width, _ = found[0].shape
             shape = (height, width, output_channels(kernel.program))
-            buffers = {WRITTEN: np.zeros(shape, np.float32)}
-            if not self.name.endswith(INLINE):
-                buffers[READ] = np.pad(
-                    kernel.weights, (0, -kernel.weights.size % 4 or 4 * (not kernel.weights.size))
-                )
-            buffers |= {FIRST_IMAGE + i: image for i, image in enumerate(found)}
+            weights = np.pad(kernel.weights, (0, -kernel.weights.size % 4 or 4 * (not kernel.weights.size)))
+            given = {RESULT: np.zeros(shape, np.float32), WEIGHTS: weights}
+            read = (image.name for image in kernel.interface.images)
+            given |= dict(zip(read, found, strict=True))
+            numbers, buffers = _numbered(kernel.interface, given)
             picked = kernel.manifest["schedule"]
             threads, group = (-(-width // picked["pixels"]), height), picked.get("group", GROUP)
-            launch = Launch((width, height), buffers, (WRITTEN,), threads, tuple(group))
+            launch = Launch((width, height), buffers, (numbers[RESULT],), threads, tuple(group))
             prepared = self._kernel(kernel, kernel.entry_point, len(found))
             found = [self._launch(prepared, launch)[0].reshape(shape)]
         return found[0]
@@ -100,18 +96,26 @@ class BufferRunner(Executor):
         shape = (len(kernel.planes), part.rows, part.width)
         sizes = (part.width, part.height, part.first_row, part.rows, part.first_sample)
         numbers = (*sizes, part.samples, part.seed)
-        buffers = {WRITTEN: np.zeros(shape, np.float32)}
-        launch = Launch(numbers, buffers, (WRITTEN,), (part.width, part.rows))
+        places, buffers = _numbered(kernel.interface, {SUMS: np.zeros(shape, np.float32)})
+        launch = Launch(numbers, buffers, (places[SUMS],), (part.width, part.rows))
         return self._launch(self._kernel(kernel, kernel.entry_point, 0), launch)[0].reshape(shape)
 
     def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
         _, height, width = sums.shape
         images = {i.name: np.zeros((height, width, i.channels), np.float32) for i in kernel.images}
-        buffers = {READ: sums}
-        buffers |= {FIRST_IMAGE + i: image for i, image in enumerate(images.values())}
-        places = [place for place in buffers if place >= FIRST_IMAGE]
+        written = {f"{IMAGE}{name}": image for name, image in images.items()}
+        numbers, buffers = _numbered(kernel.interface, {SUMS: sums, **written})
+        places = [numbers[name] for name in written]
         launch = Launch((width, height, samples), buffers, places, (width, height))
         found = self._launch(self._kernel(kernel, kernel.entry_point, len(images)), launch)
         return {
             name: flat.reshape(image.shape) for (name, image), flat in zip(images.items(), found, strict=True)
         }
+
+
+def _numbered(
+    interface: Interface, given: Mapping[str, NDArray[np.float32]]
+) -> tuple[Mapping[str, int], dict[int, NDArray[np.float32]]]:
+    """Return the number of each array of a kernel, and the given arrays by number: those that it binds."""
+    numbers = interface.numbers()
+    return numbers, {numbers[name]: data for name, data in given.items() if name in numbers}

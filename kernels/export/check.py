@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.weight_homes import INLINE, UNIFORM
+from ...compiler.interface import BLOCK, TABLE
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..bench import peer_onnxruntime
 from ..executor import Executor, Part
@@ -219,12 +219,12 @@ def runner(target: str, kernel: str) -> Executor:
     from . import compute_runner, gl_runner, host_pass_runner, host_runner, wgpu_runner
 
     if target in ("opencl", "glsl"):
-        if kernel.endswith((INLINE, UNIFORM)) and kernel != f"opencl:{UNIFORM}":
+        if kernel.endswith((TABLE, BLOCK)) and kernel != f"opencl:{BLOCK}":
             raise ExecutorUnavailable(f"nothing runs {target} here with weights in that place")
         opened = open_executor("opencl" if target == "opencl" else "opengl")
         opened.name = kernel
         return opened
-    if kernel == f"glsl-es:{UNIFORM}":
+    if kernel == f"glsl-es:{BLOCK}":
         raise ExecutorUnavailable(f"nothing runs {target} here with weights in that place")
     openers: Mapping[str, Callable[[], Executor]] = {
         "glsl-es": gl_runner.ESRunner,

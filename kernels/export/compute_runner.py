@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.glsl_compute import SHADER_VERSION
-from ...compiler.weight_homes import UNIFORM
+from ...compiler.interface import BLOCK, READ_NUMBER
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..opengl_executor import OpenGLExecutor
-from .buffer_runner import READ, BufferRunner, Launch
+from .buffer_runner import BufferRunner, Launch
 
 
 class ComputeRunner(BufferRunner):
@@ -48,7 +48,7 @@ class ComputeRunner(BufferRunner):
             for place, data in launch.buffers.items():
                 held[place] = self._context.buffer(np.ascontiguousarray(data).tobytes())
                 made.callback(held[place].release)
-                if place == READ and self.name.endswith(UNIFORM):
+                if place == READ_NUMBER and self.name.endswith(BLOCK):
                     held[place].bind_to_uniform_block(place)
                 else:
                     held[place].bind_to_storage_buffer(place)

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.weight_homes import INLINE
+from ...compiler.interface import FIRST_IMAGE, READ_NUMBER, TABLE, WRITTEN_NUMBER
 from ...refimpl.errors import ExecutorUnavailable
 from . import tools
-from .buffer_runner import READ, WRITTEN, BufferRunner, Launch
+from .buffer_runner import BufferRunner, Launch
 
 OPTIONS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")
 """Nothing here may allow what the standards do not."""
@@ -146,7 +146,7 @@ class HostRunner(BufferRunner):
 
     def _weights(self, buffer: str) -> list[str]:
         """Return the argument that holds weights, if they are one."""
-        return [] if self.name.endswith(INLINE) else [buffer]
+        return [] if self.name.endswith(TABLE) else [buffer]
 
     def _prepare(self, source: str, entry: str, count: int, group: tuple[int, int] | None) -> Any:
         self._count += 1
@@ -182,7 +182,7 @@ class HostRunner(BufferRunner):
 
 def _images(count: int) -> list[str]:
     """Return the texts of so many image buffers."""
-    return [f"buffers[{WRITTEN + 1 + i}]" for i in range(count)]
+    return [f"buffers[{FIRST_IMAGE + i}]" for i in range(count)]
 
 
 class CRunner(HostRunner):
@@ -194,7 +194,7 @@ class CRunner(HostRunner):
     options = ("-std=c99",)
 
     def _glue(self, source: str, entry: str, count: int, group: tuple[int, int] | None, folder: Path) -> str:
-        images, reads, writes = _images(count), f"buffers[{READ}]", f"buffers[{WRITTEN}]"
+        images, reads, writes = _images(count), f"buffers[{READ_NUMBER}]", f"buffers[{WRITTEN_NUMBER}]"
         part = ", ".join(["(uint32_t)sizes[4]" if i == 4 else f"sizes[{i}]" for i in range(6)])
         arguments = {
             "wamnet_pixel": [*images, *self._weights(reads), writes, *_sizes(2)],
@@ -220,7 +220,7 @@ class CUDARunner(HostRunner):
 
     def _glue(self, source: str, entry: str, count: int, group: tuple[int, int] | None, folder: Path) -> str:
         images = _images(count)
-        reads, writes = f"buffers[{READ}]", f"buffers[{WRITTEN}]"
+        reads, writes = f"buffers[{READ_NUMBER}]", f"buffers[{WRITTEN_NUMBER}]"
         arguments = {
             "wamnet_denoise": [*images, *self._weights(reads), writes, *_sizes(2)],
             "wamnet_trace": [writes, *_sizes(7)],

@@ -28,6 +28,7 @@ IMAGE_LINES: Mapping[str, str] = {
     "names": 'bind_texture({number}, {name}, "{name}");',
     "channels": "   {slot}: {name}",
     "arguments": "",
+    "header": "",
 }
 """How a line of the code binds an image, by the kind of slots."""
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from ...compiler.emit_inlined import LARGEST_WEIGHTS
 from ...compiler.glsl import WEIGHT_TEXTURE_WIDTH
+from ...compiler.interface import BLOCK, TABLE
 from ...compiler.schedules import PLAIN
-from ...compiler.weight_homes import INLINE, UNIFORM
 from . import tools
 
 BUFFER, TEXTURE = "buffer", "texture"
@@ -113,20 +113,20 @@ def _storage(
 ) -> dict[str, Place]:
     """Return the places of a target with storage buffers."""
     found = {BUFFER: Place(kernel, schedules)}
-    return found | {UNIFORM: Place(f"{kernel}:{UNIFORM}", limit=_block(uniform, name))} if uniform else found
+    return found | {BLOCK: Place(f"{kernel}:{BLOCK}", limit=_block(uniform, name))} if uniform else found
 
 
 def _tabled(kernel: str) -> dict[str, Place]:
     """Return the place of a table."""
-    return {INLINE: Place(f"{kernel}:{INLINE}", limit=TABLE_WEIGHTS, each=1.0)}
+    return {TABLE: Place(f"{kernel}:{TABLE}", limit=TABLE_WEIGHTS, each=1.0)}
 
 
 def _fragment(kernel: str, rows: int) -> dict[str, Place]:
     """Return the places of a fragment shader."""
     return {
         TEXTURE: Place(kernel, limit=_texture(rows), each=1 / WEIGHT_TEXTURE_WIDTH),
-        INLINE: Place(kernel, ("inlined",), limit=INLINED, each=1.0),
-        UNIFORM: Place(f"{kernel}:{UNIFORM}", limit=_block(16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE")),
+        TABLE: Place(kernel, ("inlined",), limit=INLINED, each=1.0),
+        BLOCK: Place(f"{kernel}:{BLOCK}", limit=_block(16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE")),
     }
 
 
@@ -155,23 +155,27 @@ glDisable(GL_FRAMEBUFFER_SRGB);
 glDrawArrays(GL_TRIANGLES, 0, 3);"""
 """Integration with OpenGL; helpers are the program's own."""
 
-BUFFERS_CODE = """\
+
+def _buffers_code(api: str, dispatch: str = DISPATCH) -> str:
+    """Return the integration with buffers that have numbers; helpers are the program's own."""
+    return f"""\
 /* All buffers hold 32-bit floats; images (height, width, channels), rows from the top. */
-{api} pipeline = create_pipeline("{file}", "{entry}");
+{api} pipeline = create_pipeline("{{file}}", "{{entry}}");
 bind_uniform(pipeline, 0, sizes);          /* int32: width, height */
 bind_storage(pipeline, 1, weights);        /* weights.bin */
 bind_storage(pipeline, 2, result);         /* width * height * 3 floats, display-encoded */
-{images}
+{{images}}
 {dispatch};
 wait();
 show(result);                              /* do not encode for the display again */"""
-"""Integration with buffers that have numbers; helpers are the program's own."""
 
-ARGUMENTS_CODE = """\
+
+def _arguments_code(call: str) -> str:
+    """Return the integration with functions."""
+    return f"""\
 /* Arrays of float: images (height, width, channels), rows from the top; weights as in weights.bin. */
 {call}
 /* result: width * height * 3 floats, display-encoded: do not encode them for the display again. */"""
-"""Integration with functions."""
 
 
 ROWS: tuple[Row, ...] = (
@@ -203,7 +207,7 @@ ROWS: tuple[Row, ...] = (
         _storage("glsl-compute", 16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE"),
         _as(".comp"),
         "numbered",
-        BUFFERS_CODE.replace("{api}", "GLuint").replace("{dispatch}", f"gl{DISPATCH}"),
+        _buffers_code("GLuint", f"gl{DISPATCH}"),
     ),
     Row(
         "glsl-es",
@@ -219,7 +223,7 @@ ROWS: tuple[Row, ...] = (
         VULKAN_PLACES,
         _as(".comp"),
         "numbered",
-        BUFFERS_CODE.replace("{api}", "VkPipeline").replace("{dispatch}", DISPATCH),
+        _buffers_code("VkPipeline"),
     ),
     Row(
         "wgsl",
@@ -227,7 +231,7 @@ ROWS: tuple[Row, ...] = (
         _storage("wgsl", 64 * KILOBYTE, "maxUniformBufferBindingSize"),
         _as(".wgsl"),
         "numbered",
-        BUFFERS_CODE.replace("{api}", "const").replace("{dispatch}", DISPATCH),
+        _buffers_code("const"),
         most_images=Limit("maxStorageBuffersPerShaderStage, less 2", 6, "use fewer features"),
     ),
     Row(
@@ -236,7 +240,7 @@ ROWS: tuple[Row, ...] = (
         VULKAN_PLACES,
         _hlsl,
         "registers",
-        BUFFERS_CODE.replace("{api}", "auto").replace("{dispatch}", DISPATCH),
+        _buffers_code("auto"),
     ),
     Row(
         "metal",
@@ -244,8 +248,8 @@ ROWS: tuple[Row, ...] = (
         _storage("metal", 64 * KILOBYTE, "constant memory of a kernel") | _tabled("metal"),
         _as(".metal"),
         "numbered",
-        BUFFERS_CODE.replace("{api}", "id<MTLComputePipelineState>").replace(
-            "{dispatch}",
+        _buffers_code(
+            "id<MTLComputePipelineState>",
             "dispatchThreadgroups(ceil(width / {across}), ceil(height / {down})) of {group_x} x {group_y}",
         ),
     ),
@@ -255,16 +259,16 @@ ROWS: tuple[Row, ...] = (
         VULKAN_PLACES,
         _spirv,
         "numbered",
-        BUFFERS_CODE.replace("{api}", "VkPipeline").replace("{dispatch}", DISPATCH),
+        _buffers_code("VkPipeline"),
     ),
     Row(
         "c",
         "C99, one header",
         {BUFFER: Place("c", IN_C), **_tabled("c")},
         _as(".h"),
-        "arguments",
+        "header",
         '#include "denoise.h"\n'
-        + ARGUMENTS_CODE.replace("{call}", "wamnet_image({arguments});")
+        + _arguments_code("wamnet_image({arguments});")
         + "\n/* wamnet_pixel does {columns} pixels of a row, for your own loops. Use -O3 -march=native:\n"
         "   tile8 wants registers of 8 floats (AVX2); for those of 4 (SSE, NEON) export --schedule tile4. */",
     ),
@@ -274,8 +278,7 @@ ROWS: tuple[Row, ...] = (
         _storage("cuda") | _tabled("cuda"),
         _as(".cu"),
         "arguments",
-        ARGUMENTS_CODE.replace(
-            "{call}",
+        _arguments_code(
             "dim3 block({group_x}, {group_y});\n"
             "dim3 grid((width + {across} - 1) / {across}, (height + {down} - 1) / {down});\n"
             "wamnet_denoise<<<grid, block>>>({arguments});\n"
@@ -285,7 +288,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         "shadertoy",
         "Shadertoy's tabs",
-        {INLINE: Place("shadertoy", ("inlined",), limit=INLINED, each=1.0)},
+        {TABLE: Place("shadertoy", ("inlined",), limit=INLINED, each=1.0)},
         _as(".glsl"),
         "channels",
         "1. Make buffers A, B, ... and paste features/feature.<name>.glsl into one each, in this order.\n"

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.weight_homes import UNIFORM
+from ...compiler.interface import BLOCK, READ_NUMBER
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from . import tools
-from .buffer_runner import READ, BufferRunner, Launch
+from .buffer_runner import BufferRunner, Launch
 
 WAY_OUT = "pip install 'wamnet[targets]', and a Vulkan driver: apt-get install mesa-vulkan-drivers"
 """How to get a device."""
@@ -95,7 +95,7 @@ class WgpuRunner(BufferRunner):
         held = {0: device.create_buffer_with_data(data=sizes, usage=usage.UNIFORM)}
         for place, data in launch.buffers.items():
             written = usage.COPY_SRC if place in launch.back else 0
-            kind = usage.UNIFORM if place == READ and self.name.endswith(UNIFORM) else usage.STORAGE
+            kind = usage.UNIFORM if place == READ_NUMBER and self.name.endswith(BLOCK) else usage.STORAGE
             held[place] = device.create_buffer_with_data(
                 data=np.ascontiguousarray(data).tobytes(), usage=kind | written
             )

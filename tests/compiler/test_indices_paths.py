@@ -15,9 +15,10 @@ from itertools import product
 
 import pytest
 
-from wamnet.compiler.encode_kernel import ENCODE_DIALECTS, compile_encode
+from wamnet.compiler.encode_kernel import compile_encode
 from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import SCHEDULES, compile_path
+from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.refimpl.dataset import Normalization
 from wamnet.refimpl.scenes import canonical
 from wamnet.refimpl.transport import Settings
@@ -127,8 +128,9 @@ def encode_text(target):
     return made.source, len(made.planes), {f"image_{image.name}": image.channels for image in made.images}
 
 
-CASES = [(path_text, target) for target in SCHEDULES if target != "numpy"]
-CASES += [(encode_text, target) for target in ENCODE_DIALECTS]
+WRITTEN = [target for target in {**DENOISERS, **EXPORTED}.values() if target.dialect]
+CASES = [(path_text, target.name) for target in WRITTEN if target.paths]
+CASES += [(encode_text, target.name) for target in WRITTEN if target.encodes]
 
 
 def check_picture(text, height, width):

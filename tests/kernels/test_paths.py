@@ -10,7 +10,8 @@ import pytest
 
 from wamnet.compiler.emit_path import FRAME_GROUPS
 from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import SCHEDULES, compile_path
+from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.targets import target_named
 from wamnet.kernels.executor import Part
 from wamnet.kernels.render_on import compile_scene, render_on
 from wamnet.refimpl import frame, scenes
@@ -88,7 +89,7 @@ def test_all_schedules_give_the_same_image(executor_named):
     """On one device vectors compute what numbers compute; 1e-5 leaves room for contraction."""
     executor = executor_named("opencl")
     programs, part = lower_scene(scene("cornell"), Settings(max_depth=3)), Part(29, 11, 0, 11, 0, 3, 1)
-    schedules = SCHEDULES["opencl"][1]
+    schedules = tuple(target_named("opencl").paths)
     assert schedules == (1, 4, 8, 16)
     kernels = [compile_path(programs, "opencl", lanes=lanes) for lanes in schedules]
     images = [executor.trace(kernel, part) for kernel in kernels]

@@ -10,7 +10,7 @@ import pytest
 
 from wamnet.compiler.ir import Type
 from wamnet.compiler.lower_scene import MOST_UNROLLED, lower_scene, primitives
-from wamnet.compiler.path_kernel import UNROLLED, compile_path, most_unrolled
+from wamnet.compiler.path_kernel import compile_path, most_unrolled
 from wamnet.compiler.trace import trace
 from wamnet.compiler.verify import verify
 from wamnet.kernels.executor import Part
@@ -125,7 +125,7 @@ def test_loops_begin_above_the_threshold(executor, more):
 def test_thresholds():
     """Lower bounds of what is known to be worth it: the canonical scenes are statements on every target."""
     assert MOST_UNROLLED == most_unrolled("opencl") == most_unrolled("numpy") == 32
-    assert most_unrolled("opengl") == UNROLLED["opengl"] == 128
+    assert most_unrolled("opengl") == 128
 
 
 def carried_about(surface):

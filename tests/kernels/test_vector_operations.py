@@ -7,8 +7,9 @@ import pytest
 
 from wamnet.compiler.ir import Node, Type
 from wamnet.compiler.lower_scene import lower_scene
+from wamnet.compiler.opencl_path import LANES, of_lanes
 from wamnet.compiler.ops import OPS
-from wamnet.compiler.path_kernel import SCHEDULES, compile_path
+from wamnet.compiler.path_kernel import compile_path
 from wamnet.refimpl import scenes
 from wamnet.refimpl.transport import Settings
 
@@ -16,12 +17,12 @@ EDGES = [0.0, -0.0, 0.25, -0.25, 1.0, -1.0, 2.5, -2.5, 1e30, -1e30, 2.0**23 - 0.
 """Numbers where a floor by cutting off, or a comparison in place of a function, could go wrong."""
 
 
-@pytest.mark.parametrize("lanes", SCHEDULES["opencl"][1][1:])
+@pytest.mark.parametrize("lanes", LANES[1:])
 @pytest.mark.parametrize("operation", ["absolute", "floor", "minimum", "maximum"])
 def test_operators_on_vectors_compute_what_numpy_computes(executor_named, lanes, operation):
     """All pairs of the edges; equal to the bit, but for the sign of zero, which comparisons do not see."""
     context = executor_named("opencl")._context
-    dialect = SCHEDULES["opencl"][0](lanes)
+    dialect = of_lanes(lanes)
     arity = OPS[operation].arity
     a, b = (part.ravel().astype(np.float32) for part in np.meshgrid(EDGES, EDGES))
     a, b = (np.resize(part, -(-len(a) // lanes) * lanes) for part in (a, b))

@@ -1,0 +1,131 @@
+"""What a kernel is bound to, as data: its role, its arrays, its integers. Everything that shows them follows.
+
+A dialect declares an interface in its own words [openings.py], the manifest of an export states it, and a
+device binds it: none of them lists arrays or integers again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from .ir import Image
+
+DENOISE, PATH, ENCODE = "denoise", "path", "encode"
+"""What a kernel does."""
+
+READ, WRITE = "read", "write"
+"""What a kernel does with an array."""
+
+BUFFER, BLOCK, TABLE = "buffer", "uniform", "inline"
+"""Homes of an array: memory, or a texture; a uniform block, or constant memory; a table in the source."""
+
+WEIGHTS, RESULT, SUMS, IMAGE = "weights", "result", "sums", "image_"
+"""Names of arrays; an image's name follows the last one."""
+
+UNSIGNED = ("first_sample", "seed_number")
+"""Integers of 32 bits without a sign; all others have one."""
+
+INTEGERS: Mapping[str, tuple[str, ...]] = {
+    DENOISE: ("width", "height"),
+    PATH: ("width", "height", "first_row", "rows", "first_sample", "samples", "seed_number"),
+    ENCODE: ("width", "height", "sample_count"),
+}
+"""The integers that a kernel is given, in order, by role; a dialect may know some of them by itself."""
+
+READ_NUMBER, WRITTEN_NUMBER, FIRST_IMAGE = 1, 2, 3
+"""Numbers of what is read, of what is written and of the first image; 0 are the integers."""
+
+
+@dataclass(frozen=True)
+class Array:
+    """An array of float32: `shape` in numbers, or in names of integers."""
+
+    name: str
+    access: str
+    shape: tuple[int | str, ...]
+    home: str = BUFFER
+
+    @property
+    def is_image(self) -> bool:
+        """Return whether it is a feature's image, before or after its encoding."""
+        return self.name.startswith(IMAGE)
+
+    @property
+    def quads(self) -> int:
+        """Return how many vectors of four hold a one-dimensional array."""
+        return -(-int(self.shape[0]) // 4)
+
+
+@dataclass(frozen=True)
+class Interface:
+    """All that a kernel is given, in the order of its arguments: arrays, then integers."""
+
+    role: str
+    arrays: tuple[Array, ...]
+    integers: tuple[str, ...]
+
+    def named(self, name: str) -> Array | None:
+        """Return the array of this name, if there is one."""
+        return next((array for array in self.arrays if array.name == name), None)
+
+    @property
+    def images(self) -> tuple[Array, ...]:
+        """Return the images, in order."""
+        return tuple(array for array in self.arrays if array.is_image)
+
+    @property
+    def place(self) -> tuple[str, str]:
+        """Return the names of an item's column and row: a path's are numbers of lanes besides."""
+        return ("column", "row") if self.role == PATH else ("x", "y")
+
+    @property
+    def rows(self) -> str:
+        """Return the integer that limits the row."""
+        return "rows" if self.role == PATH else "height"
+
+    def numbers(self) -> Mapping[str, int]:
+        """Return the number of each array, where arrays have numbers."""
+        found, free = {}, FIRST_IMAGE
+        for array in self.arrays:
+            if array.is_image:
+                found[array.name], free = free, free + 1
+            else:
+                found[array.name] = READ_NUMBER if array.access == READ else WRITTEN_NUMBER
+        return found
+
+    def by_number(self) -> list[Array]:
+        """Return the arrays in the order of their numbers."""
+        numbers = self.numbers()
+        return sorted(self.arrays, key=lambda array: numbers[array.name])
+
+    def without(self, name: str) -> Interface:
+        """Return the interface without an array."""
+        return replace(self, arrays=tuple(array for array in self.arrays if array.name != name))
+
+
+def _image(image: Image, access: str) -> Array:
+    """Return an image."""
+    return Array(f"{IMAGE}{image.name}", access, ("height", "width", image.channels))
+
+
+def denoiser(
+    images: Sequence[Image], weights: int, channels: int, home: str, integers: Sequence[str]
+) -> Interface:
+    """Return what a denoiser is given: images, so many weights at their home, and a result."""
+    found = [_image(image, READ) for image in images]
+    if home != TABLE:
+        found.append(Array(WEIGHTS, READ, (weights,), home))
+    found.append(Array(RESULT, WRITE, ("height", "width", channels)))
+    return Interface(DENOISE, tuple(found), tuple(integers))
+
+
+def paths(planes: int, integers: Sequence[str]) -> Interface:
+    """Return what a path kernel is given: planes of sums."""
+    return Interface(PATH, (Array(SUMS, WRITE, (planes, "rows", "width")),), tuple(integers))
+
+
+def encoding(planes: int, images: Sequence[Image], integers: Sequence[str]) -> Interface:
+    """Return what an encoding is given: planes of sums, and images to write."""
+    found = [Array(SUMS, READ, (planes, "height", "width")), *(_image(image, WRITE) for image in images)]
+    return Interface(ENCODE, tuple(found), tuple(integers))

@@ -1,0 +1,154 @@
+"""How a kernel on buffers opens: its arrays and integers are declared, an item finds its place, or ends.
+
+Three binding styles share it: arguments of a function [`Arguments`: C, OpenCL, CUDA], arguments with numbers
+(Metal), and declarations with numbers (GLSL for Vulkan and OpenGL 4.3, WGSL). Integers that are arguments are
+read by their names; those of a structure by `size` and their names, unless they are made variables: `early`
+before the guard, `late` after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from .dialect import Dialect, Parts
+from .interface import ENCODE, PATH, UNSIGNED, Array, Interface
+
+IMAGES = "each image: width * height * channels floats, rows from the top, channels interleaved"
+"""What images are."""
+
+WEIGHTS_RESULT = (
+    "weights; result: width * height * {channels} floats in the same order, encoded as `output` says"
+)
+"""What the other arrays of a denoiser are."""
+
+NUMBERS = "width, height of the image; first_row; rows; first_sample; samples to add up"
+"""What the integers of a path kernel are."""
+
+
+class Buffers(Dialect):
+    """Kernels whose arrays are buffers; `item` are the texts of an item's column and row.
+
+    `reach`: what a column is multiplied by where an item computes several pixels. `word`: a qualifier of
+    numbers that are read.
+    """
+
+    item: tuple[str, str]
+    reach: str = ""
+    size: str = ""
+    early: Mapping[str, Sequence[str]] = {}
+    late: Mapping[str, Sequence[str]] = {}
+    word: str = ""
+
+    def begin(self, kernel: Interface, parts: Parts) -> str:
+        """Return the text of a kernel up to its first statement."""
+        return "\n".join([*self.top(kernel, parts), *self.head(kernel), *self.opening(kernel)])
+
+    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what stands above the function."""
+        if kernel.role == PATH:
+            return [self.depth(parts), parts.top]
+        return [] if kernel.role == ENCODE else [parts.top]
+
+    def head(self, kernel: Interface) -> list[str]:
+        """Return the lines of the function up to its brace."""
+        raise NotImplementedError
+
+    def opening(self, kernel: Interface) -> list[str]:
+        """Return the first statements: the item's place, the guard, and what the role wants."""
+        early, late = self.variables(kernel, self.early), self.variables(kernel, self.late)
+        return [*early, *self.guard(kernel), *late, *self.start(kernel)]
+
+    def start(self, kernel: Interface) -> list[str]:
+        """Return the first statements that a role wants."""
+        if kernel.role == PATH:
+            return self.path_start(kernel)
+        return self.encode_start(kernel) if kernel.role == ENCODE else []
+
+    def guard(self, kernel: Interface) -> list[str]:
+        """Return the item's place, and the end of an item outside of the picture."""
+        names, limits = kernel.place, (self.integer(kernel, "width"), self.integer(kernel, kernel.rows))
+        column, row = (self.cast("int32", text) for text in self.item)
+        outside = " || ".join(f"{name} >= {limit}" for name, limit in zip(names, limits, strict=True))
+        return [
+            f"    {self.index(names[0], column + self.reach)}",
+            f"    {self.index(names[1], row)}",
+            f"    if ({outside}) {{",
+            "        return;",
+            "    }",
+        ]
+
+    def variables(self, kernel: Interface, named: Mapping[str, Sequence[str]]) -> list[str]:
+        """Return the declarations of integers of the structure that become variables."""
+        return [f"    {self.index(name, f'{self.size}{name}')}" for name in named.get(kernel.role, ())]
+
+    def integer(self, kernel: Interface, name: str) -> str:
+        """Return the text of an integer that the kernel is given."""
+        return name if name in self.early.get(kernel.role, ()) else f"{self.size}{name}"
+
+    # ---- places in memory --------------------------------------------------------------------------------
+
+    def offset(self, name: str, value: str) -> str:
+        """Return the declaration of a place in memory."""
+        return self.index(name, value)
+
+    def factor(self, text: str) -> str:
+        """Return a number as a factor of a place in memory."""
+        return text
+
+    def path_start(self, kernel: Interface) -> list[str]:
+        """Return the first statements of a path kernel: its place in the planes, pixel and seed."""
+        rows, width = (self.factor(self.integer(kernel, name)) for name in ("rows", "width"))
+        column, row = (self.factor(name) for name in kernel.place)
+        return [
+            f"    {self.offset('plane', f'{rows} * {width}')}",
+            f"    {self.offset('at', f'{row} * {width} + {column}')}",
+            *super().path_start(kernel),
+        ]
+
+    def encode_start(self, kernel: Interface) -> list[str]:
+        """Return the first statements of an encoding: its place in the planes, and the samples."""
+        height, width = (self.factor(self.integer(kernel, name)) for name in ("height", "width"))
+        column, row = (self.factor(name) for name in kernel.place)
+        return [
+            f"    {self.offset('plane', f'{width} * {height}')}",
+            f"    {self.offset('at', f'{row} * {width} + {column}')}",
+            f"    {self.samples(kernel)}",
+        ]
+
+    def samples(self, kernel: Interface) -> str:
+        """Return the declaration of the number of samples, as a float."""
+        value = self.cast("float32", self.integer(kernel, "sample_count"))
+        return self.word + self.let("float32", "samples", value)
+
+    def typed(self, name: str) -> str:
+        """Return the declaration of an integer, without what ends it."""
+        return f"{self.scalars['uint32' if name in UNSIGNED else 'int32']} {name}"
+
+
+class Arguments(Buffers):
+    """Kernels whose arrays and integers are arguments in a list: `heading` opens it.
+
+    `reads`, `writes`: an argument that is an array, by what the kernel does with it.
+    """
+
+    heading: str
+    reads: str
+    writes: str
+
+    def head(self, kernel: Interface) -> list[str]:
+        """Return the lines of the function up to its brace."""
+        listed = ",\n".join(f"    {each}" for each in self.listed(kernel))
+        return [f"{self.heading.format(entry=self.entries[kernel.role])}(", f"{listed})", "{"]
+
+    def listed(self, kernel: Interface) -> list[str]:
+        """Return all arguments."""
+        arrays = [self.array_argument(array) for array in kernel.arrays]
+        return [*arrays, *(self.typed(name) for name in kernel.integers)]
+
+    def array_argument(self, array: Array) -> str:
+        """Return an argument that is an array."""
+        return (self.writes if array.access == "write" else self.reads).format(name=array.name)
+
+    def cast(self, dtype: str, text: str) -> str:
+        """Return the text of a number converted to another kind."""
+        return f"({self.scalars[dtype]})" + (f"({text})" if " " in text else text)

@@ -372,17 +372,21 @@ __kernel void wamnet_update(
         }
         return;
     }
-{slopes}
+"""
+"""The second kernel up to the derivative."""
+
+UPDATE_ADAM = """\
     const float16 theta = old[i], m = old[COUNT + i], v = old[2 * COUNT + i];
     const float16 learning_rate = learning_rate_number, grown_1 = grown_1_number, grown_2 = grown_2_number;
 """
-"""The second kernel up to Adam, with braces as they are."""
+"""What follows the derivative, up to Adam."""
 
 SLOPES = """\
     float16 g = sums[i];
     for (int n = 1; n < groups; ++n) {
         g += sums[n * SUMS + i];
-    }"""
+    }
+"""
 """The derivative: the sum over all work items."""
 
 SLOPES_SPLIT = """\
@@ -393,7 +397,8 @@ SLOPES_SPLIT = """\
     float16 g = sums[i];
     for (int n = 1; n < groups && i < FACTORS; ++n) {
         g += sums[n * SUMS + i];
-    }"""
+    }
+"""
 """The same where a matrix is trained through its factors [emit_factors.py]."""
 
 
@@ -445,7 +450,7 @@ def update_text(step: Step, adam: Program, dialect: Dialect) -> str:
             value = f"t{ends['theta']}.s{lane:x}"
             lines.append(f"    if (neuron + {lane} < {slot.width}) {target.format(lane)} = {value};")
         lines.append("}")
-    begin = UPDATE_BEGIN.replace("{slopes}", SLOPES if step.split is None else SLOPES_SPLIT)
+    begin = UPDATE_BEGIN + (SLOPES if step.split is None else SLOPES_SPLIT) + UPDATE_ADAM
     return begin + "\n".join(f"    {line}" for line in lines) + "\n}\n"
 
 

@@ -2,7 +2,7 @@
 
 1. Get a context [`CONTEXTS`]: through EGL, or through OSMesa, which renders into main memory [`osmesa.py`].
 2. Upload images and weights as float textures; texel row 0 is the frame's top row.
-3. Draw one triangle that covers a float colour buffer of the image's size [`VERTEX_SHADER`], and read it
+3. Draw one triangle that covers a float colour buffer of the image's size [`CORNERS`], and read it
    back: fragment (x, y) computed the pixel in column x of row y, so rows need no turning.
 4. Of two passes the first one draws into as many buffers as its channels fill, which the second one reads
    [`OpenGLExecutor._draw_all`].
@@ -34,14 +34,14 @@ from .executor import Executor, Images, Part, black, gather_of, keep
 from .passes import PICTURE, Passes
 from .registry import CONTEXT_VARIABLE
 
-VERTEX_SHADER = """\
-#version 330 core
+CORNERS = """\
 void main()
 {
     gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
 }
 """
-"""A triangle from (-1, -1) to (3, -1) and (-1, 3): it covers the square of all pixels, without a seam."""
+"""A vertex shader below its version: a triangle from (-1, -1) to (3, -1) and (-1, 3), which covers the square
+of all pixels without a seam."""
 
 
 def _egl() -> Any:
@@ -102,10 +102,10 @@ class _Built:
 
 
 class OpenGLExecutor(Executor):
-    """One OpenGL context; another version of the language has another `vertex_shader`."""
+    """One OpenGL context; another version of the language has another `version`."""
 
     name = "opengl"
-    vertex_shader = VERTEX_SHADER
+    version = "#version 330 core"
 
     def __init__(self, context: str | None = None) -> None:
         kind, self._context = _open(context or os.environ.get(CONTEXT_VARIABLE) or "auto")
@@ -181,7 +181,8 @@ class OpenGLExecutor(Executor):
     def _program(self, source: str, made: ExitStack) -> tuple[Any, Any]:
         """Return the shaders and the triangle that they draw; `made` gives them back if something fails."""
         try:
-            program = self._context.program(vertex_shader=self.vertex_shader, fragment_shader=source)
+            corners = f"{self.version}\n{CORNERS}"
+            program = self._context.program(vertex_shader=corners, fragment_shader=source)
         except moderngl.Error as error:
             raise CompileError(f"{self.device} does not build the kernel: {error}") from None
         made.callback(program.release)

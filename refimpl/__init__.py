@@ -1,1 +1,1 @@
-"""The executable specification: every algorithm of wamnet in its plainest form, in NumPy alone."""
+"""The executable specification: every algorithm of wamnet in its plainest form, in NumPy only."""

@@ -37,8 +37,8 @@ PIXEL_TAG = 0x50495845
 """Counter `block` of the words that choose pixels ("PIXE" in ASCII); light paths use small numbers."""
 
 LARGEST_WINDOW_PX = 64
-"""Largest window: 64 x 64 pixels of 16 channels are 65,536 numbers a pixel, far beyond any use, and a typing
-error is told before it takes all memory."""
+"""Largest window: 64 x 64 pixels of 16 channels are 65,536 numbers a pixel, far beyond any use. A typing
+error is refused before it takes all memory."""
 
 
 LARGEST_SCALE = 1e18
@@ -212,7 +212,7 @@ class Window:
 def check_window(window: Window) -> None:
     """Refuse a size or a border rule that means nothing."""
     if not isinstance(window.size, int) or not 1 <= window.size <= LARGEST_WINDOW_PX:
-        rule = f"a whole number from 1 to {LARGEST_WINDOW_PX}"
+        rule = f"an integer from 1 to {LARGEST_WINDOW_PX}"
         raise InputError("window size", window.size, rule, "the paper's is 12")
     if window.border not in BORDERS:
         raise InputError("window border", window.border, "a known rule", f"use one of {', '.join(BORDERS)}")
@@ -436,7 +436,7 @@ def _check_pairs(pairs: Sequence[tuple[Frame, Frame]]) -> None:
 
 
 def _starts(lengths: Sequence[int]) -> Indices:
-    """Return where each of several runs begins when they lie end to end."""
+    """Return where each of several runs begins when they follow one another."""
     return np.cumsum([0, *lengths[:-1]], dtype=np.int64)
 
 
@@ -448,7 +448,7 @@ def examples_at(dataset: Dataset, frame: Indices, y: Indices, x: Indices) -> tup
 
 
 def places_of(dataset: Dataset, frame: Indices, y: Indices, x: Indices) -> tuple[Indices, Indices, Indices]:
-    """Return where the examples of pixels frame, y, x (N,) lie, each (N,).
+    """Return the places of the examples of pixels frame, y, x (N,), each (N,).
 
     The pixel of `values` at the window's first corner, pixels from row to row there, the row of `targets`.
     """
@@ -471,7 +471,7 @@ def sample_pixels(
 
 
 def sample_indices(seed: int, stream: int, tag: int, count: int, n: int) -> Indices:
-    """Draw (count,) whole numbers in [0, n), with replacement: floor(word n / 2**32), n < 2**31.
+    """Draw (count,) integers in [0, n), with replacement: floor(word n / 2**32), n < 2**31.
 
     Number i of a stream is made of word i % 4 of the block (seed, i // 4, stream, tag).
     """

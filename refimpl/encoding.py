@@ -9,7 +9,7 @@
 
 Only the transfer function is taken from sRGB: no colour space is converted, the three channels stay what the
 scene says they are. The clip is the one step that loses information, so `from_display` inverts `to_display`
-on [0, 2**-exposure_stops] alone.
+only on [0, 2**-exposure_stops].
 """
 
 from __future__ import annotations

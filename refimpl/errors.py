@@ -1,9 +1,9 @@
-"""Errors that a user can cause, and the one form in which they are told.
+"""Errors that a user can cause, and the one form in which they are reported.
 
 Every message is one line with four parts: what is wrong, its value, the rule that it breaks, and the way out.
 Programs catch [`WamnetError`]; the command line prints its text and exits with status 2.
 
-Parts of a message come from files of strangers, and a terminal obeys what it is shown: [`escaped`] replaces
+Parts of a message come from untrusted files, and a terminal obeys what it is shown: [`escaped`] replaces
 its control characters, and [`shown`] also makes one line of a stated length.
 """
 
@@ -14,7 +14,7 @@ LONGEST_MESSAGE = 1000
 
 _MOST_OF_WHAT, _MOST_OF_VALUE, _MOST_OF_RULE = 200, 120, 320
 """Most characters of a message's parts: the name of the thing, its value, the rule and, as long, the way out.
-Together with what stands between them they are at most LONGEST_MESSAGE."""
+Together with the text between them they are at most LONGEST_MESSAGE."""
 
 
 def escaped(text: str) -> str:
@@ -55,13 +55,13 @@ class InputError(WamnetError, ValueError):
     """
 
     def __init__(self, what: str, value: object, rule: str, way_out: str) -> None:
-        told = shown(value if isinstance(value, str) else repr(value), _MOST_OF_VALUE)
+        given = shown(value if isinstance(value, str) else repr(value), _MOST_OF_VALUE)
         thing, law, help_ = (
             shown(what, _MOST_OF_WHAT),
             shown(rule, _MOST_OF_RULE),
             shown(way_out, _MOST_OF_RULE),
         )
-        super().__init__(f"{thing} is {told}: {law}; {help_}")
+        super().__init__(f"{thing} is {given}: {law}; {help_}")
         self.what, self.value, self.rule, self.way_out = what, value, rule, way_out
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, object, str, str]]:
@@ -70,7 +70,7 @@ class InputError(WamnetError, ValueError):
 
 
 class TrainingError(WamnetError):
-    """Training cannot go on, for example because the loss is no longer finite."""
+    """Training cannot continue, for example because the loss is no longer finite."""
 
 
 class CompileError(WamnetError):

@@ -98,7 +98,7 @@ def _power_of_ones(n: int, shared: float, exponent: float) -> Array:
 def start(weight: Array, size: int, rank: int) -> Factors:
     """Return factors to begin training with: those of [`cut`], scaled to the norm of the weights.
 
-    The initial weights are random: cut alone they would be smaller, and so would all that follows.
+    The initial weights are random: a cut without scaling would make them smaller, and so all that follows.
     """
     factors = cut(weight, size, rank)
     norm, left = (float(np.linalg.norm(w.astype(np.float64))) for w in (weight, expand(factors)))

@@ -50,7 +50,9 @@ LAYERS: Mapping[str, Layer] = {
         Layer("position", 3, "first hit in world space, in scene units; 0 where nothing is hit"),
         Layer("direction", 3, "unit direction of the camera ray in world space"),
         Layer(
-            "unshadowed", 3, "radiance of the first hit by the lamps alone, were nothing in between, if matt"
+            "unshadowed",
+            3,
+            "radiance of the first hit from the lamps only, if it were matte and nothing were in between",
         ),
     )
 }

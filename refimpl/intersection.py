@@ -5,7 +5,7 @@
 2. [`closest_hit`] asks the room and each shape, row by row [`fold_distances`], for the distance along the ray
    and keeps the least positive one with its id. The formulas are the shapes' own (shapes/).
 3. [`surface_at`] evaluates the winner once more for its normal, and looks its material up by id.
-4. [`occluded`] is the shadow ray's question: does anything stand between two points?
+4. [`occluded`] is the shadow ray's question: does anything block the line between two points?
 5. [`spawn_origin`] lifts an origin off its surface, by an amount that follows the rounding error of a hit.
 
 Of coincident faces the primitive listed first wins, since a later one must be strictly closer. Normals always

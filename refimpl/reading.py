@@ -1,8 +1,8 @@
-"""Reading what a stranger may have written: nothing is believed before it was looked at.
+"""Reading untrusted files: nothing is believed before it is checked.
 
 1. A file must be a regular one of at most a stated length. It is looked at before it is opened, opened
    without waiting, and no more than that length is read [`read_file`].
-2. JSON is UTF-8 with limits on nesting, on the number of values and on the length of a number; a key stands
+2. JSON is UTF-8 with limits on nesting, on the number of values and on the length of a number; a key appears
    once in an object, and every number is finite [`parse_json`].
 3. A dataclass is made from JSON's values by the annotations of its fields [`to_dataclass`].
 4. What else goes wrong while content becomes values is one error of ours [`refusing`].
@@ -46,7 +46,7 @@ BROKEN = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeErro
 """What Python raises while content of another form than expected is taken apart."""
 
 _HALF_CHARACTER = re.compile(r"\\u[dD][89a-fA-F]")
-"""Where half a character (a surrogate) may stand in a JSON text."""
+"""Where half a character (a surrogate) may be in a JSON text."""
 
 _Built = TypeVar("_Built")
 
@@ -97,7 +97,7 @@ def _check_regular(found: os.stat_result, what: str, shown: str) -> None:
 
 
 def check_room(needed: int, what: str, shown: object, way_out: str) -> None:
-    """Refuse what would take more memory, in bytes, than this process can get; nothing was asked for yet."""
+    """Refuse what would take more memory, in bytes, than this process can get; nothing is allocated yet."""
     free = _free_bytes()
     if needed > free:
         rule = f"it would take {needed / 2**20:,.0f} MiB of memory, and {free / 2**20:,.0f} MiB are free"
@@ -133,7 +133,7 @@ def stated_bytes(manifest: Mapping[str, Any], name: str, what: str, way_out: str
     sizes = manifest[SIZES]
     size = sizes.get(name) if isinstance(sizes, dict) else None
     if type(size) is not int or size < 0:
-        rule = "it must be the file's length in bytes, a whole number"
+        rule = "it must be the file's length in bytes, an integer"
         raise InputError(f"{what}: {SIZES}: {name}", size, rule, way_out)
     return size
 
@@ -146,7 +146,7 @@ SIZES = "file_bytes"
 
 
 def parse_json(text: str | bytes, what: str, way_out: str, most: int = LARGEST_JSON_BYTES) -> Any:
-    """Return the value of a JSON text; refuse what is none, or beyond the limits above."""
+    """Return the value of a JSON text; refuse what is not JSON, or beyond the limits above."""
 
     def refused(rule: str) -> InputError:
         beginning = text[:_BEGINNING] if isinstance(text, str) else text[:_BEGINNING].decode(errors="replace")
@@ -204,7 +204,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(made) != len(pairs):
         seen: set[str] = set()
         twice = next(key for key, _ in pairs if key in seen or seen.add(key))  # type: ignore[func-returns-value]
-        raise ValueError(f"the key {twice[:40]!r} stands there twice")
+        raise ValueError(f"the key {twice[:40]!r} appears twice")
     return made
 
 
@@ -225,7 +225,7 @@ def _deeper_than(value: Any, depth: int) -> bool:
 
 
 def _unusual(value: Any, path: str) -> Iterator[tuple[str, str, str]]:
-    """Yield path, value and rule of what stands in a value and is no number or no text; it is not deep."""
+    """Yield path, value and rule of the invalid numbers and texts in a value that is not deep."""
     if isinstance(value, str) and _has_half_character(value):
         yield path, ascii(value), HALF
     elif isinstance(value, float) and not math.isfinite(value):
@@ -239,7 +239,7 @@ def _unusual(value: Any, path: str) -> Iterator[tuple[str, str, str]]:
             yield from _unusual(item, f"{path}.{key}")
 
 
-HALF = "half a character (a surrogate alone) cannot be written to a file"
+HALF = "half a character (a lone surrogate) cannot be written to a file"
 """The rule of a text that UTF-8 cannot hold."""
 
 
@@ -260,7 +260,7 @@ def refusing(what: str, value: object, rule: str, way_out: str) -> Iterator[None
 
 
 def _reason(error: BaseException) -> str:
-    """Return what an exception of Python says; a missing key says its name alone."""
+    """Return what an exception of Python says; a missing key says only its name."""
     return f"{error} is missing" if isinstance(error, KeyError) else str(error) or type(error).__name__
 
 
@@ -281,7 +281,7 @@ def to_dataclass(
 ) -> _Built:
     """Make the dataclass `kind` from a JSON object, each field by its annotation.
 
-    `path` is where the object stands, `largest` the largest magnitude of its numbers. Unknown keys, missing
+    `path` is where the object is, `largest` the largest magnitude of its numbers. Unknown keys, missing
     ones without a default (of a `whole` record all missing ones), and values of another type are refused.
     """
     if not isinstance(data, dict):
@@ -354,13 +354,13 @@ def _number(value: Any, path: str, largest: float) -> float:
 
 
 _LARGEST_DOUBLE = float.fromhex("0x1.fffffffffffffp+1023")
-"""Python's whole numbers are larger."""
+"""Python's integers can be larger."""
 
 
 def _count(value: Any, path: str) -> int:
     """Return a JSON number that is whole, and is written so."""
     if type(value) is not int:
-        raise InputError(path, _shortened(value), "it must be a whole number", "write it without a point")
+        raise InputError(path, _shortened(value), "it must be an integer", "write it without a point")
     return value
 
 
@@ -376,5 +376,5 @@ def _text(value: Any, path: str) -> str:
     if not isinstance(value, str):
         raise InputError(path, value, "it must be a text", "put it in quotation marks")
     if _has_half_character(value):
-        raise InputError(path, ascii(value), HALF, "mend the text")
+        raise InputError(path, ascii(value), HALF, "fix the text")
     return value

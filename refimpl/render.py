@@ -4,7 +4,7 @@
 2. [`trace`] sends one path through each pixel of a tile and follows them until none is alive; paths that have
    ended leave the arrays, which is the only thing that this driver does for speed.
 3. Means and variances are taken over the samples in their order, in float64. A pixel's random numbers depend
-   on (seed, pixel, sample) alone, so neither tile size nor row range changes a bit of the result.
+   only on (seed, pixel, sample), so neither tile size nor row range changes a bit of the result.
 4. The features may be means over more camera rays than are followed to the end: they cost a fraction of a
    path, and show edges without jags. They are then the layers of a job without scattering [`feature_job`],
    [`with_own_features`].
@@ -45,7 +45,7 @@ FEATURE_SPP = "feature_spp"
 
 @dataclass(frozen=True)
 class Job:
-    """What to render, besides the scene: size in pixels, samples per pixel, seed, transport, float type.
+    """How to render a scene: size in pixels, samples per pixel, seed, transport, float type.
 
     `first_sample` is the number of the first sample: jobs with different ranges are independent parts of one
     render. `feature_spp` is the number of camera rays whose first hits the feature layers are means over; 0,
@@ -193,7 +193,7 @@ def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: in
         if depth == job.settings.max_depth:
             break
         path, alive = transport.scatter(world, path, surface, hit, rng.counter(depth), counters)
-        # Put down what paths that end have gathered, and go on with the others.
+        # Store what paths that end have gathered, and continue with the others.
         ended = np.flatnonzero(~alive)
         color[lanes[ended]] = path.radiance[ended]
         if len(ended) > 0:

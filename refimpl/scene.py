@@ -148,7 +148,7 @@ def from_json(text: str | bytes) -> Scene:
 
     Raises InputError, with the path of the value, where it breaks a rule.
     """
-    data = parse_json(text, "scene", "mend the text: a scene is a JSON object")
+    data = parse_json(text, "scene", "fix the text: a scene is a JSON object")
     if not isinstance(data, dict):
         raise InputError("scene text", data, "a scene is a JSON object", "take one from `wamnet scene`")
     form, version = data.pop("format", None), data.pop("version", None)
@@ -173,7 +173,7 @@ def _material(value: Any, path: str) -> Material:
 
 
 SPECIAL: Special = {Material: _material}
-"""Fields that are not made by their annotation alone."""
+"""Fields whose annotation does not say how they are made."""
 
 # -----------------------------------------------------------------------------------------------------------
 # Rules
@@ -185,7 +185,7 @@ def validate(scene: Scene) -> Scene:
     """Return the scene itself, or raise InputError with the path of the first value that breaks a rule."""
     _check_camera(scene.camera)
     rule = f"all numbers must be finite and at most {LARGEST_NUMBER:g} in magnitude"
-    _check(scene.background, "scene.background", _is_finite, rule, "mend the number")
+    _check(scene.background, "scene.background", _is_finite, rule, "fix the number")
     _check(
         scene.background, "scene.background", _not_negative, "radiance must not be negative", "use 0 or more"
     )
@@ -241,7 +241,7 @@ def _check_finite(part: Any, path: str) -> None:
     for f in fields(part):
         value = getattr(part, f.name)
         rule = f"all numbers must be finite and at most {LARGEST_NUMBER:g} in magnitude"
-        _check(value, f"{path}.{f.name}", _is_finite, rule, "mend the number")
+        _check(value, f"{path}.{f.name}", _is_finite, rule, "fix the number")
 
 
 def _check_camera(camera: Camera) -> None:
@@ -289,7 +289,7 @@ def _check_room(room: Room, path: str) -> None:
         _check(reflectance, f"{path}.reflectances[{i}]", _is_share, *_SHARE_RULE)
     if len(room.materials) not in (0, len(WALLS)):
         count = f"{len(room.materials)} entries"
-        raise InputError(f"{path}.materials", count, "they must be six or none", "use null for matt walls")
+        raise InputError(f"{path}.materials", count, "they must be six or none", "use null for matte walls")
     for i, material in enumerate(room.materials):
         _check_material(material, f"{path}.materials[{i}]", has_inside=False)
 
@@ -298,7 +298,7 @@ def _check_material(material: Material | None, path: str, has_inside: bool) -> N
     if material is None:
         return
     if material.transmits and not has_inside:
-        rule = "light passes into closed bodies alone"
+        rule = "light passes only into closed bodies"
         raise InputError(path, material.kind, rule, "give it to a box or a sphere; use a thin box for a pane")
     _check_finite(material, path)
     material.check(path)

@@ -48,7 +48,7 @@ def minicubes(time: float = 0.0, warm: Vector = WARM, cool: Vector = COOL) -> Sc
     """Return the scene of the mini cubes at a time in seconds; light colours are parameters."""
     white, red, green = (0.74, 0.74, 0.72), (0.70, 0.26, 0.22), (0.26, 0.56, 0.30)
     room = Room((-2.0, -2.0, -2.0), (2.0, 2.0, 2.0), (red, green, white, white, (0.42, 0.46, 0.66), white))
-    # The warm light hangs below the ceiling, the cool one stands before the right wall.
+    # The warm light hangs below the ceiling, the cool one is in front of the right wall.
     ceiling = Light((-1.1, 1.98, -0.5), (1.2, 0.0, 0.0), (0.0, 0.0, 1.2), warm, 48.0)
     side = Light((1.98, -0.6, -1.2), (0.0, 0.0, 1.0), (0.0, 1.4, 0.0), cool, 30.0)
     camera = Camera((0.0, 0.25, 6.6), (0.0, -0.05, 0.0), vertical_fov_deg=41.0)
@@ -79,7 +79,7 @@ def _turn(angle_rad: float) -> Matrix:
 
 
 def glossy(time: float = 0.0, roughness: float = 0.22, ior: float = 1.5) -> Scene:
-    """Return a turntable with balls of glass, gold and matt coral, blocks of copper and glass, and a mirror.
+    """Return a turntable with balls of glass, gold and matte coral, blocks of copper and glass, and a mirror.
 
     roughness is that of the gold ball, ior that of the glass.
     """
@@ -121,7 +121,7 @@ def glossy(time: float = 0.0, roughness: float = 0.22, ior: float = 1.5) -> Scen
 
 
 def daylight(time: float = 0.0, sun_concentration: float = 400.0) -> Scene:
-    """Return a gold ball, a glass ball and a matt block on a plain, under a sky whose sun goes round.
+    """Return a gold ball, a glass ball and a matte block on a plain, under a sky whose sun goes round.
 
     sun_concentration is that of the sun's lobe: the lower, the softer its shadows.
     """

@@ -84,7 +84,7 @@ def site(materials: Materials, surface: Surface, hit: Hit, direction: Directions
 def scattered(
     materials: Materials, at: Site, hit: Hit, u0: Floats, u1: Floats, u_choice: Floats
 ) -> Scattered:
-    """Return how paths go on, each by the material of its surface, for three uniform numbers (...)."""
+    """Return how paths continue, each by the material of its surface, for three uniform numbers (...)."""
     first, others = _ask(materials, at, hit, lambda kind, own: kind.sample(own, u0, u1, u_choice))
     direction, beta, pdf, through = first
     for is_kind, other in others:

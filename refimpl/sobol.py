@@ -4,7 +4,7 @@
    has bits. Sobol, 1967; direction numbers of Joe and Kuo, "Constructing Sobol Sequences with Better
    Two-Dimensional Projections", SIAM Journal on Scientific Computing 30(5), 2008 [`DIRECTIONS`].
 2. [`scramble`] permutes [0, 1) so that halves, quarters, ... keep together (Owen, "Randomly Permuted
-   (t,m,s)-Nets and (t,s)-Sequences", 1995), by a hash that carries bits upwards alone: Laine and Karras,
+   (t,m,s)-Nets and (t,s)-Sequences", 1995), by a hash that carries bits only upwards: Laine and Karras,
    "Stratified Sampling for Stochastic Transparency", 2011, on reversed bits.
 3. [`uniforms`] takes the place of rng.py's function of the same arguments: each block of each pixel has its
    own scrambling, and its own order of the same points, so that blocks are independent of each other.
@@ -33,11 +33,10 @@ BITS = 32
 """Bits of an index and of a point's coordinate."""
 
 ORDER_KEY, SCRAMBLE_KEY = 0xFFFFFFFF, 0xFFFFFFFE
-"""What stands in the sample's place when rng.py's hash makes the keys of a block: its order, its
-scramblings."""
+"""What replaces the sample when rng.py's hash makes the keys of a block: of its order, of its scramblings."""
 
 MULTIPLIERS = (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6)
-"""Multipliers of Laine and Karras. They are even, so that a bit changes with lower bits alone."""
+"""Multipliers of Laine and Karras. They are even, so that a bit changes only with lower bits."""
 
 SWAPS = ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555))
 """Distance and mask of the swaps that reverse the bits of a word, after its halves."""

@@ -6,11 +6,11 @@
 3. Compute the mean squared error of display-encoded colour and its derivative [`loss_and_gradients`].
 4. Follow it with Adam, at a learning rate given by the schedule [`SCHEDULES`]; where the recipe asks for a
    first layer of low rank, its factors are what moves [`factored`].
-5. Everything that the next step depends on is in [`TrainState`], so training can stop after any step and go
-   on later to the same bits [`state_to_arrays`], [`state_from_arrays`].
+5. Everything that the next step depends on is in [`TrainState`], so training can stop after any step and
+   resume later to the same bits [`state_to_arrays`], [`state_from_arrays`].
 
 Source: *WAMnet for Image Denoising* for the protocol of the preset `paper`. No generator has a state:
-minibatch k depends on (seed, k) alone. Bits repeat on one machine with one BLAS and one number of BLAS
+minibatch k depends only on (seed, k). Bits repeat on one machine with one BLAS and one number of BLAS
 threads; another BLAS sums in another order.
 """
 
@@ -133,7 +133,7 @@ def check_recipe(recipe: Recipe) -> None:
     for name, least in counts.items():
         value = getattr(recipe, name)
         if not isinstance(value, int) or not least <= value < POOL_STREAM:
-            rule = f"a whole number from {least} to {POOL_STREAM - 1}"
+            rule = f"an integer from {least} to {POOL_STREAM - 1}"
             raise InputError(f"recipe: {name}", value, rule, "see the presets " + ", ".join(PRESETS))
     if not (math.isfinite(recipe.learning_rate) and recipe.learning_rate > 0):
         raise InputError("recipe: learning_rate", recipe.learning_rate, "finite and > 0", "try 0.001")
@@ -247,7 +247,7 @@ def start(
 
 
 def _check_network(network: Siren, recipe: Recipe) -> None:
-    """Refuse to go on with a network of another shape than the recipe's."""
+    """Refuse to continue with a network of another shape than the recipe's."""
     has = (network.widths, network.omega_0_first, network.omega_0_hidden, network.activation)
     wants = (recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden, recipe.activation)
     if has != wants:
@@ -270,7 +270,7 @@ def train(
 ) -> TrainState:
     """Train on (noisy, reference) pairs from the start or from `state`, up to step `until` (all by default).
 
-    A start from `network` goes on with its weights, cut to the recipe's rank; else they are random.
+    A start from `network` begins with its weights, cut to the recipe's rank; else they are random.
     `on_progress` is called every recipe.log_every steps and after the last. `on_checkpoint` is called every
     `checkpoint_every` steps, after the last, on an interrupt, and before TrainingError is raised: then
     with the last state whose loss is finite, if this call has seen one.
@@ -326,7 +326,7 @@ def resumed(state: TrainState, recipe: Recipe, digest: str) -> TrainState:
     same = replace(recipe, steps=state.recipe.steps, log_every=state.recipe.log_every)
     if same != state.recipe:
         names = [name for name in asdict(same) if getattr(same, name) != getattr(state.recipe, name)]
-        rule = "a resumed run keeps its recipe, but for steps and log_every"
+        rule = "a resumed run keeps its recipe, except for steps and log_every"
         raise InputError("changed parts of the recipe", ", ".join(names), rule, "start a new run")
     if digest != state.digest:
         rule = f"the run was started on frames with digest {state.digest[:12]}"
@@ -383,7 +383,7 @@ def draw_pool(recipe: Recipe, data: Dataset) -> Pixels | None:
 
 
 def draw_batch(recipe: Recipe, step: int, data: Dataset, pool: Pixels | None) -> Pixels:
-    """Draw the pixels of one minibatch, a function of (recipe.seed, step) alone."""
+    """Draw the pixels of one minibatch, which depends only on (recipe.seed, step)."""
     if pool is None:
         return dataset.sample_pixels(recipe.seed, step, recipe.batch, data.shapes)
     pick = draw_picks(recipe, step)

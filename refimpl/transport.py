@@ -8,13 +8,13 @@ A path starts at the camera [`camera_path`]. At each vertex
    between [`direct_light`] (next-event estimation);
 3. it then samples a direction by the surface's material, and multiplies the throughput beta by f cos / pdf
    (shading.py; for a Lambertian surface that is just the reflectance);
-4. a path ends where nothing was hit, and by Russian roulette if asked for. Drivers end it after `max_depth`
+4. a path ends where nothing was hit, and by Russian roulette if enabled. Drivers end it after `max_depth`
    scatterings, with the emission that the last direction meets.
 
 Both ways to find a light are combined by multiple importance sampling (Veach, "Robust Monte Carlo Methods
-for Light Transport Simulation", 1997, chapter 9) with the balance or the power heuristic; each way alone is
-an unbiased estimator as well, which the tests use. Emission of surfaces that are no lights, and of a
-constant background, is found by the second way alone and has weight 1; so has whatever a mirrored or
+for Light Transport Simulation", 1997, chapter 9) with the balance or the power heuristic; each way by itself
+is an unbiased estimator as well, which the tests use. Emission of surfaces that are not lights, and of a
+constant background, is found only by the second way and has weight 1; so has whatever a mirrored or
 refracted direction meets, since no light sample ever takes it.
 
 The functions hold no state, write nothing in place, use no mask as an index, and get their random numbers
@@ -46,7 +46,7 @@ HEURISTICS = {"balance": 1, "power": 2}
 """Exponent of the densities in the multiple importance sampling weight, by the heuristic's name."""
 
 STRATEGIES = ("mis", "light", "bsdf")
-"""Ways to find a light: both combined, light samples alone, directions of the BSDF alone."""
+"""Ways to find a light: both combined, only light samples, only directions of the BSDF."""
 
 SAMPLERS: Mapping[str, Callable[..., rng.Block]] = {"pcg4d": rng.uniforms, "sobol": sobol.uniforms}
 """Sources of random numbers by name: four uniform floats of (seed, pixel, sample, block). The first is the
@@ -59,7 +59,7 @@ LARGEST_DEPTH = (1 << 32) // BLOCKS_PER_BOUNCE
 """Largest number of scatterings whose blocks, after the camera's, have numbers of 32 bits."""
 
 ROULETTE_LIMIT = 0.95
-"""Greatest probability to go on after Russian roulette, so that paths between white walls end too."""
+"""Greatest probability to survive Russian roulette, so that paths between white walls end too."""
 
 LEAST_DENSITY = 1e-15
 """Floor of cosines and densities that divide: its inverse squared is still finite in float32."""
@@ -73,12 +73,12 @@ CAMERA_PDF = SINGLE_PDF
 the weight of what it meets is 1."""
 
 LEAST_SQUARE = 1e-30
-"""Floor of squared distances that divide, in scene units squared; it acts on coincident points alone."""
+"""Floor of squared distances that divide, in scene units squared; it acts only on coincident points."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How light is gathered. `max_depth` is the greatest number of scatterings; 0 shows emission alone.
+    """How light is gathered. `max_depth` is the greatest number of scatterings; 0 shows only emission.
 
     `roulette_depth` is the number of scatterings after which Russian roulette begins; None turns it off.
     """
@@ -231,7 +231,7 @@ def arrive(world: World, path: Path) -> tuple[Path, Surface, Hit]:
 def scatter(
     world: World, path: Path, surface: Surface, hit: Hit, depth: Any, counters: Counters
 ) -> tuple[Path, Any]:
-    """Gather light at the surface and leave it in a sampled direction; return state and who (...) goes on.
+    """Gather light at the surface and leave it in a sampled direction; return state and what (...) continues.
 
     depth (...) counts the scatterings so far, as uint32.
     """
@@ -323,7 +323,7 @@ def direct_light(
 
 
 def unshadowed(world: World, surface: Surface) -> Radiance:
-    """Return the radiance (..., 3) that the lamps alone would give a surface, were it matt and all in sight.
+    """Return a surface's radiance (..., 3) from the lamps only, if it were matte and saw all of them.
 
     Each lamp, of area A and radiance L, is taken for a disk of the same area around its middle, in direction
     wi at distance d: its irradiance L A cos_s cos_l / (d^2 + A / pi). On the axis of a disk that faces the

@@ -91,7 +91,7 @@ def _limits(name: str) -> tuple[float, float]:
 
 
 def ranges_from_json(text: str) -> Ranges:
-    """Return the ranges that a frame or a model says, or refuse what is none."""
+    """Return the ranges that a frame or a model states; refuse what is not ranges."""
     found = to_dataclass(Ranges, parse_json(text, "ranges", "make the data set or the model again"), "ranges")
     check_ranges(found)
     return found

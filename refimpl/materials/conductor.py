@@ -36,7 +36,7 @@ sharper ones would lose their digits, and look like mirrors anyway."""
 
 LEAST_HEIGHT = 1e-7
 """Least cosine between normal and wo: half an ulp of 1, below which a direction's own rounding decides on
-which side of the surface it lies. It keeps q + z away from zero on lanes that hit nothing."""
+which side of the surface it is. It keeps q + z away from zero on lanes that hit nothing."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def _height(w: Directions, alpha: Floats) -> tuple[Floats, Floats]:
 
 
 def _local_wo(site: Site) -> Directions:
-    """Return wo (..., 3) around the normal; by rounding alone it could be below the surface."""
+    """Return wo (..., 3) around the normal; rounding could put it below the surface."""
     wo = sampling.to_local(site.wo, site.normal)
     return vectors.vector(wo[..., 0], wo[..., 1], np.maximum(wo[..., 2], LEAST_HEIGHT))
 

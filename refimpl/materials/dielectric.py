@@ -2,8 +2,8 @@
 
 1. [`refract`] gives the refracted direction by Snell's law, and its cosine; 0 under total reflection.
 2. [`fresnel`] is the share of unpolarised light that is mirrored.
-3. [`Dielectric.sample`] mirrors with that probability, so that neither way needs a weight besides the
-   surface's reflectance, which tints both.
+3. [`Dielectric.sample`] mirrors with that probability, so that both ways have the same weight: the surface's
+   reflectance, which tints both.
 
 Formulas: Fresnel's equations as in Born and Wolf, "Principles of Optics", 1999, section 1.5.2, divided by the
 index on the far side, so that one ratio r = n_near / n_far is all that is needed. The square of the refracted

@@ -17,7 +17,7 @@ from .material import Material, Scattered, Site
 
 @dataclass(frozen=True)
 class Lambertian(Material):
-    """A matt surface; it is what surfaces without a material are."""
+    """A matte surface; surfaces without a material are matte."""
 
     kind = "lambertian"
 

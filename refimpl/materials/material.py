@@ -2,7 +2,7 @@
 
 1. A material is a frozen dataclass; its fields are what a scene's JSON says of it beside `kind`. A surface's
    `reflectance` belongs to the surface, and each material says how it uses it.
-2. `sample` turns uniform numbers into the direction in which a path goes on [`Scattered`].
+2. `sample` turns uniform numbers into the direction in which a path continues [`Scattered`].
 3. `value` and `pdf` say what light from a given direction is worth, and how likely `sample` was to find that
    direction: light sampling and multiple importance sampling ask for them. Materials that reflect into single
    directions (`single` is true) have neither: no light sample ever meets those directions [`Single`].
@@ -47,7 +47,7 @@ class Site(NamedTuple):
 
 
 class Scattered(NamedTuple):
-    """How paths go on: unit direction (..., 3), throughput beta (..., 3), pdf (...) of the direction in 1/sr.
+    """How paths continue: unit direction (..., 3), throughput beta (..., 3), its pdf (...) in 1/sr.
 
     through (...) tells who passes to the other side of the surface; None where the material lets nobody pass.
     """
@@ -76,7 +76,7 @@ class Material:
 
     @staticmethod
     def sample(site: Site, u0: Floats, u1: Floats, u_choice: Floats) -> Scattered:
-        """Return how paths go on, for three uniform numbers (...)."""
+        """Return how paths continue, for three uniform numbers (...)."""
         raise NotImplementedError
 
     @staticmethod

@@ -1,6 +1,6 @@
 """Parallelograms: quads, which look alike from both sides, and lights, which emit from one.
 
-Lights are numbered after the quads and stand in the same tables: a ray meets both in the same way.
+Lights are numbered after the quads and are in the same tables: a ray meets both in the same way.
 """
 
 from __future__ import annotations

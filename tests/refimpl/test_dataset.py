@@ -261,7 +261,7 @@ def test_normalization_text_is_checked(text: str) -> None:
 
 @pytest.mark.parametrize("size", [0, -1, 65, 1.5])
 def test_window_sizes_are_checked(size: Any) -> None:
-    with pytest.raises(InputError, match=r"window size is .*a whole number from 1 to 64"):
+    with pytest.raises(InputError, match=r"window size is .*an integer from 1 to 64"):
         dataset.check_window(Window(size))
 
 

@@ -170,13 +170,13 @@ REFUSALS = [
     (
         "quads.0.material",
         {"kind": "dielectric"},
-        r"scene.quads\[0\].material is dielectric: light passes into c",
+        r"scene.quads\[0\].material is dielectric: light passes only into c",
     ),
     ("room.materials", [None] * 5, r"scene.room.materials is 5 entries: they must be six or none; use null"),
     (
         "room.materials",
         [{"kind": "dielectric"}] + [None] * 5,
-        r"materials\[0\] is dielectric: light passes into",
+        r"materials\[0\] is dielectric: light passes only into",
     ),
     ("lights.0.power", -1, r"scene.lights\[0\].power is -1.0: power must not be negative"),
 ]

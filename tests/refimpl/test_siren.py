@@ -81,7 +81,7 @@ def test_float32_is_float64_rounded_once() -> None:
 
 @pytest.mark.parametrize("widths", [(3,), (0, 3), (3, -1, 2), (3, 2.5, 1)])
 def test_init_refuses_widths(widths: Any) -> None:
-    with pytest.raises(InputError, match=r"widths is .*at least two whole numbers >= 1"):
+    with pytest.raises(InputError, match=r"widths is .*at least two integers >= 1"):
         siren.init(widths, 1.0, 1.0, seed=0)
 
 

@@ -264,9 +264,9 @@ def test_best_is_short_for_longer() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"batch": 0}, "recipe: batch is 0: a whole number from 1"),
-        ({"steps": 2.5}, "recipe: steps is 2.5: a whole number"),
-        ({"steps": 2**32}, "recipe: steps is 4294967296: a whole number from 1 to 4294967294"),
+        ({"batch": 0}, "recipe: batch is 0: an integer from 1"),
+        ({"steps": 2.5}, "recipe: steps is 2.5: an integer"),
+        ({"steps": 2**32}, "recipe: steps is 4294967296: an integer from 1 to 4294967294"),
         ({"log_every": 0}, "recipe: log_every is 0"),
         ({"n_windows": -1}, "recipe: n_windows is -1"),
         ({"seed": -1}, "recipe: seed is -1"),

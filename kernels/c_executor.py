@@ -208,7 +208,7 @@ class CExecutor(Executor):
     def _try(self) -> None:
         """Find out what the compiler takes, and whether its programs compute as they must."""
         program = Path(self._folder.name) / "trial"
-        # Not all compilers know all options; what the program prints decides, not what they are told.
+        # Not all compilers know all options; what the program prints decides, not which options they accept.
         for options in ([*STRICT, NATIVE], STRICT, []):
             self._options = [*OPTIONS, *options]
             done = self._compile(program, TRIAL, [])

@@ -65,7 +65,7 @@ def read_json(name: str) -> Any:
         if entry["schema"] == SCHEMA and entry["sha256"] == _checksum(entry["data"]):
             return entry["data"]
     _log.warning(
-        "cache entry %s is damaged, or no entry of wamnet: it is ignored and written anew", shown(str(path))
+        "cache entry %s is damaged, or no entry of wamnet: it is ignored and written again", shown(str(path))
     )
     return None
 

@@ -3,7 +3,7 @@
 1. Both are rendered, and give a mean and a variance for each pixel and channel [`compare_images`].
 2. Pixels are joined in blocks [`BLOCK_PX`]: a path's radiance is far from normally distributed, and the mean
    of few samples still is.
-3. Each block and channel with noise has a p-value (welch.py); the least is held to Sidak's level.
+3. Each block and channel with noise has a p-value (welch.py); the least is checked against Sidak's level.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SIGNIFICANCE = 0.01
 """Chance that a kernel that is right is refused, over all blocks and channels."""
 
 ROUNDING = 2.0**-18
-"""What rounding alone may change in a sample, relative to the mean, 64 u: a few products and sums."""
+"""What rounding may change in a sample, relative to the mean, 64 u: a few products and sums."""
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """Path kernels against the reference, step by step: what differs must be explained by rounding.
 
-1. A kernel tells the state of each path after its last arrival; stopped at depth 0, 1, ... it tells all of
-   them [`_states`]. These are builds of the same text but for the depth: a compiler that made different code
-   of them would show as unexplained.
+1. A kernel reports the state of each path after its last arrival; stopped at depth 0, 1, ... it reports every
+   state [`_states`]. These are builds of the same text except for the depth: a compiler that made different
+   code of them would show as unexplained.
 2. One step of the reference starts from the *kernel's own* state, so that errors do not pile up: `start` or
    `scatter` gives ranges for the ray that the kernel has next, `arrive` on that ray gives ranges for the
    surface and the radiance (compiler/ranges.py) [`step_ranges`].
@@ -59,7 +59,7 @@ State = dict[str, NDArray[Any]]
 """Values of paths (P,) by the names of programs, and `alive`."""
 
 Build = Callable[[PathPrograms, Executor], PathArtifact]
-"""Makes the kernel that tells the states; tests put a wrong one in its place."""
+"""Makes the kernel that reports the states; tests put a wrong one in its place."""
 
 
 @dataclass(frozen=True)
@@ -232,7 +232,7 @@ def _as_kind(values: NDArray[Any], kind: str) -> NDArray[Any]:
         return values > 0
     if kind == "float32":
         return values
-    # What is no whole number of the kind stays visible: no surface is numbered -1.
+    # A value that is not an integer of the kind stays visible: no surface is numbered -1.
     whole = (np.abs(values) < 2.0**24) & (values == np.floor(values))
     return np.where(whole, values, -1.0).astype(kind)
 

@@ -103,7 +103,7 @@ class Choice:
 
 
 def check_limits(limits: Limits) -> None:
-    """Refuse limits that nothing can be held to."""
+    """Refuse limits that nothing can be checked against."""
     for option, name, limit in limits.rules:
         if not math.isfinite(limit) or (limit < 0 and name != "psnr_loss_db"):
             least = "finite" if name == "psnr_loss_db" else "finite and >= 0"

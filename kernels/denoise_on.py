@@ -28,7 +28,7 @@ class RunResult:
 
     `seconds_compile`: tracing, passes, bound, emission, the driver's compilation and one run on a few pixels.
     `seconds_run`: images to the device, the kernel, the result back; not the encoding of the features.
-    `schedule`: what was picked, and why, where it is not what was asked for; `reason`: why it was asked for.
+    `schedule`: what was picked, and why, where it is not the requested one; `reason`: why that was requested.
     `kernel`: its digest. `variant`: what it may cost.
     """
 

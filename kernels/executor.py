@@ -97,7 +97,7 @@ class Executor(ABC):
     def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
         """Return the encoded images of checked sums."""
         rule = "its encodings run in pipelines only, where nothing leaves the device"
-        raise InputError("executor of an encoding alone", self.name, rule, "use kernels.Pipeline")
+        raise InputError("executor of an encoding by itself", self.name, rule, "use kernels.Pipeline")
 
     def passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
         """Return passes over a picture of `size` (height, width), whose images stay on the device."""
@@ -213,7 +213,7 @@ def _check_range(image: Image, array: NDArray[np.float32]) -> None:
             f"image {image.name!r} at row {y}, column {x}",
             array[y, x].tolist(),
             "all numbers must be finite",
-            "mend or mask the frame first",
+            "fix or mask the frame first",
         )
     # In float64: a Python number would be rounded to the array's float32 first.
     outside = (array < np.float64(image.low)) | (array > np.float64(image.high))

@@ -57,7 +57,7 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class Request:
-    """All that determines a data set, besides the version: scene, animation, numbers, sizes, seed, ways.
+    """All that determines a data set, except for the version: scene, animation, numbers, sizes, seed, ways.
 
     The animation runs from `start_s` for `seconds`, of which training leaves out the last `arc_s`;
     `parameters` are those of the canonical scene. Cameras are drawn from the ranges `yaw_deg`, `pitch_deg`

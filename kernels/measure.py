@@ -1,4 +1,4 @@
-"""Times of several ways to do one thing, taken in turns: drift of the machine meets all of them alike.
+"""Interleaved times of several ways to do one thing: drift of the machine affects all of them alike.
 
 1. Each way runs `warm` times unmeasured.
 2. In each of `repeats` rounds every way runs once, after a pause: threads of a library that ran before may

@@ -1,10 +1,10 @@
 """Measure a curve: every variant under every schedule of an executor that may pay [`measure`].
 
 1. The full network runs under each schedule on a small picture first. Of the schedules the [`MOST_SCHEDULES`]
-   fastest go on: a plain kernel may take a minute where another takes a second [`promising`].
+   fastest remain: a plain kernel may take a minute where another takes a second [`promising`].
 2. Errors and losses are taken on given frames, with the device's own kernels, against the full network in
-   float64 [`quality`]; times on a picture of the size that is asked for, of random numbers.
-3. Times are those of kernels/measure.py: all ways in turns.
+   float64 [`quality`]; times on a picture of the requested size, of random numbers.
+3. Times are those of kernels/measure.py: the ways are interleaved.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ REPEATS = 5
 """Rounds of the measurement; their median counts."""
 
 PAUSE_S = 0.05
-"""Seconds before each run: no other library runs here whose threads would go on spinning."""
+"""Seconds before each run: no other library runs here whose threads would still spin."""
 
 NOISE_TAG = 0x4E4F4953
 """Counter `block` of the words that become noise ("NOIS" in ASCII)."""
@@ -84,7 +84,7 @@ def measure(
 ) -> Curve:
     """Return the points of a model on a device at a size (height, width), errors from pairs of frames.
 
-    `schedules`: which to measure, none for those that may pay. `on_done` is told of each variant's share.
+    `schedules`: which to measure, none for those that may pay. `on_done` gets each variant's share.
     """
     pictures = [denoise(model, noisy, np.float64) for noisy, _ in pairs]
     chosen = tuple(schedules) or promising(executor, model, profile)

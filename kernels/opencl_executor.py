@@ -253,7 +253,7 @@ class OpenCLExecutor(Executor):
     def kernel_seconds(
         self, artifact: Artifact, images: Images, clock: Callable[[], float] = time.perf_counter
     ) -> float:
-        """Return the time of a built artifact's kernels alone: images and result stay on the device."""
+        """Return the time of only a built artifact's kernels: images and result stay on the device."""
         height, width = next(iter(images.values())).shape[:2]
         # Memory that is written before the clock starts: the system gives it when it is first touched.
         result = np.full((height, width, output_channels(artifact.program)), 0, np.float32)
@@ -414,7 +414,7 @@ class OpenCLPasses(Passes):
 def sums_shape(kernel: PathArtifact, part: Part) -> tuple[int, int, int]:
     """Return (planes, rows, numbers in a row) of the sums that a kernel writes for a part of an image.
 
-    They are whole groups of whole vectors; what lies beyond the part is computed too, and means nothing.
+    They are whole groups of whole vectors; what is beyond the part is computed too, and means nothing.
     """
     items = (-(-part.width // kernel.lanes), part.rows)
     columns, rows = _whole(items, PATH_LOCAL_SIZE[min(kernel.lanes, 2)])

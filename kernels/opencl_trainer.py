@@ -3,7 +3,7 @@
 1. Pictures and targets are copied once; parameters and moments when a run begins [`OpenCLTrainer.load`].
 2. A block of steps is put into the queue with its minibatches [`OpenCLTrainer.enqueue`]; the host may draw
    the next block meanwhile. Waiting for it gives the losses [`OpenCLTrainer.finish`].
-3. Parameters and moments stand there twice: a step reads one copy and writes the other. After a loss that is
+3. Parameters and moments have two copies: a step reads one and writes the other. After a loss that is
    not finite nothing is written any more, so that the last two states remain [`OpenCLTrainer.state`].
 """
 
@@ -141,7 +141,7 @@ class OpenCLTrainer:
         found = np.empty((self._groups, end * LANES), np.float32)
         cl.enqueue_copy(self._queue, found, self._sums)
         if (split := self._kernel.step.split) is not None:
-            # These are one sum already, in the place of the first work item.
+            # These are one sum already, in the first work item's slot.
             for slot in (self._kernel.places[name] for name in (split.parameter, *split.factors)):
                 found[1:, slot.offset * LANES : slot.end * LANES] = 0
         return unpack(self._kernel.places, np.add.accumulate(found, axis=0)[-1])

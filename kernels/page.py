@@ -56,7 +56,7 @@ SHOWN = ("color", "normal")
 """Features that a page shows, whether or not a network reads them."""
 
 RANK = 16
-"""Rank of the fast variant's first layer, unless another is asked for: as many numbers as four colour buffers
+"""Rank of the fast variant's first layer, unless another is given: as many numbers as four colour buffers
 hold. Trained in this form it loses nothing (spec/factored.md)."""
 
 MANY, FEW = "packed", "inlined"
@@ -73,7 +73,7 @@ SAMPLE_SCENES = 4
 that are equal by chance are not taken for one."""
 
 COMPUTED = ("camera.", "world.lights.")
-"""Tables that a page computes itself: a number that stands in another one too is known by its place here."""
+"""Tables that a page computes itself: a number that is in another one too is known by its place here."""
 
 TOLD = ("trained_on_scene", "steps_done")
 """What of a model's info a page repeats."""

@@ -2,7 +2,7 @@
 
     path kernel -> sums -> encoding kernel -> feature images -> denoising kernel -> picture
 
-Sums, images and picture are made once for a size and stay on the device; [`Passes.read`] alone copies
+Sums, images and picture are made once for a size and stay on the device; only [`Passes.read`] copies
 anything to the host. Passes are ordered: each sees what the one before it has written.
 
 On devices whose memory is the host's the passes are the plain composition of the three kernels, which is the

@@ -5,7 +5,7 @@
    [`Pipeline`].
 2. [`Pipeline.draw`] starts them one after another. Sums, feature images and the result stay on the device
    (kernels/passes.py).
-3. The result is read back, and nothing else unless it is asked for [`Pipeline.picture`], [`Pipeline.image`].
+3. The result is read back, and other images only on request [`Pipeline.picture`], [`Pipeline.image`].
 
 The definition is the composition of the three on the executor `numpy`. The separate way (render_on.py, then
 denoise_on.py) gives the same picture up to rounding: it encodes in float64 on the host. It refuses pictures
@@ -40,7 +40,7 @@ from .tune import choose
 class Pipeline:
     """A scene and a model on an open executor, for pictures of one size; a context manager.
 
-    `show` names features that are to be readable besides those of the model. With `whole`, paths are traced
+    `show` names features that are to be readable in addition to the model's. With `whole`, paths are traced
     by the kernel of render_on.py, which writes more than is needed: one to compile where both are used. A
     `variant` of the model has fewer operations [variants.py]. So many `pictures` are to come: what compiles
     long may pay [tune.py]. The kernels are `path`, `encode` and `denoise`; `passes` runs
@@ -93,7 +93,7 @@ class Pipeline:
         return kernel
 
     def set_scene(self, scene: Scene) -> None:
-        """Go on with another scene, or another time of it: compiles its path kernel, the others stay."""
+        """Continue with another scene, or another time of it: compiles its path kernel, the others stay."""
         self.path = self._compiled(scene)
 
     def draw(self, seed: int = 0, spp: int = 1, first_sample: int = 0) -> None:
@@ -109,7 +109,7 @@ class Pipeline:
         self._drawn = True
 
     def part(self, seed: int, spp: int, first_sample: int) -> Part:
-        """Return what the path kernel is asked for: all rows."""
+        """Return what the path kernel has to draw: all rows."""
         return Part(self._width, self._height, 0, self._height, first_sample, spp, seed)
 
     def picture(self) -> NDArray[np.float32]:

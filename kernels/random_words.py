@@ -60,7 +60,7 @@ def wrong_words(
 
 
 def _programs(max_depth: int) -> PathPrograms:
-    """Return the programs of the empty scene with words in the place of features."""
+    """Return the programs of the empty scene with words instead of features."""
 
     def look(*values: Any) -> dict[str, Any]:
         halves = [

@@ -1,11 +1,11 @@
 """Make a failure small: the smallest part of a picture, and the first stage of a network, that show it.
 
 1. Cut rows and columns off while the failure stays, halves first, single ones at last [`shrink`]; before that
-   look at the worst pixel alone, and at what its window sees.
+   look at only the worst pixel, and at what its window sees.
 2. A stage is a layer's sums, or its sines: the network up to there is a program of its own, some neurons at
    a time, as many as a target's image has channels [`stages`], [`stage_program`]. The first one whose kernel
-   deviates is where to look [`first_stage`]; a failure that no stage alone has is in what comes after them,
-   or in how they are put together.
+   deviates is where to look [`first_stage`]; a failure that no stage by itself has is in what comes after
+   them, or in how they are combined.
 3. [`reduced`] does both, for the kernels that a triage found to deviate.
 """
 
@@ -181,7 +181,7 @@ def first_stage(
     images: Images,
     compiled: Compile = compile_plan,
 ) -> tuple[Stage, Verdict] | None:
-    """Return the first stage whose kernel deviates on images (H, W, C), or None if none does alone."""
+    """Return the first stage whose kernel deviates on images (H, W, C), or None if none does by itself."""
     most = target_named(runner.target).most or MOST_NEURONS
     size = next(iter(images.values())).shape[:2]
     for stage in stages(model.siren, most):
@@ -195,7 +195,7 @@ def first_stage(
 
 @dataclass(frozen=True)
 class Found:
-    """An odd kernel, the first stage that deviates alone, and how; None: no stage does."""
+    """An odd kernel, the first stage that deviates by itself, and how; None: no stage does."""
 
     kernel: Kernel
     stage: Stage | None
@@ -205,7 +205,7 @@ class Found:
     def text(self) -> str:
         """Return the stage for a reader."""
         if self.stage is None or self.verdict is None:
-            return f"{self.kernel.name}: no stage deviates alone; look at what comes after the last one"
+            return f"{self.kernel.name}: no stage deviates by itself; look at what comes after the last one"
         at = ""
         if self.verdict.pixel is not None:
             row, column, channel = self.verdict.pixel

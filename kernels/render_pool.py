@@ -3,7 +3,7 @@
 1. Rows are dealt out in bands [`bands`]; a band is an independent [`render`] of the reference.
 2. Workers count finished samples in shared memory; the caller's progress function sees the sum
    [`render_parallel`].
-3. The bands are joined top to bottom. A pixel's random numbers depend on (seed, pixel, sample) alone, so the
+3. The bands are joined top to bottom. A pixel's random numbers depend only on (seed, pixel, sample), so the
    number of workers does not change the image.
 """
 

@@ -1,10 +1,10 @@
 """Training on a device: refimpl.train.train with the arithmetic of a step done by compiled kernels.
 
 1. Data, pool and minibatches are the reference's, to the bit, and so are first weights, learning rates and
-   the form of states: a run may go on with either trainer [`train_on`].
+   the form of states: a run may continue with either trainer [`train_on`].
 2. Steps run in blocks that end where a callback is due. While the device works on one, the host draws the
    minibatches of the next [`Run.draw`].
-3. A loss that is not finite, or an interrupt, is told and kept as the reference does it [`Run.settle`].
+3. A loss that is not finite, or an interrupt, is reported and kept as the reference does it [`Run.settle`].
 
 The definition is refimpl/train.py; how far a step may be from it: compiler/step.py.
 """

@@ -6,7 +6,7 @@
 2. Name the odd ones out: those that deviate while others are within their bounds. If all deviate, it is the
    program or the bound that is suspect [`conclusion`].
 3. Cut the picture down to one that still shows it [reduce.py: `shrink`], and run the network's first stages
-   alone until one deviates [reduce.py: `first_stage`].
+   without the rest until one deviates [reduce.py: `first_stage`].
 
 Executors run in processes of their own [apart.py]: one that crashes, or never answers, has deviated. One that
 refuses a kernel in its own words has not: it has written nothing.
@@ -125,7 +125,7 @@ def kernels_of(
 ) -> list[Kernel]:
     """Return the kernels of a program for each runner, in the picked schedule or in `all` that hold it.
 
-    `instead`: schedules by target, in the place of the picked ones.
+    `instead`: schedules by target, instead of the picked ones.
     """
     known: dict[tuple[str, str], Artifact | str] = {}
     kernels = []
@@ -141,7 +141,7 @@ def kernels_of(
                 kernels.append(Kernel(runner, schedule, None, found))
                 continue
             actual = str(found.manifest["schedule"]["name"])
-            # One that gives way to another is that one, which has its turn.
+            # One that is replaced by another is that other one, which has its turn.
             if actual == schedule or which != EVERY:
                 kernels.append(Kernel(runner, actual, found))
     return kernels

@@ -1,11 +1,11 @@
-"""Which schedule runs a denoiser fastest on this device: measured once, remembered, and told.
+"""Which schedule runs a denoiser fastest on this device: measured once, remembered, and reported.
 
 1. Each schedule of the executor's target that holds the program is built. Its result on a crop must lie
    within the bound of the float64 reference there: what is wrong is not timed [`_checked`].
 2. What would take many times as long as the fastest, going by the time of a larger crop, is not timed either
    [`SLOW`]. The others take turns on noise of the picture's size [measure.py].
 3. Each one is then forgotten and built again: drivers keep what they compile on disk, and the second time is
-   what the next run will wait for. Where the weights stand in the source, another model is another source,
+   what the next run will wait for. Where the weights are in the source, another model is another source,
    and the first time counts [`_built`].
 4. The table is kept in the cache folder [cache.py] under all that it depends on: device, driver, cores, shape
    of the network, profile, rank, size of the picture to a factor of two, the compiler's own text [`_entry`].

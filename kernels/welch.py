@@ -1,4 +1,4 @@
-"""Welch's test, in NumPy alone: are two noisy pictures estimates of one and the same?
+"""Welch's test, in NumPy only: are two noisy pictures estimates of one and the same?
 
 1. Per pixel and channel two means, their variances and counts give a statistic t and degrees of freedom
    [`welch_p`]: Welch, "The Generalization of 'Student's' Problem when Several Different Population Variances
@@ -7,7 +7,7 @@
    incomplete beta function [`incomplete_beta`]: DLMF (dlmf.nist.gov) 8.17.4 and the continued fraction
    8.17.22, evaluated by Lentz's method (Thompson and Barnett, "Coulomb and Bessel functions of complex
    arguments and order", Journal of Computational Physics 64, 1986).
-3. With m comparisons each is held to Sidak's level, so that the chance of a false alarm over all of them is
+3. With m comparisons each is tested at Sidak's level, so that the chance of a false alarm over all of them is
    the stated significance [`sidak`].
 
 The method for pictures: Jung, Hanika and Dachsbacher, "Detecting Bias in Monte Carlo Renderers using Welch's
@@ -101,5 +101,5 @@ def _fraction(a: Array, b: Array, x: Array) -> Array:
 
 
 def _not_zero(x: Array) -> Array:
-    """Return x (...) with a tiny number in the place of 0."""
+    """Return x (...) with a tiny number instead of 0."""
     return np.where(x == 0, LEAST_TERM, x)

@@ -1,8 +1,8 @@
 """How far a contender's picture is from the reference in float64, and what its quality on unseen frames is.
 
 1. The reference is computed on a crop at the picture's first corner, whose pixels see the border [`Crop`].
-   It is the full network's, whatever a variant leaves out [`Crop.full`]; beside it stands the function that a
-   variant computes, whose distance is rounding alone, with a bound [`Crop.rounding`].
+   It is the full network's, whatever a variant leaves out [`Crop.full`]. A second one is what the variant
+   computes: from it a kernel differs only by rounding, which has a bound [`Crop.rounding`].
 2. The error is a difference of colours in [0, 1]: the largest, the mean, and the largest in units in the last
    place of the reference [`errors`].
 3. Quality is PSNR and SSIM against a reference frame, and what is lost of the full network's [`quality`].
@@ -67,7 +67,7 @@ class Crop:
     def rounding(self, variant: Variant, target: str | None, schedule: str = "") -> tuple[Array, float]:
         """Return what a variant computes in float64, and the largest bound of a kernel's rounding.
 
-        `schedule` of `target`: whose sums; a peer without a target is held to those of the interpreter.
+        `schedule` of `target`: whose sums; a peer without a target is checked against the interpreter's.
         """
         plan = plan_program(
             variant.program(self.model), target or "numpy", variant.profile, schedule or PLAIN, variant.rank

@@ -84,7 +84,7 @@ def activation_in(library: str, table: Mapping[str, Any], model: Model) -> Any:
     """Return what a library has for the model's activation, from a table by the names of activations."""
     name = model.siren.activation
     if name not in table:
-        raise ExecutorUnavailable(f"{library} is not told how to compute {name}, only {', '.join(table)}")
+        raise ExecutorUnavailable(f"{library} has no function here for {name}, only for {', '.join(table)}")
     return table[name]
 
 
@@ -107,7 +107,7 @@ class Opened:
 
     `display` turns what `run` returns into display-encoded colours, outside of what is timed. `stages` are
     what it does for a pixel [cost.py], `rates` the name of the rates that it has [`MACHINE` or its own].
-    `kernel_seconds`: the kernel alone, images and result on the device. `schedule`: the one that was picked,
+    `kernel_seconds`: without copies to and from the device. `schedule`: the one that was picked,
     `bound`: what is proven for all images, `certified`: whether the proof is written out.
     """
 

@@ -3,7 +3,7 @@
 1. A kernel is named EXECUTOR:SCHEDULE, with :VARIANT where it is not the whole network [`kernel`].
 2. Variants run with the schedule that suits the device, or the one that takes its place [`of_machine`]: sines
    and profiles, which need no training [`VARIANTS`], and forms that were trained and are given.
-3. Peers stand in files of their own, `peer_*.py`; a new one is a file and a line in `PEERS`.
+3. Each peer has a file of its own, `peer_*.py`; a new one is a file and a line in `PEERS`.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ Told = Callable[[str, float], None]
 """Called with what is done next, and the share of the work that has been done since the last call."""
 
 PROBE_PAUSE_S = 0.05
-"""Seconds before a run of a small program: one library alone runs, whose threads wait for it."""
+"""Seconds before a run of a small program: only one library runs, whose threads wait for it."""
 
 DOUBT = 4.0
 """Times the budget that a prediction must reach for a kernel to be left out unseen: it may be off."""
@@ -162,7 +162,7 @@ class Contest:
 
     @contextmanager
     def _failing(self, row: Row) -> Iterator[None]:
-        """Write an error into a row, and go on; a peer may raise what it likes, others only our errors."""
+        """Write an error into a row, and continue; a peer may raise what it likes, others only our errors."""
         try:
             yield
             return
@@ -229,7 +229,7 @@ class Contest:
         }
 
     def _rates_of(self, contender: Contender, name: str) -> Rates:
-        """Return the machine's rates, or an executor's with a schedule, measured when first asked for."""
+        """Return the machine's rates, or an executor's with a schedule, measured at its first use."""
         limits = self.limits
         assert limits is not None, "the machine is measured first"
         if name == MACHINE:
@@ -275,7 +275,7 @@ class Contest:
         turns = min(wanted, int(budget / max(frame, 1e-9)) - 1)
         if turns < 1:
             row.seconds.append(frame)
-            row.reason = f"one frame alone: it took {frame:.1f} s of --budget {budget:g} s"
+            row.reason = f"only one frame: it took {frame:.1f} s of --budget {budget:g} s"
         elif turns < wanted:
             row.reason = f"{turns} of {wanted} rounds: a frame takes {frame:.1f} s, --budget is {budget:g} s"
         return turns

@@ -41,7 +41,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Rates:
-    """What a device does in a second, and the seconds that a pixel takes besides."""
+    """What a device does in a second, and the seconds that a pixel takes in addition."""
 
     products_per_s: float
     sines_per_s: float

@@ -22,7 +22,7 @@ from .cost import layered
 from .workload import Given
 
 LOADER_VARIABLE = "OPENCL_PATH"
-"""Environment variable by which tinygrad is told where the loader is."""
+"""Environment variable that names the loader to tinygrad."""
 
 MODES = {"clamp": "replicate", "zero": "constant"}
 """Border rules as modes of `Tensor.pad`."""

@@ -1,7 +1,7 @@
 """Cases: what is given, what is expected, how far off an answer may be, and which clause says so.
 
 1. A kind of case has a function of the reference, the clauses that it tests, and a way to make its cases
-   [`Kind`]; all kinds stand in `kinds/`.
+   [`Kind`]; all kinds are in `kinds/`.
 2. A file of vectors holds the cases of one kind, with the version of the format [`save`], [`load`]. Files are
    text that can be reviewed: floats are hexadecimal (numbers.py).
 3. A case is valid, and has expected values with bounds, or invalid, and must be refused.

@@ -1,7 +1,7 @@
 """Numbers as text that loses nothing: floats in hexadecimal, so that files can be compared and reviewed.
 
 1. A float is C's `%a`: `0x1.8p+1`; also `inf`, `-inf` and `nan` [`number_text`]. An integer is a JSON number.
-2. An array is a list of such, nested by its axes [`to_json`]; a truth value is a JSON one.
+2. An array is a list of such, nested by its axes [`to_json`]; a boolean is a JSON one.
 3. Reading takes decimal numbers too, which are rounded to float64: programs without a hexadecimal format may
    answer with 17 significant digits [`from_json`].
 4. A picture may be a file: `{"file": PATH, "shape": [...]}`, raw little-endian float32 [`from_file`].
@@ -57,7 +57,7 @@ def from_file(value: Mapping[str, Any], what: str) -> NDArray[np.float32]:
 
 
 def to_json(value: Any) -> Any:
-    """Return arrays, numbers and truth values in the form of JSON; mappings and sequences item by item."""
+    """Return arrays, numbers and booleans in the form of JSON; mappings and sequences item by item."""
     if isinstance(value, dict):
         return {name: to_json(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -1,7 +1,7 @@
 """Answers of an executor: functions traced, compiled and run on an image of one pixel, and whole pictures.
 
 1. A function of numbers is compiled like a network: its inputs are the channels of an image [`OnExecutor`].
-2. A whole path is told vertex by vertex by kernels that stop at each depth (compare_paths.py) [`_vertices`].
+2. Kernels that stop at each depth report a whole path vertex by vertex (compare_paths.py) [`_vertices`].
 3. Pictures are denoised and rendered as the commands do it; not every executor has kernels of paths.
 
 Steps of a path, layers and derivatives of a network have no kernel of their own: they are not supported.
@@ -51,7 +51,7 @@ Own = Callable[[Mapping[str, Any], str], Mapping[str, Any]]
 
 
 class OnExecutor:
-    """Functions as kernels, compiled when they are first asked for."""
+    """Functions as kernels, compiled at their first use."""
 
     def __init__(self, executor: Executor) -> None:
         self.executor = executor
@@ -98,7 +98,7 @@ class OnExecutor:
         return {name: np.array([_joined(row, name) for row in rows]) for name in VERTEX}
 
     def _compile_path(self, scene: str, settings: str, profile: str) -> PathArtifact:
-        """Return the kernel that tells the last vertex of paths."""
+        """Return the kernel that reports the last vertex of paths."""
         programs = lower_scene(
             scene_module.from_json(scene), Settings(**json.loads(settings)), most_unrolled(self.executor.name)
         )

@@ -34,7 +34,7 @@ LONGEST_LINE = 2**24
 """Most bytes of an answer: what is longer is no answer."""
 
 LINES_AHEAD = 4
-"""Most lines that are kept before they are asked for: an endless output must not fill the memory."""
+"""Most lines that are kept before they are read: an endless output must not fill the memory."""
 
 PATIENCE_S = 2.0
 """Time in which a program ends by itself once its input has ended, in seconds."""
@@ -114,7 +114,7 @@ class Session:
         return answer
 
     def _start(self) -> _Child:
-        """Return the running program, started anew if it has ended."""
+        """Return the running program, started again if it has ended."""
         if self._child is not None and self._child.process.poll() is None:
             return self._child
         self._end()

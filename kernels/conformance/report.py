@@ -1,10 +1,10 @@
-"""What is told of verdicts: counts, one text a failure, JSON, JUnit, and what changed since the last time.
+"""Reports of verdicts: counts, one text a failure, JSON, JUnit, and what changed since the last time.
 
-1. [`counts`] counts verdicts by kind; [`about`] tells all of one failure, [`first_blamed`] finds the
-   one to mend first.
+1. [`counts`] counts verdicts by kind; [`about`] describes one failure in full, [`first_blamed`] finds the
+   one to fix first.
 2. [`to_json`] and [`to_junit`] are for other programs.
 3. A track is a file of the last verdicts: [`changes`] are the cases that differ from it, and those that are
-   [`worse`] are failures; known ones are not. It is written anew unless something is worse.
+   [`worse`] are failures; known ones are not. It is replaced unless something is worse.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def about(verdict: Verdict, case: Case, again: str) -> list[str]:
 
 
 def to_json(program: str, profile: str, verdicts: Sequence[Verdict], again: str) -> str:
-    """Return a report as JSON; `again` is the command that asks a case alone, but for its id."""
+    """Return a report as JSON; `again` is the command that asks a single case, without its id."""
     first = first_blamed(verdicts)
     data = {
         "format": "wamnet-conformance-report",

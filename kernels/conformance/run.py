@@ -1,4 +1,4 @@
-"""Verdicts: each case is asked, each answer held to its bounds, and nothing a program does is a traceback.
+"""Verdicts: each case is asked, each answer checked against its bounds, and no program causes a traceback.
 
 1. Cases are chosen by kind, clause, flag or part of their id [`chosen`].
 2. A verdict is one word [`Verdict`], with the first output that deviates, what was expected, what was found,
@@ -163,7 +163,7 @@ def judge(kind: str, case: Case, answer: Mapping[str, Any]) -> Verdict:
 
 
 IN_STEPS = ("path.whole",)
-"""Kinds whose outputs have steps on their first axis: the earliest step that deviates is told."""
+"""Kinds whose outputs have steps on their first axis: the earliest step that deviates is reported."""
 
 
 def _step(verdict: Verdict) -> int:
@@ -181,7 +181,7 @@ def _compared(
 ) -> tuple[Wrong | None, float]:
     """Return what is wrong with an output, if anything, and the largest error / bound.
 
-    Where its first axis has steps, the worst number of the earliest step that is wrong is told."""
+    Where its first axis has steps, that is the worst number of the earliest step that is wrong."""
     if isinstance(expected.value, str) and not is_number(expected.value):
         return (None if got == expected.value else ("another text", name, expected.value, str(got)[:80])), 0.0
     try:

@@ -18,7 +18,7 @@ from .case import FORMAT, VERSION, Kind, text_of
 from .kinds import KINDS
 
 FOLDER = Path(__file__).resolve().parents[2] / "spec" / "vectors"
-"""Where the vectors lie, in the repository and where the package is installed."""
+"""Where the vectors are, in the repository and where the package is installed."""
 
 NUMBER = {
     "anyOf": [

@@ -74,7 +74,7 @@ def test_the_odd_one_out_is_kept(wamnet, here, fault) -> None:
     assert outcome.status == 1
     assert "opencl plain is the odd one out: 1 other within its bound" in outcome.out
     assert "smallest part that shows it: 5x6 pixels from row " in outcome.out
-    assert "opencl plain: no stage deviates alone" in outcome.out
+    assert "opencl plain: no stage deviates by itself" in outcome.out
     odd = here / "odd"
     names = sorted(str(path.relative_to(odd)) for path in odd.rglob("*") if path.is_file())
     assert {"README.md", "frame.exr", "model.safetensors", "report.json"} <= set(names)

@@ -67,7 +67,7 @@ def test_a_damaged_entry_is_ignored_with_a_line_and_rewritten(caplog, damage):
     path.write_text(DAMAGES[damage](text), encoding="latin-1")
     assert cache.read_json("a") is None
     assert [record.getMessage() for record in caplog.records] == [
-        f"cache entry {path} is damaged, or no entry of wamnet: it is ignored and written anew"
+        f"cache entry {path} is damaged, or no entry of wamnet: it is ignored and written again"
     ]
     cache.write_json("a", DATA)
     assert cache.read_json("a") == DATA

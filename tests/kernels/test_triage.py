@@ -143,7 +143,7 @@ def test_a_pixel_is_named_and_its_place_is_kept(executor_named, kit, model, imag
     assert odd.ratio == odd.error / odd.bound > 1
     small = reduced(found, model, "ieee", images, compiled)
     assert small.box == Box(0, 0, 5, 7)
-    text = f"{way} plain: no stage deviates alone; look at what comes after the last one"
+    text = f"{way} plain: no stage deviates by itself; look at what comes after the last one"
     assert small.stages[0].text == text
 
 

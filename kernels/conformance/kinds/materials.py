@@ -1,4 +1,4 @@
-"""Kinds of materials: how paths go on, what light from a direction is worth, heuristics, the sky."""
+"""Kinds of materials: how paths continue, what light from a direction is worth, heuristics, the sky."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ CHOICES = {**UNIFORM, "u_choice": Field("third uniform number")}
 """The numbers that choose a direction."""
 
 GONE_ON = {
-    "direction": Field("unit direction in which the path goes on", 3),
+    "direction": Field("unit direction in which the path continues", 3),
     "beta": Field("throughput, for a throughput of 1 before", 3),
     "pdf": Field("density of the direction, 1/sr"),
 }
-"""How a path goes on."""
+"""How a path continues."""
 
 GOLD = (1.0, 0.78, 0.34)
 """A reflectance."""
@@ -47,7 +47,7 @@ def _site(given: Numbers, parameter: Any = None, outside: Any = None) -> Site:
 
 
 def _sampled(material: Any, given: Numbers, **of_site: Any) -> dict[str, Any]:
-    """Return how a path goes on."""
+    """Return how a path continues."""
     found = material.sample(_site(given, **of_site), given["u0"], given["u1"], given["u_choice"])
     return {name: getattr(found, name) for name in GONE_ON}
 
@@ -76,7 +76,7 @@ LAMBERTIAN = Function(
     _vertex,
     draws=4,
 )
-"""Matt surfaces."""
+"""Matte surfaces."""
 
 MIRROR = Function(
     "material.mirror",

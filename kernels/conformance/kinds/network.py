@@ -32,7 +32,7 @@ POSTERIORI = "bounds of profile ieee at these inputs (compiler/bounds.py)"
 """Where the bounds of networks come from."""
 
 SIZES = (([4, 5, 3], 3.0, 1.0), ([6, 8, 8, 3], 1.0, 10.0), ([3, 4, 4, 4, 3], 30.0, 30.0), ([2, 3], 1.0, 1.0))
-"""Networks of the cases: widths, omega_0 of the first layer and of the others; the last is affine alone."""
+"""Networks of the cases: widths, omega_0 of the first layer and of the others; the last is only affine."""
 
 EXAMPLES = 4
 """Examples of a minibatch."""
@@ -266,7 +266,7 @@ KINDS = (
         "network.forward",
         "The network, layer by layer",
         {**NETWORK, "x": "float[D_in]"},
-        {"layer_l": "float[D_out], what layer l gives: after its sine, but for the last"},
+        {"layer_l": "float[D_out], what layer l gives: after its sine, except for the last"},
         _forward_cases,
         _forward,
     ),

@@ -105,7 +105,7 @@ def _world(text: str, settings_text: str) -> World:
 
 
 def programs_of(name: str, settings: Settings) -> PathPrograms:
-    """Return the programs of a path; the greatest depth is none of their business."""
+    """Return the programs of a path; they do not depend on the greatest depth."""
     return _programs(name, replace(settings, max_depth=0))
 
 
@@ -310,7 +310,7 @@ PLACES = (
     (5, 9, ""),  # a block of glass
     (11, 2, ""),  # a lamp
     (7, 8, ""),  # rough metal
-    (3, 8, ""),  # a matt block
+    (3, 8, ""),  # a matte block
     (1, 6, ""),  # a mirror
     (9, 12, ""),  # the floor
 )
@@ -416,7 +416,7 @@ def _add(
 # ---- whole paths ----------------------------------------------------------------------------------------
 
 VERTEX = ("t", "surface", "point", "normal", "reflectance", "beta", "radiance")
-"""What is told of each vertex: the surface, and beta and radiance on arrival."""
+"""The outputs of each vertex: the surface, and beta and radiance on arrival."""
 
 
 def whole(inputs: Mapping[str, Any]) -> dict[str, Any]:
@@ -547,7 +547,7 @@ KINDS = (
             **OF_PATH,
             **OF_SURFACE,
         },
-        {"alive": "whether it goes on; if not, only radiance is asked for", **OF_PATH},
+        {"alive": "whether it continues; if not, only radiance is required", **OF_PATH},
         lambda: _steps().scatter,
         scatter,
         files,

@@ -46,13 +46,13 @@ SIZE_PX, BLOCK_PX = 16, 4
 
 
 MIDDLE, BEYOND = (0.5, 0.5, 0.5), (-0.25, 0.5, 1.25)
-"""Colours around which pictures lie: in the middle of [0, 1], where clipping hides nothing, and beyond."""
+"""Colours that pictures are near: in the middle of [0, 1], where clipping hides nothing, and beyond."""
 
 
 def _model(
     features: tuple[str, ...], window: Window, widths: list[int], seed: int, around: tuple[float, ...]
 ) -> Model:
-    """Return a small model whose pictures lie around a colour."""
+    """Return a small model whose pictures are near a colour."""
     n_in = dataset.n_inputs(features, window)
     network = siren.init([n_in, *widths, 3], 3.0, 1.0, seed=seed, dtype=np.float32)
     biases = (*network.biases[:-1], np.array(around, np.float32))
@@ -79,7 +79,7 @@ DENOISED = (
     (("depth", "albedo", "position"), Window(3, "clamp"), [5, 5], (1, 4), MIDDLE, "one row"),
     (("color",), Window(2, "clamp"), [4], (2, 2), BEYOND, "clipped to [0, 1]"),
 )
-"""Features, window, hidden widths, height and width, the colour around which pictures lie, note."""
+"""Features, window, hidden widths, height and width, the colour that pictures are near, note."""
 
 
 def _denoise_cases() -> list[Case]:
@@ -193,7 +193,7 @@ KINDS = (
         _render,
         paths.files,
         "The answer may have any number of samples, any random numbers and be in files; "
-        "`expected` holds the means of blocks of pixels, and `welch` what the test needs besides.",
+        "`expected` holds the means of blocks of pixels, and `welch` what else the test needs.",
     ),
 )
 """The kinds of this module."""

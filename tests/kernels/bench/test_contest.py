@@ -221,7 +221,7 @@ def test_a_slow_one_has_one_frame(model) -> None:
     data = run(model, [fake("slow", lambda t, m, s: by_reference(m))], budget_s=1e-9, sizes=(40,))
     row = rows(data)["slow"]
     assert len(row["ms"]["rounds"]) == 1
-    assert row["reason"].startswith("one frame alone: it took ")
+    assert row["reason"].startswith("only one frame: it took ")
     (grown,) = data["sizes"]
     assert grown["size_px"] == 40
     assert "by its time at another size, more than --budget 1e-09 s" in grown["contenders"][0]["reason"]

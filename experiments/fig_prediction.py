@@ -5,7 +5,7 @@
 2. Figure 2: input, normals, predictions, reference, and where FLIP sees a difference [`prediction`].
 3. Figure 3: one unseen frame by several methods, whole and enlarged [`strip`]. The paper's other networks
    are drawn from the pictures of experiments/table1.py, where its folder has some [`others`].
-4. Scores of all that is shown stand in a table [`measure`].
+4. A table has the scores of all that is shown [`measure`].
 
     python experiments/fig_prediction.py
     python experiments/fig_prediction.py --scale paper -o out/fig-prediction-paper
@@ -51,7 +51,7 @@ NETWORKS: Mapping[str, tuple[Recipe, bool]] = {
     "WAMnet, paper": (PAPER, True),
     "WAMnet, short": (SHORT, False),
 }
-"""Recipes, and whether they are trained on one frame alone, as in the paper."""
+"""Recipes, and whether they are trained on only one frame, as in the paper."""
 
 REFERENCE = "reference"
 """Name of the picture of many samples in the folder of experiments/table1.py."""

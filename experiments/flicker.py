@@ -98,7 +98,7 @@ def by_network(recipe: Recipe, lone: bool, ground: Ground, scale: str, kind: str
 
 
 def by_oidn(clean: bool, ground: Ground, scale: str, kind: str, seed: int) -> Floats:
-    """Return what Open Image Denoise makes of colour, albedo and normal; `clean`: it is told they are."""
+    """Return what Open Image Denoise makes of colour, albedo and normal; `clean`: they have no noise."""
     noisy = sequence(ground, scale, kind, seed, frames.NOISY_SPP)
     return np.stack([to_display(peer_oidn.filtered(frame, frame, clean)) for frame in noisy])
 

@@ -36,7 +36,7 @@ GROWTH = 2.0
 """Each look comes after so many times the steps of the last one."""
 
 MARKS_S = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 90.0)
-"""Seconds at which the table tells the quality; the last is the paper's."""
+"""Seconds at which the table gives the quality; the last is the paper's."""
 
 
 def stops(steps: int) -> list[int]:

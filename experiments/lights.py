@@ -1,4 +1,4 @@
-"""Lights of other colours: where the paper's network fails (its sections 6.1 and 6.2), and what mends it.
+"""Lights of other colours: where the paper's network fails (its sections 6.1 and 6.2), and what helps.
 
 1. A set of lights is the colours of both lamps of `minicubes`: A is the scene's own; others have hues and
    saturations drawn within a range, and keep the lamps' brightness [`light_set`].
@@ -82,7 +82,7 @@ SET_SEED = 61
 """Seed of the light sets' colours, and of which set a frame has."""
 
 COLORS = Ranges(saturation=(0.3, 0.9))
-"""Range of the colours of trained and tested sets; A's saturations lie amid it."""
+"""Range of the colours of trained and tested sets; it contains A's saturations."""
 
 FIRST_OF_FRAMES, FIRST_OF_TESTS = 1000, 5000
 """Numbers of the first set of frames with colours of their own, and of tests."""

@@ -70,7 +70,7 @@ def candidate(name: str) -> Recipe:
 
 
 def frames(folder: Path, size: int, times: Sequence[float], reference_spp: int) -> list[Pair]:
-    """Return (1 spp, reference) pairs at the times, from the folder where they lie there already."""
+    """Return (1 spp, reference) pairs at the times, from the folder where they are there already."""
     shots = []
     for moment in times:
         seed = round(moment * 1000)

@@ -7,8 +7,8 @@
    outside are compared with those of training before anything is rendered; none shows what another one shows.
 2. Each row denoises the test frames of each seed, which is that of the noise and of the training [`judged`].
    Features are those of the colour's one camera ray, or means over 16 rays: then for both denoisers.
-3. Beside a score stands the number of samples per pixel whose render has the same error [`climbed`].
-4. Times of a frame are taken in turns, from frame to picture in display encoding [`timed`].
+3. Each score comes with the number of samples per pixel whose render has the same error [`climbed`].
+4. Times of a frame are interleaved, and go from frame to picture in display encoding [`timed`].
 5. Records hold every frame's scores. Tables have means and 95 % intervals over frames and seeds, and so have
    the differences between two rows, frame by frame [`report`]. The folder gets `quality.json`, `times.json`
    and `quality.md`, and a sheet of pictures for each set.
@@ -257,7 +257,7 @@ def climbed(bench: Bench, kept: Results) -> scores.Ladder:
 
 
 def timed(bench: Bench, kept: Results, rounds: int) -> None:
-    """Take the times of a frame from its layers in memory to a picture, all ways in turns."""
+    """Take interleaved times of all ways from a frame's layers in memory to a picture."""
     if kept.get("times", 0) is not None:
         return
     frame = bench.tests(0, RAYS)[0][0]
@@ -307,7 +307,7 @@ def report(kept: Results, clock: Results | None, names: Sequence[str], rows: Seq
             [name, f"{1000 * float(np.median(s)):.1f}", f"{1000 * min(s):.1f} - {1000 * max(s):.1f}"]
             for name, s in times["seconds"].items()
         ]
-        heads = ["a frame, in turns", "ms, median", "ms, range"]
+        heads = ["a frame, interleaved", "ms, median", "ms, range"]
         parts += [
             f"## Time ({times['device']}, schedule {times['schedule']})\n",
             tables.markdown(heads, cells),

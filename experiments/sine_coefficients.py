@@ -2,7 +2,7 @@
 
 1. Remez' exchange finds the odd polynomial c1 r + c3 r^3 + ... that is closest to sin on [0, R_MAX] in the
    maximum norm, the first coefficients being held [`remez`]. From degree 7 on c1 is 1, so that the sine of a
-   small number is that number; below, the absolute error alone counts, and c1 is free [`held`].
+   small number is that number; below, only the absolute error counts, and c1 is free [`held`].
 2. A search makes the coefficients float32, one after the other, and fits the rest again after each. What the
    rest could still reach with real coefficients is a lower bound for all that follow: a branch that cannot
    beat the best one found is cut off [`search`]. Where the search ends by itself, no float32 coefficients

@@ -107,7 +107,7 @@ def kernel(target: str, profile: str, cosine: bool = False) -> Artifact:
 
 
 def native_sin(artifact: Artifact) -> Artifact:
-    """Return the OpenCL kernel with `native_sin` in the place of `sin`."""
+    """Return the OpenCL kernel with `native_sin` instead of `sin`."""
     source = artifact.source.replace("= sin(", "= native_sin(")
     if source == artifact.source:
         raise ValueError("the kernel calls no sin: nothing was replaced")
@@ -230,7 +230,7 @@ def timed(executor: Any, artifact: Artifact, image: Array) -> None:
 
 
 def speed(rounds: int) -> Iterator[str]:
-    """Yield a line a sine: how long a frame takes in OpenCL's schedule for this machine, in turns."""
+    """Yield a line a sine: a frame's time in OpenCL's schedule for this machine, all sines interleaved."""
     widths = (WINDOW**2 * FEATURES, 32, 32, 32, 32, 3)
     network = siren.init(widths, 3.0, 3.0, seed=1, dtype=np.float32)
     gather = Gather(Window(WINDOW, "clamp"), (Image("a", FEATURES, -1.0, 1.0),))

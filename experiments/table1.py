@@ -10,13 +10,13 @@
 3. Each row is trained, tuned or opened for each seed, which is that of the noise too, and judged on the test
    frames [`judged`]. A row without its packages is left out, and said so. DnCNN and pix2pix are trained until
    their error on the validation frames is flat [`baselines/fitting.py`].
-4. Times of a frame, of its input and of a step of training are taken in turns, on the same cores, when
+4. Times of a frame, of its input and of a step of training are interleaved, on the same cores, when
    everything else is done [`timed`].
 5. The folder gets `table1.json`, `times.json`, `table1.md` with a table of qualities and one of costs, the
    pictures of the first test frame, `curves.png` with the validation errors, and `crops.png`: a crop around a
    corner of pix2pix's patches [`drawn`].
 
-Every step is kept, so an interrupted run goes on. Numbers are means over test frames and seeds; records keep
+Every step is kept, so an interrupted run resumes. Numbers are means over test frames and seeds; records keep
 those of each frame. "worth" is the number of samples per pixel whose render has the same error. "blocks" is
 how much the error jumps at borders of patches, against elsewhere [`baselines/blocks.py`]. "MSE modulo 256" is
 that of arithmetic of 8 bits; that the paper's was so is a conjecture [`experiments/claims.py`].
@@ -186,7 +186,7 @@ def _renders(bench: Bench, own: Shot | None, seed: int) -> dict[str, Any]:
 
 
 def timed(rows: Sequence[str], bench: Bench, kept: Results, rounds: int) -> None:
-    """Take the times of a frame and of its input, all rows in turns."""
+    """Take interleaved times of a frame and of its input, for all rows."""
     left = [row for row in rows if kept.get(row, 0) is None and ROWS[row].timed]
     if not left:
         return
@@ -279,7 +279,7 @@ def priced(row: str, kept: Results, times: Results) -> dict[str, float] | None:
 
 
 def count(found: Summary) -> str:
-    """Return a whole number with commas."""
+    """Return an integer with commas."""
     return f"{found.mean:,.0f}"
 
 
@@ -411,7 +411,7 @@ def _may_go_on(found: Values, settings: Mapping[str, Any]) -> bool:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Render, train, judge, time, and print the table."""
     parser = command.parser(__doc__ or "", "table1")
-    # Costly rows have fewer seeds than others, unless seeds are asked for.
+    # Costly rows have fewer seeds than others, unless seeds are given.
     parser.set_defaults(seeds=None)
     parser.add_argument("--only", nargs="+", choices=list(ROWS), default=list(ROWS), help="rows")
     parser.add_argument("--plan", action="store_true", help="say how long it will take, and stop")
@@ -442,7 +442,7 @@ def run(options: argparse.Namespace) -> None:
             forecast(bench, missing)
         if options.plan:
             return
-        with hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"):
+        with hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"):
             for row, seed in missing:
                 sys.stderr.write(f"table1: {row}, seed {seed}\n")
                 kept.put(row, seed, judged(row, bench, kept, pictures, seed))

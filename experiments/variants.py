@@ -1,4 +1,4 @@
-"""Variants of a trained network: what each costs on unseen frames, untouched and trained on, and its time.
+"""Variants of a trained network: what each costs on unseen frames, untouched and trained further; its time.
 
     wamnet demo -o out/demo
     python experiments/variants.py --model out/demo/model.safetensors --dataset out/demo/frames --tune 2000
@@ -27,7 +27,7 @@ from wamnet.refimpl.denoise import Model, denoise
 from wamnet.refimpl.train import SHORT, model_of
 
 MORE = ("window4", "hidden24", "hidden16", "without-normal", "without-albedo", "without-position")
-"""Variants besides those of a curve, which lose much untouched."""
+"""Variants in addition to those of a curve, which lose much untouched."""
 
 
 def psnr(model: Model, tests: Pairs) -> float:

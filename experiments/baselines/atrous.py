@@ -4,8 +4,8 @@
 2. The variance of its luminance is estimated over neighbours on the same surface [`local_variance`], for
    there is one frame only and no history.
 3. Five passes of a 5x5 kernel, the cubic B-spline's weights (1, 4, 6, 4, 1)/16 in each direction, whose taps
-   lie 1, 2, 4, 8, 16 pixels apart ("with holes", a trous) [`pass_over`]. Each tap counts the less, the more
-   its depth, normal and luminance differ; the variance is filtered along with the squared weights.
+   are 1, 2, 4, 8, 16 pixels apart ("with holes", a trous) [`pass_over`]. Each tap counts the less, the more
+   its depth, normal and luminance differ; the variance is filtered with the squared weights.
 4. The result times albedo is the picture [`denoise`].
 
 Sources: Schied et al., "Spatiotemporal Variance-Guided Filtering: Real-Time Reconstruction for Path-Traced
@@ -36,7 +36,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Weights of linear red, green and blue (Rec. ITU-R BT.709)."""
 
 ALBEDO_EPSILON = 1e-3
-"""Reflectance below this one is none: the colour is emitted, or there is no surface."""
+"""Reflectance below this one counts as zero: the colour is emitted, or there is no surface."""
 
 DEPTH_EPSILON = 1e-3
 """Depth, in scene units, by which neighbours of a surface that faces the camera may differ."""

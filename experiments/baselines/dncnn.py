@@ -1,7 +1,7 @@
 """DnCNN: a convolutional network that predicts the noise of a picture, as the paper trained it.
 
 1. `depth` layers of 3x3 convolutions with 64 channels: the first with ReLU, the middle ones with batch
-   normalisation and ReLU, the last alone [`network`]. It maps a noisy picture y to the noise R(y) in it.
+   normalisation and ReLU, the last with neither [`network`]. It maps a noisy picture y to its noise R(y).
 2. The loss is 1/(2N) sum over the N pictures of ||R(y) - (y - x)||^2, x the clean one [`residual_loss`].
 3. The clean picture is y - R(y) [`DnCNN.picture`].
 

@@ -1,7 +1,7 @@
 """Training a baseline in PyTorch until its validation error is flat; it can be stopped after any step.
 
-1. Examples are crops of display-encoded pictures, or tiles of them [`Examples`], drawn for each step as a
-   function of the seed and the step alone [`draw`]; so is all other noise [`generator_of`].
+1. Examples are crops of display-encoded pictures, or tiles of them [`Examples`]. What a step draws depends
+   only on the seed and the step [`draw`]; so does all other noise [`generator_of`].
 2. A step is the method's own [`Method.step`]: losses, gradients, optimisers.
 3. Every so many steps the network denoises validation pictures, which are neither trained on nor reported
    [`validated`]. Where the best PSNR of the last third of these looks is less than [`FLAT_DB`] above the best
@@ -219,7 +219,7 @@ def draw(recipe: Recipe, step: int, data: Examples) -> tuple[Tensor, Tensor]:
 
 
 def generator_of(seed: int, step: int) -> torch.Generator:
-    """Return the generator of a step's noise: a function of seed and step alone."""
+    """Return the generator of a step's noise, which depends only on seed and step."""
     words = random_block(*(counter(np.array([n])) for n in (seed, step, 0, NOISE_TAG)))
     high, low = (int(word[0]) for word in words[:2])
     return torch.Generator().manual_seed(high << 32 | low)
@@ -238,7 +238,7 @@ def validated(method: Method, recipe: Recipe, data: Examples) -> float:
     found = []
     for noisy, clean in zip(data.noisy, data.clean, strict=True):
         size = min(VALIDATION_PX, *noisy.shape[1:])
-        # The measure of pix2pix's patches: the middle is one of a whole number of them.
+        # For pix2pix, whose pictures are tiled with patches: the middle is made of whole patches.
         size -= size % recipe.crop if recipe.tiles else 0
         y, x = ((side - size) // 2 for side in noisy.shape[1:])
         part = slice(None), slice(y, y + size), slice(x, x + size)
@@ -273,8 +273,8 @@ def fit(
 ) -> dict[str, Any]:
     """Train the method's networks in place until they are flat; return the facts of the run.
 
-    `until`: stop after so many steps, to go on later. Networks that are finished are read; a run that was
-    interrupted goes on, and so does one that may do more steps than it did and was not flat.
+    `until`: stop after so many steps, to resume later. Networks that are finished are read; a run that was
+    interrupted resumes, and so does one that may do more steps than it did and was not flat.
     """
     folder.mkdir(parents=True, exist_ok=True)
     path = path_of(folder, recipe, data, validation)
@@ -285,7 +285,7 @@ def fit(
             return facts
     checkpoint = path.with_suffix(".checkpoint")
     run = _load(method, checkpoint)
-    with hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"):
+    with hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"):
         _advance(method, recipe, (data, validation), run, checkpoint, until)
     found = _facts(method, recipe, (data, validation), run)
     if run.done == recipe.steps or found["flat"]:
@@ -353,7 +353,7 @@ def seconds_a_step(method: Method, recipe: Recipe, data: Examples) -> float:
 
 @contextmanager
 def whole_steps() -> Iterator[list[int]]:
-    """Put Ctrl-C off until the block is done: half a step could not be gone on with. Yield what came."""
+    """Put Ctrl-C off until the block is done: a run cannot resume in mid-step. Yield what came."""
     came: list[int] = []
     if threading.current_thread() is not threading.main_thread():
         yield came

@@ -3,7 +3,7 @@
 1. Noisy frames and references are rendered once and kept [`frames.render_all`, `frames.pairs`].
 2. Networks are trained once and kept, with their seconds [`training.trained`].
 3. A picture is scored against its reference in both spaces [`scores.score`].
-4. One record per configuration and seed is kept as JSON, so that an interrupted run goes on
+4. One record per configuration and seed is kept as JSON, so that an interrupted run resumes
    [`results.Results`], [`results.fill`]; records become means with their spread, and Markdown tables
    [`tables.table`]; values per pose and seed become bootstrap intervals [`intervals.interval`].
 5. Contact sheets and curves are PNG [`figures`].

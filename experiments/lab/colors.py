@@ -1,7 +1,7 @@
 """How far the colours of a picture are off, whatever its noise: errors of means.
 
 A picture is cut into tiles; the error of a tile is the length of the difference of mean colours, so that
-noise and blur, which leave means alone, hardly count. One tile compares the pictures' mean colours.
+noise and blur, which keep means, hardly count. One tile compares the pictures' mean colours.
 """
 
 from __future__ import annotations

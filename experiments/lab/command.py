@@ -20,7 +20,7 @@ SCALES = ("small", "paper")
 """Minutes on two cores, or the paper's sizes."""
 
 SEEDS = (0, 1, 2)
-"""What is repeated, so that a spread can be told."""
+"""Seeds of the repetitions that the spread comes from."""
 
 HIDDEN_SCALE = "toy"
 """A scale for tests: seconds, and numbers that mean nothing."""
@@ -36,7 +36,7 @@ SCRIPTS = ("experiments", "bench")
 def line(arguments: Sequence[str] | None = None) -> str:
     """Return the command of this process as typed in the repository's root, without folders of results.
 
-    Nothing is returned for a program that is none of the project's, such as a test's. `arguments`: those of
+    Nothing is returned for a program outside the project, such as a test's. `arguments`: those of
     the process, its script first, unless they are given.
     """
     script, *rest = sys.argv if arguments is None else arguments

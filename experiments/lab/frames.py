@@ -99,11 +99,11 @@ def render_all(folder: Path, shots: Iterable[Shot], executor: str = "opencl") ->
     left = [shot for shot in wanted if there[id(shot)] is None]
     samples = sum(shot.job.samples for shot in left)
     with (
-        hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"),
+        hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"),
         progress(f"rendering {len(left)} frames", samples) as advance,
     ):
         for shot in left:
-            # A shot that is asked for twice is there by now.
+            # A shot that appears twice in the list is there by now.
             known = find(folder, shot, executor)
             there[id(shot)] = known or _render(folder, shot, executor, advance)
     return [path for shot in wanted if (path := there[id(shot)]) is not None]

@@ -79,7 +79,7 @@ network of one scene needs no thousand frames, which would not fit into memory e
 
 @dataclass
 class Ground:
-    """Where a study stands: its plan, the folder that keeps frames and networks, and the executor."""
+    """What a study builds on: its plan, the folder that keeps frames and networks, and the executor."""
 
     plan: Plan
     cache: Path

@@ -33,7 +33,7 @@ Line = Sequence[tuple[float, float, float, float]]
 
 @dataclass(frozen=True)
 class Plot:
-    """What draws a plot, the records that it shows, and what a reader is told under it."""
+    """What draws a plot, the records that it shows, and the text under it."""
 
     draw: Callable[[Records], Any]
     records: Sequence[str]

@@ -7,8 +7,8 @@
    comes before the writing, numbers have six digits [`rounded`].
 3. A record may name pictures of frames, with their digests; plots are drawn from records instead
    [`pictures`].
-4. A text that shows a record which is still to be made stands in `pending.txt`, with the command that makes
-   it [`pending`]; figures that need none in `quoted.txt`, with the reason [`quoted`].
+4. A text that shows a record which is still to be made is listed in `pending.txt`, with the command that
+   makes it [`pending`]; figures that need no record in `quoted.txt`, with the reason [`quoted`].
 """
 
 from __future__ import annotations

@@ -223,7 +223,7 @@ def fill(
     """Find what has no record yet: each configuration by its function of the seed, all seeds of one first."""
     left = [(name, seed) for name in work for seed in seeds if results.get(name, seed) is None]
     with (
-        hint_on_interrupt(lambda: f"the same command goes on where it was, in {results.path}"),
+        hint_on_interrupt(lambda: f"the same command resumes where it was, in {results.path}"),
         progress(title, len(left)) as advance,
     ):
         for name, seed in left:

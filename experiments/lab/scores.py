@@ -7,7 +7,7 @@
 3. FLIP is that of the package `flip-evaluator`, for pictures of display range, at its usual 67 pixels per
    degree: Andersson, Nilsson, Akenine-Moeller, Oskarsson, Astrom, Fairchild, "FLIP: A Difference Evaluator
    for Alternating Images", Proceedings of the ACM on Computer Graphics and Interactive Techniques 3(2), 2020.
-4. Beside a score stands the number of samples per pixel whose render has the same error: the noise of a mean
+4. Each score comes with the number of samples per pixel whose render has the same error: the noise of a mean
    falls with their number, and what display-encoding adds is measured [`Ladder.spp_of`], [`Ladder.mse_of`].
 
 *WAMnet for Image Denoising* prints MSE on 0 .. 255 and, as PSNR, ten times the natural logarithm of

@@ -147,7 +147,7 @@ def quality_times(records: Records) -> str:
         [name, f"{1000 * statistics.median(s):.1f}", f"{1000 * min(s):.1f} - {1000 * max(s):.1f}"]
         for name, s in seconds.items()
     ]
-    return tables.markdown(["a frame, in turns", "ms, median", "ms, range"], cells)
+    return tables.markdown(["a frame, interleaved", "ms, median", "ms, range"], cells)
 
 
 # ---- the paper's table and claims -----------------------------------------------------------------------

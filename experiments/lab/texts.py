@@ -6,8 +6,8 @@
        ...
        <!-- end -->
 
-2. A figure in a sentence lies between two comments, which nobody sees where the text is read:
-   `<!--= losses/MSE/psnr:.1f -->31.3<!--/-->`. Before the colon stands the record, the configuration and the
+2. A figure in a sentence is between two comments, which nobody sees where the text is read:
+   `<!--= losses/MSE/psnr:.1f -->31.3<!--/-->`. Before the colon are the record, the configuration and the
    value, after it how Python writes a number; `low` or `high` before the value is an end of its interval
    [`figure`]. `losses@machine` is what the record was measured on, `losses@numpy` a version
    [`fact`]. One word in place of the three is a function of the records [`shown.FIGURES`].
@@ -33,7 +33,7 @@ TABLE = re.compile(
 """A block that a function returns."""
 
 FIGURE = re.compile(r"<!--= (?P<name>[^<>]+?) -->(?P<old>[^<>]*)<!--/-->")
-"""A figure in a sentence; its text may go on on the next line."""
+"""A figure in a sentence; its text may continue on the next line."""
 
 MARK = re.compile(r"<!-- table:|<!--=|<!--/-->")
 """What may only be there as a part of the two above."""

@@ -1,9 +1,8 @@
 """Networks trained once: a folder keeps each under its recipe and its data, with the seconds it took.
 
 1. The file is named after the recipe, the training frames and the executor [`path_of`].
-2. Training goes through the command's own code: progress, checkpoints, and a run that was interrupted goes on
-   to the same bits [`trained`]. Its seconds are those of
-   the steps of the last part, in proportion.
+2. Training goes through the command's own code: progress, checkpoints, and a run that was interrupted resumes
+   to the same bits [`trained`]. Its seconds are those of the steps of the last part, in proportion.
 3. A picture is made by the executor, or by the reference [`denoised`].
 """
 
@@ -52,7 +51,7 @@ def trained(
         state = None  # its seconds are not known
     share = 1.0 if state is None else 1.0 - state.step / recipe.steps
     _, seconds = fit(recipe, pairs, path, state, executor=executor)
-    # A run that went on has timed its own steps: all of them took as long, in proportion.
+    # A resumed run has timed only its own steps: all of them took as long, in proportion.
     total = seconds / share
     write_text(clock, json.dumps({"seconds": total, "recipe": json.loads(recipe_to_json(recipe))}) + "\n")
     checkpoint.unlink(missing_ok=True)

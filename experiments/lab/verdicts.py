@@ -37,7 +37,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Question:
-    """Whether a number lies above a bound, or below it; `decides`: whether the claim depends on it.
+    """Whether a number is above a bound, or below it; `decides`: whether the claim depends on it.
 
     `digits` after the point; `means_digits`: those of the means that are compared, if they are others.
     """
@@ -62,7 +62,7 @@ class Question:
 
 @dataclass(frozen=True)
 class Answer:
-    """A question, what was measured, the verdict, and the reason for one that is none."""
+    """A question, what was measured, the verdict, and the reason where it is not clear."""
 
     question: Question
     found: Measured | None
@@ -84,7 +84,7 @@ class Answer:
 
 
 def decide(found: Interval, bound: float, above: bool = True) -> tuple[str, str]:
-    """Return the verdict of an interval, and the reason for one that is none."""
+    """Return the verdict of an interval, and the reason where it is not clear."""
     if not all(map(math.isfinite, (found.mean, found.low, found.high, bound))):
         return UNTESTED, "a number is not finite"
     if found.seeds * found.poses == 1:

@@ -1,4 +1,4 @@
-"""All targets of `wamnet export`, compiled, run and held to their bound here: the table of the README.
+"""All targets of `wamnet export`, compiled, run and checked against their bound: the table of the README.
 
     python bench/exports.py
     python bench/exports.py --model model.safetensors --scene minicubes --targets wgsl c --places
@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def places(target: str, every: bool) -> list[str]:
-    """Return the places of the weights that are asked for; nothing is the usual one."""
+    """Return the requested places of the weights; nothing is the usual one."""
     return [*TARGETS[target].places] if every and target != ONNX else [""]
 
 

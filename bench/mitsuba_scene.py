@@ -72,11 +72,11 @@ def check(scene: Scene, settings: Settings) -> None:
     """Refuse a scene or settings that Mitsuba would show differently."""
     if settings.roulette_depth is not None or settings.strategy != "mis" or settings.heuristic != "power":
         rule = "the peer combines both strategies by the power heuristic, without roulette"
-        raise InputError("settings", settings, rule, "use the default ones but for max_depth")
+        raise InputError("settings", settings, rule, "use the default ones except for max_depth")
     materials = [part.material for part in (*scene.boxes, *scene.spheres, *scene.quads)]
     materials += scene.room.materials if scene.room is not None else ()
     if any(material is not None for material in materials):
-        rule = "only matt surfaces are exported"
+        rule = "only matte surfaces are exported"
         raise InputError("scene with materials", scene.name, rule, "compare a scene without")
     if scene.environment is not None:
         rule = "no sky is exported"
@@ -98,7 +98,7 @@ def check(scene: Scene, settings: Settings) -> None:
 
 
 def _holds(room: Room, part: Box | Sphere | Quad | Light) -> bool:
-    """Tell whether a primitive lies within the room, but for rounding."""
+    """Tell whether a primitive lies within the room, up to rounding."""
     low, high = _extent(part)
     slack = 1e-6 * (np.array(room.high) - room.low)
     return bool(np.all(low >= room.low - slack) and np.all(high <= room.high + slack))

@@ -4,9 +4,9 @@
 
 Both ways use kernels that are compiled before, of one executor; they take turns, so that drift of the
 machine's speed meets them alike. Separate: trace all layers, read them back, encode in float64, upload,
-denoise, read back. The table also has the parts of the pipeline, each ended by waiting for the device, and
-below it stands what a new time of the scene costs: its kernel is compiled anew, since the scene is constants
-in it.
+denoise, read back. The table also has the parts of the pipeline, each ended by waiting for the device. Below
+it is what a new time of the scene costs: its kernel is compiled again, since the scene is constants in it.
+
 The network has random weights: speed does not depend on them.
 """
 

@@ -40,7 +40,7 @@ NO_CACHES = {
     "MESA_SHADER_CACHE_DISABLE": "true",
     "MESA_GLSL_CACHE_DISABLE": "true",
 }
-"""Environment in which drivers build every kernel anew."""
+"""Environment in which drivers reuse no kernel that they built before."""
 
 
 @dataclass

@@ -5,8 +5,8 @@
 
 1. Each way to render makes its first frame [`Way.begin`]: reading the scene, compiling and all that happens
    once count there, with empty caches of compilers [`empty_caches`].
-2. Then they take turns, so that drift of the machine's speed meets all of them alike. A turn ends when the
-   frame is in memory as an array. Kernels write all layers and the variance, the peer colours alone.
+2. Then they take turns, so that drift of the machine's speed affects all of them alike. A turn ends when the
+   frame is in memory as an array. Kernels write all layers and the variance, the peer only colours.
 3. Printed are the machine, the median and the range, samples a second, and their ratio to the last way's;
    then how far each way's mean colour is from the first's, in standard errors that come from the spread of
    the turns, whose seeds differ.
@@ -132,7 +132,7 @@ def empty_caches() -> Iterator[None]:
 
 
 def _ways(name: str, job: Job, by: Sequence[str], workers: Sequence[int]) -> list[Way]:
-    """Return the ways to render a canonical scene, in the order asked for."""
+    """Return the ways to render a canonical scene, in the order of `by`."""
     scene, ways = canonical(name), []
     for kind in by:
         if kind == "numpy":

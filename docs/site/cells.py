@@ -29,7 +29,7 @@ DOTS_PER_INCH = 110
 """Resolution of plots: sharp enough on a screen, small enough for a page."""
 
 WIDEST_PX = 640
-"""Pictures are magnified by a whole number to at most so many pixels across, so that pixels are seen."""
+"""Pictures are magnified by an integer to at most this width, so that their pixels are visible."""
 
 
 @dataclass

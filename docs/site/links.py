@@ -48,7 +48,7 @@ def broken(folder: Path) -> list[str]:
         name = path.relative_to(folder).as_posix()
         for address in dict.fromkeys(page.addresses):
             reason = _wrong(address, path, pages)
-            # The page that a server gives for what is not there lies at any address.
+            # A server gives this page at every address that has no page.
             if reason and not (name == "404.html" and address.startswith("/")):
                 wrong.append(f"{name}: {address[:100]}: {reason}")
         wrong += [f"{name}: picture {source} has no alternative text" for source in page.images_without_text]

@@ -2,7 +2,7 @@
 
 1. A small network and a small scene are compiled, their programs with the places that they came from
    [`network_listing`], [`scene_listing`].
-2. A line of a kernel belongs to the line of the function shown that asked for it, itself or through what it
+2. A line of a kernel belongs to the line of the shown function that led to it, directly or through what it
    called; both have one colour, and its number leads from one to the other [`shown`].
 3. Pointing at a line, or moving to it with the keyboard, marks its partners (assets/listing.js).
 """
@@ -30,7 +30,7 @@ from wamnet.refimpl.shapes import sphere
 from wamnet.refimpl.transport import Settings
 
 ROOT = Path(siren.__file__).parents[1]
-"""The folder of which places are told."""
+"""The folder whose places are shown."""
 
 MARK = "<p>LISTING {}</p>"
 """The place of a listing on its page."""
@@ -74,7 +74,7 @@ def listings() -> Iterator[tuple[str, str]]:
 
 
 def shown(function: Callable[..., Any], lines: list[Line], name: str, only: bool = False) -> str:
-    """Return the HTML of a function beside the lines of a kernel; `only`: those that came from it alone."""
+    """Return the HTML of a function beside the lines of a kernel; `only`: no others."""
     source, first = inspect.getsourcelines(function)
     file = Path(inspect.getfile(function))
     path = file.relative_to(ROOT).as_posix()

@@ -74,7 +74,7 @@ def pictures(model: Path, folder: Path, name: str, size: int) -> list[Path]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Draw what is asked for."""
+    """Draw the pictures that the command line selects."""
     parser = argparse.ArgumentParser(description="Draw the web page at 40 degrees and under other colours.")
     parser.add_argument("model", type=Path, help="model file, or the name of a shipped one")
     parser.add_argument("folder", type=Path, help="where the pictures go")

@@ -57,7 +57,7 @@ class Outcome(NamedTuple):
 
 
 def read(table: str) -> list[Mutant]:
-    """Return the mutants of a table, whose paragraphs each are one but for the first."""
+    """Return the mutants of a table: each paragraph is one, except for the first."""
     found = []
     for paragraph in table.strip().split("\n\n")[1:]:
         title, ask, *lines = paragraph.split("\n")
@@ -72,7 +72,7 @@ def mutated(mutant: Mutant, text: str) -> str:
     """Return the program with the change; its text must occur once."""
     count = text.count(mutant.old)
     if count != 1 or mutant.old == mutant.new:
-        raise ValueError(f"{mutant.name}: its text stands there {count} times, or stays as it is")
+        raise ValueError(f"{mutant.name}: its text appears {count} times, or stays as it is")
     return text.replace(mutant.old, mutant.new)
 
 

@@ -155,8 +155,8 @@ ROOM = scenes.furnace()
     ("scene", "settings", "message"),
     [
         (ROOM, Settings(roulette_depth=2), "the peer combines both strategies by the power heuristic"),
-        (ROOM, Settings(strategy="light"), "use the default ones but for max_depth"),
-        (scenes.glossy(), Settings(), "scene with materials is glossy: only matt surfaces are exported"),
+        (ROOM, Settings(strategy="light"), "use the default ones except for max_depth"),
+        (scenes.glossy(), Settings(), "scene with materials is glossy: only matte surfaces are exported"),
         (scenes.daylight(), Settings(), "scene with .* is daylight: .* compare a scene without"),
         (
             replace(ROOM, environment=scenes.daylight().environment),

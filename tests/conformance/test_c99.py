@@ -168,7 +168,7 @@ def test_each_mutant_changes_one_place_and_breaks_a_clause(mutants):
 
 def test_a_mutant_whose_text_is_gone_is_an_error(mutants):
     mutant = mutants.Mutant("RNG-1", "nothing", (), "no such text", "another")
-    with pytest.raises(ValueError, match=r"nothing: its text stands there 0 times"):
+    with pytest.raises(ValueError, match=r"nothing: its text appears 0 times"):
         mutants.mutated(mutant, SOURCE.read_text())
 
 

@@ -1,8 +1,8 @@
 """One writer for one output: the second is refused, in one line, before it has written anything.
 
 1. A writer locks an empty file, in its folder [`alone_in`] or beside its file [`alone_at`]; [`working_in`]
-   makes the folder too. The system forgets the lock of a process that was killed, so that the next run goes
-   on; the file goes at every other end.
+   makes the folder too. The system forgets the lock of a process that was killed, so that the next run can
+   begin; at every other end the file is removed.
 2. A lock is made or opened as itself: a link of its name, anything but a regular file, and a file with
    content are somebody else's, refused, and stay.
 3. While a lock is taken or given back SIGINT and SIGTERM wait, so that none ends a run in between

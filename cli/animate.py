@@ -2,8 +2,8 @@
 
 1. Each time of the animation is rendered and denoised, and drawn as one labelled picture: by one pipeline
    where one device does both [`draw_frames`], else one after the other [`draw_apart`].
-2. A picture carries what it was made from, so that an interrupted run goes on where it was; pictures of
-   another animation are refused [`missing`].
+2. A picture carries what it was made from, so that an interrupted run resumes; pictures of another animation
+   are refused [`missing`].
 3. A film is made from the pictures when all are there; they lie in FILE.frames until then
    [`movie.write_movie`].
 """
@@ -103,7 +103,7 @@ def animate(
 ) -> None:
     """Show what a model does over an animation: noisy, denoised and reference side by side.
 
-    After any interruption the same command goes on where it was.
+    After any interruption the same command resumes where it was.
     """
     from ..kernels.frame_plan import animation_times
     from ..refimpl.denoise import learned_feature_spp
@@ -126,7 +126,7 @@ def animate(
     _say_what_is_not_learned(output, shots, network)
     with (
         working_in(folder, "drawing pictures"),
-        hint_on_interrupt(lambda: f"the same command goes on where it was, in {folder}"),
+        hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"),
     ):
         made = _draw(shots, folder, network, (executor, renderer), rank)
         if is_film:
@@ -147,7 +147,7 @@ def _remove(shots: Sequence[Shot]) -> None:
 def _draw(
     shots: Sequence[Shot], folder: Path, network: Model, by: tuple[ExecutorName, Renderer], rank: int
 ) -> int:
-    """Draw the pictures that are not in the folder, which is this process's alone; return how many."""
+    """Draw the pictures that are not in the folder, which only this process uses; return how many."""
     from ..compiler.variants import FULL, with_rank
     from ..kernels import open_executor
 

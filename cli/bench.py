@@ -59,10 +59,10 @@ MOST_FRAMES = 100
 """More test frames than anybody waits for."""
 
 MOST_REPEATS = 1000
-"""More rounds than anybody waits for; a typing error is told before."""
+"""More rounds than anybody waits for; a typing error is refused before."""
 
 JSON_NAME, TEXT_NAME = "bench.json", "bench.md"
-"""Files of the result in the output folder, besides the plots."""
+"""Files of the result in the output folder, in addition to the plots."""
 
 
 ModelFile = Annotated[
@@ -168,7 +168,9 @@ def bench(
     first_runs: FirstRuns = False,
     quick: Quick = False,
 ) -> None:
-    r"""Measure speed against error: kernels, schedules, forms of the network, and peers, in turns in one run.
+    r"""Measure speed against error: kernels, schedules, forms of the network, and peers, in one run.
+
+    Frames of all of them are interleaved: drift of the machine affects them alike.
 
     The model of the mini cubes that ships with the package is measured on unseen frames of its scene, which
     are rendered first; another one on those of its own scene, or of a data set. Peers that are installed take
@@ -197,7 +199,7 @@ def bench(
     forms = _forms(network, train_variants, quick, counts["steps"])
     forms = _needed(forms, *taking_part, size=numbers["size"], quick=quick)
     with working_in(output, "measuring"):
-        with hint_on_interrupt(lambda: f"the same command goes on with the frames and forms in {output}"):
+        with hint_on_interrupt(lambda: f"the same command resumes with the frames and forms in {output}"):
             shown = what.frames(network, output, numbers["size"], counts)
             trained = what.train(network, forms, output)
         request = _request(name, network, shown, quick=quick, first_runs=first_runs, **numbers)
@@ -387,7 +389,7 @@ def _sizes(text: str) -> tuple[int, ...]:
     try:
         return tuple(int(part) for part in parse_names(text))
     except ValueError:
-        rule = "it must be whole numbers with commas"
+        rule = "it must be integers with commas"
         raise InputError("--sizes", text, rule, "for example --sizes 256,512,1024") from None
 
 

@@ -1,9 +1,9 @@
 """Forms of a network that a benchmark trains before it measures them: ranks, windows, and both.
 
-1. A form is cut from the model [compiler/variants.py] and trained on by the model's own recipe with fewer
+1. A form is cut from the model [compiler/variants.py] and trained further with the model's recipe, with fewer
    steps, on its own scales: images are encoded as the model's are [`start_of`].
-2. Each is kept in a folder of its model, beside its checkpoint: an interrupted run goes on where it was, and
-   a form that is finished is read [`trained`].
+2. Each is kept in a folder of its model, beside its checkpoint: an interrupted run resumes, and a form that
+   is finished is read [`trained`].
 3. The whole network is trained on as far too: what more steps give is not credited to a form [`FURTHER`].
 """
 

@@ -6,7 +6,7 @@
    [`scene_of`, `ranges_of`, `rendered`].
 3. Training frames of the same kind, for forms of the network that are trained on [`for_training`].
 
-An interrupted run goes on where it was, as `wamnet dataset` does.
+An interrupted run resumes, as that of `wamnet dataset` does.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def of_folder(folder: Path, model: Model, split: str = "test") -> Frames:
 
 
 def _draw(frame: Mapping[str, Any], noisy: Frame, model: Model) -> dict[str, Any]:
-    """Return what a manifest says of a frame besides its files, and what about it training did not have.
+    """Return what a manifest says of a frame beyond its files, and what about it training did not have.
 
     A frame at a time that training had is named too: it may show what was learned.
     """

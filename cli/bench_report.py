@@ -26,17 +26,17 @@ NO_CACHE = "nothing is kept"
 """What a contender's `caches` says that leaves no compiled code on disk; equal to that of kernels."""
 
 NONE = "–"
-"""What stands where there is no number."""
+"""What is printed where there is no number."""
 
 LEGEND = """\
-Sorted by time. A star stands on the Pareto front of time and error: nothing here is faster and nearer. Times
-are medians of frames made in turns, copies included. Errors are the largest difference from the full network
+Sorted by time. A star is on the Pareto front of time and error: nothing here is faster and nearer. Times are
+medians of interleaved frames, copies included. Errors are the largest difference from the full network
 in float64: what a form leaves out counts. Predictions come from operations, sines and bytes
 (spec/bench.md)."""
 """What a reader of the first table should know."""
 
 OF_SGEMM_TOO_FAST = 1.05
-"""A share of sgemm above this is none of noise: the library that was measured is slower than it could be."""
+"""A share of sgemm above this does not come from noise: the measured library is slower than it could be."""
 
 
 def number(value: float | None, form: str = ".3g") -> str:
@@ -349,7 +349,7 @@ def _loss(value: float | None) -> str:
 
 
 TABLE_LEGEND = """\
-Sorted by time: median of frames made in turns, copies included; the spread is (longest - shortest) / median.
+Sorted by time: median of interleaved frames, copies included; the spread is (longest - shortest) / median.
 A star is on the Pareto front of time and loss. PSNR is against the references, the mean over the frames; lost
 is that of the full network less it. The error is the largest difference from the form's own network in
 float64; its bound is computed for this frame, and for all frames; a dagger marks a certificate. `further` is

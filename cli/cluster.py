@@ -1,6 +1,6 @@
 """Independent tasks in this process, on processes of this machine, or on a running Dask scheduler.
 
-1. One process does the tasks in their order [`do_here`]; results are handed over one by one.
+1. One process does the tasks in their order [`do_here`]; it yields results one by one.
 2. A cluster does them in any order [`do_on_cluster`]: workers of this machine, or those that a scheduler at
    an address has [`open_client`]. A task whose worker is lost is done again by another; the scheduler does
    that.
@@ -89,7 +89,7 @@ def do_on_cluster(
         raise InputError("cluster", "short of memory, perhaps", rule, "use fewer workers") from None
     except (distributed.comm.CommClosedError, distributed.CancelledError):
         rule = "the connection to it was lost"
-        raise InputError("Dask scheduler", "gone", rule, "run the same command again to go on") from None
+        raise InputError("Dask scheduler", "gone", rule, "run the same command again to resume") from None
 
 
 @contextmanager
@@ -117,8 +117,8 @@ def open_client(workers: int, scheduler: str | None) -> Iterator[Any]:
 def _close(distributed: Any, cluster: Any) -> None:
     """Close a cluster, whatever its workers do.
 
-    When all else is closed Dask asserts that each worker is, too. One that was to be started in the place
-    of a lost one is not, and has no process; at the end of Python Dask would wait for it once more.
+    When all else is closed Dask asserts that each worker is, too. The successor of a lost worker may not be:
+    it was never started and has no process. At the end of Python Dask would wait for it once more.
     """
     try:
         cluster.close()
@@ -139,7 +139,7 @@ def _local(distributed: Any, workers: int) -> Any:
             )
     except (RuntimeError, OSError, TimeoutError):
         rule = "one of them ended, or did not answer, before it had begun"
-        way_out = "run the same command again to go on, perhaps with fewer --workers"
+        way_out = "run the same command again to resume, perhaps with fewer --workers"
         raise InputError("worker processes", workers, rule, way_out) from None
 
 

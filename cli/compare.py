@@ -34,7 +34,7 @@ PANEL = "Paths"
 """Title of the options that go with `--paths`."""
 
 OF_PATHS = ("executor", "width", "height", "sample", "spp", "seed", "max_depth")
-"""Options that go with `--paths` alone."""
+"""Options that go only with `--paths`."""
 
 OF_SCENE = ("time", "parameters")
 """Options of the scene."""

@@ -60,7 +60,7 @@ def _as_data(name: str, device: str, paths: PathReport, image: ImageReport) -> d
 
 
 def _finite(data: Any) -> Any:
-    """Return data with None in the place of numbers that JSON does not know."""
+    """Return data with None instead of numbers that JSON does not know."""
     if isinstance(data, dict):
         return {key: _finite(value) for key, value in data.items()}
     if isinstance(data, list | tuple):

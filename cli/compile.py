@@ -1,7 +1,7 @@
 """`wamnet compile`: from a model or a scene to the source of a kernel and its manifest.
 
 A name of a canonical scene, or a file that ends in .json, is a scene; anything else is a model: a file, or
-one that comes along, as in model:minicubes.
+one that ships with the package, as in model:minicubes.
 """
 
 from __future__ import annotations
@@ -97,8 +97,8 @@ def compile_model(
     """Compile a model, or a scene, to a kernel: source, weights, and a manifest with its interface.
 
     The source is meant to be read and pasted into another program: a model's denoises, with a bound on its
-    error; a scene's traces paths. No device is needed, but for --here, or if a variant is to be chosen by
-    limits: then the fastest one that keeps them is, from a curve that is measured once for each device.
+    error; a scene's traces paths. No device is needed, except for --here, or to choose a variant by limits.
+    The fastest one that keeps them is taken, from a curve that is measured once for each device.
     """
     folder, name = output or Path(target.value), EXECUTOR_OF[target]
     request = Request(max_error, max_ms, max_loss_db, curve, frames, size)
@@ -183,12 +183,12 @@ def is_scene(name: str) -> bool:
 
 
 def _check_name(name: str, of_scenes: Mapping[str, Any]) -> None:
-    """Refuse options of scenes, and what looks like a scene's name and is none: a model's file is there."""
+    """Refuse options of scenes, and what looks like a scene's name but is not one: a model's file exists."""
     _only_for("a scene", of_scenes, f"{name} is no scene: neither a canonical one nor a .json file")
     comes_along = name.startswith(MODEL_PREFIX)
     if not comes_along and not Path(name).suffix and not Path(name).exists():
         rule = "neither a canonical scene nor a file"
-        way_out = f"scenes are {options.SCENES}; models that come along: {MODEL_PREFIX}NAME, {options.MODELS}"
+        way_out = f"scenes are {options.SCENES}; shipped models: {MODEL_PREFIX}NAME, {options.MODELS}"
         raise InputError("model or scene", name, rule, way_out)
 
 
@@ -215,7 +215,7 @@ def _compiled_scene(
 
 
 def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:
-    """Refuse a folder where a kernel cannot lie, or that holds files of another program, kind or target."""
+    """Refuse a folder where a kernel cannot be, or that holds files of another program, kind or target."""
     from ..compiler import artifact, path_kernel
 
     if folder.exists() and not folder.is_dir():
@@ -243,7 +243,7 @@ def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:
 
 
 def write_kernel(kernel: Files, folder: Path) -> tuple[Path, ...]:
-    """Write a kernel's files; what the system refuses is told with the folder's name."""
+    """Write a kernel's files; what the system refuses is reported with the folder's name."""
     from ..compiler import artifact
 
     try:

@@ -33,7 +33,7 @@ STATUS_FAILED = 1
 """Exit status when a case fails."""
 
 SHOWN_FAILURES = 10
-"""Failures that are told in full; the reports hold all."""
+"""Failures that are printed in full; the reports hold all."""
 
 REFERENCE = "reference"
 """Name that stands for the reference among the executors."""
@@ -88,7 +88,7 @@ Write = Annotated[
     typer.Option(
         "--write",
         metavar="DIR",
-        help="Make the vectors anew with the reference, and end.",
+        help="Make the vectors again with the reference, and end.",
         show_default=False,
     ),
 ]
@@ -248,4 +248,4 @@ def _print_failures(failed: Sequence[Verdict], cases: Mapping[str, Sequence[Case
         for line in about(verdict, by_id[verdict.id], f"{again} {verdict.id}"):
             say(line)
     if len(failed) > SHOWN_FAILURES:
-        say(f"... and {len(failed) - SHOWN_FAILURES} more; --json or --junit tell all")
+        say(f"... and {len(failed) - SHOWN_FAILURES} more; --json or --junit report all")

@@ -163,7 +163,7 @@ def make(
     if (folder / dataset_files.MANIFEST).exists():
         known = dataset_files.bytes_of(dataset_files.read_manifest(folder))
     elif scheduler is None:
-        # A device that is missing here is told before a folder asks for it.
+        # A device that is missing here is reported before a folder needs it.
         open_executor(request.executor).close()
     with (
         progress("checking", known) as look,

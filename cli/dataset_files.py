@@ -1,8 +1,8 @@
 """A data set's folder: its manifest, its pictures, and what an interrupted run leaves for the next one.
 
 1. The manifest, `manifest.json`, is written first: the request and every picture, without checksums. When all
-   pictures are there it is written again, with them [`Store.open`]. Reading it refuses what is none
-   [`read_manifest`].
+   pictures are there it is written again, with them [`Store.open`]. Reading it refuses what is not a
+   manifest [`read_manifest`].
 2. A rendered band is a file in `unfinished/` whose name ends in its checksum, so that it and its checksum
    appear in one step [`Store.put`]. A picture whose bands are all there is joined, noted in a journal with
    its checksum and bytes, and moved to its place. Each step can be the last one of a run: what was done
@@ -10,8 +10,8 @@
 3. Every file is compared with its checksum before it counts as done [`verify`]; one that is damaged or
    missing is made again.
 4. One process at a time works in a folder [alone.py]; another data set's folder is refused [`Store.open`].
-5. What is removed is a regular file of a name that is given here. Folders that are links, and what else lies
-   in `unfinished/`, are refused before anything is written or removed [`check_work_folders`].
+5. What is removed is a regular file of a name that is given here. Folders that are links, and other files in
+   `unfinished/`, are refused before anything is written or removed [`check_work_folders`].
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def _known(frames: Sequence[Mapping[str, Any]]) -> Iterator[str | None]:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Return a data set's manifest, or say that the folder is none or that the manifest is damaged."""
+    """Return a data set's manifest; refuse a folder that is not a data set, and a damaged manifest."""
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError("data set", str(folder), f"it has no {MANIFEST}", "make one: wamnet dataset")
@@ -427,12 +427,12 @@ def _known_before(folder: Path, request: Request, frames: Sequence[FramePlan]) -
 
 
 def _read_journal(path: Path) -> dict[str, Sum]:
-    """Return the pictures that a journal knows; a line that is cut short or damaged is none."""
+    """Return the pictures that a journal knows; a line that is cut short or damaged does not count."""
     sums = {}
     text = read_file(path, "journal").decode("utf-8", "replace") if path.exists() else ""
     for line in text.splitlines():
         try:
-            entry = parse_json(line, "journal", "go on")
+            entry = parse_json(line, "journal", "continue")
             sums[str(entry["file"])] = _sum_in(entry)
         except BROKEN:
             continue
@@ -452,7 +452,7 @@ def check_work_folders(folder: Path) -> None:
         there.append(folder / MANIFEST)
     for path in sorted(there):
         if path.name == MANIFEST or not _is_own(path):
-            what = "it is none of the files that wamnet makes there"
+            what = "it is not one of the files that wamnet makes there"
             raise InputError(
                 "file of a data set", str(path), what, "move it elsewhere, or choose another folder with -o"
             )

@@ -8,8 +8,8 @@
 4. Measure noisy and denoised pictures against their references [`score`].
 5. Write pictures and frames [`write_pictures`], then `report.json` and `report.html` [`report.write`].
 
-A run that was interrupted goes on where it was: the data set knows what of it is there; training resumes from
-its checkpoint, which refuses other frames and other recipes.
+A run that was interrupted resumes: the data set knows what of it is there; training resumes from its
+checkpoint, which refuses other frames and other recipes.
 """
 
 from __future__ import annotations
@@ -170,7 +170,7 @@ def demo(
 ) -> None:
     """Render, train, compile, denoise unseen frames and write a report, in a few minutes.
 
-    Open FOLDER/report.html afterwards. After Ctrl-C, the same command goes on where it was.
+    Open FOLDER/report.html afterwards. After Ctrl-C, the same command resumes where it was.
     """
     for module in ("matplotlib", "jinja2"):
         need(module, "to draw the report", "report")
@@ -179,7 +179,7 @@ def demo(
     plan = for_this_machine(QUICK if quick else Plan(size_px=Plan.size_px if size is None else size))
     folder = output or Path(QUICK_FOLDER if quick else FOLDER)
     command = f"wamnet demo {'--quick' if quick else f'--size {plan.size_px}'} -o {shlex.quote(str(folder))}"
-    with begun(plan, folder), hint_on_interrupt(lambda: f"go on with the same command: {command}"):
+    with begun(plan, folder), hint_on_interrupt(lambda: f"resume with the same command: {command}"):
         results = carry_out(plan, folder)
         speed = (
             None if quick else _timed(results.seconds, "speed", lambda: measure_speed(plan, results, folder))
@@ -316,7 +316,7 @@ def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Mode
         state, seconds = train.fit(recipe, pairs, path, begin, executor=plan.trainer)
         done = begin.step
     except InputError:
-        # There is no checkpoint, or it is damaged, or one of other frames or another recipe: begin anew.
+        # There is no checkpoint, or it is damaged, or one of other frames or another recipe: start again.
         state, seconds = train.fit(recipe, pairs, path, executor=plan.trainer)
     if state.step > done:
         write_text(speed, f"{seconds / (state.step - done)}\n")
@@ -324,7 +324,7 @@ def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Mode
 
 
 def _seconds(path: Path) -> float | None:
-    """Return the time in a file, or None where there is none: it is told, and nothing depends on it."""
+    """Return the time in a file, or None where there is none: it is printed, and nothing depends on it."""
     try:
         value = float(read_file(path, most=100))
     except (InputError, ValueError):

@@ -86,7 +86,7 @@ def export(
         typer.Option(
             metavar="SCENE",
             help="The path tracer too, of this scene: a canonical one or a file (.json).",
-            show_default="the denoiser alone",
+            show_default="only the denoiser",
         ),
     ] = None,
     time: options.Time = None,
@@ -104,7 +104,7 @@ def export(
 ) -> None:
     """Write a denoiser for another program: kernels, a manifest, a README, and a pair to check with.
 
-    Each target's files were compiled by its own tools, run, and held to the bound that the manifest states.
+    Each target's files were compiled by its own tools, run, and checked against the bound in the manifest.
     With a scene the path tracer and the encoding of its features are written too; with --target html, a web
     page that does all of it.
     """

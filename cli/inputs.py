@@ -17,7 +17,7 @@ MODELS = Path(__file__).with_name("models")
 """Folder of the models that come with the package, each with its recipe and its scores."""
 
 MODEL_PREFIX = "model:"
-"""May stand before the name of a model that comes along, and must where scenes have names too."""
+"""May be before the name of a model that ships with the package, and must where scenes have names too."""
 
 CHECKPOINT_MARK = ".checkpoint"
 """Before the suffix of a model's name in the name of its checkpoint."""
@@ -40,15 +40,15 @@ def shipped_models() -> list[str]:
 
 
 def model_path(path: Path) -> Path:
-    """Return the file of a model: the file that is named, else the one that comes along under this name."""
+    """Return the file of a model: the file that is named, else the shipped one of this name."""
     known, name = shipped_models(), str(path).removeprefix(MODEL_PREFIX)
     # No model is a folder: one of that name, perhaps of results, does not hide the model.
     if path.suffix or (path.exists() and not (name in known and path.is_dir())):
         return path
     if path.is_dir():
-        tell(f"{path}/ is a folder, and no model: the model of this name that comes along is taken")
+        tell(f"{path}/ is a folder, and no model: the model of this name that ships with wamnet is taken")
     if name not in known:
-        rule = "there is no such file, and no model of this name comes along"
+        rule = "there is no such file, and wamnet ships no model of this name"
         raise InputError("model", str(path), rule, f"give a .safetensors file, or one of {', '.join(known)}")
     return MODELS / f"{name}.safetensors"
 
@@ -75,7 +75,7 @@ def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
     told = []
     scenes, scene = model.info.get("trained_on_scene", ""), info.get("scene", "")
     if scenes and scene and scene not in scenes.split(", "):
-        told.append(f"it shows {scene}, and the model has learned {scenes} alone: expect a poor picture")
+        told.append(f"it shows {scene}, and the model has learned only {scenes}: expect a poor picture")
     elif beyond := outside_ranges(model, info):
         told.append(f"outside of what the model has learned: {', '.join(beyond)}; expect errors")
     if scenes and "spp" in info:

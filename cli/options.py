@@ -25,7 +25,7 @@ SCENES = "minicubes, glossy, daylight, cornell, furnace, lone_light, empty"
 """Canonical scenes by name, for help texts; equal to the registry in refimpl, which they do not import."""
 
 MODELS = "minicubes, cornell, glossy"
-"""Models that come along by name, for help texts; equal to the files in cli/models."""
+"""Names of the models that ship with the package, for help texts; equal to the files in cli/models."""
 
 LARGEST_EXPOSURE_STOPS = 64.0
 """Brightest and darkest exposure: a factor of 2**64; far past it float32 ends."""
@@ -153,7 +153,7 @@ ModelFile = Annotated[
     Path,
     typer.Argument(
         metavar="MODEL",
-        help=f"Trained model (.safetensors), or the name of one that comes along ({MODELS}).",
+        help=f"Trained model (.safetensors), or the name of one that ships with wamnet ({MODELS}).",
         show_default=False,
     ),
 ]

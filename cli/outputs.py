@@ -1,7 +1,7 @@
 """Writing files so that nothing is ever half written or lost.
 
-1. Before long work starts, the output's name is checked: the folder exists and can be written, the name is no
-   folder and none of the inputs [`check_output`].
+1. Before long work starts, the output's name is checked: the folder exists and can be written, the name is
+   neither a folder nor one of the inputs [`check_output`].
 2. The content goes into a new file of another name in the same folder; only when it is complete does it take
    the output's name, in one step of the file system [`replacing`, compiler/writing.py]. Whatever ends the
    writer before that (an error, Ctrl-C) removes the new file and leaves the old one.

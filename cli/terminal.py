@@ -1,6 +1,6 @@
 """What the commands print: results on standard output, progress on standard error if that is a terminal.
 
-Names and texts may be those of strangers: nothing reaches the terminal before [`errors.escaped`] has seen it.
+Names and texts may be untrusted: nothing reaches the terminal before [`errors.escaped`] has seen it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def tell(text: str) -> None:
 
 @contextmanager
 def hint_on_interrupt(hint: Callable[[], str]) -> Iterator[None]:
-    """Say on standard error how to go on when the block is interrupted; the hint is asked for then."""
+    """Say on standard error how to resume when the block is interrupted; the hint is made then."""
     try:
         yield
     except KeyboardInterrupt:

@@ -115,17 +115,17 @@ def train(
     seed: Annotated[int | None, typer.Option(help="Seed of the first weights and of the draws.")] = None,
     resume: Annotated[
         bool,
-        typer.Option("--resume", help="Go on from the checkpoint beside the model, with its own recipe."),
+        typer.Option("--resume", help="Resume from the checkpoint beside the model, with its own recipe."),
     ] = False,
     restart: Annotated[
-        bool, typer.Option("--restart", help="Begin anew, and replace the checkpoint of an earlier run.")
+        bool, typer.Option("--restart", help="Start again, and replace the checkpoint of an earlier run.")
     ] = False,
     executor: options.Trainer = TrainerName.numpy,
 ) -> None:
     """Train a network on noisy frames and their references, or on the training frames of a data set.
 
-    A checkpoint is kept beside the model. After Ctrl-C, --resume goes on from there, to the same bits. With
-    more --steps it goes on after the end; the learning rate, which falls over the length of the run, then
+    A checkpoint is kept beside the model. After Ctrl-C, --resume continues from there, to the same bits. With
+    more --steps it continues after the end; the learning rate, which falls over the length of the run, then
     jumps, so the model differs from that of a run which had this length from the start.
     """
     from ..compiler.model_file import load_checkpoint
@@ -176,7 +176,7 @@ def _first_network(begin: Path | None, state: TrainState | None) -> Siren | None
     if begin is None:
         return None
     if state is not None:
-        raise InputError("--from", str(begin), "a resumed run goes on from its checkpoint", "leave it out")
+        raise InputError("--from", str(begin), "a resumed run continues from its checkpoint", "leave it out")
     return load_model(begin).siren
 
 
@@ -228,11 +228,11 @@ def _fit_to_the_end(
     network: Siren | None,
     executor: str,
 ) -> TrainState:
-    """Train, and say how to go on after an interrupt, and that a longer run is another one."""
+    """Train, and say how to resume after an interrupt, and that a longer run is another one."""
     saved = checkpoint_path(output)
 
     def hint() -> str:
-        return f"go on with --resume, from {saved}" if saved.exists() else "no step was done"
+        return f"continue with --resume, from {saved}" if saved.exists() else "no step was done"
 
     with hint_on_interrupt(hint):
         state, _ = fit(recipe, pairs, output, begin, network, executor)
@@ -245,18 +245,18 @@ def _fit_to_the_end(
 def check_begin(saved: Path, preset: Preset | None, resume: bool, restart: bool) -> None:
     """Refuse options that contradict each other, and to replace an earlier run's checkpoint unasked."""
     if resume and restart:
-        rule = "a run goes on or begins anew"
+        rule = "a run resumes or starts again"
         raise InputError("pair of options", "--resume, --restart", rule, "choose one of them")
     if resume and preset is not None:
         rule = "with --resume the checkpoint's own recipe counts"
-        raise InputError("--preset", preset.value, rule, "leave it out, or begin anew with --restart")
+        raise InputError("--preset", preset.value, rule, "leave it out, or start again with --restart")
     if saved.exists() and not (resume or restart):
         rule = "it is there from an earlier run, which would be lost"
         raise InputError(
             "checkpoint",
             str(saved),
             rule,
-            "go on with --resume, replace it with --restart, or choose another -o",
+            "continue with --resume, replace it with --restart, or choose another -o",
         )
 
 
@@ -314,7 +314,7 @@ def fit(
 ) -> tuple[TrainState, float]:
     """Train with a progress bar and checkpoints beside `output`; write the model there. Seconds come too.
 
-    The run goes on from `state`, or begins with the weights of `network`, or with random ones.
+    The run continues from `state`, or begins with the weights of `network`, or with random ones.
     """
     from ..compiler.model_file import save_checkpoint, save_model
     from ..refimpl.train import model_of

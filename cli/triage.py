@@ -3,8 +3,8 @@
 1. Run the model's kernels and judge them [kernels/triage.py].
 2. If one deviates, make the failure small [kernels/reduce.py], and keep it: model, part of the frame, the
    odd kernels' files and a report, all or nothing [`keep`]. Its README has the command that repeats it.
-3. `--kernel` runs such a kernel's files, as they are or as somebody has changed them, in the place of what
-   the compiler makes [`kept_kernel`].
+3. `--kernel` runs such a kernel's files, as they are or as somebody has changed them, instead of what the
+   compiler makes [`kept_kernel`].
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ KeptKernel = Annotated[
     typer.Option(
         "--kernel",
         metavar="FOLDER",
-        help="Run this kernel's files in the place of what the compiler makes for its target and schedule.",
+        help="Run this kernel's files instead of what the compiler makes for its target and schedule.",
         show_default=False,
     ),
 ]
@@ -130,9 +130,9 @@ def triage(
 
 @dataclass(frozen=True)
 class Task:
-    """What is asked for: a model on a frame, whose encoded images are `images`, and how.
+    """What to do: a model on a frame, whose encoded images are `images`, and how.
 
-    `kept`: the kernel that runs in the place of what the compiler makes for its target and schedule.
+    `kept`: the kernel that runs instead of what the compiler makes for its target and schedule.
     """
 
     model: Model
@@ -210,7 +210,7 @@ def _concluded(task: Task, verdicts: Sequence[Verdict]) -> Reduced | None:
     for stage in found.stages:
         say(stage.text)
     if task.kept:
-        say("stages are compiled anew: the kept kernel's files have none")
+        say("stages are compiled again: the kept kernel's files have none")
     return found
 
 
@@ -374,7 +374,7 @@ class Kept:
         return str(self.kernel.manifest["schedule"]["name"])
 
     def compiled(self, plan: Plan) -> Artifact:
-        """Return the kept kernel where it is asked for, else a new one."""
+        """Return the kept kernel where it is the plan's, else a new one."""
         from ..compiler.compile import compile_plan
 
         made = compile_plan(plan)
@@ -394,10 +394,10 @@ class Kept:
 
 
 def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
-    """Return the kernel whose manifest and files lie in a folder.
+    """Return the kernel whose manifest and files are in a folder.
 
-    They may have been changed: neither their hashes nor their lengths are asked for. The manifest says of
-    what they are the kernel.
+    They may have been changed: neither their hashes nor their lengths are checked. The manifest says what
+    they are the kernel of.
     """
     from ..compiler import artifact, ir
     from ..compiler.compile import compile_program
@@ -423,7 +423,7 @@ def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
 
 
 def _with_files(made: Artifact, folder: Path) -> Artifact:
-    """Return an artifact with the source and the weights that lie in a folder, in the place of its own."""
+    """Return an artifact with the source and the weights in a folder instead of its own."""
     import numpy as np
 
     from ..compiler import artifact, ir

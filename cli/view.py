@@ -1,8 +1,8 @@
 """`wamnet view`: a model at work in the browser, on a scene that is path-traced there.
 
 1. Make the page [`webpage.page_of`]; with -o it is written to a file, and that is all.
-2. Serve it on the loopback interface, to this machine alone, and open the browser [`serve`]; Ctrl-C ends.
-3. Who asks must name this machine and the port (header Host): a page of another site whose name was made to
+2. Serve it on the loopback interface, only to this machine, and open the browser [`serve`]; Ctrl-C ends.
+3. A request must name this machine and the port (header Host): a page of another site whose name was made to
    point here could read the model otherwise (DNS rebinding). Connections have a time limit, and are few at
    once [`PageServer`].
 """
@@ -36,7 +36,7 @@ wamnet view model.safetensors -o page.html"""
 """Shown below the help of `wamnet view`."""
 
 HOST = "127.0.0.1"
-"""Where the page is served: to this machine alone."""
+"""Where the page is served: only to this machine."""
 
 NAMES = (HOST, "localhost", "[::1]")
 """What a browser on this machine calls it."""
@@ -169,7 +169,7 @@ def handler_of(page: bytes) -> type[BaseHTTPRequestHandler]:
     """Return a handler that knows one page."""
 
     class Handler(BaseHTTPRequestHandler):
-        """Answers `/` to who names this machine, and nothing else."""
+        """Answers `/` where the request names this machine, and nothing else."""
 
         def do_GET(self) -> None:
             if self._answered():

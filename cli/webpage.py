@@ -35,8 +35,8 @@ FRAMES = 240
 """Moments of an animation that a page can show: eight seconds, 30 a second."""
 
 FPS = 30.0
-"""Moments a second. They lie half a step beside whole numbers, since some scenes are laid out otherwise
-at time 0, where their boxes are parallel to the axes."""
+"""Moments a second. They are half a step beside integers, since some scenes are laid out otherwise at time 0,
+where their boxes are parallel to the axes."""
 
 LEAD = (
     "One random path per pixel gives the noisy picture; a small network, compiled to a fragment shader with "

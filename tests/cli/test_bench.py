@@ -102,7 +102,7 @@ def test_predicted_stands_beside_measured(found) -> None:
     [
         (["--size", "0"], "size of the picture is 0: it must be from 1 to 8192 pixels"),
         (["--sizes", "64,9000"], "size of the picture is 9000"),
-        (["--sizes", "64 128"], "--sizes is 64 128: it must be whole numbers with commas"),
+        (["--sizes", "64 128"], "--sizes is 64 128: it must be integers with commas"),
         (["--repeats", "0"], "--repeats is 0: it must be from 1 to 1000"),
         (["--budget", "nan"], "--budget is nan: it must be positive and finite"),
         (["--budget", "0"], "--budget is 0.0: it must be positive and finite"),

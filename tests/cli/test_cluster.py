@@ -100,7 +100,7 @@ def test_workers_that_do_not_start(monkeypatch, error) -> None:
         raise error
 
     monkeypatch.setattr("distributed.LocalCluster", fails)
-    rule = "worker processes is 2: one of them ended, .* run the same command again to go on"
+    rule = "worker processes is 2: one of them ended, .* run the same command again to resume"
     with pytest.raises(InputError, match=rule), cluster.open_client(2, None):
         pass
 

@@ -65,7 +65,7 @@ def test_many_failures_are_counted(wamnet, program):
     done = wamnet("conformance", "--program", program("1664525", "1664527"), "-k", "random.block")
     assert done.status == 1
     assert done.out.count("\nFAIL ") == 10
-    assert "... and 5 more; --json or --junit tell all" in done.out
+    assert "... and 5 more; --json or --junit report all" in done.out
     assert "look first at RNG-3: random.block/1 fails" in done.out
 
 

@@ -225,7 +225,7 @@ def test_links_in_a_data_set_are_refused_before_anything_changes(tmp_path, name)
     link.unlink(missing_ok=True)
     link.symlink_to(victim if link.suffix == "" else victim / "thesis.txt")
     before = content(tmp_path)
-    with pytest.raises(InputError, match=r"it is a symbolic link|none of the files that wamnet makes"):
+    with pytest.raises(InputError, match=r"it is a symbolic link|one of the files that wamnet makes"):
         make(folder)
     assert content(tmp_path) == before
     link.unlink()
@@ -242,7 +242,7 @@ def test_other_files_in_the_unfinished_folder_are_refused(tmp_path, name) -> Non
         mine.write_text("precious")
     else:
         mine.symlink_to(tmp_path)
-    with pytest.raises(InputError, match="it is none of the files that wamnet makes there; move it"):
+    with pytest.raises(InputError, match="it is not one of the files that wamnet makes there; move it"):
         make(tmp_path / "a")
     assert mine.exists()
 
@@ -253,7 +253,7 @@ def test_a_manifest_that_is_a_link_is_refused(tmp_path) -> None:
         pass
     (tmp_path / "a" / files.MANIFEST).rename(tmp_path / "m.json")
     (tmp_path / "a" / files.MANIFEST).symlink_to(tmp_path / "m.json")
-    with pytest.raises(InputError, match=r"manifest\.json: it is none of the files"):
+    with pytest.raises(InputError, match=r"manifest\.json: it is not one of the files"):
         make(tmp_path / "a")
 
 

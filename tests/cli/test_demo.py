@@ -271,7 +271,8 @@ def test_an_interrupt_tells_how_to_go_on(wamnet, tmp_path, monkeypatch, quick) -
     monkeypatch.setattr(demo, "carry_out", interrupt)
     outcome = wamnet("demo", *(["--quick"] if quick else []))
     command = "--quick -o out/demo-quick" if quick else "--size 256 -o out/demo"
-    assert outcome.err == f"wamnet: go on with the same command: wamnet demo {command}\nwamnet: interrupted\n"
+    hint = f"resume with the same command: wamnet demo {command}"
+    assert outcome.err == f"wamnet: {hint}\nwamnet: interrupted\n"
     assert outcome.status == 130
 
 

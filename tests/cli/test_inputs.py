@@ -129,7 +129,7 @@ def test_models_have_names(samples, monkeypatch, tmp_path, capsys) -> None:
     (tmp_path / "cubes").touch()
     assert inputs.model_path(Path("cubes")) == Path("cubes")
     assert inputs.model_path(Path("cubes.safetensors")) == Path("cubes.safetensors")
-    text = "model is spheres: there is no such file, and no model of this name comes along; give .* of cubes"
+    text = "model is spheres: there is no such file, and wamnet ships no model of this name; give .* of cubes"
     with pytest.raises(InputError, match=text):
         inputs.model_path(Path("spheres"))
 
@@ -225,5 +225,5 @@ def test_a_frame_of_another_scene_is_denoised_with_a_warning(wamnet, here) -> No
     save_model(here / "other.safetensors", replace(model, info={"trained_on_scene": "cornell"}))
     outcome = wamnet("denoise", "other.safetensors", "noisy.exr")
     assert outcome.status == 0
-    assert "noisy.exr: it shows minicubes, and the model has learned cornell alone" in outcome.out
+    assert "noisy.exr: it shows minicubes, and the model has learned only cornell" in outcome.out
     assert (here / "denoised.png").exists()

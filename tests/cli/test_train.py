@@ -197,7 +197,7 @@ def test_a_model_is_cut_and_trained_on(wamnet, refused, pair, tmp_path) -> None:
     want = reference.train(recipe, [frames], network=network)
     got = load_checkpoint(tmp_path / "cut.checkpoint.safetensors")
     assert all((a == b).all() for a, b in zip(got.parameters, want.parameters, strict=True))
-    text = "--from is full.safetensors: a resumed run goes on from its checkpoint; leave it out"
+    text = "--from is full.safetensors: a resumed run continues from its checkpoint; leave it out"
     assert text in refused("train", *pair[:4], "--resume", "-o", "cut.safetensors", *more[:2])
     others = (*pair[:4], "--features", "color", *more[:2], "-o", "x.safetensors")
     assert "widths, omegas and activation of the first network is " in refused("train", *others)

@@ -110,7 +110,7 @@ def test_the_kept_command_repeats_it(wamnet, here, fault, monkeypatch, capsys) -
     again = json.loads((here / "odd/triage/report.json").read_text())
     assert (again["part"]["height"], again["part"]["width"]) == (6, 5)
     assert again["verdicts"][0]["pixel"] == [5, 4]
-    assert "stages are compiled anew" in capsys.readouterr().out
+    assert "stages are compiled again" in capsys.readouterr().out
     kernel = here / "odd/triage/opencl-plain"
     files = json.loads((kernel / "manifest.json").read_text())["files"]
     assert files["denoise.cl"] == sha256((kernel / "denoise.cl").read_bytes())

@@ -3,8 +3,8 @@
 1. Hypothesis draws the same examples on every run, without a deadline: a test's result is a function of the
    code. HYPOTHESIS_PROFILE=long draws others on each run, HYPOTHESIS_EXAMPLES (2,000) in place of 100;
    --hypothesis-seed repeats them, as `.ci/long` says.
-2. `executor` runs one test body on every executor of whole pipelines [`PIPELINES`], `denoiser` on those that
-   denoise alone too [`EXECUTORS`]; `mitsuba` and `chromium` give peers [`PEERS`]; some tests need packages
+2. `executor` runs one test body on every executor of whole pipelines [`PIPELINES`], `denoiser` also on those
+   that only denoise [`EXECUTORS`]; `mitsuba` and `chromium` give peers [`PEERS`]; some tests need packages
    that the usual set-up leaves out [`packages.needed`]. What is missing fails its tests when WAMNET_REQUIRE
    names it, as with `make test` and `.ci/run`; else they are skipped. Either way the summary says what was
    missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
@@ -56,7 +56,7 @@ COSTLY = {
 """Markers of tests that take long, with what is said where they are left out."""
 
 _state_key = pytest.StashKey[dict[str, str]]()
-"""Where a run keeps "ok (device)" or "MISSING: reason" of each executor that it has asked for, by name."""
+"""Where a run keeps "ok (device)" or "MISSING: reason" of each executor that it has requested, by name."""
 
 
 def required_executors() -> frozenset[str]:
@@ -109,7 +109,7 @@ def executor_named(pytestconfig: pytest.Config) -> Iterator[Callable[[str], Any]
         if opened[name] is not None:
             return opened[name]
         if name in required_executors():
-            way_out = "to go on without it, list what you have: make test WAMNET_REQUIRE=opencl"
+            way_out = "to do without it, list what you have: make test WAMNET_REQUIRE=opencl"
             pytest.fail(f"{kind} {name} is required and {state[name]}; {way_out}", pytrace=False)
         pytest.skip(f"{kind} {name} is {state[name]}")
 
@@ -209,7 +209,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         return
     terminalreporter.section("executors")
     for name in (*EXECUTORS, *PEERS, *PACKAGES):
-        text = state.get(name, "not asked for by any test that ran")
+        text = state.get(name, "not requested by any test that ran")
         colour = {"ok": {"green": True}, "MISSING": {"red": True, "bold": True}}.get(
             text.partition(" ")[0].rstrip(":"), {}
         )
@@ -221,7 +221,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
 
 @pytest.fixture(scope="session", autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Put a folder of this test run in the place of the user's cache."""
+    """Use a folder of this test run instead of the user's cache."""
     folder = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("WAMNET_CACHE", str(folder))

@@ -44,7 +44,7 @@ def test_a_constant_picture_stays():
 
 
 def test_open_passes_are_the_spline_s_wavelet():
-    """Away from borders, without edges, pass i convolves with the B-spline whose taps lie 2^i apart.
+    """Away from borders, without edges, pass i convolves with the B-spline whose taps are 2^i apart.
 
     The impulse response of two passes is the product of the kernel with itself spread by 2 (Dammertz et al.
     2010).

@@ -160,7 +160,7 @@ def test_an_interrupted_training_goes_on_to_the_same_weights(tmp_path, files, re
     assert again["seconds"] > spent > 0.0
     for key, value in fitting._parts(whole).items():
         assert torch.equal(value, fitting._parts(later)[key]), key
-    # It was not flat, so it may go on: two steps more are those of a training that had them from the start.
+    # It was not flat, so it may resume: two steps more are those of a training that had them from the start.
     longer = replace(recipe, steps=recipe.steps + 2)
     on = fitting.fit(later, longer, data, data, tmp_path / "parts")
     straight = fitting.fit(make(longer), longer, data, data, tmp_path / "straight")

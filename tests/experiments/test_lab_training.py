@@ -1,4 +1,4 @@
-"""Networks of experiments: trained once, and gone on with after an interruption to the same bits."""
+"""Networks of experiments: trained once, and resumed after an interruption to the same bits."""
 
 from __future__ import annotations
 

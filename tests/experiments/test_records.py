@@ -63,7 +63,7 @@ def test_every_record_is_shown():
 
 
 class Counting(Records):
-    """Records that remember what was asked for by a table or a figure."""
+    """Records that remember what a table or a figure has read."""
 
     asked: set[str] = set()
 

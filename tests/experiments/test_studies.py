@@ -162,9 +162,9 @@ def test_light_sets_of_tests_are_those_of_no_training(scale, tmp_path):
 
 @pytest.mark.parametrize("count", [4, 16])
 def test_light_sets_follow_no_pose(count):
-    """Taken in turns, every set was seen in a few poses only: the turn's and theirs had a common factor.
+    """Taken in a fixed order, every set was seen in only a few poses: both periods had a common factor.
 
-    Drawn one by one, hardly a frame has the set that the turns would give it.
+    Drawn one by one, hardly a frame has the set that the fixed order would give it.
     """
     lights = importlib.import_module("lights")
     frames_each = lights.FRAMES * PLANS["small"].train_frames
@@ -221,7 +221,7 @@ def test_the_clock_of_training_stands_still_while_it_is_looked_at():
 
 
 class State:
-    """The one thing of a training's state that is asked for here."""
+    """The only part of a training's state that is read here."""
 
     def __init__(self, step):
         self.step = step
@@ -250,7 +250,7 @@ def test_kinds_of_frames_share_no_noise(scale, tmp_path):
 
 
 def test_a_range_of_orientations_follows_no_pose(tmp_path):
-    """Each frame draws its yaw independently: neither it nor the pose tells the other.
+    """Each frame draws its yaw independently: neither it nor the pose determines the other.
 
     Yaw and pose of n independent frames have a correlation of deviation 1 / sqrt(n - 1); at the significance
     of 1 % it stays below 2.58 of these.
@@ -323,7 +323,7 @@ def test_scores_of_several_kinds_of_frames_stand_side_by_side():
 
 
 def test_a_study_says_what_is_left_before_it_begins(tmp_path, cache, capsys):
-    """Frames that are there are not counted, nor those that are asked for twice."""
+    """Frames that are there are not counted, nor those that are listed twice."""
     fresh = Ground(PLANS["toy"], tmp_path, "numpy")
     shots = fresh.training_shots()
     assert left_to_render(fresh, [(shots, 2), (shots[:1], 2)]) == (4, 2 * 16 * 16 * (1 + 2))

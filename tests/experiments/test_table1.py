@@ -65,7 +65,7 @@ def test_blocks_are_kept_of_each_frame(made):
     for values in (kept.get("wamnet", 0), kept.get("wamnet-own", 0)):
         each = values["per_frame"]["blocks"]
         assert len(each) == len(values["per_frame"]["psnr"])
-        # A ratio of sums lies between the frames' own, but for the roundings of so many terms.
+        # A ratio of sums lies between the frames' own, up to the roundings of so many terms.
         rounding = 2 * 48 * 48 * 3 * 2.0**-52
         assert min(each) * (1 - rounding) <= values["blocks"] <= max(each) * (1 + rounding)
 

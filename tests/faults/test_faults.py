@@ -10,7 +10,7 @@ import pytest
 
 @pytest.mark.parametrize("kind", faults.FAULTS)
 def test_a_fault_loses_nothing(tmp_path, kind) -> None:
-    """A kill, a full disk, a folder that cannot be written, a lost worker, two: the next run goes on."""
+    """A kill, a full disk, a folder that cannot be written, a lost worker, two: the next run resumes."""
     bench, case = faults.Bench(tmp_path), faults.CASES["render" if kind == "revoked" else "train"]
     bench.undisturbed(case)
     wrong = bench.fault(case, kind, faults.random.Random(7), faults.Who())

@@ -153,7 +153,7 @@ def _run(asked: Mapping[str, Any]) -> None:
 
             try:
                 status = main(asked["words"])
-            except BaseException:  # noqa: BLE001 - whatever it is, it is none of ours
+            except BaseException:  # noqa: BLE001 - whatever it is, we did not raise it
                 traceback.print_exc()
             file.flush()
     finally:

@@ -6,7 +6,7 @@
    finite, or control characters on the terminal are findings.
 3. Targets take turns until the time is over or each had its count; processes share them [`fuzz`].
 4. Counts, the seed, and for each finding the input's file and the command that repeats it are printed; the
-   exit status is 1 if there are findings. A finding's file belongs into tests/fuzz/corpus once it is mended.
+   exit status is 1 if there are findings. A finding's file belongs into tests/fuzz/corpus once it is fixed.
 """
 
 from __future__ import annotations
@@ -76,11 +76,11 @@ def read_state(path: Path, seed: int) -> dict[str, Found]:
 
 
 KEPT = ("findings", "following")
-"""What a state keeps besides counts."""
+"""What a state keeps in addition to counts."""
 
 
 def write_state(path: Path, seed: int, total: dict[str, Found]) -> None:
-    """Keep what was found, for runs that go on."""
+    """Keep what was found, for runs that resume."""
     path.parent.mkdir(parents=True, exist_ok=True)
     found = {
         name: {"counts": one.counts, **{k: getattr(one, k) for k in KEPT}} for name, one in total.items()
@@ -113,7 +113,7 @@ def tried(target: Target, content: bytes) -> tuple[str, str]:
     except UnicodeDecodeError as error:
         # The targets themselves decode texts that the program gets as such.
         return ("refused", "") if "targets.py" in _innermost(error) else ("FOUND", _told(error))
-    except Exception as error:  # noqa: BLE001 - whatever it is, it is none of ours
+    except Exception as error:  # noqa: BLE001 - whatever it is, we did not raise it
         return "FOUND", _told(error)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
@@ -189,7 +189,7 @@ def fuzz(
 ) -> dict[str, Found]:
     """Let all targets take turns, until there were `most` inputs; return what was found, by target.
 
-    `before`: what earlier runs of this seed have found; this one goes on where they ended.
+    `before`: what earlier runs of this seed have found; this one continues where they ended.
     """
     until = time.monotonic() + seconds
     total = dict(before or {})
@@ -270,7 +270,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=None, help="repeats a run")
     parser.add_argument("--workers", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--only", nargs="*", default=[], help="targets whose name holds one of these words")
-    parser.add_argument("--state", type=Path, help="file of counts: a run goes on where the last one ended")
+    parser.add_argument("--state", type=Path, help="file of counts: a run continues where the last one ended")
     parser.add_argument("--at", type=int, default=None, help="this one input, with its traceback")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/fuzz"), help="folder of findings")
     given: Any = parser.parse_args(arguments)

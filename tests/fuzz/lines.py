@@ -165,14 +165,14 @@ def _options(good: Good, content: bytes, folder: Path) -> None:
 
 
 def _apart(good: Good, file: str, line: str, content: bytes, folder: Path) -> None:
-    """Run a command on a changed file in the place of a good one."""
+    """Run a command on a changed file instead of a good one."""
     prepare(good, folder)
     (folder / file).write_bytes(content)
     check(*in_child(line.split(), folder, BEGUN_S))
 
 
 def prepare(good: Good, folder: Path) -> None:
-    """Put all good files into a folder, and things that are none."""
+    """Put all good files into a folder, and things that are not files."""
     shutil.copytree(good.folder, folder, dirs_exist_ok=True)
     os.mkfifo(folder / "pipe")
     (folder / "folder").mkdir()

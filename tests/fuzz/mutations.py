@@ -1,4 +1,4 @@
-"""What a stranger may do to a file: damage of bytes, and changes that keep its form.
+"""What may happen to an untrusted file: damage of bytes, and changes that keep its form.
 
 1. Bytes are flipped, cut, doubled, moved, or replaced by pieces that parsers have stumbled over [`of_bytes`].
 2. A JSON text keeps its form while values, keys and lists change [`of_json`]; texts inside that are JSON
@@ -137,7 +137,7 @@ def of_bytes(random: Random, content: bytes) -> bytes:
 
 
 def of_json(random: Random, content: bytes) -> bytes:
-    """Return a JSON text with values, keys or lists changed; of a text that is none, damaged bytes."""
+    """Return a JSON text with values, keys or lists changed; of a text that is not JSON, damaged bytes."""
     try:
         tree = json.loads(content)
     except (ValueError, RecursionError):

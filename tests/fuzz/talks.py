@@ -91,7 +91,7 @@ def _request(content: bytes, _folder: Path) -> None:
     said = answer.getvalue()
     for status in re.findall(rb"(?m)^HTTP/1\.[01] (\d+) ", said):
         assert int(status) in STATUSES, f"status {status!r}"
-    assert PAGE not in said or NAMED.search(content), "the page goes to who names another host"
+    assert PAGE not in said or NAMED.search(content), "the page goes to a client that names another host"
 
 
 def _answered(cases: Mapping[str, Case], content: bytes, _folder: Path) -> None:
@@ -103,5 +103,5 @@ def _answered(cases: Mapping[str, Case], content: bytes, _folder: Path) -> None:
             raise InputError("answer", error.verdict, str(error), "see spec/conformance.md") from None
     judged = [judge(name.partition("/")[0], case, answer) for name, case in cases.items()]
     ElementTree.fromstring(report.to_junit("x", judged, "again"))
-    parse_json(report.to_json("x", "ieee", judged, "again"), "report", "mend it")
+    parse_json(report.to_json("x", "ieee", judged, "again"), "report", "fix it")
     report.track_text(None, judged)

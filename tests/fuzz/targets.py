@@ -1,8 +1,8 @@
-"""What reads files of strangers: for each kind of file good examples, and what is done with a changed one.
+"""What reads untrusted files: for each kind of file good examples, and what is done with a changed one.
 
 A reader gets bytes in a file of its own folder, reads them by the Python API, and uses what it got as the
 program would. It returns a value or raises a `WamnetError`; numbers that come out must be finite. A command
-is run in this process with the changed file in the place of a good one [`commands`].
+is run in this process with the changed file instead of a good one [`commands`].
 """
 
 from __future__ import annotations
@@ -243,7 +243,7 @@ def _track(content: bytes, folder: Path) -> None:
 
 
 def _answer(content: bytes, _folder: Path) -> None:
-    parse_json(content, "answer", "mend it")
+    parse_json(content, "answer", "fix it")
 
 
 def _frame(good: Good, content: bytes, folder: Path) -> None:
@@ -296,7 +296,7 @@ def _command(good: Good, file: str, line: str, content: bytes, folder: Path) -> 
     """Run a command on a changed file: status 0, 1 or 2, and of 2 one line that a terminal can show."""
     path = folder / file
     if path.parent != folder:
-        # What the file speaks of lies beside it.
+        # What the file refers to is beside it.
         shutil.copytree(good.folder / Path(file).parent, path.parent)
     path.write_bytes(content)
     words = line.replace("{good}/kernel-copy", str(path.parent)).replace("{good}", str(good.folder)).split()

@@ -1,7 +1,7 @@
 """Readers and commands on changed files: what was once found, and some of each kind on every run.
 
-`make fuzz MINUTES=10` goes on for as long as is wanted [fuzz.py]. What it finds is mended, and its file is
-put into corpus/TARGET/ [`CORPUS`].
+`make fuzz MINUTES=10` runs for as long as is wanted [fuzz.py]. What it finds is fixed, and its file is put
+into corpus/TARGET/ [`CORPUS`].
 """
 
 from __future__ import annotations

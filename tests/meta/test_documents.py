@@ -58,7 +58,7 @@ def commands(block: Block) -> list[str]:
 
 
 def run(block: Block, folder: Path) -> None:
-    """Run a block in a folder; on failure tell the place, the text and the last lines of the output."""
+    """Run a block in a folder; on failure say the place, the text and the last lines of the output."""
     program = {"sh": ["bash", "-euo", "pipefail", "-c"], "python": [sys.executable, "-c"]}[block.language]
     environment = os.environ | {
         "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",

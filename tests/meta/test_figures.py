@@ -1,7 +1,7 @@
 """House rule about figures: what a document says was measured has a record in git.
 
 1. A figure in README, CHANGELOG, docs, spec or experiments is written from a record, between two marks or in
-   a block [`lab/texts.py`]; a table by hand is none [`test_figures_have_records`].
+   a block [`lab/texts.py`]; a table typed by hand is refused [`test_figures_have_records`].
 2. What needs no record is quoted in `experiments/records/quoted.txt`, with its reason; an entry that covers
    nothing goes [`test_quotes_are_of_use`].
 """

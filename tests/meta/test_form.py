@@ -35,7 +35,7 @@ def test_constants_carry_a_string(house):
 
 
 def constant_name(node: ast.stmt) -> str | None:
-    """Return the name of a module's constant that a statement defines; a type variable is none."""
+    """Return the name of a module's constant that a statement defines; a type variable is not a constant."""
     if isinstance(node, ast.Assign) and len(node.targets) == 1:
         target, value = node.targets[0], node.value
     elif isinstance(node, ast.AnnAssign):
@@ -59,7 +59,7 @@ def test_public_names_are_documented(house):
 
 
 def is_declared_elsewhere(node: ast.stmt) -> bool:
-    """Tell methods whose contract stands at another place: overloads and overrides."""
+    """Tell whether a method's contract is elsewhere: that of overloads and overrides is."""
     decorators = [ast.unparse(d) for d in getattr(node, "decorator_list", [])]
     return any(d.endswith(("overload", "override", ".setter")) for d in decorators)
 

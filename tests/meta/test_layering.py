@@ -34,7 +34,7 @@ ALLOWED = {
         "jinja2",
     },
 }
-"""What each part may import besides the standard library; its keys are in the order of imports."""
+"""What each part may import in addition to the standard library; its keys are in the order of imports."""
 
 ORDER = tuple(ALLOWED)
 OUTSIDE = ("tests", "bench", "experiments", "docs")
@@ -90,7 +90,7 @@ def test_devices_are_used_in_kernels_only(house):
 
 
 def test_peers_are_used_in_their_file_only(house):
-    """And when they are asked for: nothing that is installed needs them."""
+    """And only when they are used: nothing that is installed needs them."""
     wrong = []
     for source in house.parts():
         at_import = {id(node) for node in source.tree.body}

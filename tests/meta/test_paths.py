@@ -15,13 +15,13 @@ NAMED = re.compile(
 
 
 def named_paths(text: str) -> list[str]:
-    """Return the paths that a text names; one with a gap to fill in, as in spec/<stem>.md, is none."""
+    """Return the paths that a text names; one with a gap to fill in, as in spec/<stem>.md, does not count."""
     found = [match.rstrip("/") for match in NAMED.findall(text)]
     return [path for path in found if not set("<>{}*") & set(path)]
 
 
 def texts(house) -> Iterator[tuple[str, str]]:
-    """Yield (place, text) of every document and of every string that stands alone in Python code."""
+    """Yield (place, text) of every document and of every string that is a statement of Python code."""
     for path in house.files():
         if path.suffix == ".md":
             yield path.relative_to(house.root).as_posix(), path.read_text()

@@ -69,7 +69,7 @@ def test_folder_that_is_no_environment(house, tmp_path):
 
 
 def test_all_stands_for_its_extras_and_not_for_the_baselines(house, tmp_path):
-    """With a stand-in for Python that notes what pip is asked for."""
+    """With a stand-in for Python that notes what pip has to install."""
     (tmp_path / "bin").mkdir()
     python_that_says(tmp_path / "bin", f'case "$*" in *"pip install"*) echo "$*" >>{tmp_path}/asked;; esac')
     (tmp_path / ".wamnet").mkdir()
@@ -182,7 +182,7 @@ def test_a_long_run_without_a_seed_draws_one(house, tmp_path):
 def test_a_seed_that_is_no_number_is_refused(house, tmp_path):
     done = long(house, tmp_path, SEED="x")
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("long: SEED and EXAMPLES are whole numbers of at most ten digits: 'x'")
+    assert done.stderr.startswith("long: SEED and EXAMPLES must be integers of at most ten digits: 'x'")
 
 
 def test_make_lists_every_target(house):

@@ -118,7 +118,7 @@ def test_named_code_exists(house):
 
 
 def public_names(tree: ast.Module) -> list[str]:
-    """Return the public functions and classes of a module, but for a second definition of a name."""
+    """Return the public functions and classes of a module, without a second definition of a name."""
     found = [n.name for n in tree.body if isinstance(n, ast.FunctionDef | ast.ClassDef)]
     return [name for name in dict.fromkeys(found) if not name.startswith("_")]
 

@@ -1,6 +1,6 @@
-"""Examples in the spec are true: worked ones are computed anew, fenced blocks run, links lead somewhere.
+"""Examples in the spec are true: worked ones are computed again, fenced blocks run, links lead somewhere.
 
-1. Between `<!-- worked: name -->` and `<!-- end -->` stands what tests/support/worked.py computes under that
+1. Between `<!-- worked: name -->` and `<!-- end -->` is what tests/support/worked.py computes under that
    name [`test_worked_examples`]; `--update-golden` writes it.
 2. A fenced block is run, read or drawn by its language [`test_fenced_blocks`], or a mark before it says where
    a test runs it, `<!-- run by tests/... -->`, or why it cannot be, `<!-- not run: reason -->`.
@@ -72,7 +72,7 @@ def fenced(path: Path) -> list[tuple[str | None, str | None, str, str]]:
 
 
 def run(where: str, language: str, text: str, folder: Path) -> None:
-    """Run a block in a folder; on failure tell the place and the last lines of the output."""
+    """Run a block in a folder; on failure say the place and the last lines of the output."""
     program = {"sh": ["bash", "-euo", "pipefail", "-c"], "python": [sys.executable, "-c"]}[language]
     done = subprocess.run([*program, text], cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -103,7 +103,7 @@ def test_links_lead_somewhere() -> None:
 
 
 def test_decisions_about_the_paper_are_in_the_appendix() -> None:
-    """What a chapter decides because the paper is silent, or against it, stands in departures.md in words."""
+    """What a chapter decides because the paper is silent, or against it, is in departures.md in words."""
     by_hand = WORKED.sub("", (ROOT / "spec/departures.md").read_text())
     about = {
         clause

@@ -80,7 +80,7 @@ def test_clauses_that_vectors_name_exist(house):
     wrong = [
         f"{ids[0]} and {len(ids) - 1} more: {clause}" for clause, ids in found.items() if clause not in known
     ]
-    house.refuse(wrong, "A clause that a vector names exists: correct the kind, and write the vectors anew.")
+    house.refuse(wrong, "A clause that a vector names exists: correct the kind, and write the vectors again.")
 
 
 def said_by_clauses(folder: Path) -> set[tuple[str, str]]:

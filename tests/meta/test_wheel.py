@@ -16,7 +16,7 @@ VECTORS = "spec/vectors"
 """The folder of data that becomes `wamnet.spec.vectors`."""
 
 SHELF = "kernels/shelf/"
-"""Kernels to be read and pasted: no program needs them, `wamnet export` writes them anew."""
+"""Kernels to be read and pasted: no program needs them, `wamnet export` writes them again."""
 
 NOT_DATA = {".pyc"}
 """Suffixes of files in these folders that are no part of the package."""

@@ -41,7 +41,7 @@ def test_two_steps_by_hand() -> None:
 
 
 def test_third_step_by_hand_has_both_moments() -> None:
-    """Go on with gradient 8: m = 4, v = 3 + 16 = 19, m_hat = 4/(7/8) = 32/7, v_hat = 19/(37/64) = 1216/37.
+    """Continue with gradient 8: m = 4, v = 3 + 16 = 19, m_hat = 4/(7/8) = 32/7, v_hat = 19/(37/64) = 1216/37.
 
     theta = 3/5 - 1/2 (32/7) / (sqrt(1216/37) + 1) = 3/5 - (16/7) / 6.732793...
     """

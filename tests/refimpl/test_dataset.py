@@ -172,7 +172,7 @@ def test_features_by_hand() -> None:
 
 
 def test_sums_are_encoded_as_their_means_are() -> None:
-    """Sums over 4 samples, which divide exactly; in float64, so that feature_image rounds alone."""
+    """Sums over 4 samples, which divide exactly; in float64, so that only feature_image rounds."""
     frame = frame_of(5, 4)
     scales = Normalization(0.5, 1.5, (0.1, -0.2, 0.3), 1.5)
     sums = {name: 4.0 * values.astype(np.float64) for name, values in frame.layers.items()}

@@ -31,8 +31,8 @@ def built(sky, dtype=np.float64):
 def around(sky, points=48):
     """Return directions (P, 3) and weights (P,) of a quadrature over the sphere around the sun, fine near it.
 
-    Gauss's rule in 1 - cos, on three intervals, times even steps around the sun. What is smooth in 1 - cos
-    alone, such as the density, has no error but rounding; the gradient's corner at the horizon costs 6e-6.
+    Gauss's rule in 1 - cos, on three intervals, times even steps around the sun. What is smooth in 1 - cos,
+    such as the density, has no error but rounding; the gradient's corner at the horizon costs 6e-6.
     """
     nodes, weights = np.polynomial.legendre.leggauss(points)
     parts = []
@@ -126,7 +126,7 @@ def test_plane_under_the_sky(strategy, concentration):
 
 @pytest.mark.parametrize("strategy", transport.STRATEGIES)
 def test_white_furnace(strategy):
-    """A matt plane of reflectance 1/2 under a white sky: 1/2, as under the background 1."""
+    """A matte plane of reflectance 1/2 under a white sky: 1/2, as under the background 1."""
     mean, error = plane_radiance(WHITE, strategy=strategy)
     # Where every sample has the same value, the rounding of 16384 sums is all that differs: 2^14 u = 1.8e-12.
     assert_all_plausible(z_p(mean - 0.5, np.maximum(error, 2.0**-39)))
@@ -147,7 +147,7 @@ def test_camera_sees_the_sky_itself():
 )
 @pytest.mark.parametrize("lit", [False, True])
 def test_strategies_agree(strategy, heuristic, lit):
-    """The sky alone, and beside a lamp (ENV-4): all ways to find light estimate the same image (Welch)."""
+    """With and without a lamp (ENV-4): all ways to find light estimate the same image (Welch)."""
     lamp = Light((-0.5, 2.0, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0), 4.0)
     ball = Sphere((0.0, 0.6, 0.0), 0.6, (0.8, 0.4, 0.4))
     scene = Scene("day", Camera((0.0, 1.0, 3.5), (0.0, 0.4, 0.0)), quads=(PLANE,), spheres=(ball,))

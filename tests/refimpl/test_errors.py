@@ -72,7 +72,7 @@ def test_errors_of_one_sentence_are_shown_so_too(kind):
 
 
 def test_long_parts_keep_their_ends_and_leave_room_for_the_others():
-    """A file's name stands at the end of its path."""
+    """A file's name is at the end of its path."""
     path = f"/{'folder/' * 1000}frame.exr"
     error = InputError(f"{path}: layers", path, 5000 * "r", 5000 * "w")
     first, second = str(error).split(" is ")[0], str(error).split(" is ")[1]

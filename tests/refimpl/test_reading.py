@@ -1,4 +1,4 @@
-"""What strangers write: every text gives a value or one InputError, within limits of time and memory."""
+"""Untrusted files: every text gives a value or one InputError, within limits of time and memory."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ values = st.recursive(
     | st.booleans()
     | st.integers(-(2**70), 2**70)
     | st.floats(allow_nan=False, allow_infinity=False)
-    # A surrogate alone is no text.
+    # A lone surrogate is not a text.
     | st.text(st.characters(exclude_categories=["Cs"])),
     lambda inner: st.lists(inner) | st.dictionaries(st.text(st.characters(exclude_categories=["Cs"])), inner),
 )
 
 
 def parsed(text):
-    return parse_json(text, "thing", "mend it")
+    return parse_json(text, "thing", "fix it")
 
 
 @given(values)
@@ -91,7 +91,7 @@ def test_json_of_too_many_values_is_refused_before_it_is_taken_apart():
 
 def test_json_that_is_too_long_is_refused():
     with pytest.raises(InputError, match="10 bytes"):
-        parse_json('"0123456789"', "thing", "mend it", most=10)
+        parse_json('"0123456789"', "thing", "fix it", most=10)
 
 
 @given(st.binary() | st.text())
@@ -168,12 +168,12 @@ def test_a_file_that_becomes_shorter_is_refused(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("sizes", [None, [], {}, {"a": -1}, {"a": 1.0}, {"a": True}, {"a": "1"}, {"b": 1}])
 def test_lengths_that_a_manifest_does_not_state_are_refused(sizes):
-    assert reading.stated_bytes({"file_bytes": {"a": 7}}, "a", "manifest", "mend it") == 7
-    assert reading.stated_bytes({}, "a", "manifest", "mend it") is None, "an older manifest"
+    assert reading.stated_bytes({"file_bytes": {"a": 7}}, "a", "manifest", "fix it") == 7
+    assert reading.stated_bytes({}, "a", "manifest", "fix it") is None, "an older manifest"
     with pytest.raises(
         InputError, match=r"manifest: file_bytes: a is .*: it must be the file's length in bytes"
     ):
-        reading.stated_bytes({"file_bytes": sizes}, "a", "manifest", "mend it")
+        reading.stated_bytes({"file_bytes": sizes}, "a", "manifest", "fix it")
 
 
 def test_a_file_that_grows_after_the_look_is_refused(tmp_path, monkeypatch):
@@ -188,8 +188,8 @@ def test_a_file_that_grows_after_the_look_is_refused(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", ["", ".", "..", "a/b", "/dev/zero", "..\\a", "a\0", 3, None])
 def test_names_that_lead_elsewhere_are_refused(name):
     with pytest.raises(InputError, match="plain name"):
-        plain_name(name, "name", "mend it")
-    assert plain_name("weights.bin", "name", "mend it") == "weights.bin"
+        plain_name(name, "name", "fix it")
+    assert plain_name("weights.bin", "name", "fix it") == "weights.bin"
 
 
 # ---- records ----------------------------------------------------------------------------------------------

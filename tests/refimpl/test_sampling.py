@@ -145,8 +145,7 @@ def test_quad_chi_square():
 
 
 def test_chi_square_rejects_a_uniform_hemisphere():
-    """The test above can fail: directions that are uniform in solid angle are told from cosine-weighted
-    ones."""
+    """The test above can fail: it rejects directions that are uniform in solid angle."""
     u0, u1, *_ = uniforms()
     cosines, angles = np.linspace(0, 1, 17), np.linspace(-np.pi, np.pi, 33)
     observed, _, _ = np.histogram2d(u0, (2 * u1 - 1) * np.pi, bins=(cosines, angles))

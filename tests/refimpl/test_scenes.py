@@ -60,8 +60,8 @@ def test_minicubes_come_back_after_a_turn_and_differ_in_between():
 
 @pytest.mark.parametrize("time", [0.0, 0.9, 2.1, 5.0])
 def test_glossy_turns_inside_its_room_and_no_bodies_meet(time):
-    """The bodies stand on the table without touching it, and none reaches into another: spheres around them
-    differ.
+    """The bodies are above the table without touching it, and none reaches into another: the spheres around
+    them are disjoint.
     """
     scene = scenes.glossy(time=time)
     table, *blocks = scene.boxes

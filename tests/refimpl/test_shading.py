@@ -1,4 +1,4 @@
-"""Several materials in a scene: each surface has its own, inside is told from outside, and energy is kept."""
+"""Several materials in a scene: each surface has its own, inside and outside differ, and energy is kept."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def arrived(scene, size=24, depths=1, dtype=np.float32):
 
 
 def test_every_surface_has_its_own_material():
-    """What the selection gives are the bits of the surface's material alone, with its own number."""
+    """What the selection gives are the bits of only the surface's material, with its own number."""
     numbers = uniforms(24 * 24, dtype=np.float32)[:3]
     owners = [material or Lambertian() for material, _ in shading.intersection.materials_by_id(ALL)]
     for world, path, surface, hit in arrived(ALL, depths=3):
@@ -148,9 +148,9 @@ def test_throughput_never_grows():
     ("strategy", "heuristic"), [("light", "power"), ("bsdf", "power"), ("mis", "balance")]
 )
 def test_strategies_agree(strategy, heuristic):
-    """All ways to find a light estimate the same image of rough metal and matt walls: Welch's test per pixel.
+    """All ways to find a light estimate the same image of rough metal, matte walls: Welch's test per pixel.
 
-    Glass and mirrors are left out: light that they send to matt walls comes in rare bright paths, and the
+    Glass and mirrors are left out: light that they send to matte walls comes in rare bright paths, and the
     mean of 256 of them is far from normal. What they weigh is tested exactly, in the tests of each."""
     metal = Conductor(0.4)
     scene = replace(

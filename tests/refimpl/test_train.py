@@ -1,4 +1,4 @@
-"""Training: it lowers the error on unseen frames, resumes to the same bits, and tells what it refuses."""
+"""Training: it lowers the error on unseen frames, resumes to the same bits, and says what it refuses."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ STRATEGIES = [
 @pytest.mark.parametrize(("strategy", "heuristic"), STRATEGIES)
 @pytest.mark.parametrize("name", ["minicubes", "cornell", "lone_light"])
 def test_strategies_agree(name, strategy, heuristic):
-    """Light samples alone, BSDF samples alone and both combined estimate the same image (different seeds)."""
+    """Only light samples, only BSDF samples and both combined estimate the same image (different seeds)."""
     scene = scenes.canonical(name)
     combined = render(scene, spp=256, seed=1, max_depth=3)
     other = render(scene, spp=1024, seed=2, max_depth=3, strategy=strategy, heuristic=heuristic)

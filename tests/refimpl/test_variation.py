@@ -52,7 +52,7 @@ def test_the_orbit_keeps_what_it_must(yaw, pitch, distance) -> None:
 
 @given(st.floats(0, 1), st.floats(0, 1))
 def test_a_lamp_keeps_its_brightness(hue, saturation) -> None:
-    """The mean of the channels is the lamp's own, the saturation the one that was asked for."""
+    """The mean of the channels is the lamp's own, the saturation the requested one."""
     color = V.lamp_color(OWN[0], hue, saturation)
     assert abs(sum(color) / sum(OWN[0]) - 1) <= 16 * U
     assert abs(V.saturation_of(color) - saturation) <= 16 * U
@@ -93,7 +93,7 @@ def test_variations_that_are_refused(change, text) -> None:
 
 
 def test_ranges_as_text() -> None:
-    """There and back; what is none is refused."""
+    """There and back; what is not ranges is refused."""
     for ranges in (V.Ranges(), V.Ranges((1.0, 7.0), (-24.0, 24.0), (0.0, 8.0), (0.9, 1.1), (0.0, 0.7))):
         assert V.ranges_from_json(ranges.to_json()) == ranges
     for text in ("", "[]", '{"yaw_deg": [1]}', '{"yaw": [0, 1]}', '{"yaw_deg": [2, 1]}', "[" * 100_000):

@@ -69,7 +69,7 @@ class Chromium(AbstractContextManager["Chromium"]):
 
 
 class Tab:
-    """A page, and all that it has said and asked for."""
+    """A page, and all that it has said and requested."""
 
     def __init__(self, page: Any, path: Path) -> None:
         self.page = page

@@ -78,12 +78,12 @@ SMALLER = (
 """Prelude: a demonstration of some seconds."""
 
 OFTEN = "from wamnet.cli import train; train.CHECKPOINT_INTERVAL_S = 0.0"
-"""Prelude: a checkpoint as often as there can be one."""
+"""Prelude: a checkpoint after every step that may have one."""
 
 
 @dataclass
 class Case:
-    """A command, the files whose bytes are wanted, and those that may lie there besides, as patterns."""
+    """A command, the files whose bytes are wanted, and patterns of the files that may also be there."""
 
     arguments: Sequence[str]
     exact: Sequence[str]

@@ -17,7 +17,7 @@ PACKAGES = {"torch": "PyTorch", "pyoidn": "Open Image Denoise"}
 """Their names for Python and for people."""
 
 FOUND: dict[str, str] = {}
-"""What has been found of each one that was asked for: "ok (version)" or "MISSING: reason"."""
+"""What has been found of each requested one: "ok (version)" or "MISSING: reason"."""
 
 
 def required() -> frozenset[str]:

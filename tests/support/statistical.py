@@ -2,7 +2,7 @@
 
 Every test states its significance: the chance that it fails although the code is right. Seeds are fixed, so a
 verdict does not change from run to run; the significance says how lucky the seed may be. Where a test makes m
-comparisons, each is held to the level that Sidak's correction gives [`sidak`], so that the chance of any
+comparisons, each is tested at the level that Sidak's correction gives [`sidak`], so that the chance of any
 false alarm stays at the stated one. Follows Nori's and Mitsuba's habit of testing samplers and renderers by
 hypothesis tests, and Jung, Hanika and Dachsbacher, "Detecting Bias in Monte Carlo Renderers using Welch's
 t-test", JCGT 9(2), 2020. SciPy's distributions are the oracle of kernels/welch.py, which does without.

@@ -182,7 +182,7 @@ def path_vertex() -> list[str]:
     weight = transport.mis_weight(world.settings, way.pdf, other)
     color, light = transport.direct_light(world, site, hit, origin, pick, u0, u1)
     after, alive = transport.scatter(world, path, surface, hit, rng.counter(0), _counters())
-    assert alive.all(), "the example's path goes on"
+    assert alive.all(), "the example's path continues"
     assert np.all(light > 0), "the example's light sample is visible"
     local = sampling.sample_cosine_hemisphere(v0, v1)
     rows = [

@@ -131,7 +131,7 @@ def test_no_light_sample_is_worth_anything():
 
 
 def test_glass_is_an_obstacle_to_light_samples():
-    """DIE-6: behind glass a light is found by directions alone, in front of it by light samples too."""
+    """DIE-6: behind glass a light is found only by directions, in front of it by light samples too."""
     lamp = Light((-0.5, 2.0, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), WHITE, 4.0)
     floor = Quad((-2.0, -1.0, -2.0), (0.0, 0.0, 4.0), (4.0, 0.0, 0.0), (0.5, 0.5, 0.5))
     pane = Box((0.0, 1.0, 0.0), (9.0, 0.1, 9.0), WHITE, material=Dielectric())

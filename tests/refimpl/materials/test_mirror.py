@@ -45,11 +45,11 @@ def test_mirror_ball_in_a_white_sky_is_its_reflectance(dtype):
 def test_light_in_a_mirror_has_its_full_radiance(strategy):
     """A camera looks into a tilted mirror, which shows a light: reflectance times radiance in every strategy.
 
-    Beside the mirror stands a matt wall, so that lights are sampled.
+    Beside the mirror is a matte wall, so that lights are sampled.
     """
     mirror = Quad((-1.0, -1.0, -1.0), (2.0, 0.0, 2.0), (0.0, 2.0, 0.0), (0.5, 0.25, 1.0), material=Mirror())
     wall = Quad((-9.0, -9.0, -9.0), (18.0, 0.0, 0.0), (0.0, 18.0, 0.0), (0.5, 0.5, 0.5))
-    # The mirror turns -z into -x; the light stands there and shines along +x.
+    # The mirror turns -z into -x; the light is there and shines along +x.
     light = Light((-5.0, -3.0, -3.0), (0.0, 6.0, 0.0), (0.0, 0.0, 6.0), (1.0, 1.0, 1.0), 36.0 * np.pi)
     camera = Camera((0.0, 0.0, 3.0), (0.0, 0.0, 0.0), vertical_fov_deg=2.0)
     scene = Scene("mirror", camera, quads=(mirror, wall), lights=(light,))

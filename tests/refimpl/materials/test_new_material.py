@@ -51,7 +51,7 @@ def test_a_file_and_a_line_are_all_that_a_new_material_needs(monkeypatch: pytest
         found = render_on(executor, SCENE, job)
     wanted = render(SCENE, job).frame.layers
     assert np.array_equal(found.frame.layers["unshadowed"], wanted["unshadowed"])
-    # A colour is a sum of light, all of it positive; fewer than 128 operations, u each, lie before it.
+    # A colour is a sum of light, all of it positive; fewer than 128 operations, u each, lead to it.
     assert (np.abs(found.frame.layers["color"] - wanted["color"]) <= 128 * 2.0**-24 * wanted["color"]).all()
 
 

@@ -20,7 +20,7 @@ from wamnet.refimpl.scenes import canonical
 
 
 class Outcome(NamedTuple):
-    """What a command leaves behind besides files."""
+    """What a command leaves behind, except for files."""
 
     status: int
     out: str

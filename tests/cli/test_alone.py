@@ -1,4 +1,4 @@
-"""Tests of locks: one writer at a time, which no kill, link or stranger's file turns into a loss."""
+"""Tests of locks: one writer at a time, which no kill, link or foreign file turns into a loss."""
 
 from __future__ import annotations
 

@@ -188,7 +188,7 @@ def test_quality_comes_from_a_data_set(wamnet, here) -> None:
 
 
 def small_scene(monkeypatch) -> None:
-    """Let training frames be few and tiny, and NumPy render and train: no device is asked for."""
+    """Let training frames be few and tiny, and NumPy render and train: no device is needed."""
     monkeypatch.setattr(bench_frames, "renderer", lambda: "numpy")
     monkeypatch.setattr(bench, "_trainer", lambda: "numpy")
     monkeypatch.setattr(bench_frames, "TRAINING_FRAMES", 2)
@@ -272,7 +272,7 @@ def test_what_a_model_has_not_learned_is_said() -> None:
 
 @pytest.mark.parametrize("executor", ["opencl", "opengl"])
 def test_forms_are_trained_and_then_measured(wamnet, here, monkeypatch, executor_named, executor) -> None:
-    """Each is a row with the steps of its training; one that the model cannot have is none."""
+    """Each is a row with the steps of its training; one that the model cannot have has no row."""
     executor_named(executor)
     small_scene(monkeypatch)
     monkeypatch.setattr(bench_forms, "FORMS", ("full", "rank2", "window3", "window14"))

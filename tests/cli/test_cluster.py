@@ -132,7 +132,7 @@ def test_a_signal_waits_until_workers_have_started(monkeypatch, number) -> None:
 
 
 def test_a_worker_that_is_being_started_keeps_no_cluster_open(monkeypatch) -> None:
-    """An assertion of Dask's in the place of what the command had to say, and a traceback."""
+    """Dask's assertion and a traceback hid what the command had to say."""
 
     class Open:
         def __init__(self, **_):
@@ -165,7 +165,7 @@ def test_a_worker_without_the_package(monkeypatch) -> None:
 
 
 def test_nobody_is_there(monkeypatch) -> None:
-    """An address without a scheduler; an address that is none."""
+    """An address without a scheduler; a text that is not an address."""
     monkeypatch.setattr(cluster, "CONNECT_S", 0.5)
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

@@ -18,7 +18,7 @@ from wamnet.refimpl.frame import Frame
 
 
 def test_the_numbers_are_the_references(wamnet, samples) -> None:
-    """On the form of the colours that each metric is meant for, at the exposure that is asked for."""
+    """On the form of the colours that each metric is meant for, at the requested exposure."""
     names = samples / "noisy.exr", samples / "reference.exr"
     data = json.loads(wamnet("compare", *names, "--json", "--exposure", -1).out)
     a, b = (exr.read_frame(name)["color"] for name in names)

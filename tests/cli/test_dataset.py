@@ -157,7 +157,7 @@ def test_on_a_running_scheduler(wamnet, tmp_path) -> None:
 
 @pytest.mark.parametrize(("sent", "workers"), [(signal.SIGINT, 1), (signal.SIGINT, 2), (signal.SIGKILL, 2)])
 def test_an_interrupted_process_is_gone_on_with(wamnet, tmp_path, sent, workers) -> None:
-    """The whole group is interrupted, or the process alone killed; nothing that was done is redone."""
+    """The whole group is interrupted, or only the process killed; nothing that was done is redone."""
     arguments = [str(a) for a in (*TINY[:-3], 36, "--spp", 64, "-o", "a")]
     command = [sys.executable, "-m", "wamnet.cli", "dataset", *arguments, "--workers", str(workers)]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, start_new_session=True) as process:

@@ -1,4 +1,4 @@
-"""Tests of `wamnet demo --quick`: all files, honest numbers, a report that stands alone, resuming."""
+"""Tests of `wamnet demo --quick`: all files, honest numbers, a self-contained report, resuming."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_every_executor_is_told_and_within_its_bound(report) -> None:
 
 
 def test_the_denoised_picture_is_the_models(finished, report) -> None:
-    """The written picture is the definition's, but for the kernel's bound and the rounding to 8 bits."""
+    """The written picture is the definition's, up to the kernel's bound and the rounding to 8 bits."""
     model = load_model(finished / "model.safetensors")
     # The bound for all frames: the one of a frame is that of the first.
     bound = next(run["bound_all"] for run in report["runs"] if run["executor"] == report["denoised_by"])
@@ -174,7 +174,7 @@ def test_a_damaged_frame_is_rendered_again(finished, tmp_path) -> None:
 
 
 def test_another_recipe_is_trained_anew(finished, tmp_path) -> None:
-    """The checkpoint of another seed is not gone on with."""
+    """The checkpoint of another seed is not resumed."""
     folder = tmp_path / "out"
     shutil.copytree(finished, folder)
     pairs = [pair for _, pair in demo._pairs(folder, "train")]
@@ -185,7 +185,7 @@ def test_another_recipe_is_trained_anew(finished, tmp_path) -> None:
 
 
 def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
-    """And the user is told of both."""
+    """And both are reported to the user."""
     from wamnet.refimpl.errors import ExecutorUnavailable
 
     def nothing(name: str):
@@ -207,7 +207,7 @@ def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
 
 
 def test_an_executor_that_is_missing_is_told(finished, monkeypatch) -> None:
-    """The report goes on without it and says why."""
+    """The report leaves it out and says why."""
     from wamnet.compiler.compile import compile_program
     from wamnet.compiler.lower import lower
     from wamnet.kernels import open_executor
@@ -233,7 +233,7 @@ def test_a_target_that_promises_nothing_has_no_bound(finished) -> None:
 
 
 def test_refusals(refused, tmp_path) -> None:
-    """A file in the folder's place; a size that is none."""
+    """A file in the folder's place; an invalid size."""
     (tmp_path / "a").write_text("hello")
     assert "output folder is a: it is a file; choose another with -o" in refused("demo", "-o", "a")
     assert "width is 0: it must be an integer" in refused("demo", "--size", 0)

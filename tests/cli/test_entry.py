@@ -59,7 +59,7 @@ def test_the_status_is_the_command_s(tmp_path) -> None:
 
 
 def test_an_interrupt_while_an_object_is_deleted_is_not_lost() -> None:
-    """Python printed it with a traceback, dropped it, and the command went on."""
+    """Python printed it with a traceback, dropped it, and the command continued."""
     program = (
         "import signal, sys, time\n"
         "from wamnet.cli import main\n"

@@ -193,7 +193,7 @@ def test_a_missing_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x76\x2f\x31\x01"])
 def test_a_file_that_is_no_exr(tmp_path: Path, content: bytes, capfd: pytest.CaptureFixture[str]) -> None:
-    """Empty, text, the magic number alone; the library's own messages do not reach the terminal."""
+    """Empty, text, only the magic number; the library's own messages do not reach the terminal."""
     (tmp_path / "a.exr").write_bytes(content)
     with pytest.raises(InputError, match=r"input file is .*a\.exr: it is not an OpenEXR image"):
         exr.read_frame(tmp_path / "a.exr")
@@ -234,7 +234,7 @@ def test_integer_pixels(tmp_path: Path) -> None:
 
 
 def test_pixels_that_are_not_finite(tmp_path: Path) -> None:
-    """The file, the layer, the place and the number are told."""
+    """The file, the layer, the place and the number are reported."""
     channels = rgb(1, 2, 3)
     channels["G"][1, 2] = np.nan
     channels["B"][0, 1] = np.inf

@@ -1,4 +1,4 @@
-"""Tests of what commands say of wrong inputs: folders, checkpoints, missing layers, numbers that are none."""
+"""Tests of what commands say of wrong inputs: folders, checkpoints, missing layers, invalid numbers."""
 
 from __future__ import annotations
 

@@ -212,7 +212,7 @@ def test_a_worker_that_is_killed_is_one_line(tmp_path) -> None:
 @pytest.mark.parametrize("seconds", [0.9, 1.3, 1.8, 4.0])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_signals_end_the_workers(tmp_path, number, seconds) -> None:
-    """SIGTERM to the parent alone, SIGINT to all, while the workers start and later: no process is left."""
+    """SIGTERM only to the parent, SIGINT to all, while the workers start and later: no process is left."""
     arguments = ("render", "minicubes", "--spp", "100000", "--workers", "2", "-o", "a.exr")
     code = (
         "import sys; from wamnet.cli.main import main\n"

@@ -100,7 +100,7 @@ def full(*_args: object, **_options: object) -> None:
 
 
 def test_a_full_disk_names_the_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not the temporary file, which nobody has asked for."""
+    """Not the temporary file, which nobody has named."""
     monkeypatch.setattr(Path, "write_text", full)
     with pytest.raises(InputError, match=r"output file is .*a\.txt: cannot be written \(No space left"):
         write_text(tmp_path / "a.txt", "text")

@@ -1,4 +1,4 @@
-"""Tests of what is printed: texts appear as they are, and an interrupt tells how to go on."""
+"""Tests of what is printed: texts appear as they are, and an interrupt says how to resume."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ def test_descriptions_of_progress_are_no_markup(capsys, monkeypatch) -> None:
 
 
 def test_the_hint_is_said_on_interrupt(capsys) -> None:
-    """And the interrupt goes on."""
+    """And the interrupt is raised again."""
 
     def interrupted() -> None:
-        with terminal.hint_on_interrupt(lambda: "go on so"):
+        with terminal.hint_on_interrupt(lambda: "resume so"):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
-    assert capsys.readouterr().err == "wamnet: go on so\n"
+    assert capsys.readouterr().err == "wamnet: resume so\n"
 
 
 def controls_of(text: str) -> list[str]:

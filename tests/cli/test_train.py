@@ -147,7 +147,7 @@ def test_resuming_with_another_recipe_or_other_frames(wamnet, refused, pair) -> 
 
 
 def test_an_earlier_run_is_not_lost(wamnet, refused, pair, tmp_path) -> None:
-    """It goes on, or is replaced, when that is asked for."""
+    """It resumes, or is replaced, only on request."""
     assert wamnet("train", *pair, "--steps", 2).status == 0
     line = refused("train", *pair, "--steps", 3)
     assert "checkpoint is model.checkpoint.safetensors: it is there from an earlier run" in line
@@ -204,7 +204,7 @@ def test_a_model_is_cut_and_trained_on(wamnet, refused, pair, tmp_path) -> None:
 
 
 def test_another_activation(wamnet, refused, pair, tmp_path, executor_named) -> None:
-    """Trained by the compiled trainer, gone on with by the reference, and run within its bound."""
+    """Trained by the compiled trainer, resumed by the reference, and run within its bound."""
     executor_named("opencl")
     options = ("--activation", "relu", "--steps", 4, "--executor", "opencl", "-o", "m.safetensors")
     assert wamnet("train", *pair, *options).status == 0
@@ -221,7 +221,7 @@ def test_another_activation(wamnet, refused, pair, tmp_path, executor_named) -> 
 
 
 def test_training_on_a_device(wamnet, refused, pair, tmp_path, executor_named) -> None:
-    """The model is train_on's, to the bit; a checkpoint of one executor is gone on with by the other."""
+    """The model is train_on's, to the bit; a checkpoint of one executor is resumed by the other."""
     device = executor_named("opencl")
     options = ("--steps", 4, "--executor", "opencl")
     assert wamnet("train", *pair, *options, "-o", "m.safetensors").status == 0
@@ -238,7 +238,7 @@ def test_training_on_a_device(wamnet, refused, pair, tmp_path, executor_named) -
 
 
 def test_factors_are_trained_on_a_device(wamnet, pair, tmp_path, executor_named) -> None:
-    """From a model in full: train_on's model, to the bit; NumPy goes on from its checkpoint."""
+    """From a model in full: train_on's model, to the bit; NumPy continues from its checkpoint."""
     device = executor_named("opencl")
     assert wamnet("train", *pair, "--steps", 2, "-o", "full.safetensors").status == 0
     more = ("--from", "full.safetensors", "--rank", 4, "--steps", 3, "-o", "cut.safetensors")
@@ -254,7 +254,7 @@ def test_factors_are_trained_on_a_device(wamnet, pair, tmp_path, executor_named)
 
 
 def test_a_device_that_is_missing(refused, pair, monkeypatch) -> None:
-    """The reason is told, and nothing is written."""
+    """The reason is reported, and nothing is written."""
 
     def missing(name: str) -> None:
         raise ExecutorUnavailable(f"{name}: no such device here; take numpy")

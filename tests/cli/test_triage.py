@@ -37,7 +37,7 @@ def here(samples, tmp_path, executor_named):
 
 @pytest.fixture
 def fault(monkeypatch):
-    """Plant a fault in OpenCL's kernels: one pixel's green is off. Return a way to mend them."""
+    """Plant a fault in OpenCL's kernels: one pixel's green is off. Return a way to fix them."""
     real = compiling.compile_plan
 
     def compiled(plan):
@@ -100,7 +100,7 @@ def test_the_odd_one_out_is_kept(wamnet, here, fault) -> None:
 
 
 def test_the_kept_command_repeats_it(wamnet, here, fault, monkeypatch, capsys) -> None:
-    """With the kept kernel (TRI-11) also when the compiler is mended; without it no longer."""
+    """With the kept kernel (TRI-11) also when the compiler is fixed; without it no longer."""
     assert wamnet("triage", "model.safetensors", "noisy.exr", *TWO, "-o", "odd").status == 1
     fault()
     commands = re.findall(r"^wamnet (triage .*)$", (here / "odd/README.md").read_text(), re.MULTILINE)
@@ -116,14 +116,14 @@ def test_the_kept_command_repeats_it(wamnet, here, fault, monkeypatch, capsys) -
     assert files["denoise.cl"] == sha256((kernel / "denoise.cl").read_bytes())
     shutil.rmtree(here / "odd/triage")
     assert main(shlex.split(commands[1])) == 0
-    # A kernel that somebody mends by hand is run as it is.
+    # A kernel that somebody fixes by hand is run as it is.
     source = here / "odd/opencl-plain/denoise.cl"
     source.write_text(source.read_text().replace("[1] = 2.5f", "[1] += 0.0f"))
     assert main(shlex.split(commands[0])) == 0
 
 
 def test_a_kernel_that_is_given_runs_though_another_schedule_would_be_picked(wamnet, here) -> None:
-    """The executor's own choice must not take its place: its verdict would be told as the kept one's."""
+    """The executor's own choice must not take its place: its verdict would be reported as the kept one's."""
     compiled = wamnet("compile", "model.safetensors", "--target", "opencl", "-o", "kept")
     assert compiled.status == 0
     given = ("triage", "model.safetensors", "noisy.exr", "--executor", "opencl", "--kernel", "kept")
@@ -156,7 +156,7 @@ def test_a_kernel_that_cannot_be_run_is_refused(wamnet, refused, here, change, s
 
 
 def test_a_kernel_of_two_passes_is_refused(wamnet, refused, here) -> None:
-    """Triage runs whole networks; half of a cut one must not be run in the place of one."""
+    """Triage runs whole networks; half of a cut one must not run instead of one."""
     compiled = wamnet(
         "compile", "model.safetensors", "--target", "opencl", "--variant", "rank2", "-o", "kept"
     )
@@ -212,7 +212,7 @@ def test_exact_prints_bits(wamnet, here) -> None:
 
 
 def test_one_that_is_not_here_is_told(wamnet, here, monkeypatch, refused) -> None:
-    """Unless it was asked for by name."""
+    """Unless it was requested by name."""
     monkeypatch.setenv("WAMNET_OPENCL_DEVICE", "abacus")
     outcome = wamnet("triage", "model.safetensors", "noisy.exr")
     assert outcome.status == 0

@@ -195,7 +195,7 @@ def test_the_page_measures_its_own_error(still, data):
     assert 0 < check["share"] <= 1
     assert 0 < check["error"] <= check["bound"]
     assert "within" in still.text("error")
-    # A number of the reference that is moved by 1e-3, as by a sine without its range reduction, is told.
+    # A number of the reference that is moved by 1e-3, as by a sine without its range reduction, is reported.
     moved = """async () => {
       const check = wamnet.page.data.variants[0].check;
       const kept = check.expected;
@@ -476,7 +476,7 @@ def test_a_lost_device_comes_back(chromium, path):
 
 
 def test_slow_devices_get_small_pieces(still):
-    """However dear a pixel is, what is handed out at once is worth no more than a batch."""
+    """However costly a pixel is, what is dispatched at once costs no more than a batch."""
     rows = still.page.evaluate(
         """() => {
           const handed = [];

@@ -209,7 +209,7 @@ def test_a_changed_step_is_refused_by_name(path, changed, place, value, match):
 
 
 def test_scalings_whose_products_overflow_are_refused_and_lapack_is_not_asked(path, changed, monkeypatch):
-    """It would print a complaint of its own about numbers that are none."""
+    """It would print a complaint of its own about numbers that are not finite."""
     held = certificate_of(path)
     for at, scale in ((0, 1e-308), (1, 1e308)):
         held = put(held, ("outputs", 0, "scalings", at), lambda old, scale=scale: [scale] * len(old))

@@ -1,6 +1,6 @@
 """Indices of the emitted texts, evaluated in 32 bits at the largest picture of each language (KER-2).
 
-The texts are read, not the tables that they are made of: each subscript in which `width` stands is evaluated
+The texts are read, not the tables that they are made of: each subscript that contains `width` is evaluated
 at the corners of pictures of just below 2^31 numbers. No step of it may leave 32 bits, and no two corners may
 meet. What reads textures has no such subscript; its coordinates are those of the texture.
 """

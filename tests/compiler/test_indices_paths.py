@@ -33,7 +33,7 @@ DECLARED = re.compile(
     r"(?m)^ +(?:const |let )?"
     r"(?:(?P<kind>size_t|int) (?P<name>\w+)|(?P<name_>\w+): (?P<kind_>i32)) = (?P<text>[^;]+);"
 )
-"""A declaration of a whole number."""
+"""A declaration of an integer."""
 
 SUBSCRIPT = re.compile(r"\b(?P<array>sums|image_\w+)\[(?P<text>[^\[\]]*\b(?:at|pixel)\b[^\[\]]*)\]")
 """A subscript of a place in the picture."""
@@ -46,12 +46,12 @@ TEXTURES = ("texelFetch", "layout(location")
 
 
 class Number:
-    """A whole number of a type, whose arithmetic must not leave it."""
+    """An integer of a type, whose arithmetic must not leave it."""
 
     def __init__(self, value, kind):
         value = int(value)
         low, high = (0, 2**64) if kind == "size_t" else (-LIMIT, LIMIT)
-        assert low <= value < high, f"{value} is no {kind}"
+        assert low <= value < high, f"{value} is outside of {kind}"
         self.value, self.kind = value, kind
 
     def _with(self, other, operation):
@@ -173,7 +173,7 @@ def test_indices_beyond_the_limit_are_right_or_no_numbers(make, target):
         if wide:
             check_picture(text, height, width)
         else:
-            with pytest.raises(AssertionError, match="is no i"):
+            with pytest.raises(AssertionError, match="is outside of i"):
                 check_picture(text, height, width)
 
 
@@ -189,5 +189,5 @@ def test_opencl_paths_in_vectors_are_right(lanes):
 def test_a_product_that_overflows_is_seen():
     text = path_text("opencl")[0].replace("size_t", "int")
     assert text != path_text("opencl")[0]
-    with pytest.raises(AssertionError, match="is no int"):
+    with pytest.raises(AssertionError, match="is outside of int"):
         check_picture((text, 6, {}), 2**15, 2**15)

@@ -59,7 +59,7 @@ def test_a_layer_s_lines(target):
 
 
 def test_what_a_pass_puts_in_has_the_places_of_what_was_there():
-    """The emitted sine's operations are asked for by the line that asks for the sine."""
+    """The emitted sine's operations have the place of the line that contains the sine."""
     sine = lines_under(kernel_lines("ieee"), "x = activate(_omega_0(siren, layer) * x)")
     assert sum("floor(" in line for line in sine) == 2
 
@@ -129,6 +129,6 @@ def test_a_line_of_another_block_is_not_taken_for_a_node():
 
 
 def test_places_are_asked_for_by_name():
-    """What moves in a scene stood where the places are asked for, and was taken for a yes."""
+    """What moves in a scene was once passed as the argument that requests the places, and taken for a yes."""
     with pytest.raises(TypeError, match="positional arguments"):
         lower_scene(canonical("empty"), Settings(), None, None, True)  # type: ignore[misc]

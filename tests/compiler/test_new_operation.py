@@ -17,7 +17,7 @@ from wamnet.refimpl.dataset import Window
 
 
 def _trunc(context, operands):
-    """As a floor, on both sides of 0: off by the whole numbers between both values."""
+    """As a floor, on both sides of 0: off by the integers between both values."""
     (a,) = operands
     steps = np.trunc(a.high + a.read) - np.trunc(a.low - a.read)
     return bounds.Enclosure(np.trunc(a.low), np.trunc(a.high), np.minimum(steps, np.ceil(a.read)))
@@ -36,7 +36,7 @@ def test_a_row_a_rule_and_words_are_all_that_a_new_operation_needs(monkeypatch):
     (found,) = interpret(program, {"window": x}, np.float64).values()
     assert found.tolist() == [[-2.0, 0.0, 2.0]]
     (bound,) = bounds.at_inputs(program, {"window": x.astype(np.float64)}, EMITTED_SINE).values()
-    assert (bound < 1.0).all(), "no argument is near a whole number: the kernel has the same"
+    assert (bound < 1.0).all(), "no argument is near an integer: the kernel has the same"
     for target in ("opencl", "opengl"):
         kernel = compile_program(program, target)
         assert "trunc(" in kernel.source

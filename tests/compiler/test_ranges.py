@@ -193,7 +193,7 @@ COMPARED = {
 
 @given(op=st.sampled_from(list(COMPARED)), data=st.data())
 def test_comparisons_are_certain_exactly_when_all_members_agree(op, data):
-    """On whole numbers all members of both ranges can be tried."""
+    """On integers all members of both ranges can be tried."""
     whole = st.integers(-3, 3)
     a, b = (sorted((data.draw(whole), data.draw(whole))) for _ in range(2))
     program = program_of(op, [Type("int32")] * 2, Type("bool"))

@@ -195,7 +195,7 @@ REFUSED = {
         gathered(lambda x: np.where((y := x @ W.T) < 0.5, np.sin(y) @ rounded(3, 3).T, y)),
         r"%\d+ is bool\[3\], which %\d+ in another loop reads",
     ),
-    "window": (gathered(lambda x: x * 2.0), "something besides an affine map reads the window"),
+    "window": (gathered(lambda x: x * 2.0), r"something \w+ an affine map reads the window"),
     "output": (gathered(lambda x: x), "the output is not computed"),
     "shared": (SHARED, "a matrix is applied to the window and to a layer, which need it in two orders"),
     "private": (

@@ -1,4 +1,4 @@
-"""Programs under test, made of the example in the spec: right as it stands, wrong with one line changed."""
+"""Programs under test, made of the example in the spec: right as it is, wrong with one line changed."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ EVERY = 3
 """One mutant in this many is asked."""
 
 STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
-"""What the program is held to."""
+"""Options under which the program must compile."""
 
 SANITIZERS = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 """Reads and writes outside of memory, and undefined behaviour, end a program that is built so."""

@@ -136,7 +136,7 @@ MUTANTS = {
     "SSIM's K2 of 0.3": (metrics, "K2", 0.3, "metric.ssim", "MET-5"),
     "relMSE's epsilon of 0.001": (metrics, "RELMSE_EPSILON", 1e-3, "metric.relmse", "MET-6"),
 }
-"""Wrong references: module, name, what stands in its place, the kind that notices, the clause blamed."""
+"""Wrong references: module, name, what replaces it, the kind that notices, the clause blamed."""
 
 
 @pytest.mark.parametrize("name", MUTANTS)
@@ -234,7 +234,7 @@ SOME = (
     "material.dielectric",
     "picture.denoised",
 )
-"""Kinds that every executor is asked for here; the command asks for all."""
+"""Kinds that every executor is tested with here; the command tests all."""
 
 
 def test_executors_pass(executor):

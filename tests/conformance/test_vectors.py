@@ -20,7 +20,7 @@ from wamnet.refimpl.errors import InputError
 FILES = sorted(path for path in vectors.FOLDER.glob("*.json") if path.name != "schema.json")
 
 SHARE = 64
-"""A number that is made anew may differ by this share of its bound (CNF-7)."""
+"""A number that is made again may differ by this share of its bound (CNF-7)."""
 
 LARGEST_BYTES = 2 * 10**6
 """What all vectors together may take: they are part of the package."""
@@ -234,7 +234,7 @@ def test_what_is_no_vector_is_refused(tmp_path, text):
 
 @pytest.mark.parametrize("name", ["../secret", "/dev/zero", "a/../../b", "a//b", "..", "", 3, None])
 def test_vectors_name_files_of_their_own_folder(tmp_path, name):
-    """RDG-4: a stranger's vectors led the reference to any file, and to pipes."""
+    """RDG-4: untrusted vectors led the reference to any file, and to pipes."""
     text = (vectors.FOLDER / "image.window.json").read_text()
     data = json.loads(text)
     data["cases"][0]["input"]["image"] = {"file": name, "shape": [1]}

@@ -188,7 +188,7 @@ def quad_beyond_its_edge(quad, origin, direction):
 
 
 def open_quad(quad, origin, direction):
-    """Return the distance of a quad without its edges: < in the place of <=."""
+    """Return the distance of a quad without its edges: < instead of <=."""
     corner, dual_u, dual_v, _ = quad
     t = right_quad(quad, origin, direction)
     offset = origin + vectors.scale(direction, np.where(t < MISS, t, 0.0)) - corner
@@ -360,7 +360,7 @@ def test_views_outside_their_rules_are_refused():
     [
         *((name, 128) for name in ("minicubes", "daylight", "cornell", "lone_light", "balls")),
         # Light that glass gathers is far from normally distributed: of 15 pairs of the kernel's own pictures
-        # one was refused with 128 samples, none with 1024, whose least p-values lie as they should.
+        # one was refused with 128 samples, none with 1024, whose least p-values are as expected.
         ("glossy", 1024),
     ],
 )

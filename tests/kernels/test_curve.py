@@ -45,7 +45,7 @@ CHOICES = {
     "error and time": (Limits(max_error=0.3, max_ms=70.0), RANK),
     "all": (Limits(max_error=0.3, max_ms=70.0, max_loss_db=0.2), NARROW),
 }
-"""What is asked for, and what is chosen."""
+"""What is requested, and what is chosen."""
 
 
 @pytest.mark.parametrize("name", CHOICES)

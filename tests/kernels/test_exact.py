@@ -144,7 +144,7 @@ def test_every_schedule_gives_the_same_bits(executor_named, kit, paper, target, 
     program, images = paper
     artifact = compile_program(program, target, "exact", schedule)
     picked = artifact.manifest["schedule"]
-    # Sums from spectra have another order, which the profile does not allow: they say so and give way.
+    # Sums from spectra have another order, which the profile does not allow: they say so and are replaced.
     assert picked["name"] == schedule or "profile exact states" in picked["reason"]
     found = executor.run(artifact, images)
     assert np.array_equal(bits(found), bits(expected(program, images, kit)))

@@ -141,7 +141,7 @@ def test_executors_agree_through_denoise_on(executor_named, kit, rank) -> None:
 
 
 def test_a_second_picture_of_another_size(executor_named, kit) -> None:
-    """The image between both passes is kept from run to run, and made anew for another size or rank."""
+    """The image between both passes is kept from run to run, and made again for another size or rank."""
     executor, program = executor_named("opencl"), paper_s(kit)
     for rank, shape in ((3, (5, 9)), (3, (9, 5)), (2, (9, 5)), (3, (5, 9)), (3, (6, 20))):
         artifact = compile_program(program, "opencl", "ieee", "tile16", rank)

@@ -86,7 +86,7 @@ def test_pictures_have_names_and_seeds_of_their_own() -> None:
 
 
 def test_rays_of_features_and_samples_of_tests() -> None:
-    """Noisy pictures alone have rays for features; test targets have samples of their own number."""
+    """Only noisy pictures have rays for features; test targets have samples of their own number."""
     request = replace(TINY, feature_spp=16, test_spp=5)
     jobs = [{kind: p.job for kind, p in frame.pictures.items()} for frame in plan(request)]
     assert [job["noisy"].feature_spp for job in jobs] == [16, 16, 16]

@@ -1,4 +1,4 @@
-"""Times taken in turns: the order of the runs, what is measured, and what a way measures itself."""
+"""Interleaved times: the order of the runs, what is measured, and what a way measures itself."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_ways_take_turns_after_warm_runs() -> None:
 
 
 def test_a_way_may_measure_itself() -> None:
-    """What it returns stands in place of the clock's difference."""
+    """What it returns replaces the clock's difference."""
     own = iter([9.0, 3.0, 1.0, 2.0])
     times = in_turns({"device": lambda: next(own)}, 3, pause_s=0.0)["device"]
     assert times.seconds == (3.0, 1.0, 2.0)

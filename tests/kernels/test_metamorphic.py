@@ -242,7 +242,7 @@ def test_schedules_agree_within_the_bound(executor_named, kit, original, border,
     program = original.program(kit, border)
     artifact = compile_program(program, target, "ieee", schedule)
     if reason := artifact.manifest["schedule"].get("reason"):
-        pytest.skip(f"{schedule} gives way: {reason}")
+        pytest.skip(f"{schedule} is replaced: {reason}")
     assert excess(kit, executor, original, original, border, artifact) <= 1
 
 

@@ -104,7 +104,7 @@ EXACT = (
 """Cases that every executor computes to the bit: integers, decisions, and floats rounded once."""
 
 AWKWARD = [0.0, -0.0, 1.0, -1.0, 2.0, -2.0, 1 / 3, 2 / 3, 1e-20, -1e-40, 0.66666669, 1.9999999]
-"""Zeros of both signs, whole numbers after scaling, denormals, neighbours of whole numbers."""
+"""Zeros of both signs, integers after scaling, denormals, neighbours of integers."""
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +115,7 @@ def image():
 
 
 def test_every_operation_has_a_case():
-    """Loops are in kernels of paths alone: tests/kernels/test_tables.py."""
+    """Loops are only in kernels of paths: tests/kernels/test_tables.py."""
     assert set(CASES) == set(OPS) - set(LOOPS)
 
 

@@ -18,10 +18,10 @@ POOL = (
     "import sys; from wamnet.kernels.render_pool import render_parallel\n"
     "from wamnet.refimpl.render import Job; from wamnet.refimpl.scenes import canonical\n"
     "if __name__ == '__main__':\n"
-    "    told = lambda samples: print('ready', flush=True)\n"
-    "    render_parallel(canonical('minicubes'), Job(256, 256, 10000), workers=2, on_progress=told)\n"
+    "    report = lambda samples: print('ready', flush=True)\n"
+    "    render_parallel(canonical('minicubes'), Job(256, 256, 10000), workers=2, on_progress=report)\n"
 )
-"""A render on two processes that tells when they work."""
+"""A render on two processes that reports when they work."""
 
 APART = (
     "import time; from wamnet.kernels.apart import Apart\n"

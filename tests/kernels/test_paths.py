@@ -40,7 +40,7 @@ def test_image_is_the_reference_s(executor, name):
 
     1e-5 is 168 u: a distance with 64 u s of error (spec/intersection.md), twice, and rounding of sums. A path
     that falls on the other side of a decision changes its pixel wholly. Curved mirrors and glass multiply
-    errors, by up to 2 t / r a bounce, but what they show is smooth but for edges.
+    errors, by up to 2 t / r a bounce, but what they show is smooth except at edges.
     """
     job = R.Job(WIDTH, HEIGHT, 2, SEED, Settings(max_depth=4))
     expected, found = R.render(scene(name), job), render_on(executor, scene(name), job)

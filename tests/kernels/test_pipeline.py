@@ -153,7 +153,7 @@ FAULTS = {
     "rows that are too long": ("(size_t)y * (size_t)row_stride", "(size_t)y * (size_t)(row_stride + 1)"),
     "one plane too far": ("sums[3 * plane", "sums[4 * plane"),
 }
-"""What may go wrong in an encoding kernel: a text of its source and what stands there instead."""
+"""What may go wrong in an encoding kernel: a text of its source and what replaces it."""
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -284,7 +284,7 @@ def test_features_that_are_only_shown(executor, model_of):
 
 
 def test_the_kernel_of_whole_frames(executor, model_of):
-    """The same picture as by a kernel that writes what is needed alone, here where nothing is contracted."""
+    """The same picture as by a kernel that writes only what is needed, here where nothing is contracted."""
     model, size = model_of(("depth", "color"), 3, "zero"), (7, 19)
     kinds = {}
     for whole in (False, True):

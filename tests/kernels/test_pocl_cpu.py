@@ -17,7 +17,7 @@ libc.free.argtypes = [ctypes.c_void_p]
 def record(*texts, words=128, before=3):
     """Return a device's record of `words` words of the C library that points to `texts`, and the texts.
 
-    The first pointer stands after `before` words.
+    The first pointer comes after `before` words.
     """
     kept = [ctypes.create_string_buffer(text) for text in texts]
     memory = (ctypes.c_uint64 * words).from_address(libc.malloc(8 * words))
@@ -47,7 +47,7 @@ def test_anything_else_is_left_alone(texts):
 
 
 def test_memory_behind_the_record_is_left_alone(monkeypatch):
-    """The pointer stands in the same piece of readable memory, but just beyond what belongs to the record."""
+    """The pointer is in the same piece of readable memory, but just beyond what belongs to the record."""
     monkeypatch.setattr(pocl_cpu.platform, "machine", lambda: "x86_64")
     words, _kept = record(b"generic", before=80)
     monkeypatch.setattr(pocl_cpu, "_allocated", lambda _: 8 * 80)

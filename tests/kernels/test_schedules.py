@@ -22,7 +22,7 @@ EXAMPLES = max(settings.default.max_examples // 10, 1)
 """Each example compiles a kernel, up to a second: a tenth of what other tests draw."""
 
 LADDER = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules[1:]]
-"""All schedules besides the plain ones, with their targets."""
+"""All schedules except for the plain ones, with their targets."""
 
 
 LARGEST = {"inlined": (3, 10), "compute": (6, 10), "compute4": (6, 10), "fft32": (20, 32)}
@@ -124,7 +124,7 @@ def elementwise(x):
 
 @pytest.mark.parametrize(("target", "schedule"), LADDER)
 def test_every_operation_on_vectors(executor_named, kit, target, schedule):
-    """Away from whole numbers, where floor may fall to either side, the bound is finite."""
+    """Away from integers, where floor may fall to either side, the bound is finite."""
     program = kit.program(elementwise, {"a": 3}, 2)
     artifact = compile_program(program, target, "ieee", schedule)
     assert artifact.manifest["schedule"]["name"] == schedule

@@ -140,7 +140,7 @@ def carried_about(surface):
 
 
 def test_numbers_that_trade_places(executor):
-    """A loop of our own in the place of the first hit's layers; halves and small integers are exact."""
+    """A loop of our own instead of the first hit's layers; halves and small integers are exact."""
     programs = lower_scene(crowd(), Settings(max_depth=0))
     names = ("albedo_r", "albedo_g", "albedo_b", "depth")
 

@@ -158,7 +158,7 @@ def test_error_is_within_the_bound(executor_named, name, way, schedule, profile)
     executor, case = executor_named(way), trained(name)
     artifact = compile_program(case.program, executor.name, profile, schedule)
     if reason := artifact.manifest["schedule"].get("reason"):
-        pytest.skip(f"{schedule} gives way: {reason}")
+        pytest.skip(f"{schedule} is replaced: {reason}")
     assert case.excess(executor, artifact) <= 1
 
 
@@ -220,7 +220,7 @@ def test_one_wrong_weight_is_caught(executor_named, name):
 @pytest.mark.parametrize("name", MODELS)
 def test_nan_is_caught(name):
     class Broken:
-        """Writes what is expected, but for one number."""
+        """Writes what is expected, except for one number."""
 
         def run(self, artifact, images):
             found = trained(name).held(artifact).value.copy()

@@ -344,14 +344,14 @@ def test_runs_repeat_and_resume_to_the_same_bits(opencl: Any, changes: Any) -> N
 
 
 def test_a_run_may_change_its_trainer(opencl: Any) -> None:
-    """Either goes on from the other's state; both end near the run that did not change."""
+    """Either continues from the other's state; both end near the run that did not change."""
     whole = train.train(SMALL, PAIRS)
     for first, second in ((train.train, device_train(opencl)), (device_train(opencl), train.train)):
         half = first(SMALL, PAIRS, until=10)
         end = second(SMALL, PAIRS, state=train.state_from_arrays(*train.state_to_arrays(half)))
         assert end.step == 20
         moved = max(np.abs(a - b).max() for a, b in zip(_flat(end), _flat(whole), strict=True))
-        # Twenty steps of at most 1e-3 each; had the second half begun anew, it would be off by some of them.
+        # Twenty steps of at most 1e-3 each; a second half from the start would be off by some of them.
         assert moved <= 1e-3
 
 
@@ -415,7 +415,7 @@ def test_an_interrupt_keeps_the_state_and_goes_on(opencl: Any) -> None:
 
 
 def test_an_interrupt_while_the_device_works(opencl: Any, monkeypatch: Any) -> None:
-    """What was handed to the device is waited for, and kept with its losses."""
+    """What was sent to the device is waited for, and kept with its losses."""
     kept: list[TrainState] = []
     draw, calls = trainer.Run.draw, []
 

@@ -210,7 +210,7 @@ def test_runs_repeat_and_resume_to_the_same_bits(opencl: Any) -> None:
 
 
 def test_a_run_may_change_its_trainer(opencl: Any) -> None:
-    """Either goes on from the other's state; both end near the run that did not change."""
+    """Either continues from the other's state; both end near the run that did not change."""
     whole = train.train(SMALL, PAIRS)
     on_device = lambda *a, **k: train_on(opencl, *a, **k)  # noqa: E731
     for first, second in ((train.train, on_device), (on_device, train.train)):
@@ -218,7 +218,7 @@ def test_a_run_may_change_its_trainer(opencl: Any) -> None:
         end = second(SMALL, PAIRS, state=train.state_from_arrays(*train.state_to_arrays(half)))
         assert end.step == 20
         moved = max(np.abs(a - b).max() for a, b in zip(end.parameters, whole.parameters, strict=True))
-        # Twenty steps of at most 1e-3 each; had the second half begun anew, it would be off by some of them.
+        # Twenty steps of at most 1e-3 each; a second half from the start would be off by some of them.
         assert moved <= 1e-3
 
 

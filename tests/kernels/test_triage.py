@@ -60,11 +60,11 @@ def wrong_weight(target):
         program = plan.analysed
         if plan.target.name == target and "W1" in program.parameters:
             weight = program.parameters["W1"].copy()
-            # A stage of GLSL's holds four neurons, the next one the fifth alone.
+            # A stage of GLSL's holds four neurons, the next one only the fifth.
             if len(weight) > 3:
                 weight[3, 0] += 2.0**-6
             program = replace(program, parameters={**program.parameters, "W1": weight})
-            # A fault of the kernel alone: the plan that it is judged by stays.
+            # A fault of only the kernel: the plan that it is judged by stays.
             return replace(compile_plan(replace(plan, analysed=program)), plan=plan)
         return compile_plan(plan)
 
@@ -89,7 +89,7 @@ def planted(kit, target, text):
 
 
 def test_picked_schedules_run(executor_named, model, images):
-    """Those that denoise_on would take; one that gives way is told by the name of the other."""
+    """Those that denoise_on would take; one that is replaced is reported by the name of the other."""
     ways = runners(executor_named, *WAYS)
     found = verdicts_of(ways, model, images, which=triage.PICKED)
     wanted = [
@@ -101,7 +101,7 @@ def test_picked_schedules_run(executor_named, model, images):
 
 
 def test_all_agree(executor_named, model, images):
-    """Every executor, every schedule: a kernel for each one that does not give way to another."""
+    """Every executor, every schedule: a kernel for each one that is not replaced by another."""
     found = verdicts_of(runners(executor_named, *WAYS), model, images, which=triage.EVERY)
     assert {v.kernel.runner.way for v in found} == set(WAYS)
     assert {v.kernel.schedule for v in found if v.kernel.runner.way == "opencl"} > {"plain", "tile4"}
@@ -111,7 +111,7 @@ def test_all_agree(executor_named, model, images):
 
 @pytest.mark.parametrize("way", WAYS)
 def test_executor_stage_and_neuron_are_named(executor_named, model, images, way):
-    """A wrong weight of layer 1 in one executor alone, numpy too: beside it opencl, or numpy."""
+    """A wrong weight of layer 1 in one executor, also in numpy: beside it opencl, or numpy."""
     ways = runners(executor_named, way, "opencl" if way == "numpy" else "numpy")
     compiled = wrong_weight(ways[[r.way for r in ways].index(way)].target)
     found = verdicts_of(ways, model, images, compiled=compiled)
@@ -131,7 +131,7 @@ def test_executor_stage_and_neuron_are_named(executor_named, model, images, way)
 
 @pytest.mark.parametrize("way", COMPILED)
 def test_a_pixel_is_named_and_its_place_is_kept(executor_named, kit, model, images, way):
-    """One number of one pixel: the part keeps what lies above and left of it; no stage has it alone."""
+    """One number of one pixel: the part keeps what is above and left of it; no stage by itself has it."""
     ways = runners(executor_named, way)
     compiled = planted(kit, ways[1].target, "if (y == 4 && x == 6) {{ {v}[1] += 0.01f; }}")
     found = verdicts_of(ways, model, images, compiled=compiled)

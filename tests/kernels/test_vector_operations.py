@@ -20,7 +20,7 @@ EDGES = [0.0, -0.0, 0.25, -0.25, 1.0, -1.0, 2.5, -2.5, 1e30, -1e30, 2.0**23 - 0.
 @pytest.mark.parametrize("lanes", LANES[1:])
 @pytest.mark.parametrize("operation", ["absolute", "floor", "minimum", "maximum"])
 def test_operators_on_vectors_compute_what_numpy_computes(executor_named, lanes, operation):
-    """All pairs of the edges; equal to the bit, but for the sign of zero, which comparisons do not see."""
+    """All pairs of the edges; equal to the bit, except for the sign of zero, which comparisons do not see."""
     context = executor_named("opencl")._context
     dialect = of_lanes(lanes)
     arity = OPS[operation].arity

@@ -133,8 +133,8 @@ def test_scalarize_takes_vectors_apart_and_shares_what_is_equal():
     program = traced(function)
     apart = eliminate_dead(fold(scalarize(program)))
     assert all(not node.type.shape for node in apart.nodes if node.op not in ("input", "stack"))
-    assert ops(apart).count("stack") == 1  # the output alone
-    # The first component of B is 1; the sums are there once, though they were asked for in two ways.
+    assert ops(apart).count("stack") == 1  # only the output
+    # The first component of B is 1; the sums are there once, though they were written in two ways.
     assert ops(apart).count("multiply") == 2 + 3
     assert ops(apart).count("add") == 3
     assert apart.parameters == {}

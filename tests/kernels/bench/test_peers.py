@@ -23,7 +23,7 @@ from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame
 
 pytestmark = pytest.mark.filterwarnings("default")
-"""Warnings of a peer are none of ours."""
+"""Warnings of a peer are not faults of the project."""
 
 LIBRARY_SINE = SineContract("4 ulp, as OpenCL asks of a library", 4 * 2.0**-24)
 """A sine of a library: an ulp of a number in [-1, 1] is at most 2^-24, and libraries promise 1 to 4."""

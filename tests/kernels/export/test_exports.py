@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 def model(widths=(96, 8, 3), size=4, features=("color", "normal")):
-    """An untrained network whose outputs lie around the middle: clipped ones would hide errors."""
+    """An untrained network whose outputs are near the middle: clipped ones would hide errors."""
     network = siren.init(widths, 2.0, 2.0, 5, np.float32)
     middle = np.full(3, 0.5, np.float32)
     network = replace(network, biases=(*network.biases[:-1], middle))
@@ -57,7 +57,7 @@ def exported(request):
 
 
 def test_an_export_keeps_its_bound_where_it_is_run(exported):
-    """EXP-4, EXP-6, EXP-10, EXP-11: the pair's picture within its bound; the paths' sums but for 2 %."""
+    """EXP-4, EXP-6, EXP-10, EXP-11: the pair's picture within its bound; the paths' sums within 2 %."""
     verdict = check.check(exported)
     assert verdict.holds, verdict.wrong
     if "missing" in verdict.executed:
@@ -156,7 +156,7 @@ def test_what_a_tool_refuses_is_a_verdict():
     [(row.name, place) for row in targets.TARGETS.values() for place in [*row.places][1:]],
 )
 def test_other_places_of_weights_keep_the_bound(target, place):
-    """EXP-7: each place that a target has is compiled and, where something runs it, held to the bound."""
+    """EXP-7: each place that a target has is compiled, run where possible, and checked against the bound."""
     try:
         whole = export(Request(model(), target, weights=place))
     except ExecutorUnavailable as error:
@@ -179,7 +179,7 @@ def test_other_places_of_weights_keep_the_bound(target, place):
     ],
 )
 def test_other_schedules_keep_the_bound(target, schedule):
-    """EXP-12: each schedule that a target has is compiled by its tools, run, and held to the bound."""
+    """EXP-12: each schedule that a target has is compiled, run, and checked against the bound."""
     try:
         whole = export(Request(model(), target, schedule=schedule))
     except ExecutorUnavailable as error:

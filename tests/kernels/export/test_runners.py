@@ -1,4 +1,4 @@
-"""Exported languages (EXP-3, EXP-5): each one's denoiser, paths and encoding, run and held to its bound.
+"""Exported languages (EXP-3, EXP-5): denoiser, paths and encoding of each, run and checked against bounds.
 
 A runner whose tools are missing skips its tests and says so; `make test` names those that must be there.
 """
@@ -115,7 +115,7 @@ def test_a_first_layer_in_two_passes(runner, kit, case):
 
 
 def test_paths_are_the_interpreter_s(runner, traced):
-    """All decisions fall alike here: a number of a path of three surfaces is then off by rounding alone.
+    """All decisions fall alike here: a number of a path of three surfaces is then off only by rounding.
 
     Some 8,000 operations of float32, each wrong by 2^-24 of values near 1: 8000 * 2^-24 = 5e-4.
     """

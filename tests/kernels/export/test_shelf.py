@@ -18,7 +18,7 @@ WAY_OUT = "run python -m wamnet.kernels.export.shelf -o kernels/shelf MODELS, re
 
 
 def models(folder):
-    """Return the models whose kernels stand in a folder: one of random weights, or those that come along."""
+    """Return the models whose kernels are in a folder: one of random weights, or those that are shipped."""
     names = sorted(path.name for path in folder.iterdir() if path.is_dir())
     assert names, f"kernels/shelf is empty: {WAY_OUT}"
     return {
@@ -30,7 +30,7 @@ def models(folder):
 
 
 def test_the_shelf_is_what_the_compiler_writes():
-    """But for the speeds in the index, which are measurements."""
+    """Except for the speeds in the index, which are measurements."""
     folder = ROOT / "kernels/shelf"
     wanted = shelf.contents(models(folder))
     paths = [path for path in folder.rglob("*") if path.is_file()]

@@ -3,9 +3,11 @@
 1. Each row of [`WORDS`] is a pattern, the better word, and the reason. A text that matches fails with file,
    line, word and suggestion [`test_words_are_plain`].
 2. What a reader does not read as prose is blanked: code, comments, addresses, and what is written from
-   records [`prose`]. Of Python, docstrings, comments and texts are prose; `.py` joins [`SUFFIXES`] when its
-   texts have had their pass.
-3. A pattern sees text whose line ends are spaces, so that two words may be on two lines.
+   records [`prose`]. Of Python, docstrings, comments and texts are prose, but not the names in them
+   [`prose_of_token`].
+3. What is not looked at is listed: texts that programs write [`GENERATED`], this list [`THIS`], and folders
+   whose texts have not been rewritten [`NOT_YET`]. Some sentences stay because files hold them [`KEPT`].
+4. A pattern sees text whose line ends are spaces, so that two words may be on two lines.
 """
 
 from __future__ import annotations
@@ -19,11 +21,34 @@ from typing import NamedTuple
 
 import pytest
 
-SUFFIXES = (".md",)
-"""The kinds of files that are looked at; `.py` works too [`prose`]."""
+SUFFIXES = (".md", ".py")
+"""The kinds of files that are looked at [`prose`]."""
 
 GENERATED = ("kernels/shelf/README.md", "spec/vectors/README.md")
 """Texts that programs write: their words are in the programs."""
+
+THIS = "tests/meta/test_words.py"
+"""The list of words contains them."""
+
+NOT_YET = (
+    "compiler/",  # Delete this line when the texts of compiler/ are rewritten.
+    "kernels/export/",  # Delete this line when the texts of kernels/export/ are rewritten.
+)
+"""Folders whose Python texts have not been rewritten yet."""
+
+KEPT = {
+    "refimpl/dataset.py": ("were it matt and nothing in between",),  # manifests and heads of kernels
+    "kernels/conformance/kinds/files.py": (  # notes of vectors
+        "whole numbers are numbers",
+        "a version that is a truth value",
+        "a truth value as number",
+    ),
+    "kernels/conformance/kinds/materials.py": (  # titles of vectors
+        "A matt surface sends a path on",
+        "as if nothing stood in between",
+    ),
+}
+"""Phrases in files with a version or a golden text: they change when these files change anyway."""
 
 
 class Word(NamedTuple):
@@ -167,9 +192,26 @@ def test_words_are_plain(house):
     wrong = []
     for path in house.files():
         name = path.relative_to(house.root).as_posix()
-        if path.suffix in SUFFIXES and name not in GENERATED:
-            wrong += wrong_words(name, path.read_text(encoding="utf-8"))
+        left_out = name.endswith(".py") and name.startswith(NOT_YET)
+        if path.suffix in SUFFIXES and name not in (*GENERATED, THIS) and not left_out:
+            text = path.read_text(encoding="utf-8")
+            for phrase in KEPT.get(name, ()):
+                text = text.replace(phrase, blank(phrase))
+            wrong += wrong_words(name, text)
     house.refuse(sorted(wrong), "A text uses plain words and those of its field: take the better word.")
+
+
+def test_what_is_left_out_is_there_and_wrong(house):
+    sources = {source.path: source.text for source in house.python()}
+    for name, phrases in KEPT.items():
+        for phrase in phrases:
+            assert sources[name].count(phrase) == 1, f"{name}: {phrase}"
+            assert list(wrong_words("x.md", phrase)), f"{name}: {phrase}"
+    for folder in NOT_YET:
+        found = [
+            name for name, text in sources.items() if name.startswith(folder) and any(wrong_words(name, text))
+        ]
+        assert found, f"{folder} has plain words only: delete its line"
 
 
 PLANTED = {

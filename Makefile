@@ -22,7 +22,7 @@ export VENV PYTHON WAMNET_REQUIRE
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup baselines demo docs test long fuzz faults lint clean distclean
+.PHONY: help setup baselines demo docs quick test long fuzz faults lint clean distclean
 
 help: ## List the targets
 	@grep -hE '^[a-z]+: .*## ' Makefile | sed -E 's/^([a-z]+):.*## (.*)/  make \1	\2/' | expand -t 20
@@ -40,6 +40,10 @@ demo: ## Render, train, compile, run and compare; results in out/demo (5 minutes
 docs: ## Build the web site: spec, tutorial, exercises; open out/site/index.html
 	@.ci/setup opencl,opengl,cli,report,docs
 	@$(VENV)/bin/python docs/site/build.py
+
+quick: ## Run the tests that need NumPy, and no device, compiler or browser (2 minutes at most on two cores)
+	@.ci/setup quick
+	@WAMNET_REQUIRE= $(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS) --quick -rfE
 
 test: setup ## Run all tests (15 minutes at most on two cores)
 	@$(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS)

@@ -11,6 +11,7 @@
 3. The user's cache folder is never touched: tests have one of their own, which their commands inherit.
 4. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
 5. Tests that take a minute are marked [`COSTLY`], and skipped unless a run wants them; the summary says so.
+6. `--quick` runs what needs NumPy only (tests/support/quick.py).
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from typing import Any
 import hypothesis
 import pytest
 from packages import FOUND, PACKAGES, required
+
+pytest_plugins = ["quick"]
 
 PIPELINES = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
 """Executors on which every test of paths and pipelines runs; an OpenGL executor is named with the kind of its
@@ -97,12 +100,16 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 @pytest.fixture(scope="session")
-def executor_named(pytestconfig: pytest.Config) -> Iterator[Callable[[str], Any]]:
+def executor_named(
+    pytestconfig: pytest.Config, needs: Callable[[str], None]
+) -> Iterator[Callable[[str], Any]]:
     """Give a function that opens an executor by its name, once a session, under the policy above."""
     opened: dict[str, Any] = {}
     state = pytestconfig.stash[_state_key]
 
     def open_once(name: str) -> Any:
+        if name != "numpy":
+            needs("devices")
         kind = "peer" if name in PEERS else "executor"
         if name not in state:
             opened[name], state[name] = _open(name)

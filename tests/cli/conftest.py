@@ -30,6 +30,12 @@ class Outcome(NamedTuple):
 Command = Callable[..., Outcome]
 
 
+@pytest.fixture(scope="session", autouse=True)
+def extras(needs: Callable[[str], None]) -> None:
+    """Need the packages of the extras: the command prints, draws and writes pictures with them."""
+    needs("packages")
+
+
 @pytest.fixture
 def wamnet(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
     """Give a function that runs `wamnet ARGUMENTS` in an empty folder, in this process."""

@@ -42,8 +42,9 @@ def program(tmp_path: Path, example: Callable[[str], str]) -> Callable[..., list
 
 
 @pytest.fixture
-def verdicts() -> Callable[..., list[Any]]:
+def verdicts(needs: Callable[[str], None]) -> Callable[..., list[Any]]:
     """Give a function from a command, words that choose cases and a time-out to the verdicts."""
+    needs("programs")
     from wamnet.kernels.conformance import run, vectors
     from wamnet.kernels.conformance.protocol import Session
 

@@ -218,6 +218,7 @@ def test_a_decision_on_its_threshold_is_accepted_either_way():
 
 
 @pytest.mark.parametrize("name", ["numpy"])
+@pytest.mark.needs("time")
 def test_an_executor_passes_all_that_it_supports(executor_named, name):
     answers = OnExecutor(executor_named(name))
     assert set(answers.kinds) >= set(FUNCTIONS)

@@ -135,6 +135,7 @@ def test_output_without_end_fills_no_memory(program, verdicts):
     assert [v.verdict for v in found] == ["garbage"]
 
 
+@pytest.mark.needs("programs")
 def test_a_program_that_does_not_read(tmp_path):
     """A request larger than a pipe's buffer of 64 KiB must not stop the runner."""
     request = {"id": "a", "input": "x" * 2**20}

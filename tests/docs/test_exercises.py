@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.needs("programs")
+
 ROOT = Path(__file__).resolve().parents[2]
 
 EXERCISES = ROOT / "docs/exercises"

@@ -7,6 +7,8 @@ from pathlib import Path
 import faults
 import pytest
 
+pytestmark = pytest.mark.needs("programs")
+
 
 @pytest.mark.parametrize("kind", faults.FAULTS)
 def test_a_fault_loses_nothing(tmp_path, kind) -> None:

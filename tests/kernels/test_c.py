@@ -213,6 +213,7 @@ def test_a_forgotten_kernel_is_built_again(executor_named, case):
         ("gcc '", r"c: CC is .* no command \(No closing quotation\); install"),
     ],
 )
+@pytest.mark.needs("programs")
 def test_no_compiler(monkeypatch, command, says):
     monkeypatch.setenv("CC", command)
     with pytest.raises(ExecutorUnavailable, match=says):

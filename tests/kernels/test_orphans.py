@@ -11,6 +11,8 @@ import time
 import pytest
 from faults import members
 
+pytestmark = pytest.mark.needs("programs")
+
 GRACE_S = 10.0
 """Seconds after which a process that is still there counts as one that stays: a guard, no speed."""
 

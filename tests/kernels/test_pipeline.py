@@ -334,6 +334,7 @@ def test_refusals(executor, model_of):
         Pipeline(executor, scene("empty"), model, (2, 2), show=("heat",))
 
 
+@pytest.mark.needs("devices")
 def test_kernels_in_another_language_are_refused(executor, model_of):
     model = model_of(("color",), 1, "clamp")
     other = "opencl" if executor.name == "numpy" else "numpy"

@@ -305,12 +305,14 @@ def test_apart_is_as_inside(executor_named, model, images, way):
     runner.close()  # again costs nothing
 
 
+@pytest.mark.needs("devices")
 def test_an_executor_that_is_not_here(monkeypatch):
     monkeypatch.setenv("WAMNET_OPENCL_DEVICE", "abacus")
     with pytest.raises(ExecutorUnavailable, match="opencl: OpenCL: no "):
         Apart("opencl")
 
 
+@pytest.mark.needs("devices")
 def test_ways_are_those_of_the_executors():
     from wamnet.kernels import opengl_executor
 

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
+import subprocess
+import sys
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+import quick
+
+pytestmark = pytest.mark.needs("programs")
 
 pytest_plugins = ["pytester"]
 
@@ -164,3 +171,84 @@ def test_long_runs_draw_other_cases_each_time(run, pytester, monkeypatch, profil
     found = re.findall(r"DRAWN (\d+) (\d+)", run("", "-s", *options).stdout.str())
     assert [count for count, _ in found] == [examples] * 2
     assert (found[0] == found[1]) == alike
+
+
+QUICK = """
+import subprocess
+import sys
+
+import pytest
+
+def test_quick():
+    assert True
+
+def test_package():
+    import pyopencl
+
+def test_program():
+    subprocess.run([sys.executable, "-c", ""], check=True)
+
+@pytest.mark.needs("programs")
+def test_marked():
+    subprocess.run([sys.executable, "-c", ""], check=True)
+
+def test_it(executor_named):
+    executor_named("opencl")
+"""
+"""One test that is quick, two that ask for what a quick run lacks, two that say so."""
+
+
+@pytest.mark.parametrize("options", [(), ("-n", "1")])
+def test_a_quick_run_has_no_packages_devices_or_programs(run, pytester, options):
+    pytester.makepyfile(QUICK, test_file="import moderngl")
+    result = run("", "--quick", *options)
+    result.assert_outcomes(passed=1, failed=2, skipped=3)
+    result.stdout.fnmatch_lines_random(
+        [
+            "A quick run does not have pyopencl: do without, or mark the test*pytest.mark.needs(...).",
+            f"A quick run does not have {sys.executable}: do without, *",
+            "1 tests or files: it imports moderngl; make test runs it",
+            "1 tests or files: it starts programs; make test runs it",
+            "1 tests or files: it runs kernels or other renderers; make test runs it",
+        ]
+    )
+
+
+def test_a_need_that_nobody_knows_is_refused(run, pytester):
+    pytester.makepyfile('import pytest\n\n@pytest.mark.needs("luck")\ndef test_it():\n    assert True\n')
+    result = run("")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*needs('luck',): the words are devices, packages, programs, time"])
+
+
+def test_a_quick_run_works_where_nothing_else_is_installed(tmp_path):
+    """A folder with links to the distributions that it brings is all that this Python can import."""
+    for name in quick.brought() - {"wamnet"}:
+        with contextlib.suppress(metadata.PackageNotFoundError):  # another version of Python needs it
+            for top in {file.parts[0] for file in metadata.files(name) or ()} - {"..", "__pycache__"}:
+                (tmp_path / top).symlink_to(metadata.distribution(name).locate_file(top))
+    tests = Path(__file__).parents[1]
+    (tmp_path / "wamnet").mkdir()
+    for part in ("refimpl", "compiler", "kernels", "cli", "spec"):
+        (tmp_path / "wamnet" / part).symlink_to(tests.parent / part)
+    files = [tests / f"{name}.py" for name in ("refimpl/test_siren", "hard/test_adam", "compiler/test_trace")]
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-S",
+            "-m",
+            "pytest",
+            "--quick",
+            "-p",
+            "no:cacheprovider",
+            *files,
+            tests / "kernels/test_sines.py",
+        ],
+        env={"PATH": os.environ["PATH"], "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.search(r"\d{2,} passed", done.stdout)
+    assert "runs kernels or other renderers; make test runs it" in done.stdout

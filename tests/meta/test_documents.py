@@ -88,6 +88,7 @@ ALL = {
 
 
 @pytest.mark.parametrize("document", ALL)
+@pytest.mark.needs("programs")
 def test_commands_of_a_document(document: str, tmp_path: Path) -> None:
     for block in ALL[document]:
         if block.reason is None:
@@ -124,6 +125,7 @@ assert open("file").read() == "one\\n"
 """A document with all kinds of block."""
 
 
+@pytest.mark.needs("programs")
 def test_blocks_are_found_and_share_a_folder(tmp_path: Path) -> None:
     found = blocks("x.md", SAMPLE)
     assert [(b.where, b.reason, b.language) for b in found] == [
@@ -137,6 +139,7 @@ def test_blocks_are_found_and_share_a_folder(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["false", "false | cat", "echo $NO_SUCH_VARIABLE"])
+@pytest.mark.needs("programs")
 def test_block_that_fails_is_told(text: str, tmp_path: Path) -> None:
     with pytest.raises(pytest.fail.Exception, match=r"x\.md:1 ends with status \d+"):
         run(Block("x.md:1", None, "sh", text), tmp_path)

@@ -11,6 +11,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.needs("programs")
+
 
 def setup(house, *arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
@@ -74,7 +76,7 @@ def test_all_stands_for_its_extras_and_not_for_the_baselines(house, tmp_path):
     python_that_says(tmp_path / "bin", f'case "$*" in *"pip install"*) echo "$*" >>{tmp_path}/asked;; esac')
     (tmp_path / ".wamnet").mkdir()
     (tmp_path / ".wamnet/tools-tried").touch()  # nothing is installed through apt
-    for extras in ("all", "all", "cli,report", "baselines", "baselines"):
+    for extras in ("all", "all", "cli,report", "quick", "baselines", "baselines"):
         done = setup(house, extras, VENV=str(tmp_path))
         assert done.returncode == 0, done.stderr
     asked = (tmp_path / "asked").read_text().splitlines()

@@ -133,6 +133,7 @@ raise SystemExit(3)
 """A chapter with a stale example, a marked block and one that fails."""
 
 
+@pytest.mark.needs("programs")
 def test_a_stale_example_and_a_failing_block_are_found(tmp_path: Path) -> None:
     assert "stale" not in filled(SAMPLE)
     chapter = tmp_path / "x.md"

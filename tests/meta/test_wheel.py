@@ -9,6 +9,8 @@ import zipfile
 
 import pytest
 
+pytestmark = pytest.mark.needs("programs")
+
 PARTS = ("refimpl", "compiler", "kernels", "cli")
 """The folders that become `wamnet.refimpl` and so on."""
 

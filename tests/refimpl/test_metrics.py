@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
-from skimage import metrics as oracle
 
 from wamnet.refimpl import metrics
 from wamnet.refimpl.errors import InputError
@@ -26,6 +26,15 @@ def picture(seed: int, shape: tuple[int, ...] = (17, 23, 3)) -> np.ndarray:
     y, x = np.mgrid[0 : shape[0], 0 : shape[1]]
     smooth = 0.5 + 0.3 * np.sin(0.4 * x + 0.3 * y)[..., None]
     return np.clip(smooth + 0.15 * rng.standard_normal(shape), 0.0, 1.0)
+
+
+@pytest.fixture(scope="module")
+def oracle(needs: Callable[[str], None]) -> Any:
+    """Give scikit-image's metrics."""
+    needs("packages")
+    from skimage import metrics
+
+    return metrics
 
 
 def test_mse_and_psnr_by_hand() -> None:
@@ -54,7 +63,7 @@ def test_the_papers_psnr_is_a_natural_logarithm() -> None:
 
 @pytest.mark.parametrize("shape", [(11, 11, 1), (17, 23, 3), (64, 12, 3)])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_against_scikit_image(shape: tuple[int, ...], dtype: type) -> None:
+def test_against_scikit_image(oracle: Any, shape: tuple[int, ...], dtype: type) -> None:
     """The same conventions, another program.
 
     A window mean takes 24 rounded operations on numbers in [0, 1], so a variance is off by at most 3 * 24 u

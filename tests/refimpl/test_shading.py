@@ -170,6 +170,7 @@ def test_strategies_agree(strategy, heuristic):
     assert abs(means[0].mean() - means[1].mean()) <= 2.576 * error  # the image's mean, at significance 0.01
 
 
+@pytest.mark.needs("time")
 def test_a_wrong_density_is_caught(monkeypatch):
     """The test above can fail: a density of the lobe that is four times too small makes light count twice in
     part.

@@ -40,6 +40,7 @@ def assert_same_image(a: R.Render, b: R.Render, count_a: int, count_b: int) -> N
     assert 2 * stats.norm.sf(z) >= SIGNIFICANCE
 
 
+LONG = pytest.mark.needs("time")
 STRATEGIES = [
     ("light", "power"),
     ("bsdf", "power"),
@@ -48,7 +49,9 @@ STRATEGIES = [
 
 
 @pytest.mark.parametrize(("strategy", "heuristic"), STRATEGIES)
-@pytest.mark.parametrize("name", ["minicubes", "cornell", "lone_light"])
+@pytest.mark.parametrize(
+    "name", [*(pytest.param(n, marks=LONG) for n in ("minicubes", "cornell")), "lone_light"]
+)
 def test_strategies_agree(name, strategy, heuristic):
     """Only light samples, only BSDF samples and both combined estimate the same image (different seeds)."""
     scene = scenes.canonical(name)
@@ -100,6 +103,7 @@ def test_nothing_is_lit_from_behind_a_light(strategy):
 
 
 @pytest.mark.parametrize("name", ["minicubes", "cornell"])
+@pytest.mark.needs("time")
 def test_russian_roulette_keeps_the_mean(name):
     scene = scenes.canonical(name)
     without = render(scene, spp=256, seed=1, max_depth=6)
@@ -153,6 +157,7 @@ def test_scale_changes_nothing(name, scale):
     assert np.array_equal(difference, np.zeros_like(difference))
 
 
+@pytest.mark.needs("time")
 def test_variance_of_the_mean_falls_as_one_over_n():
     """Means of n samples: the variance over 48 independent renders times n is constant.
 

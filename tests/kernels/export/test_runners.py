@@ -30,7 +30,9 @@ FEATURES = ("color", "normal")
 """What paths add up here."""
 
 
-@pytest.fixture(scope="module", params=runners.RUNNERS)
+@pytest.fixture(
+    scope="module", params=[pytest.param(n, marks=pytest.mark.needs("devices")) for n in runners.RUNNERS]
+)
 def runner(request):
     try:
         opened = runners.RUNNERS[request.param]()

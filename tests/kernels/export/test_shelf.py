@@ -43,6 +43,7 @@ def test_the_shelf_is_what_the_compiler_writes():
     assert all(a.rpartition(" | ")[0] == b.rpartition(" | ")[0] for a, b in lines), WAY_OUT
 
 
+@pytest.mark.needs("devices")
 def test_the_command_replaces_a_shelf(tmp_path):
     out = tmp_path / "shelf"
     shelf.write(out, {"old/weights.bin": b"x", "old/c/denoise.h": b"y"})

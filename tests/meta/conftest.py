@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -58,6 +58,7 @@ class House:
     """The repository: `house.python("refimpl")` gives sources, `house.files()` every path."""
 
     root: Path
+    _read: dict[Path, Source] = field(default_factory=dict, compare=False)
 
     def files(self) -> Iterator[Path]:
         """Yield every file that belongs to the project, in a fixed order."""
@@ -66,8 +67,10 @@ class House:
     def python(self, *folders: str) -> list[Source]:
         """Return the Python files under the named folders; without a name, all."""
         paths = [p for p in self.files() if p.suffix == ".py"]
-        sources = [Source(p.relative_to(self.root).as_posix(), p.read_text()) for p in paths]
-        return [s for s in sources if not folders or s.part in folders]
+        for path in paths:
+            if path not in self._read:
+                self._read[path] = Source(path.relative_to(self.root).as_posix(), path.read_text())
+        return [s for s in map(self._read.__getitem__, paths) if not folders or s.part in folders]
 
     def parts(self) -> list[Source]:
         """Return the Python files of the package."""
@@ -92,7 +95,7 @@ def _files(folder: Path) -> Iterator[Path]:
             yield from _files(path)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def house() -> House:
-    """Give the repository."""
+    """Give the repository; what one file of rules has read and parsed is let go before the next one."""
     return House(ROOT)

@@ -107,7 +107,7 @@ class Executor(ABC):
         return self._passes(encode, denoise, size)
 
     def forget(self) -> None:
-        """Drop the kernels that were built for denoising: the next build is the driver's."""
+        """Drop the kernels that were built: the next build is the driver's."""
 
     def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
         """Return a trainer (opencl_trainer.py) for pictures laid out end to end, or refuse."""

@@ -247,8 +247,10 @@ class OpenCLExecutor(Executor):
         built.kernel(self._queue, places, built.local, *inputs, built.weights, output, *numbers)
 
     def forget(self) -> None:
-        """Drop the kernels that were built for denoising."""
-        self._built.clear()
+        """Drop the kernels that were built, and the picture between two passes."""
+        for built in (self._built, self._paths, self._encoders):
+            built.clear()
+        self._kept = None
 
     def kernel_seconds(
         self, artifact: Artifact, images: Images, clock: Callable[[], float] = time.perf_counter

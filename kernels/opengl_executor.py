@@ -264,11 +264,12 @@ class OpenGLExecutor(Executor):
                 built.program[name].value = value
 
     def forget(self) -> None:
-        """Drop the kernels that were built for denoising."""
-        with self._context:
-            for built in self._built.values():
-                built.release()
-        self._built.clear()
+        """Drop the kernels that were built."""
+        for kernels in (self._built, self._paths, self._encoders):
+            with self._context:
+                for built in kernels.values():
+                    built.release()
+            kernels.clear()
 
     def build_path(self, kernel: PathArtifact) -> None:
         """Compile the shaders and draw one pixel: drivers finish compiling when they draw."""

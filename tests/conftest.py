@@ -10,8 +10,9 @@
    missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
 3. The user's cache folder is never touched: tests have one of their own, which their commands inherit.
 4. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
-5. Tests that take a minute are marked [`COSTLY`], and skipped unless a run wants them; the summary says so.
-6. `--quick` runs what needs NumPy only (tests/support/quick.py).
+5. Processes stay small (tests/support/workers.py).
+6. Tests that take a minute are marked [`COSTLY`], and skipped unless a run wants them; the summary says so.
+7. `--quick` runs what needs NumPy only (tests/support/quick.py).
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ import hypothesis
 import pytest
 from packages import FOUND, PACKAGES, required
 
-pytest_plugins = ["quick"]
+pytest_plugins = ["quick", "workers"]
 
 PIPELINES = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
 """Executors on which every test of paths and pipelines runs; an OpenGL executor is named with the kind of its
@@ -100,11 +101,20 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 @pytest.fixture(scope="session")
+def opened_executors() -> Iterator[dict[str, Any]]:
+    """Give the executors and peers that were asked for, by name; None for those that are missing."""
+    found: dict[str, Any] = {}
+    yield found
+    for executor in found.values():
+        if isinstance(executor, AbstractContextManager):
+            executor.__exit__(None, None, None)
+
+
+@pytest.fixture(scope="session")
 def executor_named(
-    pytestconfig: pytest.Config, needs: Callable[[str], None]
-) -> Iterator[Callable[[str], Any]]:
+    pytestconfig: pytest.Config, needs: Callable[[str], None], opened_executors: dict[str, Any]
+) -> Callable[[str], Any]:
     """Give a function that opens an executor by its name, once a session, under the policy above."""
-    opened: dict[str, Any] = {}
     state = pytestconfig.stash[_state_key]
 
     def open_once(name: str) -> Any:
@@ -112,18 +122,15 @@ def executor_named(
             needs("devices")
         kind = "peer" if name in PEERS else "executor"
         if name not in state:
-            opened[name], state[name] = _open(name)
-        if opened[name] is not None:
-            return opened[name]
+            opened_executors[name], state[name] = _open(name)
+        if opened_executors[name] is not None:
+            return opened_executors[name]
         if name in required_executors():
             way_out = "to do without it, list what you have: make test WAMNET_REQUIRE=opencl"
             pytest.fail(f"{kind} {name} is required and {state[name]}; {way_out}", pytrace=False)
         pytest.skip(f"{kind} {name} is {state[name]}")
 
-    yield open_once
-    for executor in opened.values():
-        if isinstance(executor, AbstractContextManager):
-            executor.__exit__(None, None, None)
+    return open_once
 
 
 @pytest.fixture(scope="session", params=PIPELINES)

@@ -225,9 +225,12 @@ def wide(kit, width):
 
 @pytest.mark.parametrize("width", [1_000, 30_000, 120_000])
 def test_wide_layers_run_on_opencl(executor_named, kit, width):
-    """Arrays of 8 bytes a neuron: groups of 64 pixels would need up to 60 MB of a thread's 8 MB stack."""
+    """Arrays of 8 bytes a neuron: groups of 64 pixels would need up to 60 MB of a thread's 8 MB stack.
+
+    The picture is small, for the reference holds all neurons of all pixels; a group has its arrays anyway.
+    """
     program = wide(kit, width)
-    images = {"a": np.random.default_rng(2).uniform(-2, 2, (5, 18, 1)).astype(np.float32)}
+    images = {"a": np.random.default_rng(2).uniform(-2, 2, (1, 3, 1)).astype(np.float32)}
     assert kit.excess(executor_named("opencl"), program, images) <= 1
 
 

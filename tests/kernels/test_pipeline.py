@@ -307,6 +307,16 @@ def test_a_kernel_that_fell_out_is_built_again(executor_named, model_of, monkeyp
         assert np.array_equal(pipeline.run(1), before)
 
 
+def test_forgotten_kernels_are_built_again(executor, model_of):
+    model = model_of(("color",), 3, "clamp")
+    with Pipeline(executor, scene("lone_light"), model, (5, 4)) as pipeline:
+        first = pipeline.run(seed=3)
+        executor.forget()
+        for kernels in ("_built", "_paths", "_encoders"):
+            assert not getattr(executor, kernels, None)
+        assert np.array_equal(pipeline.run(seed=3), first)
+
+
 # ---- refusals ------------------------------------------------------------------------------------------
 
 

@@ -22,8 +22,8 @@ from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.scenes import canonical
 
-EXAMPLES = max(settings.default.max_examples // 10, 1)
-"""Each example compiles two kernels, up to a second: a tenth of what other tests draw."""
+EXAMPLES = max(settings.default.max_examples // 20, 1)
+"""Each example compiles two kernels, up to a second: a twentieth of what other tests draw."""
 
 WAYS = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules if not isinstance(s, Fourier)]
 """All targets and schedules that hold a first layer in two passes: spectra are of windows along both axes."""

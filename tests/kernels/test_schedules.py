@@ -18,8 +18,8 @@ from wamnet.kernels import denoise_on, opencl_executor, opengl_executor
 from wamnet.refimpl import dataset, denoise, frame
 from wamnet.refimpl.errors import CompileError
 
-EXAMPLES = max(settings.default.max_examples // 10, 1)
-"""Each example compiles a kernel, up to a second: a tenth of what other tests draw."""
+EXAMPLES = max(settings.default.max_examples // 20, 1)
+"""Each example compiles a kernel, up to a second: a twentieth of what other tests draw."""
 
 LADDER = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules[1:]]
 """All schedules except for the plain ones, with their targets."""

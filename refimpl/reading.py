@@ -21,6 +21,7 @@ import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import MISSING, fields, is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
@@ -270,6 +271,12 @@ Special = Mapping[Any, Callable[[Any, str], Any]]
 """Functions of (value, path) for annotations that need one of their own."""
 
 
+@cache
+def _hints(kind: type[Any]) -> dict[str, Any]:
+    """Return a dataclass's annotations, evaluated once: a scene may have a hundred thousand boxes."""
+    return get_type_hints(kind)
+
+
 def to_dataclass(
     kind: type[_Built],
     data: Any,
@@ -294,7 +301,7 @@ def to_dataclass(
             rule = f"{kind.__name__} has no such key"
             way_out = f"known are {', '.join(known)}" if known else "remove it: there are none"
             raise InputError(f"{path}.{key}", data[key], rule, way_out)
-    hints = get_type_hints(kind)
+    hints = _hints(kind)
     convert = _Converter(largest, special or {})
     values = {}
     for name, spec in known.items():

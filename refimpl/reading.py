@@ -301,7 +301,7 @@ def to_dataclass(
             rule = f"{kind.__name__} has no such key"
             way_out = f"known are {', '.join(known)}" if known else "remove it: there are none"
             raise InputError(f"{path}.{key}", data[key], rule, way_out)
-    hints = _hints(kind)
+    hints = _hints(kind)  # type: ignore[arg-type]
     convert = _Converter(largest, special or {})
     values = {}
     for name, spec in known.items():

@@ -152,7 +152,6 @@ TESTS_APART = 500
 
 COLUMNS = (
     Column("parameters", "parameters", 0),
-    Column("seconds", "training, s", 1),
     Column("psnr", "PSNR, dB", 2, interval=True),
     Column("ssim", "SSIM", 3, interval=True),
     Column("flip", "FLIP", 3, interval=True),

@@ -102,7 +102,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture(scope="session")
 def opened_executors() -> Iterator[dict[str, Any]]:
-    """Give the executors and peers that were asked for, by name; None for those that are missing."""
+    """Give the executors and peers that were opened, by name; None for those that are missing."""
     found: dict[str, Any] = {}
     yield found
     for executor in found.values():

@@ -7,7 +7,7 @@
    out [`pytest_make_collect_report`]. Executors but `numpy` and peers are left out by the fixtures that open
    them.
 3. What cannot be seen from there is marked: `pytest.mark.needs("programs")`, with the words of `NEEDS`. A
-   test that asks for something absent without a mark fails, and is told this [`pytest_runtest_makereport`].
+   test that asks for something absent without a mark fails with this advice [`pytest_runtest_makereport`].
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def brought() -> set[str]:
 
 
 class Absent(MetaPathFinder):
-    """Finds what the finders in its care find, but for packages that a quick run does not have."""
+    """Finds what the finders in its care find, except packages that a quick run does not have."""
 
     def __init__(self, finders: Sequence[Any]) -> None:
         has = brought()
@@ -177,7 +177,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, Any, Any]:
-    """Tell a test that failed in a quick run what it asked for."""
+    """Say in the report of a failed test what a quick run did not give it."""
     report = yield
     for guard in _absent:
         if report.failed and guard.asked:

@@ -1,4 +1,4 @@
-"""Processes that run tests stay small: what one file of tests has built is let go, and peaks are told.
+"""Processes that run tests stay small: what one file of tests has built is let go, and peaks are reported.
 
 1. After each file executors drop their kernels, of which they keep dozens [`let_go`]: each of OpenGL's
    software renderer takes megabytes. What is freed goes back to the system; the C library keeps it.

@@ -21,6 +21,14 @@ from dataclasses import dataclass
 
 from .ir import Node, Program
 
+MOST_UNROLLED = 32
+"""Most primitives of a scene that become statements each, unless a target has another number (targets.py).
+
+On PoCL, at 10 statements are up to a tenth faster; at 30 they are level for boxes that share a rotation and
+for quads, and a third slower for mixtures; at 100 they are 1.3 to 1.8 times slower, their code having left
+the processor's first cache, and take 2 to 6 s to trace and build instead of 0.5. 32 keeps the 29 of
+`minicubes` statements (`python bench/primitives.py`)."""
+
 
 def bodies(program: Program) -> Sequence[frozenset[int]]:
     """Return, for each node, the loops in whose bodies it is: none or one in a verified program."""

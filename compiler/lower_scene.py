@@ -26,6 +26,7 @@ from ..refimpl.intersection import Hit, Surface, reflecting
 from ..refimpl.scene import Scene, primitives, scene_digest
 from ..refimpl.transport import Counters, Path, Settings, World
 from .ir import Program, Type
+from .loops import MOST_UNROLLED
 from .passes import pipeline
 from .scene_inputs import SceneInputs, lay_out
 from .trace import Traced, trace
@@ -70,13 +71,6 @@ LAYERS: Values = {
     "unshadowed": (RGB, FLOAT),
 }
 """The feature layers of the first hit, as refimpl/render.py: first_hit_layers."""
-
-MOST_UNROLLED = 32
-"""Most primitives of a scene that become statements each, unless a target has a number of its own
-(path_kernel.py: UNROLLED). On PoCL, at 10 statements are up to a tenth faster; at 30 they are level for boxes
-that share a rotation and for quads, and a third slower for mixtures; at 100 they are 1.3 to 1.8 times slower,
-their code having left the processor's first cache, and take 2 to 6 s to trace and build instead of 0.5. 32
-keeps the 29 of `minicubes` statements (`python bench/primitives.py`)."""
 
 PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "eliminate_dead")
 """What every program of a path goes through: numbers in place of vectors, the bits that float32 gives."""

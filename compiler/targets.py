@@ -26,7 +26,7 @@ from .glsl_es import GLSLES, GLSLESInlined, GLSLESPacked
 from .glsl_inlined import GLSL_LADDER
 from .hosts import GodotDenoise, ShadertoyDenoise
 from .interface import DENOISE, ENCODE, PATH
-from .lower_scene import MOST_UNROLLED
+from .loops import MOST_UNROLLED
 from .metal import Metal
 from .opencl import OpenCL
 from .opencl_fourier import OPENCL_FOURIER

@@ -140,7 +140,8 @@ def prediction(ground: Ground, seed: int, path: Path) -> None:
     rows: list[figures.Row] = []
     shown = [("the training frame", training_frame(ground))]
     shown += [
-        (f"unseen: {float(noisy.info['time']):.2f} s", [(noisy, clean)]) for noisy, clean in ground.unseen()[:2]
+        (f"unseen: {float(noisy.info['time']):.2f} s", [(noisy, clean)])
+        for noisy, clean in ground.unseen()[:2]
     ]
     for title, pairs in shown:
         (target,) = targets(pairs)

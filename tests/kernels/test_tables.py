@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.ir import Type
-from wamnet.compiler.lower_scene import MOST_UNROLLED, lower_scene, primitives
+from wamnet.compiler.loops import MOST_UNROLLED
+from wamnet.compiler.lower_scene import lower_scene, primitives
 from wamnet.compiler.path_kernel import compile_path, most_unrolled
 from wamnet.compiler.trace import trace
 from wamnet.compiler.verify import verify

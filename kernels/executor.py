@@ -56,7 +56,8 @@ class Executor(ABC):
     `lanes` is the number of paths that its path kernels should follow at once, `schedule` the name of the
     schedule that suits a denoiser on it, for pictures of at least `schedule_pixels`: smaller ones are done
     with the plain kernel before the other is compiled; `schedule_reason` says why. `driver` is the driver's
-    version, where `device` does not name it. `trains` says whether it has a compiled trainer.
+    version, where `device` does not name it. `trains` says whether it has a compiled trainer. `homes` are the
+    homes of weights, apart from the target's usual one, whose kernels it runs [compiler/interface.py].
     """
 
     name: str
@@ -67,6 +68,7 @@ class Executor(ABC):
     schedule_reason: str = "the only one"
     driver: str = ""
     trains: bool = False
+    homes: tuple[str, ...] = ()
 
     @abstractmethod
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
@@ -142,7 +144,7 @@ class Executor(ABC):
 
     def _check_target(self, artifact: Artifact | PathArtifact | EncodeArtifact) -> None:
         """Refuse a kernel in another language."""
-        if artifact.target != self.name:
+        if artifact.target not in (self.name, *(f"{self.name}:{home}" for home in self.homes)):
             raise InputError(
                 f"artifact for executor {self.name!r}: target",
                 artifact.target,

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..compiler.artifact import Artifact
 from ..compiler.emit import output_channels
 from ..compiler.encode_kernel import EncodeArtifact
+from ..compiler.interface import BLOCK
 from ..compiler.path_kernel import PathArtifact
 from ..compiler.step_kernel import StepKernel
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
@@ -74,6 +75,7 @@ class OpenCLExecutor(Executor):
     """One OpenCL device with its queue."""
 
     name = "opencl"
+    homes = (BLOCK,)  # constant memory is a buffer to whoever calls
 
     def __init__(self, device: str | None = None) -> None:
         chosen = _choose(device or os.environ.get(DEVICE_VARIABLE) or "")

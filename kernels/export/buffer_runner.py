@@ -13,20 +13,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact, OneSource
+from ...compiler.artifact import Artifact
 from ...compiler.emit import output_channels
 from ...compiler.encode_kernel import EncodeArtifact
 from ...compiler.glsl_buffers import GROUP
-from ...compiler.interface import IMAGE, RESULT, SUMS, WEIGHTS, Interface
+from ...compiler.interface import BLOCK, IMAGE, RESULT, SUMS, WEIGHTS, Interface
 from ...compiler.path_kernel import PathArtifact
-from ..executor import Executor, Images, Part, gather_of
+from ..executor import Executor, Images, Part
+
+Kernel = Artifact | PathArtifact | EncodeArtifact
+"""A kernel of any role."""
 
 
 @dataclass(frozen=True)
 class Launch:
     """One call: `sizes` as 32-bit integers, buffers by binding, those that come back, threads (x, y).
 
-    Threads come in groups (x, y), which may be more than are asked for.
+    Threads come in groups (x, y), which may be more than are needed. `blocks` are the uniform blocks among
+    the buffers.
     """
 
     sizes: Sequence[int]
@@ -34,6 +38,7 @@ class Launch:
     back: Sequence[int]
     threads: tuple[int, int]
     group: tuple[int, int] = GROUP
+    blocks: Sequence[int] = ()
 
     @property
     def groups(self) -> tuple[int, int]:
@@ -46,30 +51,27 @@ class BufferRunner(Executor):
     """Runs denoisers, paths and encodings of one target; a subclass runs one kernel [`_launch`]."""
 
     @abstractmethod
-    def _prepare(self, source: str, entry: str, count: int, group: tuple[int, int] | None) -> Any:
-        """Return a kernel, built from its source, that takes `count` images.
-
-        `group`: the threads (x, y) that wait for each other; None where none do.
-        """
+    def _prepare(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+        """Return a kernel, built; `group`: the threads (x, y) that wait for each other, if any do."""
 
     @abstractmethod
     def _launch(self, prepared: Any, launch: Launch) -> list[NDArray[np.float32]]:
         """Run a kernel, and return the buffers that come back, flat."""
 
-    def _kernel(self, artifact: Artifact | OneSource, entry: str, count: int) -> Any:
+    def _kernel(self, kernel: Kernel) -> Any:
         """Return a built kernel; again costs nothing."""
         if not hasattr(self, "_kernels"):
             self._kernels: dict[str, Any] = {}
-        if artifact.digest not in self._kernels:
-            group = artifact.manifest.get("schedule", {}).get("group")
+        if kernel.digest not in self._kernels:
+            group = kernel.manifest.get("schedule", {}).get("group")
             shared = None if group is None else (int(group[0]), int(group[1]))
-            self._kernels[artifact.digest] = self._prepare(artifact.source, entry, count, shared)
-        return self._kernels[artifact.digest]
+            self._kernels[kernel.digest] = self._prepare(kernel, shared)
+        return self._kernels[kernel.digest]
 
     def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
         """Build the kernels."""
         for kernel in artifact.kernels:
-            self._kernel(kernel, kernel.entry_point, len(gather_of(kernel).images))
+            self._kernel(kernel)
 
     def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
         found = list(images.values())
@@ -83,14 +85,14 @@ class BufferRunner(Executor):
             numbers, buffers = _numbered(kernel.interface, given)
             picked = kernel.manifest["schedule"]
             threads, group = (-(-width // picked["pixels"]), height), picked.get("group", GROUP)
-            launch = Launch((width, height), buffers, (numbers[RESULT],), threads, tuple(group))
-            prepared = self._kernel(kernel, kernel.entry_point, len(found))
-            found = [self._launch(prepared, launch)[0].reshape(shape)]
+            blocks = [numbers[array.name] for array in kernel.interface.arrays if array.home == BLOCK]
+            launch = Launch((width, height), buffers, (numbers[RESULT],), threads, tuple(group), blocks)
+            found = [self._launch(self._kernel(kernel), launch)[0].reshape(shape)]
         return found[0]
 
     def build_path(self, kernel: PathArtifact) -> None:
         """Build the kernel."""
-        self._kernel(kernel, kernel.entry_point, 0)
+        self._kernel(kernel)
 
     def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
         shape = (len(kernel.planes), part.rows, part.width)
@@ -98,7 +100,7 @@ class BufferRunner(Executor):
         numbers = (*sizes, part.samples, part.seed)
         places, buffers = _numbered(kernel.interface, {SUMS: np.zeros(shape, np.float32)})
         launch = Launch(numbers, buffers, (places[SUMS],), (part.width, part.rows))
-        return self._launch(self._kernel(kernel, kernel.entry_point, 0), launch)[0].reshape(shape)
+        return self._launch(self._kernel(kernel), launch)[0].reshape(shape)
 
     def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
         _, height, width = sums.shape
@@ -107,7 +109,7 @@ class BufferRunner(Executor):
         numbers, buffers = _numbered(kernel.interface, {SUMS: sums, **written})
         places = [numbers[name] for name in written]
         launch = Launch((width, height, samples), buffers, places, (width, height))
-        found = self._launch(self._kernel(kernel, kernel.entry_point, len(images)), launch)
+        found = self._launch(self._kernel(kernel), launch)
         return {
             name: flat.reshape(image.shape) for (name, image), flat in zip(images.items(), found, strict=True)
         }

@@ -18,14 +18,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.interface import BLOCK, TABLE
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..bench import peer_onnxruntime
 from ..executor import Executor, Part
-from ..registry import open_executor
 from . import tools
 from .check_pair import SEED
 from .package import Export
+from .runners import WAYS
 
 OPERATIONS = 10_000
 """Operations of a path of six surfaces, rounded up: sums are held to so many roundings of values near 1."""
@@ -216,45 +215,12 @@ COMPILED: Mapping[str, Sequence[Told]] = {
 
 def runner(target: str, kernel: str) -> Executor:
     """Return what runs a target's kernels here; `kernel` is the compiler's name of target and place."""
-    from . import compute_runner, gl_runner, host_pass_runner, host_runner, wgpu_runner
-
-    if target in ("opencl", "glsl"):
-        if kernel.endswith((TABLE, BLOCK)) and kernel != f"opencl:{BLOCK}":
-            raise ExecutorUnavailable(f"nothing runs {target} here with weights in that place")
-        opened = open_executor("opencl" if target == "opencl" else "opengl")
-        opened.name = kernel
-        return opened
-    if kernel == f"glsl-es:{BLOCK}":
+    opened = WAYS[target].open()
+    home = kernel.partition(":")[2]
+    if home and home not in opened.homes:
+        opened.close()
         raise ExecutorUnavailable(f"nothing runs {target} here with weights in that place")
-    openers: Mapping[str, Callable[[], Executor]] = {
-        "glsl-es": gl_runner.ESRunner,
-        "glsl-compute": compute_runner.ComputeRunner,
-        "glsl-vulkan": wgpu_runner.vulkan_runner,
-        "spirv": wgpu_runner.vulkan_runner,
-        "hlsl": wgpu_runner.hlsl_runner,
-        "wgsl": wgpu_runner.WgpuRunner,
-        "metal": host_runner.MetalRunner,
-        "c": host_runner.CRunner,
-        "cuda": host_runner.CUDARunner,
-        "shadertoy": host_pass_runner.ShadertoyRunner,
-        "godot": host_pass_runner.GodotRunner,
-    }
-    opened = openers[target]()
-    opened.name = kernel
     return opened
-
-
-ROUTES: Mapping[str, str] = {
-    "hlsl": "back to SPIR-V, wgpu, ",
-    "spirv": "wgpu, ",
-    "glsl-vulkan": "SPIR-V, wgpu, ",
-    "wgsl": "wgpu, ",
-    "metal": "as C++ with a shim, ",
-    "cuda": "as C++ with a shim, ",
-    "shadertoy": "its uniforms declared, ",
-    "godot": "its words declared, ",
-}
-"""How a kernel comes to its device, where that is no matter of course."""
 
 
 def _executed(export: Export) -> tuple[str, NDArray[np.float32], float | None]:
@@ -266,8 +232,7 @@ def _executed(export: Export) -> tuple[str, NDArray[np.float32], float | None]:
         return device, found, None
     with runner(export.target, export.denoiser.target) as opened:
         found = opened.run(export.denoiser, pair.images)
-        opened.name = opened.name.partition(":")[0]
-        return ROUTES.get(export.target, "") + opened.device, found, _paths(export, opened)
+        return WAYS[export.target].route + opened.device, found, _paths(export, opened)
 
 
 def _paths(export: Export, opened: Any) -> float | None:

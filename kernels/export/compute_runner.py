@@ -10,16 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.glsl_compute import SHADER_VERSION
-from ...compiler.interface import BLOCK, READ_NUMBER
+from ...compiler.interface import BLOCK
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..opengl_executor import OpenGLExecutor
-from .buffer_runner import BufferRunner, Launch
+from .buffer_runner import BufferRunner, Kernel, Launch
 
 
 class ComputeRunner(BufferRunner):
     """One OpenGL context."""
 
     name = "glsl-compute"
+    homes = (BLOCK,)
 
     def __init__(self, context: str | None = None) -> None:
         self._opened = OpenGLExecutor(context)
@@ -31,10 +32,10 @@ class ComputeRunner(BufferRunner):
                 f"{SHADER_VERSION / 100:.1f}"
             )
 
-    def _prepare(self, source: str, entry: str, count: int, group: tuple[int, int] | None) -> Any:
+    def _prepare(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
         with self._context:
             try:
-                return self._context.compute_shader(source)
+                return self._context.compute_shader(kernel.source)
             except moderngl.Error as error:
                 raise CompileError(f"{self.device} does not build the kernel: {error}") from None
 
@@ -48,7 +49,7 @@ class ComputeRunner(BufferRunner):
             for place, data in launch.buffers.items():
                 held[place] = self._context.buffer(np.ascontiguousarray(data).tobytes())
                 made.callback(held[place].release)
-                if place == READ_NUMBER and self.name.endswith(BLOCK):
+                if place in launch.blocks:
                     held[place].bind_to_uniform_block(place)
                 else:
                     held[place].bind_to_storage_buffer(place)

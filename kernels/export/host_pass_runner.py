@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.glsl_es import VERSION
 from ...compiler.hosts import CHANNELS
+from ...compiler.interface import TABLE
 from ..executor import Images
 from .gl_runner import ESRunner
 
@@ -121,6 +122,7 @@ class GodotRunner(ShadertoyRunner):
     """Shaders of Godot's canvas items."""
 
     name = "godot"
+    homes = (TABLE,)
 
     def _wrapped(self, source: str) -> str:
         return GODOT.format(source=GODOT_WORDS.sub(_plain, source))

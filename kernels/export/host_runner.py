@@ -7,19 +7,17 @@ C++: what is run is the exported text, thread by thread. It says nothing about t
 from __future__ import annotations
 
 import ctypes
-import re
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.interface import FIRST_IMAGE, READ_NUMBER, TABLE, WRITTEN_NUMBER
+from ...compiler.interface import BLOCK, PATH, TABLE, UNSIGNED, Interface
 from ...refimpl.errors import ExecutorUnavailable
 from . import tools
-from .buffer_runner import BufferRunner, Launch
+from .buffer_runner import BufferRunner, Kernel, Launch
 
 OPTIONS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")
 """Nothing here may allow what the standards do not."""
@@ -128,9 +126,9 @@ class HostRunner(BufferRunner):
     program = "c++"
     suffix = ".cpp"
     options: tuple[str, ...] = ("-std=c++20", "-pthread")
+    homes = (TABLE, BLOCK)
 
-    def __init__(self, name: str = "") -> None:
-        self.name = name or self.name
+    def __init__(self) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="wamnet-host-")
         self._count = 0
         try:
@@ -140,20 +138,16 @@ class HostRunner(BufferRunner):
             raise
         self.device = " ".join(told.split()[:4])
 
-    def _glue(self, source: str, entry: str, count: int, group: tuple[int, int] | None, folder: Path) -> str:
+    def _glue(self, kernel: Kernel, group: tuple[int, int] | None, folder: Path) -> str:
         """Return the text that is compiled, with a function `wamnet_call`."""
         raise NotImplementedError
 
-    def _weights(self, buffer: str) -> list[str]:
-        """Return the argument that holds weights, if they are one."""
-        return [] if self.name.endswith(TABLE) else [buffer]
-
-    def _prepare(self, source: str, entry: str, count: int, group: tuple[int, int] | None) -> Any:
+    def _prepare(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
         self._count += 1
         folder = Path(self._folder.name) / str(self._count)
         folder.mkdir()
-        (folder / "kernel.txt").write_text(source, encoding="utf-8")
-        glue = self._glue(source, entry, count, group, folder)
+        (folder / "kernel.txt").write_text(kernel.source, encoding="utf-8")
+        glue = self._glue(kernel, group, folder)
         (folder / f"glue{self.suffix}").write_text(glue, encoding="utf-8")
         tools.run(
             self.program,
@@ -180,9 +174,15 @@ class HostRunner(BufferRunner):
         self._folder.cleanup()
 
 
-def _images(count: int) -> list[str]:
-    """Return the texts of so many image buffers."""
-    return [f"buffers[{FIRST_IMAGE + i}]" for i in range(count)]
+def _arrays(interface: Interface) -> list[str]:
+    """Return the texts of a kernel's arrays, in the order of its arguments."""
+    numbers = interface.numbers()
+    return [f"buffers[{numbers[array.name]}]" for array in interface.arrays]
+
+
+def _integers(interface: Interface) -> list[str]:
+    """Return the texts of a kernel's integers, in order."""
+    return [f"{'(unsigned int)' * (n in UNSIGNED)}sizes[{i}]" for i, n in enumerate(interface.integers)]
 
 
 class CRunner(HostRunner):
@@ -193,19 +193,13 @@ class CRunner(HostRunner):
     suffix = ".c"
     options = ("-std=c99",)
 
-    def _glue(self, source: str, entry: str, count: int, group: tuple[int, int] | None, folder: Path) -> str:
-        images, reads, writes = _images(count), f"buffers[{READ_NUMBER}]", f"buffers[{WRITTEN_NUMBER}]"
-        part = ", ".join(["(uint32_t)sizes[4]" if i == 4 else f"sizes[{i}]" for i in range(6)])
-        arguments = {
-            "wamnet_pixel": [*images, *self._weights(reads), writes, *_sizes(2)],
-            "wamnet_trace_pixel": ["&part", writes],
-            "wamnet_encode": [reads, *images, *_sizes(3)],
-        }
-        functions = {"wamnet_pixel": "wamnet_image", "wamnet_trace_pixel": "wamnet_trace"}
-        before = {
-            "wamnet_trace_pixel": f"const wamnet_part part = {{{part}, (uint32_t)sizes[6]}};\n    "
-        }.get(entry, "")
-        call = f"{before}{functions.get(entry, entry)}({', '.join(arguments[entry])});"
+    def _glue(self, kernel: Kernel, group: tuple[int, int] | None, folder: Path) -> str:
+        arrays, integers = _arrays(kernel.interface), _integers(kernel.interface)
+        function = {"wamnet_pixel": "wamnet_image", "wamnet_trace_pixel": "wamnet_trace"}
+        call = f"{function.get(kernel.entry_point, kernel.entry_point)}({', '.join([*arrays, *integers])});"
+        if kernel.interface.role == PATH:
+            part = f"const wamnet_part part = {{{', '.join(integers)}}};"
+            call = f"{part}\n    wamnet_trace(&part, {arrays[0]});"
         head = "void wamnet_call(const int *sizes, float *const *buffers, int columns, int rows)"
         return (
             f'#include "kernel.txt"\n{head};\n{head}\n{{\n    (void)columns;\n    (void)rows;\n'
@@ -218,15 +212,9 @@ class CUDARunner(HostRunner):
 
     name = "cuda"
 
-    def _glue(self, source: str, entry: str, count: int, group: tuple[int, int] | None, folder: Path) -> str:
-        images = _images(count)
-        reads, writes = f"buffers[{READ_NUMBER}]", f"buffers[{WRITTEN_NUMBER}]"
-        arguments = {
-            "wamnet_denoise": [*images, *self._weights(reads), writes, *_sizes(2)],
-            "wamnet_trace": [writes, *_sizes(7)],
-            "wamnet_encode": [reads, *images, *_sizes(3)],
-        }
-        call = f"{entry}({', '.join(arguments[entry])});"
+    def _glue(self, kernel: Kernel, group: tuple[int, int] | None, folder: Path) -> str:
+        arguments = [*_arrays(kernel.interface), *_integers(kernel.interface)]
+        call = f"{kernel.entry_point}({', '.join(arguments)});"
         if group is None:
             place = "blockIdx = {(unsigned)column, (unsigned)row, 0}; blockDim = {1, 1, 1};"
             place += " threadIdx = {0, 0, 0};"
@@ -242,13 +230,15 @@ class MetalRunner(HostRunner):
     name = "metal"
     options = ("-std=c++20", "-pthread", "-Wno-attributes")
 
-    def _glue(self, source: str, entry: str, count: int, group: tuple[int, int] | None, folder: Path) -> str:
+    def _glue(self, kernel: Kernel, group: tuple[int, int] | None, folder: Path) -> str:
         (folder / "metal_stdlib").write_text(METAL_SHIM, encoding="utf-8")
-        arguments = ["*(const Size *)sizes", *(f"buffers[{place}]" for place in _bindings(source) if place)]
+        numbers = kernel.interface.numbers()
+        arrays = [f"buffers[{numbers[array.name]}]" for array in kernel.interface.by_number()]
+        arguments = ["*(const Size *)sizes", *arrays]
         places = ["{(uint)column, (uint)row}"]
         if group is not None:
             places.append("{(uint)group_column, (uint)group_row}")
-        call = f"{entry}({', '.join([*arguments, *places])});"
+        call = f"{kernel.entry_point}({', '.join([*arguments, *places])});"
         return f'{_waiting(group)}#include "kernel.txt"\n{_started(call, group)}'
 
 
@@ -262,13 +252,3 @@ def _started(call: str, group: tuple[int, int] | None) -> str:
     if group is None:
         return THREADS.format(call=call)
     return GROUPS.format(call=call, width=group[0], height=group[1])
-
-
-def _bindings(source: str) -> Sequence[int]:
-    """Return the numbers of the buffers that a kernel of Metal takes, in its order."""
-    return [int(number) for number in re.findall(r"\[\[buffer\((\d+)\)\]\]", source)]
-
-
-def _sizes(count: int) -> list[str]:
-    """Return the texts of so many sizes."""
-    return [f"sizes[{i}]" for i in range(count)]

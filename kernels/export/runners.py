@@ -1,44 +1,63 @@
-"""What runs exported kernels here, by target: the target's own compiler and device, or the nearest to it."""
+"""What runs exported kernels here, by target: the target's own compiler and device, or the nearest to it.
+
+A way [`WAYS`] opens an executor, whose packages are imported only then, and says how a kernel reaches it.
+Conformance runs those in [`RUNNERS`] by name.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
 
 from ..executor import Executor
-from . import host_runner, wgpu_runner
+from ..registry import open_executor
+
+Opener = Callable[[], Executor]
 
 
-def _es() -> Executor:
-    """Open OpenGL for GLSL ES."""
-    from .gl_runner import ESRunner
+@dataclass(frozen=True)
+class Way:
+    """How a target's kernels are run; `route`: what they are translated to before, if they are."""
 
-    return ESRunner()
-
-
-def _godot() -> Executor:
-    """Open OpenGL for shaders of Godot."""
-    from .host_pass_runner import GodotRunner
-
-    return GodotRunner()
+    open: Opener
+    route: str = ""
 
 
-def _compute() -> Executor:
-    """Open OpenGL for compute shaders."""
-    from .compute_runner import ComputeRunner
+def _opener(module: str, name: str, *arguments: str) -> Opener:
+    """Return what opens a runner of this folder, by its module and name."""
 
-    return ComputeRunner()
+    def opened() -> Executor:
+        found: Executor = getattr(import_module(f".{module}", __package__), name)(*arguments)
+        return found
+
+    return opened
 
 
-RUNNERS: Mapping[str, Callable[[], Executor]] = {
-    "glsl-es": _es,
-    "glsl-compute": _compute,
-    "glsl-vulkan": wgpu_runner.vulkan_runner,
-    "glsl-vulkan/hlsl-fxc": lambda: wgpu_runner.hlsl_runner("fxc"),
-    "glsl-vulkan/hlsl-dxc": lambda: wgpu_runner.hlsl_runner("dxc"),
-    "wgsl": wgpu_runner.WgpuRunner,
-    "metal": host_runner.MetalRunner,
-    "c99": host_runner.CRunner,
-    "cuda": host_runner.CUDARunner,
-    "godot": _godot,
+WAYS: Mapping[str, Way] = {
+    "opencl": Way(lambda: open_executor("opencl")),
+    "glsl": Way(lambda: open_executor("opengl")),
+    "glsl-es": Way(_opener("gl_runner", "ESRunner")),
+    "glsl-compute": Way(_opener("compute_runner", "ComputeRunner")),
+    "glsl-vulkan": Way(_opener("wgpu_runner", "vulkan_runner"), "SPIR-V, wgpu, "),
+    "spirv": Way(_opener("wgpu_runner", "vulkan_runner"), "wgpu, "),
+    "hlsl": Way(_opener("wgpu_runner", "hlsl_runner"), "back to SPIR-V, wgpu, "),
+    "wgsl": Way(_opener("wgpu_runner", "WgpuRunner"), "wgpu, "),
+    "metal": Way(_opener("host_runner", "MetalRunner"), "as C++ with a shim, "),
+    "c": Way(_opener("host_runner", "CRunner")),
+    "cuda": Way(_opener("host_runner", "CUDARunner"), "as C++ with a shim, "),
+    "shadertoy": Way(_opener("host_pass_runner", "ShadertoyRunner"), "its uniforms declared, "),
+    "godot": Way(_opener("host_pass_runner", "GodotRunner"), "its words declared, "),
+}
+"""By target of exports."""
+
+RUNNERS: Mapping[str, Opener] = {
+    **{
+        name: WAYS[name].open
+        for name in ("glsl-es", "glsl-compute", "glsl-vulkan", "wgsl", "metal", "cuda", "godot")
+    },
+    "c99": WAYS["c"].open,
+    "glsl-vulkan/hlsl-fxc": _opener("wgpu_runner", "hlsl_runner", "fxc"),
+    "glsl-vulkan/hlsl-dxc": _opener("wgpu_runner", "hlsl_runner", "dxc"),
 }
 """By compiler target, and after a stroke what it is translated to; c99 is C, whose name an executor has."""

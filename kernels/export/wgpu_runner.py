@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.interface import BLOCK, READ_NUMBER
+from ...compiler.interface import BLOCK
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from . import tools
-from .buffer_runner import BufferRunner, Launch
+from .buffer_runner import BufferRunner, Kernel, Launch
 
 WAY_OUT = "pip install 'wamnet[targets]', and a Vulkan driver: apt-get install mesa-vulkan-drivers"
 """How to get a device."""
@@ -50,6 +50,8 @@ def _declared(source: str) -> dict[int, str]:
 class WgpuRunner(BufferRunner):
     """A device of WebGPU; `translate` makes of a kernel's source what the device is given."""
 
+    homes = (BLOCK,)
+
     def __init__(
         self, name: str = "wgsl", translate: Callable[[str], str | bytes] = lambda source: source
     ) -> None:
@@ -69,7 +71,8 @@ class WgpuRunner(BufferRunner):
         self.device = f"{adapter.info['device']}, {adapter.info['backend_type']}"
         self._translate = translate
 
-    def _prepare(self, source: str, entry: str, count: int, group: tuple[int, int] | None) -> Any:
+    def _prepare(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+        source = kernel.source
         code = self._translate(source)
         try:
             module = self._device.create_shader_module(code=code)
@@ -81,7 +84,7 @@ class WgpuRunner(BufferRunner):
             bound = self._device.create_bind_group_layout(entries=entries)
             layout = self._device.create_pipeline_layout(bind_group_layouts=[bound])
             pipeline = self._device.create_compute_pipeline(
-                layout=layout, compute={"module": module, "entry_point": entry}
+                layout=layout, compute={"module": module, "entry_point": kernel.entry_point}
             )
         except Exception as error:  # noqa: BLE001 (the package has its own kinds)
             raise CompileError(f"{self.device} does not build the kernel: {error}") from None
@@ -95,7 +98,7 @@ class WgpuRunner(BufferRunner):
         held = {0: device.create_buffer_with_data(data=sizes, usage=usage.UNIFORM)}
         for place, data in launch.buffers.items():
             written = usage.COPY_SRC if place in launch.back else 0
-            kind = usage.UNIFORM if place == READ_NUMBER and self.name.endswith(BLOCK) else usage.STORAGE
+            kind = usage.UNIFORM if place in launch.blocks else usage.STORAGE
             held[place] = device.create_buffer_with_data(
                 data=np.ascontiguousarray(data).tobytes(), usage=kind | written
             )
@@ -117,11 +120,13 @@ class WgpuRunner(BufferRunner):
         ]
 
 
-def vulkan_runner(name: str = "glsl-vulkan") -> WgpuRunner:
+def vulkan_runner() -> WgpuRunner:
     """Return a runner of GLSL for Vulkan, by way of SPIR-V."""
-    return WgpuRunner(name, tools.spirv)
+    return WgpuRunner("glsl-vulkan", tools.spirv)
 
 
-def hlsl_runner(style: str = "dxc", name: str = "glsl-vulkan") -> WgpuRunner:
+def hlsl_runner(style: str = "dxc") -> WgpuRunner:
     """Return a runner of the HLSL that GLSL for Vulkan is translated to, by way of SPIR-V."""
-    return WgpuRunner(name, lambda source: tools.spirv(tools.hlsl(tools.spirv(source), style), "hlsl"))
+    return WgpuRunner(
+        "glsl-vulkan", lambda source: tools.spirv(tools.hlsl(tools.spirv(source), style), "hlsl")
+    )

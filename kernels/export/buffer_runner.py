@@ -29,8 +29,8 @@ Kernel = Artifact | PathArtifact | EncodeArtifact
 class Launch:
     """One call: `sizes` as 32-bit integers, buffers by binding, those that come back, threads (x, y).
 
-    Threads come in groups (x, y), which may be more than are needed. `blocks` are the uniform blocks among
-    the buffers.
+    Threads start in whole groups (x, y), so there may be more than requested. `blocks` are the uniform blocks
+    among the buffers.
     """
 
     sizes: Sequence[int]

@@ -27,10 +27,10 @@ from .package import Export
 from .runners import WAYS
 
 OPERATIONS = 10_000
-"""Operations of a path of six surfaces, rounded up: sums are held to so many roundings of values near 1."""
+"""Operations of a path of six surfaces, rounded up: sums may be off by so many roundings of values near 1."""
 
 PATHS_WITHIN = OPERATIONS * 2.0**-24
-"""How far a sum may be off that rounding alone has moved."""
+"""Largest difference of a sum that only rounding has moved."""
 
 PATHS_ALIKE = 0.98
 """Share of a picture's sums that must lie within; the others are of paths that passed an edge that near."""
@@ -236,7 +236,7 @@ def _executed(export: Export) -> tuple[str, NDArray[np.float32], float | None]:
 
 
 def _paths(export: Export, opened: Any) -> float | None:
-    """Return the share of the sums, or of encoded numbers, that are the reference's but for rounding."""
+    """Return the share of the sums, or of encoded numbers, that only rounding moves off the reference."""
     height, width, _ = export.pair.output.shape
     if export.passes:
         values = {"iFrame": SEED, "seed_number": SEED, "width": width, "height": height}

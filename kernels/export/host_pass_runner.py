@@ -54,7 +54,7 @@ void main()
 GODOT_WORDS = re.compile(
     r"^(?:shader_type|render_mode)\b.*;\n|(?<=^uniform )(\w+ \w+) (?:: .*|= \d+);$", re.M
 )
-"""What no other language has: the kind of a shader, and what stands behind the names of uniforms."""
+"""What no other language has: the kind of a shader, and what follows the names of uniforms."""
 
 
 def _plain(match: re.Match[str]) -> str:

@@ -3,7 +3,7 @@
 1. Compile the denoiser for the target's language and place of weights, and with a scene its paths and the
    encoding of features [`export`]; what the host cannot take is refused with the name of its limit.
 2. Each kernel has a folder of its own, as `wamnet compile` writes it, with its certificate; translations
-   stand beside the source that they are made of.
+   are beside the source that they are made from.
 3. `check/` holds inputs, the reference's output and how far off each number may be [check_pair.py].
 4. `manifest.json` says what there is and how it is bound [`manifest_of`], `README.md` how to call it.
 
@@ -70,7 +70,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Export:
-    """A whole export: files besides the manifest by path, the manifest, and what they are made of."""
+    """A whole export: the manifest, all other files by path, and what they are made from."""
 
     request: Request
     files: Mapping[str, bytes]
@@ -184,7 +184,7 @@ def _finished(
 def _facts(
     request: Request, row: Row, how: str, denoiser: Artifact, limits: Sequence[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """Return what a manifest says besides kernels and files."""
+    """Return the entries of a manifest other than kernels and files."""
     held = denoiser.manifest
     first = denoiser.kernels[0].manifest
     size = vary(parse(request.variant), request.model).model.window.size

@@ -92,7 +92,7 @@ def _facts(facts: Mapping[str, Any]) -> list[str]:
 
 
 def _schedule(facts: Mapping[str, Any]) -> list[str]:
-    """Return the line about the schedule of the denoiser, and those that there are besides."""
+    """Return the line about the denoiser's schedule, with the names of the other schedules."""
     picked = facts["kernels"][-1].get("schedule")
     if picked is None:
         return []

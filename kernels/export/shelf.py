@@ -1,7 +1,7 @@
 """The shelf: kernels of canonical models that are kept in the repository, with an index page.
 
-`python -m wamnet.kernels.export.shelf -o kernels/shelf MODEL.safetensors ...` writes it anew; without
-models it is a small network of random weights. A test holds what is there to what the command would write.
+`python -m wamnet.kernels.export.shelf -o kernels/shelf MODEL.safetensors ...` writes it again; without
+models it is a small network of random weights. A test compares the files with what the command would write.
 The index says for each kernel its size, products a pixel, certified bound and, with `--measure`, how long a
 picture of so many pixels a side takes here, copies included, on what is nearest to its target [`measured`].
 
@@ -129,7 +129,7 @@ def _ran(opened: Executor, kernel: Artifact, images: Images) -> None:
 
 
 def random_model() -> Model:
-    """Return a small network of random weights, whose outputs lie around the middle."""
+    """Return a small network of random weights, whose outputs are around 0.5."""
     network = siren.init((96, 8, 3), 2.0, 2.0, 5, np.float32)
     network = replace(network, biases=(*network.biases[:-1], np.full(3, 0.5, np.float32)))
     return Model(network, ("color", "normal"), Window(4, "clamp"), Normalization(), {})

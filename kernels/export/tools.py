@@ -1,6 +1,6 @@
 """Translators and compilers of other languages: glslang, SPIRV-Tools, SPIRV-Cross, compilers of C++ and CUDA.
 
-1. [`run`] runs one in a folder of its own; one that is missing is told with the way to get it.
+1. [`run`] runs one in a folder of its own; the error for a missing one says how to get it.
 2. [`spirv`] makes SPIR-V from GLSL or HLSL and validates it; [`hlsl`] makes HLSL from SPIR-V.
 """
 

@@ -91,7 +91,7 @@ class CUDAGroup(_Group, CUDA):
     said = {DENOISE: f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height. {GROUPED}"}
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the function."""
+        """Return the lines above the function."""
         return [f"{CLAMP}{CUDA_VECTOR}{parts.top}"]
 
 
@@ -114,7 +114,7 @@ class MetalGroup(_Group, Metal):
     said = SAID
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the function."""
+        """Return the lines above the function."""
         return super().top(kernel, parts)[:-1]
 
 
@@ -130,7 +130,7 @@ class _Declared(_Group, Declared):
         return ("w", self.kind) if array.name == WEIGHTS else super().element(array)
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the function."""
+        """Return the lines above the function."""
         return [*super().top(kernel, parts)[:-1], self.group_tile, ""]
 
 
@@ -156,7 +156,7 @@ class WGSLGroup(_Declared, WGSL):
         return f"var {name}: {self.kind} = {value};"
 
     def truth(self, name: str, value: str) -> str:
-        """Return the declaration of a truth value."""
+        """Return the declaration of a boolean."""
         return self.let("bool", name, value)
 
 

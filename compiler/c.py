@@ -68,7 +68,7 @@ def includes(role: str, *names: str) -> list[str]:
 
 
 class C(Arguments):
-    """The dialect's table; `pixels` is what one call of the denoiser computes, `step` how a row goes on."""
+    """The dialect's table; `pixels` is what one call of the denoiser computes, `step` moves along a row."""
 
     target = "c"
     language = "C99"
@@ -135,7 +135,7 @@ class C(Arguments):
         return f"part->{name}" if kernel.role == PATH else name
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the functions."""
+        """Return the lines above the functions."""
         if kernel.role == DENOISE:
             names = ("float", "math", "stdbool", "stdint")
             return [*includes(DENOISE, *names), self.unordered[parts.bounded], UNFUSED, parts.top]

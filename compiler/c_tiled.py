@@ -3,7 +3,7 @@
 1. Sums are vectors of `LANES` floats. GCC and clang have a type for them, which stays in registers where the
    processor has such; other compilers and processors get a structure and loops of `LANES` steps, which
    compilers may turn into vector instructions themselves [`VECTORS`]. WAMNET_PORTABLE chooses the structure
-   everywhere. Weights may lie at any address.
+   everywhere. Weights need no alignment.
 2. Elementwise operations are those of plain C on numbers: compilers make vector instructions of a loop over
    all pixels' numbers by themselves.
 3. Where the profile allows it, compilers may fuse products with sums [`FUSED`], which the plain header never
@@ -159,7 +159,7 @@ class CTiled(C, TiledDialect):
     operations = {name: C.operations[name] for name in OPERATIONS}
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the functions."""
+        """Return the lines above the functions."""
         head = includes(DENOISE, "float", "math", "stdbool", "stdint")
         return [*head, self.unordered[parts.bounded], parts.top, STRAIGHT, VECTORS]
 
@@ -184,7 +184,7 @@ class CTiled(C, TiledDialect):
         return f"const float *{name} = {_from(offset)}{first and f' + {first} * LANES'};"
 
     def walked(self, name: str, place: str, index: int) -> list[str]:
-        """Return the statements that declare a vector which lies `index` vectors after a place."""
+        """Return the statements that declare the vector `index` vectors after a place."""
         return [f"{self.kind} {name};", f"wamnet_load(&{name}, {place} + {index} * LANES);"]
 
     def advance(self, place: str, vectors: int) -> str:
@@ -226,4 +226,4 @@ C_LADDER = (
     _tiled("tile8", 8, 6, "the same for 16 registers of 8 numbers: 6 pixels, 12 vectors of sums"),
     _tiled("tile4", 4, 6, "the same for 16 registers of 4 numbers: 6 pixels, 12 vectors of sums"),
 )
-"""The schedules besides the plain one; AVX-512, AVX2 and SSE or NEON have those registers."""
+"""All schedules except the plain one; AVX-512, AVX2 and SSE or NEON have those registers."""

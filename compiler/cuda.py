@@ -73,7 +73,7 @@ class CUDA(Arguments):
     }
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the function."""
+        """Return the lines above the function."""
         return [*super().top(kernel, parts), *([CLAMP] if kernel.role == DENOISE else [])]
 
     def offset(self, name: str, value: str) -> str:

@@ -27,12 +27,12 @@ from .ir import LEAST, Node
 from .profiles import SineContract
 
 LONG_TABLE, TABLE_ROW = 200, 8
-"""Numbers of a constant table from which on it stands in rows, and the numbers of a row."""
+"""Length above which a constant table is written in rows, and the numbers of a row."""
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What a kernel's first lines hold besides its interface.
+    """What a kernel's first lines hold in addition to its interface.
 
     `top`: definitions and constant tables; `bounded`: an error bound is stated, and the language must keep
     the order of operations; `max_depth`: scatterings of a path; `scene_vectors`: vectors of four that hold
@@ -48,15 +48,14 @@ class Parts:
 class Dialect:
     """One language; a subclass sets every attribute that has no value here.
 
-    `exact`: lines that an exact kernel needs at its top. `unordered`: what stands where the language cannot
-    keep operations in order, without a bound and with one. `assumes`: what a bound rests on that the language
-    does not promise. `first`: lines before any comment. `home`: where weights are [interface.py].
-    More channels than `channels_per_result` go into several results; `indexes_results`: a variable may choose
-    a result's channel. A path kernel follows `lanes` paths at once; where that is more than one, a value has
-    a component for each, and `single` declares what is the same for all. `helpers`: functions that an
-    operation calls, by operation. `scene_number` reads a number of the scene that is an input; a language
-    without it takes no moving scene. `types` are those of values; `scalars` those of single numbers, where
-    values are vectors.
+    `exact`: lines that an exact kernel needs at its top. `unordered`: lines for a compiler that may reorder
+    operations, without a bound and with one. `assumes`: what a bound rests on that the language does not
+    promise. `first`: lines before any comment. `home`: where weights are [interface.py]. More channels than
+    `channels_per_result` go into several results; `indexes_results`: a variable may choose a result's
+    channel. A path kernel follows `lanes` paths at once; where that is more than one, a value has a component
+    for each, and `single` declares what is the same for all. `helpers`: functions that an operation calls, by
+    operation. `scene_number` reads a number of the scene that is an input; a language without it takes no
+    moving scene. `types` are those of values; `scalars` those of single numbers, where values are vectors.
     """
 
     target: str

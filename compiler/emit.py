@@ -186,7 +186,7 @@ class Body(Lines):
         self.group_of = {index: number for number, group in enumerate(self.groups) for index in group}
 
     def defines(self) -> list[str]:
-        """Return the lines that stand below the window's."""
+        """Return the lines below the window's."""
         return []
 
     def text(self) -> list[str]:
@@ -198,7 +198,7 @@ class Body(Lines):
         return self.lines
 
     def _prepare(self) -> None:
-        """Write what stands before the first value."""
+        """Write the lines before the first value."""
 
     # ---- groups ------------------------------------------------------------------------------------------
 
@@ -279,7 +279,7 @@ class Body(Lines):
         return self.dialect.expression(node, self.program.nodes[node.args[-1]].type.dtype, operands)
 
     def _fuses(self, index: int) -> bool:
-        """Return whether a value has no name, but stands in the only expression that reads it."""
+        """Return whether a value has no name: its text is part of the only expression that reads it."""
         return False
 
     def _outputs(self) -> None:
@@ -318,7 +318,7 @@ class Body(Lines):
     ) -> None:
         """Write the loops over images, rows of taps, taps and channels that set `value`.
 
-        `body` takes the index into the window; `before` and `after` write what stands around an image's row.
+        `body` takes the index into the window; `before` and `after` write the lines around an image's row.
         """
         dialect, names = self.dialect, self.sides
         row = f"{dialect.clamp}(y + dy - {names.row}, 0, height - 1)"

@@ -1,13 +1,13 @@
-"""What a training step does besides for a first layer of low rank: its factors' derivatives, their product.
+"""The extra work of a training step for a first layer of low rank: its factors' derivatives, their product.
 
 The step computes with the weights W = V H, and has their derivative dW, as refimpl/factored.py has it:
 
 1. `wamnet_vertical` adds up dW over the work items of the step, in their order, and gives dV = dW H^T.
 2. `wamnet_horizontal` gives dH = V^T dW. The second kernel of emit_step.py moves both factors with Adam, and
-   leaves W alone.
+   does not change W.
 3. `wamnet_expand` writes W = V H for the next step; nothing after a loss that is not finite.
 
-W lies input-major, so that its vectors hold neurons n: row (dy, k) for V's vectors (dy, r) and H's numbers
+W is input-major, so that its vectors hold neurons n: row (dy, k) for V's vectors (dy, r) and H's numbers
 (k, r). Each work item has sums of its own that no other touches, in one order: a device repeats its bits.
 """
 
@@ -19,11 +19,11 @@ from .step import Step
 from .step_layout import slots
 
 KERNELS = ("wamnet_vertical", "wamnet_horizontal", "wamnet_expand")
-"""The kernels' names, in the order in which they run; the update stands before the last one."""
+"""The kernels' names, in the order in which they run; the update runs before the last one."""
 
 
 def factor_defines(step: Step) -> Mapping[str, int]:
-    """Return where factors and their product lie, in vectors; nothing for a step that has none."""
+    """Return the offsets of factors and their product, in vectors; none for a step without factors."""
     if step.split is None:
         return {}
     places = slots(step)

@@ -193,7 +193,7 @@ class Statements:
         return Named(f"t{len(self.made) - 1}", self)
 
     def needed(self, outputs: list[str]) -> list[str]:
-        """Return the assignments on which outputs depend; a product that one sum reads stands in the sum."""
+        """Return the assignments on which outputs depend; a sum contains the products that only it reads."""
         wanted, kept, readers = set(outputs), [], Counter(outputs)
         for number, (_, operands) in reversed(list(enumerate(self.made))):
             if f"t{number}" in wanted:

@@ -57,7 +57,7 @@ ORDER = (
 
 
 class GroupDialect(Dialect):
-    """What a language says besides: its vectors of four, how to `wait` for the group, how a pixel is read.
+    """What a language adds: its vectors of four, how to `wait` for the group, how a pixel is read.
 
     `stored`: statements before and after those that store a pixel's numbers. `strided` opens a loop over a
     group's share of the tile, `largest_shared` is what a group may share, `first_weight` the name of the
@@ -95,7 +95,7 @@ class GroupDialect(Dialect):
         return f"{self.kind} {name} = {value};"
 
     def truth(self, name: str, value: str) -> str:
-        """Return the declaration of a truth value."""
+        """Return the declaration of a boolean."""
         return f"bool {name} = {value};"
 
     def function(self, name: str, read: Sequence[str], body: Sequence[str], result: str) -> list[str]:
@@ -222,7 +222,7 @@ class Grouped(Tiled):
         return self.pixels * max(sizes, default=0)
 
     def _statements(self, program: Program) -> int:
-        """Return the products of four that stand in straight code, over all pixels."""
+        """Return the number of products of four in straight code, over all pixels."""
         affine = [node for node in program.nodes if node.op == "affine"]
         rows = [
             max(image.channels for image in kernel_gather(program).images)
@@ -261,7 +261,7 @@ def _starts(gather: Gather) -> list[int]:
 
 @dataclass
 class GroupBody(InlinedBody):
-    """The statements of a grouped kernel; functions of elementwise groups stand before it."""
+    """The statements of a grouped kernel; functions of elementwise groups come before it."""
 
     grouped: Grouped = field(kw_only=True)
 

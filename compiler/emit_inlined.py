@@ -1,6 +1,6 @@
 """The inlined schedule: all loops unrolled, weights are constants of the source; values are `vec4`.
 
-1. Each number of a layer stands in a component of `vec4` variables; the last one is filled up with neurons
+1. Each number of a layer is a component of a `vec4` variable; the last one is filled up with neurons
    whose weights are 0, which nothing reads.
 2. An affine map multiplies constant matrices of four rows by what it reads: a tap's channels, or a `vec4`.
 3. A group of elementwise operations is a function on `vec4`, called for each of a layer's.
@@ -76,7 +76,7 @@ class Inlined(Schedule):
 
 @dataclass
 class InlinedBody(Body):
-    """The statements of an inlined kernel; functions of elementwise groups stand before it."""
+    """The statements of an inlined kernel; functions of elementwise groups come before it."""
 
     functions: list[str] = field(default_factory=list)
 

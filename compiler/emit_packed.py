@@ -1,6 +1,6 @@
 """The packed schedule: four weights a texel, loops over taps and numbers; values are arrays of `vec4`.
 
-1. Each number of a layer stands in a component of an array of `vec4`; the last one is filled up with neurons
+1. Each number of a layer is a component of an array of `vec4`; the last one is filled up with neurons
    whose weights are 0, which nothing reads.
 2. The weights are a texture of four floats a texel, `weights(i)`: a row of neurons for each input, one input
    after another, filled up as the values are [`Packed.pack`]. An affine map reads an input once, and adds a
@@ -67,7 +67,7 @@ class Packed(Schedule):
         return {WEIGHTS_A_TEXEL: 4}
 
     def layout(self, program: Program) -> Mapping[str, Slot]:
-        """Return where each weight lies, in floats; shapes are those that are stored."""
+        """Return the slot of each weight, in floats; shapes are those that are stored."""
         slots: dict[str, Slot] = {}
         offset = 0
         for name, array in weights.weights(program).items():

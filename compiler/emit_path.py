@@ -6,14 +6,13 @@
             arrive: the next surface; radiance of the paths that are alive
             depth 0: look, add the features of the first surface
             depth MAX_DEPTH: done
-            scatter: the path goes on; done when no path is alive
+            scatter: the path continues; done when no path is alive
         add the path's radiance
 
 1. Each program is a block of statements, one a node, on variables that have the names of its inputs
    [`_Kernel.block`]; its outputs are assigned at the block's end. A loop over the rows of tables is a loop
    on a counter that all paths share, so that a row is read once for all of them [`_Kernel._loop`].
-2. What is added up over the samples are planes, in groups [`GROUPS`]; a kernel writes the groups that it is
-   asked for.
+2. What is added up over the samples are planes, in groups [`GROUPS`]; a kernel writes the requested ones.
 3. A path that has ended is computed on with the others of its work item, and changes nothing: radiance is
    assigned where it is alive.
 """
@@ -124,7 +123,7 @@ class _Kernel(Lines):
     # ---- the skeleton ------------------------------------------------------------------------------------
 
     def _parts(self) -> Parts:
-        """Return what stands above the kernel's function."""
+        """Return what is above the kernel's function."""
         declared: dict[str, NDArray[np.generic]] = {}
         for (part, name), table in self.tables.items():
             declared[table] = self.programs.parts()[part].parameters[name]

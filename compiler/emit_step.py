@@ -1,11 +1,11 @@
 """From a training step to OpenCL C, scheduled for processors: matrix products in registers.
 
-1. A work item works alone on a part of the minibatch, TILE examples at a time. The value of a node for
+1. A work item works by itself on a part of the minibatch, TILE examples at a time. The value of a node for
    these examples is an array of vectors in memory of its own, `v<number>`; numbers are the program's.
 2. An affine map is done for EXAMPLES examples at once: every weight that is loaded meets all; the sums
-   stay in registers [`_affine`]. Windows are read where they lie, in the images.
+   stay in registers [`_affine`]. Windows are read from the images, without a copy.
 3. A sum over examples of left right^T is done for some inputs at once [`_product`]: its part for these stays
-   in registers while the examples go by. Sums go on from tile to tile; each work item has its own.
+   in registers while the examples go by. Sums continue from tile to tile; each work item has its own.
 4. Neighbouring elementwise nodes share a loop [`_elementwise`]. One operation on a value that is kept is
    computed again in each loop that reads it: an array would cost more.
 5. The second kernel adds up the work items' sums in their order, and applies Adam to whole vectors
@@ -137,7 +137,7 @@ class _Step(Lines):
         if self._again(index):
             return f"({self._expression(index, group)})"
         if index not in self.arrays:
-            raise CompileError(f"%{index}: the window is read by affine maps alone in a training kernel")
+            raise CompileError(f"%{index}: only affine maps may read the window in a training kernel")
         return f"v{index}[e * {self._vectors(index)} + j]"
 
     # ---- nodes -------------------------------------------------------------------------------------------
@@ -263,7 +263,7 @@ class _Step(Lines):
             self._close()
 
     def _registers(self, slot: Slot, block: range, inputs: int, source: str, before: str, left: int) -> None:
-        """Write the loop over the tile's examples for sums in registers; no source: of `left` alone."""
+        """Write the loop over the tile's examples for sums in registers; without a source, of `left`."""
         self._open("{")
         row = f"({before}) * {slot.vectors}" if before else "0"
         self._line(f"__global float16 *out = sums + {slot.offset} + {row};")

@@ -72,7 +72,7 @@ def refused_by_vectors(program: Program, dialect: Dialect) -> str:
 
 
 def _truth_between_loops(program: Program) -> str:
-    """Return which truth value another loop would have to read from an array, or nothing."""
+    """Return which boolean another loop would have to read from an array, or nothing."""
     group_of = {index: number for number, group in enumerate(schedule(program)) for index in group}
     for reader, node in enumerate(program.nodes):
         for index in node.args:
@@ -135,7 +135,7 @@ class Tiled(Schedule):
         return 4 * (patch + numbers)
 
     def layout(self, program: Program) -> Mapping[str, Slot]:
-        """Return where each weight lies."""
+        """Return the slot of each weight."""
         slots: dict[str, Slot] = {}
         offset = 0
         for name, array in weights.weights(program).items():

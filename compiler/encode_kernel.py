@@ -66,7 +66,7 @@ def compile_encode(
 ) -> EncodeArtifact:
     """Return the kernel that turns sums over samples into the encoded images of features.
 
-    `planes` are those that the sums have, in order; by default the features' own alone.
+    `planes` are those that the sums have, in order; by default only the features' own.
     """
     chosen, promised = target_named(target), profiles.unpinned(profile, "encodings of features")
     program = pipeline.run(lower_encode(features, normalization), promised.passes)
@@ -182,7 +182,7 @@ def _body(program: Program, dialect: Dialect, planes: Sequence[str], images: Seq
 def encode_source(
     features: Sequence[str], normalization: Normalization, dialect: Dialect, profile: str = "ieee"
 ) -> str:
-    """Return the statements alone, for a kernel that has the sums of these features in variables."""
+    """Return only the statements, for a kernel that has the sums of these features in variables."""
     program = pipeline.run(lower_encode(features, normalization), profiles.profile_named(profile).passes)
     known = [FEATURES[name] for name in features]
     images = [Image(f.name, f.channels, f.low, f.high, f.encoding(normalization)) for f in known]

@@ -29,7 +29,7 @@ PREAMBLE = f"""\
 #else
 {{unordered}}
 #endif"""
-"""First lines of a shader: `PRECISE` stands before temporaries, where the compiler knows it."""
+"""First lines of a shader. `PRECISE` qualifies temporaries: it is `precise` where the compiler knows that."""
 
 
 WEIGHT_TEXTURE = "uniform sampler2D weight_texture;"

@@ -1,8 +1,8 @@
 """Compute shaders whose images, weights, sums and results are storage buffers: GLSL 4.50 for Vulkan, 4.30.
 
 One invocation computes one pixel, in straight copies of the kernels for OpenCL: rows from the top, channels
-interleaved. Sizes stand in a uniform block. Translators make SPIR-V, HLSL and Metal from the first one
-(kernels/export/tools.py), so that its text uses numbers and arrays alone.
+interleaved. Sizes are in a uniform block. Translators make SPIR-V, HLSL and Metal from the first one
+(kernels/export/tools.py), so its text uses only numbers and arrays.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Declared(Buffers):
         return array.name, self.types["float32"]
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the function."""
+        """Return the lines above the function."""
         tables = [parts.top] if kernel.role == PATH else []
         above = {PATH: [self.depth(parts)], DENOISE: [parts.top]}.get(kernel.role, [])
         return [*above, *self.declared(kernel), *tables, ""]

@@ -1,6 +1,6 @@
 """GLSL 4.30 compute shaders for the grouped schedule [emit_group.py]: images stay textures, weights a buffer.
 
-The result is an image, the weights are a storage buffer of `vec4`: bindings stand in the source.
+The result is an image, the weights are a storage buffer of `vec4`: the source states the bindings.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """GLSL ES 3.00, fragment shaders as WebGL 2 and OpenGL ES 3.0 run them: denoiser, paths and encoding.
 
-They are those of GLSL 3.30 but for three things: the version stands in the first line, before any comment; a
-picture is drawn into at most four buffers at once; and there is no `precise`, so that a bound rests on a
-compiler that keeps the order of operations [`ASSUMES`].
+They are those of GLSL 3.30 with three exceptions. The version is in the first line, before any comment. A
+picture is drawn into at most four buffers at once. There is no `precise`, so a bound rests on a compiler that
+keeps the order of operations [`ASSUMES`].
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ precision highp float;
 precision highp int;
 precision highp sampler2D;
 #define PRECISE /* GLSL ES 3.00 has no `precise` */"""
-"""What stands in the place of the first lines of GLSL 3.30: numbers of 32 bits everywhere."""
+"""What replaces the first lines of GLSL 3.30: numbers of 32 bits everywhere."""
 
 ASSUMES = (
     "the compiler keeps the order of the operations of an expression, fused or not: the language has no word "
@@ -41,7 +41,7 @@ TEXTURES = "float textures to draw into need EXT_color_buffer_float in OpenGL ES
 
 
 def _with_textures(said: Mapping[str, str]) -> dict[str, str]:
-    """Return how kernels are called, with what callers must know besides."""
+    """Return how kernels are called, and what else callers must know."""
     return {role: f"{text}.\n{TEXTURES}" for role, text in said.items()}
 
 

@@ -44,4 +44,4 @@ class GLSLInlined(GLSL):
 
 
 GLSL_LADDER = (Inlined(GLSLInlined()),)
-"""The schedules for fragment shaders besides the plain one."""
+"""All schedules for fragment shaders except the plain one."""

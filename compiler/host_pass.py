@@ -124,7 +124,7 @@ STATEMENTS = _GodotPath()
 """The words of an encoding in every host: its statements need no order."""
 
 HOSTS = {"shadertoy": (_ShadertoyPath(), SHADERTOY_END), "godot": (_GodotPath(), GODOT_END)}
-"""By target: the words of a path, and what stands behind it."""
+"""By target: the dialect of a path, and the text after the path."""
 
 
 def feature_pass(

@@ -1,6 +1,6 @@
 """Metal Shading Language: kernels of one pixel a thread on device buffers, bound as those for Vulkan.
 
-Metal's compiler relaxes arithmetic unless it is told not to: `MTLCompileOptions.mathMode = .safe`, or
+Metal's compiler relaxes arithmetic unless an option forbids it: `MTLCompileOptions.mathMode = .safe`, or
 `fastMathEnabled = false` before macOS 15, or `-fno-fast-math` on its command line.
 """
 
@@ -86,7 +86,7 @@ class Metal(Buffers):
     }
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the function: the structure of the integers is a kernel's own."""
+        """Return the lines above the function: the structure of the integers is a kernel's own."""
         sizes = ["struct Size {", *(f"    {self.typed(name)};" for name in kernel.integers), "};", ""]
         if kernel.role == PATH:
             return [self.depth(parts), TOP, *sizes, parts.top]

@@ -1,6 +1,6 @@
 """OpenCL C 1.2: one work item a pixel; images, weights, sums and result are buffers of floats.
 
-Places in the planes of sums are of `size_t`: they may lie beyond 2^31. Rows of a launch are the global size,
+Indices into the planes of sums are of `size_t`: they may exceed 2^31. Rows of a launch are the global size,
 so that a path kernel is not given their number; an encoding reads planes of any stride.
 """
 
@@ -74,7 +74,7 @@ class OpenCL(Arguments):
         return super().array_argument(array)
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the function."""
+        """Return the lines above the function."""
         lanes = [f"#define LANES {self.lanes}"] if kernel.role == PATH else []
         return [*lanes, *super().top(kernel, parts)]
 

@@ -23,7 +23,7 @@ class OpenCLFourier(OpenCLTiled):
     said = {DENOISE: f"{ALIGNED}\nGlobal size: at least (ceil(width / {{columns}}), ceil(height / {{rows}}))"}
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the function."""
+        """Return the lines above the function."""
         return [self.macros, parts.top, PLACES]
 
     def guard(self, kernel: Interface) -> list[str]:

@@ -30,7 +30,7 @@ class OpenCLGroup(BufferGroup, OpenCLTiled):
         super().__init__(4)
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the function."""
+        """Return the lines above the function."""
         return [self.macros, parts.top]
 
 

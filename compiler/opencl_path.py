@@ -1,7 +1,7 @@
 """OpenCL C 1.2 for path kernels: several paths in a work item on CPUs, in vectors; one on GPUs.
 
-`min` and `max` are single instructions where `fmin` and `fmax`, which must treat NaN, are three. A truth
-value in a vector is an integer with all bits set, or none.
+`min` and `max` are single instructions where `fmin` and `fmax`, which must treat NaN, are three. A boolean
+in a vector is an integer with all bits set, or none.
 
 Vectors use operators in place of `min`, `max`, `fabs` and `floor`, with the same values
 [`VECTOR_OPERATIONS`]: PoCL's library may be compiled for another processor than the kernel, LLVM then inlines

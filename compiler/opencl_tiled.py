@@ -1,8 +1,8 @@
 """OpenCL C 1.2 for the tiled schedule [emit_tiled.py], and the ladder of schedules for processors.
 
-Operators stand in place of functions on vectors: PoCL's library may be compiled for another processor than
-the kernel, LLVM then inlines none of its functions, and each call saves all vector registers. `floor` is one
-instruction that no operator means; clang has a name for it, and other compilers get the function.
+Operators replace functions on vectors. PoCL's library may be compiled for another processor than the kernel:
+LLVM then inlines none of its functions, and each call saves all vector registers. `floor` is one instruction
+that no operator means; clang has a name for it, and other compilers get the function.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class OpenCLTiled(OpenCL, TiledDialect):
         }
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the function."""
+        """Return the lines above the function."""
         return [parts.top, self.macros]
 
     def weights_at(self, offset: int, index: str = "") -> str:
@@ -90,7 +90,7 @@ class OpenCLTiled(OpenCL, TiledDialect):
         return f"__global const vector *{name} = {self.weights_at(offset)}{first and f' + {first}'};"
 
     def walked(self, name: str, place: str, index: int) -> list[str]:
-        """Return the statements that declare a vector which lies `index` vectors after a place."""
+        """Return the statements that declare the vector `index` vectors after a place."""
         return [f"vector {name} = {place}[{index}];"]
 
     def advance(self, place: str, vectors: int) -> str:
@@ -133,4 +133,4 @@ OPENCL_LADDER = (
     _tiled("tile8", 8, 6, "the same for 16 registers of 8 numbers: 6 pixels, 12 vectors of sums"),
     _tiled("tile4", 4, 6, "the same for 16 registers of 4 numbers: 6 pixels, 12 vectors of sums"),
 )
-"""The schedules for processors besides the plain one; AVX-512, AVX2 and SSE or NEON have those registers."""
+"""All schedules for processors except the plain one; AVX-512, AVX2 and SSE or NEON have those registers."""

@@ -44,7 +44,7 @@ class Buffers(Dialect):
         return "\n".join([*self.top(kernel, parts), *self.head(kernel), *self.opening(kernel)])
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what stands above the function."""
+        """Return the lines above the function."""
         if kernel.role == PATH:
             return [self.depth(parts), parts.top]
         return [] if kernel.role == ENCODE else [parts.top]

@@ -101,7 +101,7 @@ class Schedule(ABC):
         return {}
 
     def layout(self, program: Program) -> Mapping[str, Slot]:
-        """Return where each weight lies."""
+        """Return the slot of each weight."""
         return weights.layout(program)
 
     def pack(self, program: Program) -> NDArray[np.float32]:

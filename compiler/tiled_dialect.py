@@ -1,4 +1,4 @@
-"""What a language says besides for register tiles [emit_tiled.py]: vectors, sums, weights, arrays of both.
+"""What a language adds for register tiles [emit_tiled.py]: vectors, sums, weights, arrays of both.
 
 A vector is `LANES` numbers; sums are `PIXELS` x `vectors` of them, `sum[p][j]`. `kind` is the type of a
 vector, `unroll` the line before a loop that must become straight code, so that its sums are registers.
@@ -21,7 +21,7 @@ OPERATIONS = (
 
 
 class TiledDialect(Dialect):
-    """The words of one language for tiles; what most of them share with C stands here."""
+    """The words of one language for tiles; what most of them share with C is here."""
 
     kind: str
     unroll: str = ""
@@ -38,7 +38,7 @@ class TiledDialect(Dialect):
         return f"{'' if written else 'const '}float *{name} = {place};"
 
     def flag(self, name: str, value: str) -> str:
-        """Return the declaration of one truth value."""
+        """Return the declaration of one boolean."""
         return f"bool {name} = {value};"
 
     def when(self, condition: str) -> str:
@@ -83,7 +83,7 @@ class TiledDialect(Dialect):
 
     @abstractmethod
     def walked(self, name: str, place: str, index: int) -> list[str]:
-        """Return the statements that declare a vector which lies `index` vectors after a place."""
+        """Return the statements that declare the vector `index` vectors after a place."""
 
     @abstractmethod
     def advance(self, place: str, vectors: int) -> str:

@@ -1,4 +1,4 @@
-"""Where weights are besides a target's usual place: a table in the source, or a uniform block.
+"""Other places for weights than a target's usual one: a table in the source, or a uniform block.
 
 A home is the dialect of a target that declares its weights elsewhere [`HOMES`; interface.py: TABLE, BLOCK].
 Fragment shaders of GLSL have constants as straight code instead [emit_inlined.py]; compute shaders have no
@@ -28,7 +28,7 @@ PLAIN_INDEX = "weights[{index}]"
 """A weight in a table, or in memory of numbers."""
 
 WHERE = {TABLE: "are in the source", BLOCK: "are a uniform block, or constant memory, of vectors of 4"}
-"""What callers are told."""
+"""What the text for callers says."""
 
 TABLES: tuple[type[Dialect], ...] = (Metal, CUDA, OpenCL, C, GodotDenoise)
 """Targets that can have a table."""

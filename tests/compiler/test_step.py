@@ -104,7 +104,7 @@ def test_wide_layers_are_done_in_blocks() -> None:
 
 def test_a_window_that_is_changed_first_has_no_schedule() -> None:
     w, b = np.ones((3, 12), np.float32), np.ones(3, np.float32)
-    with pytest.raises(CompileError, match="the window is read by affine maps"):
+    with pytest.raises(CompileError, match="only affine maps may read the window"):
         compile_lowered(step_of(lambda x: np.matmul(x * 2.0, w.T) + b, 12, 3, 1), 2)
 
 

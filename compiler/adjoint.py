@@ -75,7 +75,7 @@ def _maximum(operands: Sequence[Enclosure]) -> list[Near]:
 
 
 def sine_slope(a: Enclosure) -> Near:
-    """sin a' - sin a = 2 cos((a + a') / 2) sin(d / 2), d = a' - a; 2 sin(d / 2) is d but for d^3 / 24."""
+    """sin a' - sin a = 2 cos((a + a') / 2) sin(d / 2), d = a' - a; |2 sin(d / 2) - d| <= |d|^3 / 24."""
     quarter, half = np.pi / 2, a.read / 2
     cosine = _within(*sine_range(a.low - half + quarter, a.high + half + quarter))
     return Near(cosine.middle, cosine.radius + np.minimum(half**2 / 6, 2.0))

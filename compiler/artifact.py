@@ -82,7 +82,7 @@ class Artifact:
         return (self.before, self) if self.before else (self,)
 
     def contents(self) -> Mapping[str, bytes]:
-        """Return the files besides the manifest, by name."""
+        """Return all files except the manifest, by name."""
         own = {self.source_name: self.source.encode(), WEIGHTS_NAME: weight_bytes(self)}
         first = self.before.contents() if self.before else {}
         if self.certificate:
@@ -104,7 +104,7 @@ MANIFEST_NAME = "manifest.json"
 
 
 class OneSource:
-    """What artifacts of one file besides the manifest have in common."""
+    """What artifacts of a manifest and one more file have in common."""
 
     source: str
     source_name: str
@@ -116,7 +116,7 @@ class OneSource:
         return str(self.manifest["digest"])
 
     def contents(self) -> Mapping[str, bytes]:
-        """Return the files besides the manifest, by name."""
+        """Return all files except the manifest, by name."""
         return {self.source_name: self.source.encode()}
 
 
@@ -128,7 +128,7 @@ class Files(Protocol):
         """Return what the manifest says, as JSON's types."""
 
     def contents(self) -> Mapping[str, bytes]:
-        """Return the files besides the manifest, by name."""
+        """Return all files except the manifest, by name."""
 
 
 def weight_bytes(artifact: Artifact) -> bytes:

@@ -171,7 +171,7 @@ def _absolute(context: Context, operands: list[Enclosure]) -> Enclosure:
 def _minimum(context: Context, operands: list[Enclosure]) -> Enclosure:
     """Exact; the error of the operand that is chosen, and of both where either may be."""
     a, b = operands
-    # One that lies above the other by more than both errors is chosen nowhere.
+    # An operand above the other by more than both errors is never chosen.
     a_error = np.where(a.low - a.read > b.high + b.read, 0.0, a.error)
     b_error = np.where(b.low - b.read > a.high + a.read, 0.0, b.error)
     return Enclosure(np.minimum(a.low, b.low), np.minimum(a.high, b.high), np.maximum(a_error, b_error))
@@ -184,7 +184,7 @@ def _maximum(context: Context, operands: list[Enclosure]) -> Enclosure:
 
 
 def _floor(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """Exact on what it sees: off by the whole numbers between the reference's value and the kernel's."""
+    """Exact; the error counts the integers between the reference's operand and the kernel's."""
     (a,) = operands
     steps = np.floor(a.high + a.read) - np.floor(a.low - a.read)
     return Enclosure(np.floor(a.low), np.floor(a.high), np.minimum(steps, np.ceil(a.read)))
@@ -289,7 +289,7 @@ def _reciprocal(context: Context, operands: list[Enclosure]) -> Enclosure:
 
 
 def _decided(below: tuple[Any, Any], above: tuple[Any, Any]) -> Enclosure:
-    """Return a truth value from (sure for the reference, sure for the kernel) of True, and of False.
+    """Return a boolean from (sure for the reference, sure for the kernel) of True, and of False.
 
     It is 1 or 0; the error is 0 where both are sure to decide alike, else 1.
     """

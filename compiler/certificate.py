@@ -7,7 +7,7 @@
 3. Numbers are rounded up to `DIGITS` digits, as the checker rounds its own. One that is smaller than what the
    checker finds is refused; so none can be made smaller.
 4. The program's text, where each weight lies in the kernel's file, digests of both and of the source
-   [`certificate`]. Weights that the file does not hold stand in the certificate itself.
+   [`certificate`]. Weights that the file does not hold are in the certificate itself.
 
 checker.py repeats all of it from the text and the weights, with code of its own. Programs of another form,
 kernels in two passes and sines without a promise have no certificate [`prove`].
@@ -86,9 +86,9 @@ def _array(program: Program, layer: scaled.Layer, name: str) -> Array:
 def _layer(
     program: Program, layer: scaled.Layer, low: Array, high: Array, sine: SineContract, blocks: Sequence[Any]
 ) -> tuple[dict[str, Any], Array, tuple[Array, Array]]:
-    """Return the step of one layer for inputs (n,) in [low, high], what it adds to the errors (m,), and more.
+    """Return the step of one layer for inputs (n,) in [low, high], its part of the errors (m,), and a range.
 
-    That is between which numbers (m,) the arguments of its activation lie.
+    The range (m,) holds the arguments of the layer's activation.
     """
     weight, bias = _array(program, layer, "weight"), _array(program, layer, "bias")
     omega = abs(layer.scale)
@@ -131,7 +131,7 @@ def _is_sine(program: Program, layer: scaled.Layer) -> bool:
 def _activated(
     program: Program, layer: scaled.Layer, sine: SineContract, least: Array, most: Array
 ) -> tuple[Array, Array]:
-    """Return between which numbers (m,) a kernel's activations of arguments in [least, most] lie."""
+    """Return the range (m,) of a kernel's activations of arguments in [least, most]."""
     if layer.activation is None or _is_sine(program, layer):
         high = np.full(len(most), 1.0 + float(sine.error or 0.0) + FLUSH)
         return -high, high

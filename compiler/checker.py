@@ -5,10 +5,10 @@
 2. The text is that of a network of sines or rectifiers; anything else is refused [`_layers`].
 3. Each layer: magnitudes, rounding of sums in parts, the sine's error [`_layer`]; each output: how far each
    layer's errors reach, by norms that hold for the scalings in the certificate [`_output`].
-4. That a matrix has a norm of at most N is proven in whole numbers, by elimination [`norm_is_below`].
+4. Elimination in integers proves that a matrix has a norm of at most N [`norm_is_below`].
    All other numbers are sums of magnitudes in float64, widened by more than it rounds.
 
-It shares no code with what wrote the certificate but the promises of sines. Formulas: spec/certificate.md.
+It shares no code with what wrote the certificate except the promises of sines. Formulas: spec/certificate.md.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Refused(Exception):
 
 
 def check(path: Path) -> dict[str, Any]:
-    """Return a certificate whose every step holds; raise `Refused`, or `InputError` for what is none."""
+    """Return a certificate whose every step holds, else raise `Refused`; `InputError` for other files."""
     told = "it must be a whole certificate beside its kernel", "compile the model again"
     with refusing("certificate", str(path), *told), np.errstate(over="ignore", invalid="ignore"):
         held, manifest, text, arrays = _read(path)

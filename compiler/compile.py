@@ -59,7 +59,7 @@ def compile_program(
 def compile_plan(plan: Plan) -> Artifact:
     """Return the kernel of a plan, or both of a first layer that is cut to a rank.
 
-    A schedule that cannot hold the program gives way to another; the manifest says so.
+    Another schedule replaces one that cannot hold the program; the manifest says so.
     """
     found = _of_one_pass(plan, plan.bound) if plan.cut is None else _of_two_passes(plan, plan.cut)
     if plan.varied is None or not plan.varied.variant.steps:
@@ -84,7 +84,7 @@ def _of_two_passes(plan: Plan, cut: Cut) -> Artifact:
 
 
 def _report(plan: Plan, cut: Cut) -> Mapping[str, Any]:
-    """Return what a manifest says about a cut: its own error in the layer, and that of rounding alone."""
+    """Return what a manifest says about a cut: its own error in the layer, and that of rounding by itself."""
     weights = left(cut)
     low, high = bounds.window_box(kernel_gather(cut.whole))
     largest = np.maximum(np.abs(low), np.abs(high))
@@ -163,7 +163,7 @@ def _arguments(picked: Pick, channels: int) -> str:
 
 
 def _weight_lines(program: Program, schedule: Schedule) -> list[str]:
-    """Return the lines of the header that say where each parameter lies, wrapped."""
+    """Return the lines of the header that say where each parameter is, wrapped."""
     places = schedule.layout(program).values()
     slots = [f"{s.name} ({' x '.join(map(str, s.shape))}) at {s.offset}" for s in places]
     text = f"{', '.join(slots) or 'none'}; {schedule.order}"
@@ -241,7 +241,7 @@ def _window(gather: Gather) -> dict[str, Any]:
 
 
 def _info_value(name: str, text: str) -> Any:
-    """Return a text of a model's info, or what it holds where it is JSON: strangers write what they like."""
+    """Return a text of a model's info, or its value where it is JSON: an untrusted text may be anything."""
     with suppress(InputError):
         return parse_json(text, name, "train again") if name in JSON_INFO else text
     return text

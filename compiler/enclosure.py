@@ -1,4 +1,4 @@
-"""What is known of a value: where the reference's lies, how far the kernel's may be from it.
+"""What is known of a value: the range of the reference's, and the largest distance of the kernel's from it.
 
 float64, in which all of it is computed, rounds too: results are widened by more than that [`OUTWARD`,
 `RANGE_OUTWARD`].

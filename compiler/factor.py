@@ -4,7 +4,7 @@
    factors are rounded to float32 [`factor`].
 2. The first program maps a row of taps to R numbers, without a bias: an image of R channels, or several side
    by side where an image holds fewer [`between`]. The second one maps a column of taps of it to the layer's
-   neurons, and goes on as the given program does. Both border rules hold for each axis alone
+   neurons, and continues as the given program does. Both border rules hold for each axis by itself
    (spec/factored.md, FAC-2).
 3. The error of both together, against the given program, is that of its own values, the first affine map's
    being [`enclose`]
@@ -12,7 +12,7 @@
        |V (H x)' - W x| <= |V (H x)' - V H x| + |W - V H| |x|
 
    where ' is what the kernels compute: the rules of bounds.py for both passes, and the cut. From there on the
-   rules of bounds.py hold as they are. Without the last term it is the error of rounding alone, against the
+   rules of bounds.py hold as they are. Without the last term it is the error of rounding only, against the
    network whose weights are the product V H.
 
 `x` is a box that holds all windows, or the windows of one picture [`over_images`, `at_images`].
@@ -183,7 +183,7 @@ def at_images(
 
 
 def _layer(program: Program) -> int:
-    """Return the index of the affine map that alone reads the window, or refuse the program."""
+    """Return the index of the affine map that is the window's only reader, or refuse the program."""
     inputs = {index for index, node in enumerate(program.nodes) if node.op == "input"}
     readers = [index for index, node in enumerate(program.nodes) if inputs & set(node.args)]
     names = [node["weight"] for node in program.nodes if node.op == "affine"]

@@ -245,7 +245,7 @@ def enclose(
 ) -> list[Enclosure]:
     """Return the enclosure of every node, the sums over the window being computed from spectra.
 
-    `x`: the windows' box (low, high); `norm`: largest norm of the tile in which a window lies; `plan`: points
+    `x`: the windows' box (low, high); `norm`: largest norm of the tile that holds a window; `plan`: points
     and lanes.
     """
     index = next(i for i, node in enumerate(program.nodes) if _reads_window(program, i))
@@ -275,14 +275,14 @@ def largest_norm(gather: Gather, points: int) -> Array:
 
 
 def tile_norms(image: Array, window: dataset.Window, points: int) -> Array:
-    """Return the norm (H, W) of the tile in which each pixel of an image (H, W, C) lies."""
+    """Return the norm (H, W) of the tile that holds each pixel of an image (H, W, C)."""
     squares = (image**2).sum(axis=2)
     found: Array = np.sqrt(_over_tiles(_over_tiles(squares, window, points).T, window, points).T)
     return found
 
 
 def _over_tiles(squares: Array, window: dataset.Window, points: int) -> Array:
-    """Return the sums (n, m) over the rows of the tile in which each row of (n, m) lies."""
+    """Return the sums (n, m) over the rows of the tile that holds each row of (n, m)."""
     count, out = len(squares), points - window.size + 1
     first = np.arange(count) // out * out - window.size // 2
     rows = first[:, None] + np.arange(points)

@@ -76,7 +76,7 @@ class Interface:
 
     @property
     def place(self) -> tuple[str, str]:
-        """Return the names of an item's column and row: a path's are numbers of lanes besides."""
+        """Return the names of an item's column and row; a path's `x` and `y` are those of each lane."""
         return ("column", "row") if self.role == PATH else ("x", "y")
 
     @property

@@ -2,7 +2,7 @@
 
 Lanes are leading axes: an input of type float32[n] is an array (..., n), a number an array (...). With
 dtype=float64, in which floats are then computed, this is the reference that error bounds speak about; with
-float32 it is one more executor. Integers and truth values are the same in both.
+float32 it is one more executor. Integers and booleans are the same in both.
 
 An exact program has one order of operations [`_in_order`]: affine maps add to the bias one rounded product
 after another, in the order of the operand's numbers, or image by image where the operand is the window.

@@ -1,10 +1,10 @@
 """The intermediate representation: a program of one pixel, as a list of named operations.
 
-1. A value is the result of one node; nodes stand in the order of evaluation and name their operands by
+1. A value is the result of one node; nodes are in the order of evaluation and name their operands by
    index, so each value is assigned once [`Node`, `Program`].
 2. A value has a type: a number, or a short vector of numbers [`Type`]. Leading lanes (pixels, paths) are not
-   part of the program; every operation works on each lane alone.
-3. Weights and tables stand beside the nodes under names [`Program.parameters`]; floats are float32 exactly.
+   part of the program; every operation works on each lane by itself.
+3. Weights and tables are beside the nodes, by name [`Program.parameters`]; floats are float32 exactly.
 4. How a kernel fills the input named `window` from images is data of the program, not nodes [`Gather`].
    So is the promise to give the same bits everywhere [`Program.exact`].
 5. Programs are built by value numbering: asking twice for the same operation gives the same value
@@ -59,8 +59,8 @@ Attribute = str | int | float | Type
 class Node:
     """One operation: `args` are indices of earlier nodes, `attributes` are sorted by name.
 
-    `places` are the lines of the reference that asked for it, callers first: for listings alone, no part of
-    what the node is.
+    `places` are the lines of the reference that made it, callers first. Only listings read them: they
+    do not count when nodes are compared.
     """
 
     op: str

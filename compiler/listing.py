@@ -1,7 +1,7 @@
 """A kernel's lines beside the lines of the reference that they came from.
 
-1. A program that was traced with `keep_places` knows for each node the lines of the reference that asked for
-   it [`ir.Node.places`]; passes hand them on to what they put in a node's place.
+1. A program that was traced with `keep_places` knows for each node the lines of the reference that made it
+   [`ir.Node.places`]; passes copy them to what they put in a node's place.
 2. A kernel of the plain schedule names the nodes in its text: `t12 = ` and `v12` belong to node 12, and so
    does what follows the comment `%12: ...` [emit.py]; a path kernel has a block for each of its programs,
    with the comment `arrive: ...` at its head [emit_path.py].

@@ -9,9 +9,8 @@ A loop number l over the rows of constant tables is made of three kinds of nodes
 
 The body is what depends on a carried number or a row [`bodies`]. What does not is computed once, before the
 loop, wherever it was written: nothing has to be hoisted, and passes that copy node by node need not know of
-loops. Those that execute or print a program walk through it and meet each loop where its first result stands
-[`loops`]. Loops do not nest, and a body's values are seen from outside as results alone; the verifier sees to
-both.
+loops. Those that execute or print a program walk through it and meet each loop at its first result
+[`loops`]. Loops do not nest, and only a loop's results are read outside its body: the verifier checks both.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """From features to the program that encodes a pixel: trace the reference's own encodings [`lower_encode`].
 
-It stands between a path kernel, which leaves sums over the samples, plane by plane, and a denoiser's kernel,
-which reads encoded feature images. Its inputs are the planes by name, and `samples`; its outputs the channels
+It connects a path kernel, which leaves sums over the samples, plane by plane, to a denoiser's kernel, which
+reads encoded feature images. Its inputs are the planes by name, and `samples`; its outputs the channels
 of the images, `color_0` and so on.
 """
 

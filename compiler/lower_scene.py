@@ -5,7 +5,7 @@ A path is four pure functions of the reference, each a program; a kernel's skele
 1. `start`: pixel and counters -> the path at the camera (refimpl/render.py).
 2. `arrive`: path -> its next surface and the radiance gathered so far (refimpl/transport.py).
 3. `look`: the first surface -> the feature layers (refimpl/render.py).
-4. `scatter`: path, surface, depth and counters -> the path that goes on, and whether it does.
+4. `scatter`: path, surface, depth and counters -> the path after it, and whether it continues.
 
 Values between them have names [`PATH`, `SURFACE`, `COUNTERS`]: a vector is three numbers, `origin_x` and so
 on. The scene is constants by then: what it lacks (a kind of primitive, a second light, a rotation) is in no
@@ -78,7 +78,7 @@ PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "elimina
 
 @dataclass(frozen=True)
 class PathPrograms:
-    """The programs of one path in one scene; `alive`, `scatter`'s truth value, says whether it goes on.
+    """The programs of one path in one scene; `alive`, `scatter`'s boolean, says whether it continues.
 
     `inputs` are the names of the scene's numbers that all four are given [scene_inputs.py].
     """
@@ -108,7 +108,7 @@ def lower_scene(
     """Return the programs of a path through a scene, in float32.
 
     The primitives of a scene that has more than `most_unrolled` of them are tables and loops, else statements
-    for each; None unrolls any scene. What stands alone in its table is no loop. `keep_places`: nodes know
+    for each; None unrolls any scene. A table of one row needs no loop. `keep_places`: nodes know
     the lines of the reference that they came from, for listings. The numbers that are `moving` are inputs,
     not constants.
     """

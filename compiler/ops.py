@@ -58,7 +58,7 @@ def _declared(args: Sequence[Type], attributes: Mapping[str, Attribute], paramet
 
 
 def _constant(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
-    """A constant is one finite float, or by its `dtype` an integer in its range or a truth value."""
+    """A constant is one finite float, or by its `dtype` an integer in its range or a boolean."""
     value, dtype = attributes["value"], str(attributes.get("dtype", "float32"))
     if dtype in ("int32", "uint32"):
         info = np.iinfo(dtype)
@@ -114,13 +114,13 @@ def _elementwise(kinds: Sequence[str]) -> TypeRule:
 
 
 def _comparison(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
-    """Equal kinds of numbers give truth values."""
+    """Equal kinds of numbers give booleans."""
     _same(args, NUMBERS)
     return Type("bool", _shape(args))
 
 
 def _select(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
-    """A truth value chooses between two values of one kind."""
+    """A boolean chooses between two values of one kind."""
     _same(args[:1], ("bool",))
     return Type(_same(args[1:], DTYPES), _shape(args))
 
@@ -291,4 +291,4 @@ LOOPS = ("carried", "row", "loop")
 """The operations that make up a loop over the rows of tables (loops.py)."""
 
 ELEMENTWISE = tuple(op for op in OPS.values() if op.elementwise)
-"""The operations that work on each component alone."""
+"""The operations that work on each component by itself."""

@@ -166,14 +166,14 @@ class Plan:
 
     @property
     def reference(self) -> Program:
-        """Return what a kernel computes but for rounding; a cut has the factors' product for weights."""
+        """Return what a kernel computes up to rounding; a cut has the factors' product for weights."""
         return replace(product(self.cut) if self.cut else self.analysed, exact=False)
 
     def expected(self, images: Images) -> Expected:
         """Return what a kernel may write for images (H, W, C); any number where a sine promises nothing.
 
-        With a cut the reference is the network that has the factors' product for weights: what is bounded is
-        rounding alone.
+        With a cut the reference is the network that has the factors' product for weights: only rounding is
+        bounded.
         """
         height, width = next(iter(images.values())).shape[:2]
         gather = kernel_gather(self.analysed)

@@ -2,7 +2,7 @@
 
 1. Rounding: the relative error of each class of operations that targets may make [`RELATIVE_ERROR`].
 2. Sine: an absolute error on a domain, or no promise [`SineContract`]. Profile `ieee` emits its own sine;
-   `native` calls the target's, whose promise stands in the target's dialect [`sine_contract`].
+   `native` calls the target's, whose promise is in the target's dialect [`sine_contract`].
 3. The passes that bounds see after the common ones, and those that turn the program into the one that is
    emitted [`Profile`].
 4. Profile `ieee` has its sine in other degrees too, under names of their own: a trade of speed for error
@@ -41,7 +41,7 @@ RELATIVE_ERROR: Mapping[Rounding, float] = {
 """Largest relative error by class, over all targets; an ulp is at most 2 u |result|."""
 
 LOG2_RELATIVE = 3.0 * 2 * UNIT_ROUNDOFF
-"""Relative error of log2: 3 ulp; GLSL promises that outside [1/2, 2] alone."""
+"""Relative error of log2: 3 ulp; GLSL promises that only outside [1/2, 2]."""
 
 LOG2_ABSOLUTE = 2.0**-21
 """Absolute error of GLSL's log2 inside [1/2, 2]."""
@@ -99,7 +99,7 @@ EXPAND_SINE = "expand_sine"
 """The pass that emits the sine of the degree in use; that of another degree has its number behind it."""
 
 DEGREE_WORD = "-sine"
-"""What stands between a profile's name and the degree of its sine, where that is not the one in use."""
+"""What joins a profile's name and the degree of its sine, where that is not the one in use."""
 
 EXACT_SINE = SineContract(
     f"{EMITTED_SINE.text}, 0 where the reduced argument is below {LEAST:g}",

@@ -6,9 +6,9 @@
    monotone, so the ends of a sum, rounded, are the ends of the rounded sums, and what is computed exactly
    stays a point [`_nearest`]. Functions that the target only approximates widen the ends by their promise.
 3. A decision is certain where the ranges of what is compared do not overlap; else it is *undecided*: false
-   and true, and a selection by it has a range that holds both branches [`_compare`, `_select`]. Truth values
-   are ordered, false before true, which makes "and" and "or" Kleene's three-valued ones.
-4. Beside its range a value knows whether an undecided decision has a say in it [`Range.sure`]: a box behind
+   and true, and a selection by it has a range that holds both branches [`_compare`, `_select`]. Booleans are
+   ordered, false before true, which makes "and" and "or" Kleene's three-valued ones.
+4. Beside its range a value knows whether an undecided decision affects it [`Range.sure`]: a box behind
    the nearest surface may be undecided, and the distance is sure all the same.
 5. Beside it goes the float32 reference's own value (`plain`). Evaluated `guided`, decisions that are
    undecided fall as the reference's, which gives the range of the executors that decide as it does.
@@ -79,7 +79,7 @@ PROMISED = Arithmetic(
     EMITTED_SINE,
     EMITTED_COSINE,
 )
-"""Profile `ieee` (profiles.py): what every target is held to, in the order that the program has."""
+"""Profile `ieee` (profiles.py): what every target is checked against, in the order that the program has."""
 
 CORRECT = Arithmetic(
     "every operation correctly rounded, nothing fused", None, None, False, EMITTED_SINE, EMITTED_COSINE
@@ -89,9 +89,9 @@ CORRECT = Arithmetic(
 
 @dataclass(frozen=True)
 class Range:
-    """Ranges over lanes (...): ends in float64, integers and truth values in their own kind.
+    """Ranges over lanes (...): ends in float64, integers and booleans in their own kind.
 
-    `plain` (...) is the float32 reference's value. `sure` (...) says that no undecided decision has a say.
+    `plain` (...) is the float32 reference's value. `sure` (...) says that no undecided decision affects it.
     `product` holds the ends before rounding where the value is a product.
     """
 
@@ -264,7 +264,7 @@ def _all_sure(operands: list[Range]) -> Any:
 
 
 def _decided(context: Context, low: Any, high: Any, sure: Any) -> Range:
-    """Return the range of a whole number or truth value; guided, an undecided one is the reference's."""
+    """Return the range of an integer or boolean; guided, an undecided one is the reference's."""
     point = low == high
     if context.guided:
         low, high = np.where(point, low, context.plain), np.where(point, high, context.plain)
@@ -421,14 +421,14 @@ def _absolute(context: Context, operands: list[Range]) -> Range:
 
 
 def _minimum(context: Context, operands: list[Range]) -> Range:
-    """Exact; only one that may be the least has a say."""
+    """Exact; only an operand that may be the least affects the result."""
     a, b = operands
     sure = (a.sure & (b.sure | (a.high <= b.low))) | (b.sure & (b.high <= a.low))
     return _chosen(context, operands, np.minimum(a.low, b.low), np.minimum(a.high, b.high), sure)
 
 
 def _maximum(context: Context, operands: list[Range]) -> Range:
-    """Exact; only one that may be the largest has a say."""
+    """Exact; only an operand that may be the largest affects the result."""
     a, b = operands
     sure = (a.sure & (b.sure | (a.low >= b.high))) | (b.sure & (b.low >= a.high))
     return _chosen(context, operands, np.maximum(a.low, b.low), np.maximum(a.high, b.high), sure)
@@ -443,7 +443,7 @@ def _chosen(context: Context, operands: list[Range], low: Any, high: Any, sure: 
 
 
 def _floor(context: Context, operands: list[Range]) -> Range:
-    """Monotone; two whole numbers in the range are a decision."""
+    """Monotone; two integers in the range are a decision."""
     (a,) = operands
     low, high = np.floor(a.low), np.floor(a.high)
     return _decided(context, low, high, a.sure & (low == high))

@@ -105,7 +105,7 @@ def argument_of(program: Program, found: Sequence[Enclosure], index: int) -> int
 
 
 def output_error(program: Program, found: Sequence[Enclosure], output: int) -> Array | None:
-    """Return the bound (n,) of a network's output; None where the program is none, or at given inputs."""
+    """Return the bound (n,) of a network's output; None for other programs, or at given inputs."""
     layers = network(program, found, output)
     if len(layers) < 2 or any(np.ndim(found[layer.affine].error) != 1 for layer in layers):
         return None

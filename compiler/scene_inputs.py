@@ -5,7 +5,7 @@ some of their numbers are inputs:
 
 1. Scenes that differ in what shall move are laid out as worlds; what they have in common stays constant, each
    number that differs between any two of them becomes an input [`varying`]. Numbers that are equal in all the
-   scenes share one (a light's radiance stands in two tables).
+   scenes share one (a light's radiance is in two tables).
 2. [`SceneInputs.opened`] puts traced inputs into their places before a program is traced.
 3. [`SceneInputs.values`] reads the numbers of a scene: in float64 computed, rounded once, as constants are.
 4. [`bind`] makes programs of constants from programs with inputs: by definition they are those of the scene
@@ -79,14 +79,14 @@ def lay_out(scene: Scene, settings: Settings) -> dict[str, Any]:
 
 
 def varying(scenes: Sequence[Scene], settings: Settings) -> SceneInputs:
-    """Return the inputs that scenes need which differ in numbers alone."""
+    """Return the inputs of scenes that differ only in numbers."""
     rows = [dict(_tables(lay_out(scene, settings))) for scene in scenes]
     facts = [[(path, *_kept(table)) for path, table in row.items()] for row in rows]
     for scene, fact in zip(scenes, facts, strict=True):
         if fact != facts[0]:
             raise CompileError(
                 f"scene {scene.name}: it is laid out in another way at some of the times or colours that one "
-                "kernel is to show, so that numbers alone do not make one from the other; leave these out"
+                "kernel is to show: a kernel takes other numbers, not another layout; leave these out"
             )
     columns: dict[bytes, list[tuple[str, int]]] = {}
     for path, table in rows[0].items():
@@ -100,13 +100,13 @@ def varying(scenes: Sequence[Scene], settings: Settings) -> SceneInputs:
 
 
 def bind(programs: PathPrograms, values: Mapping[str, float]) -> PathPrograms:
-    """Return the programs with constants in the place of the inputs that have values."""
+    """Return the programs with constants instead of the inputs that have values."""
     parts: dict[str, Any] = {name: _bound(part, values) for name, part in programs.parts().items()}
     return replace(programs, inputs=(), **parts)
 
 
 def _bound(program: Program, values: Mapping[str, float]) -> Program:
-    """Return one program with constants in the place of inputs."""
+    """Return one program with constants instead of inputs."""
 
     def rule(builder: Builder, node: Node, args: tuple[int, ...]) -> int | None:
         if node.op != "input" or node["name"] not in values:

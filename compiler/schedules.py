@@ -52,7 +52,7 @@ class Schedule(ABC):
     """One way to order a kernel's work; `idea` is the sentence that sets this rung apart from the last.
 
     `arguments` says how to call the kernel, `pixels` how many neighbours of a row a work item computes,
-    `order` how a matrix lies among the weights; `language` and `suffix` are set where they are its own;
+    `order` how a matrix is stored among the weights; `language` and `suffix` are set where they are its own;
     `instead` names the schedule of programs that it refuses.
     """
 
@@ -93,11 +93,11 @@ class Schedule(ABC):
         """Return the bytes of the arrays that a work item declares."""
 
     def called(self) -> Mapping[str, str]:
-        """Return the numbers that the text about its arguments has besides, by name."""
+        """Return the further numbers of the text about its arguments, by name."""
         return {}
 
     def details(self, program: Program) -> Mapping[str, Any]:
-        """Return what a caller must know besides, for the manifest."""
+        """Return what else a caller must know, for the manifest."""
         return {}
 
     def layout(self, program: Program) -> Mapping[str, Slot]:
@@ -146,7 +146,7 @@ class Printed(Schedule):
 
 @dataclass(frozen=True)
 class Pick:
-    """The schedule of a kernel, and why it is not the one that was asked for, if so."""
+    """The schedule of a kernel, and the reason if it is not the requested one."""
 
     schedule: Schedule
     asked: str

@@ -132,7 +132,7 @@ POLYNOMIALS: Mapping[int, Polynomial] = {
 """Polynomials by degree; the errors are the script's, rounded up."""
 
 DEGREE = 11
-"""The degree in use unless another is asked for: its approximation error is far below one rounding."""
+"""The degree in use unless another is requested: its approximation error is far below one rounding."""
 
 
 def sine(x: Any, degree: int = DEGREE) -> Any:
@@ -145,7 +145,7 @@ def sine(x: Any, degree: int = DEGREE) -> Any:
 def exact_sine(x: Any) -> Any:
     """Return sin(x) as `sine` does, 0 where the reduced argument is below LEAST; may be traced.
 
-    For x in [-DOMAIN, DOMAIN] alone: exact programs are refused where an argument may be another.
+    Only for x in [-DOMAIN, DOMAIN]: exact programs are refused where an argument may be outside.
     """
     k = np.floor(x * INVERSE_PI + 0.5)
     r = reduce(x, k)

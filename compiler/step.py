@@ -4,8 +4,8 @@
    [`Step`]. It is a program like any other: verified, interpreted, bounded, rewritten by passes.
 2. What the examples give is added up: for each sum the outer products of two outputs, or one output
    [`Sum`, `sums`].
-3. Weights change from step to step: they are given anew [`with_parameters`]. A matrix that is also used
-   transposed stands there twice, the second time under its name and [`TRANSPOSED`].
+3. Weights change from step to step: each step gets its own [`with_parameters`]. A matrix that is also
+   used transposed is there twice, the second time under its name and [`TRANSPOSED`].
 4. The error of a sum follows from the enclosures of what is added, for every order of summation
    [`sum_errors`].
 5. Where the first layer has low rank, its factors move in place of its matrix [`Split`]; the error of their

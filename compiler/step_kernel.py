@@ -5,7 +5,7 @@
 
 Profile `ieee`: any order of summation, fused multiply-add, emitted sine. What the derivatives of one step may
 be off is computed at given examples [`step.sum_errors`]. There is no bound for all weights that training may
-reach: sine and cosine are proven up to their domains alone, and beyond them the result means nothing.
+reach: sine and cosine are proven only up to their domains, and beyond them the result means nothing.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ FIRST = "W0"
 class StepKernel:
     """All kernels; `step` is the analysed one, `adam` the program of one number.
 
-    `places` says where parameters lie, `copies` where transposed matrices do; `scratch_vectors` is the memory
-    of a work item.
+    `places` are the slots of parameters, `copies` those of transposed matrices; `scratch_vectors` is the
+    memory of a work item.
     """
 
     source: str

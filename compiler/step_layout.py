@@ -1,9 +1,9 @@
-"""Where the numbers of a training kernel lie: whole vectors of 16, so that a processor reads them at once.
+"""The layout of a training kernel's numbers: whole vectors of 16, so that a processor reads them at once.
 
 1. A matrix is stored input-major, (D_in, D_out), as denoisers store it (weights.py); its rows are filled up
    with zeros to whole vectors. A vector is a matrix of one row [`Slot`].
 2. All trained parameters follow one another; moments and sums are laid out alike [`slots`]. A matrix whose
-   factors are trained stands there too: without moments, and its sums are what the factors' are made of.
+   factors are trained is among them: it has no moments, and the factors' sums are made from its sums.
    Transposed matrices are kept beside them in an order of their own [`transposed_slots`].
 3. Zeros that fill up stay zeros: sums write zeros there, and Adam leaves what has no gradient (ADM-4).
 """

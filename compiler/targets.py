@@ -73,7 +73,7 @@ class Target:
 
 
 def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
-    """Return the target whose source a dialect makes, with its schedules besides the plain one."""
+    """Return the target whose source a dialect makes; `ladder` are its schedules after the plain one."""
     return Target(
         dialect.target,
         dialect.language,

@@ -37,7 +37,7 @@ _UFUNCS: Mapping[Any, str] = {
     np.bitwise_or: "logical_or",
     np.invert: "logical_not",
 }
-"""NumPy's ufuncs that are operations; `|` and `~` are those of truth values, `&` also that of words."""
+"""NumPy's ufuncs that are operations; `|` and `~` are those of booleans, `&` also that of words."""
 
 TRACEABLE = (
     *(f"np.{name}" for name in dict.fromkeys(_UFUNCS.values())),

@@ -9,7 +9,7 @@
    denoised as before.
 4. Each varied network is also one of the full network's shape, with zeros where something is left out
    [`Varied.inside`]. With D = W' - W and d = b' - b a layer's sums move, for inputs in a box with the middle
-   c and the radius r, by at most |D c + d| + |D| r, besides what its inputs' own move passes on through |W'|
+   c and the radius r, by at most |D c + d| + |D| r, plus what the move of its inputs passes on through |W'|
    [`enclose`]. The rules of bounds.py carry that to the output, and add what rounding does.
 
 The bound speaks of all images. Taps that are left out may hold anything: it says little for cuts (a picture
@@ -46,7 +46,7 @@ FULL = "full"
 """Name of the network as it was trained."""
 
 PLUS = "+"
-"""What stands between two approximations of a name."""
+"""What joins two approximations in a name."""
 
 EXAMPLE = "window8+rank12"
 """A variant, for messages."""
@@ -146,7 +146,7 @@ def narrow_window(varied: Varied, size: int) -> Varied:
     grid = np.arange(len(varied.kept[0])).reshape(before, before, -1)
     left = grid[first : first + size, first : first + size].ravel()
     channels = len(varied.kept[0]) // taps
-    # Each channel's taps are told apart by their place in the window vector alone.
+    # The taps of a channel differ only by their place in the window vector.
     return replace(_spread(varied, left, channels), window=replace(varied.window, size=size))
 
 

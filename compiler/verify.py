@@ -137,7 +137,7 @@ def tables_are_as_long_as_loops(program: Program) -> Iterator[str]:
 
 
 def loops_are_closed(program: Program) -> Iterator[str]:
-    """What a loop's body computes is seen outside as the loop's results alone, and loops do not nest."""
+    """Only a loop's results are read outside its body, and loops do not nest."""
     inside = bodies(program)
     for index, node in enumerate(program.nodes):
         if len(inside[index]) > 1 or (inside[index] and node.op == "loop"):

@@ -18,7 +18,7 @@ from .ir import Program
 
 @dataclass(frozen=True)
 class Slot:
-    """Where a parameter lies: `shape` as it is stored, `offset` in floats."""
+    """Where a parameter is: `shape` as it is stored, `offset` in floats."""
 
     name: str
     shape: tuple[int, ...]
@@ -26,7 +26,7 @@ class Slot:
 
 
 def weights(program: Program) -> Mapping[str, NDArray[Any]]:
-    """Return the parameters that are weights; the others are tables, which stand in the source."""
+    """Return the parameters that are weights; the others are tables, which are in the source."""
     found = tables(program)
     return {name: array for name, array in program.parameters.items() if name not in found}
 

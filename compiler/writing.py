@@ -5,13 +5,13 @@
    the output's name in one step; a link of that name is replaced, not followed [`replacing`].
 2. Folders that are made for an output go again if the work fails before anything is in them
    [`making_parents`].
-3. What is removed is a regular file of a name that this project gives; a link is none [`is_regular`],
+3. Only a regular file of a name that this project gives is removed, never a link [`is_regular`],
    [`remove_temporaries`].
 
 4. What must not be torn apart lets SIGINT and SIGTERM wait: locks, and imports of modules in C, some of which
    end the process if an interrupt reaches them [`signals_wait`].
 
-Errors are the system's (OSError): who calls knows what the user asked for.
+Errors are the system's (OSError): the caller knows what the user requested.
 """
 
 from __future__ import annotations

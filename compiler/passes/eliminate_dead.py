@@ -9,7 +9,7 @@ from ..ops import OPS
 
 
 def eliminate_dead(program: Program) -> Program:
-    """Return the program with the nodes and parameters alone that its outputs depend on."""
+    """Return the program with only the nodes and parameters that its outputs depend on."""
     live = {index for _, index in program.outputs}
     for index in reversed(range(len(program.nodes))):
         if index in live:

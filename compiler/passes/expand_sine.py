@@ -1,4 +1,4 @@
-"""Put the emitted sine and cosine (sine.py) in the place of the target's, by tracing them.
+"""Replace the target's sine and cosine with the emitted ones (sine.py), by tracing these.
 
 An exact program gets the sine in which no number is denormal.
 """

@@ -1,4 +1,4 @@
-"""Put selections in the place of look-ups in tables of few different stretches.
+"""Replace look-ups in tables of few different stretches with selections.
 
 The surfaces of a scene are numbered kind by kind, so most tables repeat one entry over long stretches: no
 surface but the lights emits. Such a table is a chain of selections, whose comparisons all tables share; lanes

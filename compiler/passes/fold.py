@@ -32,10 +32,10 @@ NEUTRAL: Mapping[str, tuple[float, bool]] = {
     "logical_and": (True, True),
     "logical_or": (False, True),
 }
-"""The right operand that changes nothing, and whether it may stand on the left too."""
+"""The right operand that changes nothing, and whether it may be the left one too."""
 
 DECISIVE: Mapping[str, bool] = {"logical_and": False, "logical_or": True}
-"""The operand that alone decides the result."""
+"""The operand that decides the result, whatever the other one is."""
 
 
 def fold(program: Program) -> Program:
@@ -117,7 +117,7 @@ def _decided(builder: Builder, node: Node, args: tuple[int, ...], constants: Kno
 
 
 def _selected(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
-    """Return the value that is always chosen; between truth values, what the choice amounts to."""
+    """Return the value that is always chosen; between booleans, what the choice amounts to."""
     if node.op != "select":
         return None
     condition, a, b = args

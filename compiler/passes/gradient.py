@@ -4,8 +4,8 @@
    value: the output's is given, those of operands follow by the chain rule. Slopes of a value with several
    readers add up. Values that depend on no parameter need none.
 2. In one lane an affine map y = W x + b with slope dy gives dx = W^T dy, one more affine map, dW = dy x^T and
-   db = dy. The derivative of a loss over many lanes is their sum [`step.Sum`], which is no node: a program
-   works on each lane alone. So the program gets dy and x as outputs, and the sum stands beside it.
+   db = dy. The derivative of a loss over many lanes is their sum [`step.Sum`], which is not a node: a program
+   works on each lane by itself. So the program gets dy and x as outputs, and the sum is kept beside it.
 
 Source: the chain rule in reverse order, as in Griewank and Walther, "Evaluating Derivatives", 2008, section
 3.2. tests/compiler/passes/test_gradient.py compares it with the backward pass written by hand in

@@ -1,0 +1,59 @@
+"""How a schedule is added: a class that names no language, and a line for each target that has it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from wamnet.compiler import targets, weights
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.emit import Body, emit, kernel_gather
+from wamnet.compiler.schedules import Plain
+
+
+@dataclass
+class BackwardsBody(Body):
+    """The plain statements; weights are counted from the last one."""
+
+    last: int = field(kw_only=True)
+
+    def _weight(self, index):
+        return super()._weight(f"{self.last} - ({index})")
+
+
+class Backwards(Plain):
+    """Weights from the last one to the first: of use to nobody, and different in every kernel."""
+
+    name = "backwards"
+    idea = "weights from the last one to the first"
+    order = "backwards"
+
+    def emit(self, program, header, bounded):
+        last = self.pack(program).size - 1
+        body = BackwardsBody(program, self.dialect, kernel_gather(program), last=last)
+        return emit(program, self.dialect, header, bounded, body)
+
+    def pack(self, program):
+        return weights.pack(program)[::-1].copy()
+
+
+@pytest.mark.parametrize("target", ["opencl", "opengl", "c"])
+def test_a_class_and_a_line_are_all_that_a_new_schedule_needs(monkeypatch, executor_named, kit, target):
+    """In each language its kernels compute what plain ones do, to the bit, within the same bound."""
+    executor = executor_named("opengl-egl" if target == "opengl" else target)
+    known = targets.target_named(target)
+    added = replace(known, schedules=(*known.schedules, Backwards(known.dialect)))
+    group = targets.TARGETS if target in targets.TARGETS else targets.DENOISERS
+    for registry in (group, targets.DENOISERS):
+        monkeypatch.setitem(registry, target, added)
+    program = kit.denoiser(kit.network([54, 6, 3], (3.0, 3.0)), {"color": 3, "normal": 3}, 3, "clamp")
+    drawn = np.random.default_rng(1).uniform(-2, 2, (2, 5, 7, 3)).astype(np.float32)
+    images = dict(zip(("color", "normal"), drawn, strict=True))
+    made = {name: compile_program(program, target, schedule=name) for name in ("plain", "backwards")}
+    assert made["backwards"].manifest["schedule"]["name"] == "backwards"
+    assert not np.array_equal(made["plain"].weights, made["backwards"].weights)
+    assert kit.excess(executor, program, images, made["backwards"]) <= 1
+    found = {name: executor.run(kernel, images) for name, kernel in made.items()}
+    assert np.array_equal(found["plain"], found["backwards"])

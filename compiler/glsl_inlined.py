@@ -1,9 +1,8 @@
-"""GLSL 3.30 for the inlined schedule [emit_inlined.py], and the ladder of schedules for fragment shaders."""
+"""GLSL 3.30 for the inlined schedule [emit_inlined.py]."""
 
 from __future__ import annotations
 
 from .dialect import Parts
-from .emit_inlined import Inlined
 from .glsl import GLSL, said_of_denoiser
 from .interface import DENOISE, Interface
 
@@ -41,7 +40,3 @@ class GLSLInlined(GLSL):
     def weights(self) -> list[str]:
         """Return the declaration of the weights, and of what reads them: all are in the source."""
         return []
-
-
-GLSL_LADDER = (Inlined(GLSLInlined()),)
-"""All schedules for fragment shaders except the plain one."""

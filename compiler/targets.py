@@ -23,7 +23,7 @@ from .glsl import GLSL
 from .glsl_buffers import Compute, Vulkan
 from .glsl_compute import GLSL_COMPUTE
 from .glsl_es import GLSLES, GLSLESInlined, GLSLESPacked
-from .glsl_inlined import GLSL_LADDER
+from .glsl_inlined import GLSLInlined
 from .hosts import GodotDenoise, ShadertoyDenoise
 from .interface import DENOISE, ENCODE, PATH
 from .loops import MOST_UNROLLED
@@ -111,7 +111,7 @@ TARGETS: Mapping[str, Target] = {
             _dialect_target(OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_GROUPS),
             paths={lanes: opencl_path.of_lanes(lanes) for lanes in opencl_path.LANES},
         ),
-        replace(_dialect_target(GLSL(), *GLSL_LADDER, *GLSL_COMPUTE), unrolled=UNROLLED_BY_MESA),
+        replace(_dialect_target(GLSL(), Inlined(GLSLInlined()), *GLSL_COMPUTE), unrolled=UNROLLED_BY_MESA),
     )
 }
 """The targets that the demo and the benchmark show, by the name of the executor that runs them."""

@@ -20,7 +20,6 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -98,16 +97,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 # ---- executors ------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="session")
-def opened_executors() -> Iterator[dict[str, Any]]:
-    """Give the executors and peers that were opened, by name; None for those that are missing."""
-    found: dict[str, Any] = {}
-    yield found
-    for executor in found.values():
-        if isinstance(executor, AbstractContextManager):
-            executor.__exit__(None, None, None)
 
 
 @pytest.fixture(scope="session")

@@ -10,12 +10,23 @@ from __future__ import annotations
 import ctypes
 import resource
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from typing import Any
 
 import pytest
 
 _peaks: dict[str, int] = {}
 """The most memory that each process took, in MB, by its name."""
+
+
+@pytest.fixture(scope="session")
+def opened_executors() -> Iterator[dict[str, Any]]:
+    """Give the executors and peers that were opened, by name; None for those that are missing."""
+    found: dict[str, Any] = {}
+    yield found
+    for executor in found.values():
+        if isinstance(executor, AbstractContextManager):
+            executor.__exit__(None, None, None)
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -1,0 +1,1 @@
+"""What each language looks like, for kernels of every role."""

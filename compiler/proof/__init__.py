@@ -1,0 +1,1 @@
+"""Bounds on rounding errors, and their certificates."""

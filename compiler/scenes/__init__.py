@@ -1,0 +1,1 @@
+"""Kernels of scenes: paths, and the encoding of features."""

@@ -1,0 +1,1 @@
+"""How a kernel orders its work, in words of any language."""

@@ -22,7 +22,7 @@ import numpy as np
 
 from wamnet.cli import machine
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core.lower import lower
 from wamnet.kernels import Pipeline, open_executor, render_on
 from wamnet.kernels.denoise_on import images_of
 from wamnet.kernels.passes import PICTURE

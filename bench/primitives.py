@@ -8,7 +8,7 @@ size of the source, seconds to trace and emit it, seconds until the driver has b
 are turned off) and has followed a first row of paths, and million samples a second then. The forms take
 turns, so that drift of the machine's speed meets both alike; rates are medians, with the least and greatest.
 A sample is one path with up to five scatterings, each with a shadow ray. A star marks the form that is chosen
-for a scene of so many primitives (compiler/path_kernel.py: most_unrolled).
+for a scene of so many primitives (compiler/scenes/path_kernel.py: most_unrolled).
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from wamnet.cli import machine
-from wamnet.compiler.lower_scene import lower_scene, primitives
-from wamnet.compiler.path_kernel import PathArtifact, compile_path, most_unrolled
+from wamnet.compiler.scenes.lower_scene import lower_scene, primitives
+from wamnet.compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from wamnet.kernels import open_executor
 from wamnet.kernels.executor import Executor, Part
 from wamnet.refimpl import vectors

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..compiler.writing import remove_temporaries
+from ..compiler.core.writing import remove_temporaries
 from ..refimpl.errors import InputError
 from . import machine, movie, options
 from .alone import working_in

@@ -37,7 +37,7 @@ def certify(
     all steps hold, 1 if one does not, which it names, and 2 if the file is no certificate.
     """
     from ..compiler.artifact import CERTIFICATE_NAME
-    from ..compiler.checker import Refused, check
+    from ..compiler.proof.checker import Refused, check
 
     path = file / CERTIFICATE_NAME if file.is_dir() else file
     if not path.is_file():

@@ -27,7 +27,7 @@ from .terminal import say
 
 if TYPE_CHECKING:
     from ..compiler.artifact import Artifact, Files
-    from ..compiler.path_kernel import PathArtifact
+    from ..compiler.scenes.path_kernel import PathArtifact
     from ..refimpl.denoise import Model
     from ..refimpl.scene import Scene
 
@@ -153,7 +153,7 @@ def _compiled_model(
 ) -> Artifact:
     """Return the kernel of a model: of a variant that is named, or that keeps limits, or of all of it."""
     from ..compiler.compile import compile_plan
-    from ..compiler.schedules import PLAIN
+    from ..compiler.schedules.schedules import PLAIN
     from ..compiler.variants import FULL, plan_model
 
     check_request(request, variant)
@@ -201,8 +201,8 @@ def _compiled_scene(
     lanes: int | None,
 ) -> PathArtifact:
     """Return the kernel that follows a scene's paths; of a large scene it is said first how long it takes."""
-    from ..compiler.lower_scene import lower_scene
-    from ..compiler.path_kernel import compile_path, most_unrolled
+    from ..compiler.scenes.lower_scene import lower_scene
+    from ..compiler.scenes.path_kernel import compile_path, most_unrolled
     from ..refimpl.transport import Settings
 
     for line in said_of_compiling(scene):
@@ -216,7 +216,8 @@ def _compiled_scene(
 
 def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:
     """Refuse a folder where a kernel cannot be, or that holds files of another program, kind or target."""
-    from ..compiler import artifact, path_kernel
+    from ..compiler import artifact
+    from ..compiler.scenes import path_kernel
 
     if folder.exists() and not folder.is_dir():
         raise InputError("output folder", str(folder), "it is a file", "choose another name with -o")

@@ -111,7 +111,7 @@ def conformance(
     The program reads one JSON request a line and writes one answer a line: spec/conformance.md says how, and
     has a program of forty lines. Ends with status 1 if a case fails.
     """
-    from ..compiler.profiles import profile_named
+    from ..compiler.core.profiles import profile_named
     from ..kernels.conformance import report, run
     from ..kernels.conformance import vectors as all_vectors
 

@@ -29,7 +29,7 @@ from functools import partial
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from ..compiler.writing import TEMPORARY_NAME, is_regular, remove_temporaries
+from ..compiler.core.writing import TEMPORARY_NAME, is_regular, remove_temporaries
 from ..refimpl.errors import InputError
 from ..refimpl.reading import BROKEN, parse_json, read_file
 from .alone import working_in

@@ -340,7 +340,7 @@ def run_kernels(
     Return the pictures, whose they are, and what was found about each executor.
     """
     from ..compiler.compile import compile_program
-    from ..compiler.lower import lower
+    from ..compiler.core.lower import lower
     from ..compiler.targets import TARGETS
     from ..kernels import denoise_on, open_executor
 

@@ -161,7 +161,7 @@ def _export(
 
 def _tell(made: Export) -> None:
     """Say which schedule an export has, which limits it keeps, and what its bound rests on."""
-    from ..compiler.schedules import text
+    from ..compiler.schedules.schedules import text
 
     for picked in filter(None, (kernel.get("schedule") for kernel in made.manifest["kernels"])):
         say(f"schedule {text(picked)}")

@@ -16,7 +16,7 @@ from .render import load_scene
 from .terminal import say
 
 if TYPE_CHECKING:
-    from ..compiler.listing import Line
+    from ..compiler.core.listing import Line
 
 EXAMPLES = """Examples:
 
@@ -46,7 +46,7 @@ def listing(
 
     A denoiser has the plain schedule, a scene one path at a time. Nothing is written but with -o.
     """
-    from ..compiler.listing import as_text
+    from ..compiler.core.listing import as_text
 
     if output is not None:
         check_output(output, inputs=[Path(model)])
@@ -63,10 +63,10 @@ def listing(
 def _lines(model: str, target: str, profile: str) -> list[Line]:
     """Return the lines of the kernel of a model or a scene, with their places."""
     from ..compiler.compile import compile_program
-    from ..compiler.listing import lines_of
-    from ..compiler.lower import lower
-    from ..compiler.lower_scene import lower_scene
-    from ..compiler.path_kernel import compile_path, most_unrolled
+    from ..compiler.core.listing import lines_of
+    from ..compiler.core.lower import lower
+    from ..compiler.scenes.lower_scene import lower_scene
+    from ..compiler.scenes.path_kernel import compile_path, most_unrolled
     from ..refimpl.transport import Settings
 
     if is_scene(model):

@@ -59,7 +59,7 @@ def run_one(name: str, kernel: Artifact, model: Model, frame: Frame, truth: Any)
 
     The kernel runs twice and the second time counts: drivers put off work until the first run.
     """
-    from ..compiler.enclosure import round_up
+    from ..compiler.core.enclosure import round_up
     from ..compiler.variants import plan_model
     from ..kernels import denoise_on, open_executor
     from ..refimpl.metrics import largest_error

@@ -198,7 +198,8 @@ def _begin_varied(recipe: Recipe, begin: Path | None, name: str) -> tuple[Recipe
 
 def varied(recipe: Recipe, model: Model, name: str) -> tuple[Recipe, Siren]:
     """Return the recipe and the first network with which a variant of a model is trained."""
-    from ..compiler import sine, variants
+    from ..compiler import variants
+    from ..compiler.core import sine
     from ..refimpl.train import check_recipe
 
     varied = variants.vary(variants.parse(name), model)

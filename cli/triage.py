@@ -103,7 +103,7 @@ def triage(
     one deviates, the first stage that does is looked for, and the smallest part of the frame that shows it is
     kept in FOLDER with the kernel's source. Exit status 1 says that a kernel deviates.
     """
-    from ..compiler.profiles import profile_named
+    from ..compiler.core.profiles import profile_named
     from ..kernels.denoise_on import images_of
     from . import exr
 
@@ -176,7 +176,7 @@ def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Runner]:
 
 def _judged(task: Task, runners: Sequence[Runner]) -> list[Verdict]:
     """Run all kernels on the whole frame."""
-    from ..compiler.lower import lower
+    from ..compiler.core.lower import lower
     from ..kernels.triage import Judge, kernels_of
 
     program, size = lower(task.model), (task.frame.height, task.frame.width)
@@ -275,8 +275,8 @@ def _report(task: Task, verdicts: Sequence[Verdict], found: Reduced) -> dict[str
     """Return what report.json holds; numbers that JSON does not know are words."""
     from dataclasses import asdict
 
-    from ..compiler import ir
-    from ..compiler.lower import lower
+    from ..compiler.core import ir
+    from ..compiler.core.lower import lower
     from ..compiler.plan import analysed
     from ..kernels.triage import conclusion
 
@@ -399,9 +399,10 @@ def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
     They may have been changed: neither their hashes nor their lengths are checked. The manifest says what
     they are the kernel of.
     """
-    from ..compiler import artifact, ir
+    from ..compiler import artifact
     from ..compiler.compile import compile_program
-    from ..compiler.lower import lower
+    from ..compiler.core import ir
+    from ..compiler.core.lower import lower
     from ..compiler.plan import analysed
 
     way_out = "give a folder that triage or compile wrote"
@@ -426,7 +427,8 @@ def _with_files(made: Artifact, folder: Path) -> Artifact:
     """Return an artifact with the source and the weights in a folder instead of its own."""
     import numpy as np
 
-    from ..compiler import artifact, ir
+    from ..compiler import artifact
+    from ..compiler.core import ir
 
     content = read_file(folder / made.source_name, "--kernel")
     raw = read_file(folder / artifact.WEIGHTS_NAME, "--kernel")

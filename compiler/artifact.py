@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from . import interface
-from .interface import Interface
-from .ir import Program
-from .writing import making_parents, write_together
+from .core.ir import Program
+from .core.writing import making_parents, write_together
+from .languages import interface
+from .languages.interface import Interface
 
 if TYPE_CHECKING:
     from .plan import Plan

@@ -19,17 +19,20 @@ import numpy as np
 
 from ..refimpl.errors import InputError
 from ..refimpl.reading import SIZES, parse_json
-from . import artifact, bounds, certificate, ir, schedules
+from . import artifact
 from .artifact import Artifact
-from .emit import kernel_gather, output_channels
-from .enclosure import round_up as round_up
-from .factor import HORIZONTAL, Cut, left
-from .ir import LEAST, OUTPUT_ENCODING, Gather, Program
-from .passes import pipeline
+from .core import ir
+from .core.enclosure import round_up as round_up
+from .core.ir import LEAST, OUTPUT_ENCODING, Gather, Program
+from .core.passes import pipeline
+from .core.profiles import SineContract
+from .core.sums import is_split
 from .plan import Bound, Plan, plan_program
-from .profiles import SineContract
-from .schedules import PLAIN, Pick, Schedule
-from .sums import is_split
+from .proof import bounds, certificate
+from .schedules import schedules
+from .schedules.emit import kernel_gather, output_channels
+from .schedules.factor import HORIZONTAL, Cut, left
+from .schedules.schedules import PLAIN, Pick, Schedule
 
 KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
 """What of a model's info a manifest repeats: how to encode images, and where the weights come from."""

@@ -34,7 +34,7 @@ from ..refimpl.errors import InputError
 from ..refimpl.reading import BROKEN, parse_json, read_file, to_dataclass
 from ..refimpl.siren import Siren
 from ..refimpl.train import TrainState
-from .writing import write_bytes
+from .core.writing import write_bytes
 
 Tensors = Mapping[str, NDArray[Any]]
 Texts = Mapping[str, str]

@@ -26,15 +26,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..refimpl.errors import CompileError
-from . import bounds, certificate, profiles, schedules
-from .bounds import Enclosure
-from .emit import kernel_gather
-from .factor import Cut, at_images, factor, over_images, product
-from .interpret import interpret
-from .ir import Program
-from .passes import pipeline
-from .profiles import Profile, SineContract
-from .schedules import ALL, PLAIN, Images, Pick, Schedule, pick
+from .core import profiles
+from .core.interpret import interpret
+from .core.ir import Program
+from .core.passes import pipeline
+from .core.profiles import Profile, SineContract
+from .proof import bounds, certificate
+from .proof.bounds import Enclosure
+from .schedules import schedules
+from .schedules.emit import kernel_gather
+from .schedules.factor import Cut, at_images, factor, over_images, product
+from .schedules.schedules import ALL, PLAIN, Images, Pick, Schedule, pick
 from .targets import Target, target_named
 
 if TYPE_CHECKING:

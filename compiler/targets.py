@@ -11,31 +11,31 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..refimpl.errors import CompileError
-from . import opencl_path
-from .buffers_group import ComputeGroup, CUDAGroup, MetalGroup, VulkanGroup, WGSLGroup, groups
-from .c import C
-from .c_tiled import C_LADDER
-from .cuda import CUDA
-from .dialect import Dialect
-from .emit_inlined import Inlined
-from .emit_packed import Packed
-from .glsl import GLSL
-from .glsl_buffers import Compute, Vulkan
-from .glsl_compute import GLSL_COMPUTE
-from .glsl_es import GLSLES, GLSLESInlined, GLSLESPacked
-from .glsl_inlined import GLSLInlined
-from .hosts import GodotDenoise, ShadertoyDenoise
-from .interface import DENOISE, ENCODE, PATH
-from .loops import MOST_UNROLLED
-from .metal import Metal
-from .opencl import OpenCL
-from .opencl_fourier import OPENCL_FOURIER
-from .opencl_group import OPENCL_GROUPS
-from .opencl_tiled import OPENCL_LADDER
-from .profiles import SineContract
-from .schedules import Plain, Printed, Schedule
-from .weight_homes import HOMES
-from .wgsl import WGSL
+from .core.loops import MOST_UNROLLED
+from .core.profiles import SineContract
+from .languages import opencl_path
+from .languages.c import C
+from .languages.cuda import CUDA
+from .languages.dialect import Dialect
+from .languages.glsl import GLSL
+from .languages.glsl_buffers import Compute, Vulkan
+from .languages.glsl_es import GLSLES, GLSLESInlined, GLSLESPacked
+from .languages.glsl_inlined import GLSLInlined
+from .languages.hosts import GodotDenoise, ShadertoyDenoise
+from .languages.interface import DENOISE, ENCODE, PATH
+from .languages.metal import Metal
+from .languages.opencl import OpenCL
+from .languages.weight_homes import HOMES
+from .languages.wgsl import WGSL
+from .schedules.buffers_group import ComputeGroup, CUDAGroup, MetalGroup, VulkanGroup, WGSLGroup, groups
+from .schedules.c_tiled import C_LADDER
+from .schedules.emit_inlined import Inlined
+from .schedules.emit_packed import Packed
+from .schedules.glsl_compute import GLSL_COMPUTE
+from .schedules.opencl_fourier import OPENCL_FOURIER
+from .schedules.opencl_group import OPENCL_GROUPS
+from .schedules.opencl_tiled import OPENCL_LADDER
+from .schedules.schedules import Plain, Printed, Schedule
 
 
 @dataclass(frozen=True)

@@ -31,13 +31,14 @@ from ..refimpl import factored
 from ..refimpl.dataset import FEATURES, Window
 from ..refimpl.denoise import Model
 from ..refimpl.errors import InputError
-from . import bounds, ir, sine
-from .bounds import Enclosure
-from .emit import kernel_gather
-from .enclosure import round_up
-from .lower import lower
+from .core import ir, sine
+from .core.enclosure import round_up
+from .core.lower import lower
 from .plan import Plan, analysed, plan_program
-from .schedules import PLAIN
+from .proof import bounds
+from .proof.bounds import Enclosure
+from .schedules.emit import kernel_gather
+from .schedules.schedules import PLAIN
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -19,12 +19,13 @@ import numpy as np
 
 from wamnet.cli import exr
 from wamnet.cli.runs import frame_bound
-from wamnet.compiler import bounds, scaled, sums
-from wamnet.compiler.emit import kernel_gather
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core import sums
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.core.profiles import EMITTED_SINE
 from wamnet.compiler.model_file import load_model
 from wamnet.compiler.plan import Plan, analysed
-from wamnet.compiler.profiles import EMITTED_SINE
+from wamnet.compiler.proof import bounds, scaled
+from wamnet.compiler.schedules.emit import kernel_gather
 from wamnet.compiler.targets import schedule_named
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import EXECUTORS, denoise_on, open_executor

@@ -13,13 +13,14 @@
    half the square of that.
 4. pi is cut into three constants of 12 bits, so that their products with an integer of 12 bits are exact
    [`pi_parts`] (Cody and Waite, "Software Manual for the Elementary Functions", 1980, chapter 8).
-5. The whole error, by the steps of compiler/sine.py, is added up over small intervals of r [`whole_error`].
+5. The whole error, by the steps of compiler/core/sine.py, is added up over small intervals of r
+   [`whole_error`].
 
 Remez' exchange: Cheney, "Introduction to Approximation Theory", 1966, chapter 3. A search over float32
 coefficients: Brisebarre, Muller and Tisserand, "Computing machine-efficient polynomial approximations", 2006;
 theirs walks the points of a polytope, this one a tree.
 
-The printed tables are what compiler/sine.py holds; tests/compiler/test_sine.py compares the two.
+The printed tables are what compiler/core/sine.py holds; tests/compiler/test_sine.py compares the two.
 """
 
 from __future__ import annotations
@@ -32,13 +33,14 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 
-from wamnet.compiler import bounds, sine
-from wamnet.compiler.ir import Type
-from wamnet.compiler.profiles import SineContract
-from wamnet.compiler.trace import trace
+from wamnet.compiler.core import sine
+from wamnet.compiler.core.ir import Type
+from wamnet.compiler.core.profiles import SineContract
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.proof import bounds
 
 R_MAX = 1.5735
-"""Largest reduced argument, in radians: pi / 2 and the error of choosing k (compiler/sine.py)."""
+"""Largest reduced argument, in radians: pi / 2 and the error of choosing k (compiler/core/sine.py)."""
 
 PART_BITS = 12
 """Significant bits of each part of pi: 12 + 12 bits of k fill float32's significand exactly."""
@@ -212,7 +214,7 @@ def pi_parts() -> list[float]:
 
 
 def reduction() -> dict[str, Any]:
-    """Return what compiler/sine.py states about the reduction; mpmath's precision 160 bits."""
+    """Return what compiler/core/sine.py states about the reduction; mpmath's precision 160 bits."""
     return {
         "r_max": R_MAX,
         "pi_parts": [c.hex() for c in pi_parts()],
@@ -222,7 +224,7 @@ def reduction() -> dict[str, Any]:
 
 
 def table(degree: int) -> dict[str, Any]:
-    """Return what compiler/sine.py states about one degree, and how near to the best it is."""
+    """Return what compiler/core/sine.py states about one degree, and how near to the best it is."""
     found = Search(degree)
     return {
         "degree": degree,

@@ -27,13 +27,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.compiler import sine
 from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.enclosure import round_up
-from wamnet.compiler.ir import Gather, Image, Type, sha256
-from wamnet.compiler.profiles import DEGREE_WORD
-from wamnet.compiler.trace import trace
+from wamnet.compiler.core import sine
+from wamnet.compiler.core.enclosure import round_up
+from wamnet.compiler.core.ir import Gather, Image, Type, sha256
+from wamnet.compiler.core.profiles import DEGREE_WORD
+from wamnet.compiler.core.trace import trace
 from wamnet.kernels import open_executor
 from wamnet.kernels.measure import in_turns
 from wamnet.refimpl import siren

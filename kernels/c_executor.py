@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
-from ..compiler.emit import output_channels
-from ..compiler.encode_kernel import EncodeArtifact
-from ..compiler.path_kernel import PathArtifact
-from ..compiler.schedules import PLAIN
+from ..compiler.scenes.encode_kernel import EncodeArtifact
+from ..compiler.scenes.path_kernel import PathArtifact
+from ..compiler.schedules.emit import output_channels
+from ..compiler.schedules.schedules import PLAIN
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from .executor import INDEX_LIMIT, Executor, Images, Part, gather_of, images_of, keep
 

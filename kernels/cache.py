@@ -20,7 +20,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..compiler.writing import write_bytes
+from ..compiler.core.writing import write_bytes
 from ..refimpl.errors import InputError, shown
 from ..refimpl.reading import BROKEN, parse_json, read_file
 

@@ -5,7 +5,7 @@
    code of them would show as unexplained.
 2. One step of the reference starts from the *kernel's own* state, so that errors do not pile up: `start` or
    `scatter` gives ranges for the ray that the kernel has next, `arrive` on that ray gives ranges for the
-   surface and the radiance (compiler/ranges.py) [`step_ranges`].
+   surface and the radiance (compiler/proof/ranges.py) [`step_ranges`].
 3. What the kernel has must lie in its range: else it is *unexplained*, a fault [`_judge`]. Where a decision
    of the step is closer to its threshold than rounding, it is *undecided* and the range holds both ways;
    when the kernel then went another way than the float32 reference, it is *different*.
@@ -25,11 +25,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler import ranges
-from ..compiler.emit_path import END
-from ..compiler.lower_scene import PATH, SURFACE, PathPrograms, kinds, lower_scene, names
-from ..compiler.path_kernel import PathArtifact, compile_path, most_unrolled
-from ..compiler.ranges import Arithmetic, Range
+from ..compiler.proof import ranges
+from ..compiler.proof.ranges import Arithmetic, Range
+from ..compiler.scenes.emit_path import END
+from ..compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, kinds, lower_scene, names
+from ..compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from ..refimpl import render
 from ..refimpl.render import Job
 from ..refimpl.scene import Scene

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler import schedules
 from ..compiler.artifact import Artifact
 from ..compiler.compile import compile_plan
-from ..compiler.ir import sha256
-from ..compiler.schedules import PLAIN
+from ..compiler.core.ir import sha256
+from ..compiler.schedules import schedules
+from ..compiler.schedules.schedules import PLAIN
 from ..compiler.variants import FULL, plan_model
 from ..refimpl.dataset import feature_image
 from ..refimpl.denoise import Model

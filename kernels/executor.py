@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
-from ..compiler.encode_kernel import EncodeArtifact
-from ..compiler.ir import Gather, Image
-from ..compiler.path_kernel import PathArtifact
-from ..compiler.schedules import PLAIN
-from ..compiler.step_kernel import StepKernel
+from ..compiler.core.ir import Gather, Image
+from ..compiler.scenes.encode_kernel import EncodeArtifact
+from ..compiler.scenes.path_kernel import PathArtifact
+from ..compiler.schedules.schedules import PLAIN
+from ..compiler.training.step_kernel import StepKernel
 from ..refimpl.errors import InputError
 
 if TYPE_CHECKING:
@@ -57,7 +57,8 @@ class Executor(ABC):
     schedule that suits a denoiser on it, for pictures of at least `schedule_pixels`: smaller ones are done
     with the plain kernel before the other is compiled; `schedule_reason` says why. `driver` is the driver's
     version, where `device` does not name it. `trains` says whether it has a compiled trainer. `homes` are the
-    homes of weights, apart from the target's usual one, whose kernels it runs [compiler/interface.py].
+    homes of weights, apart from the target's usual one, whose kernels it runs
+    [compiler/languages/interface.py].
     """
 
     name: str

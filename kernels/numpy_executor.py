@@ -1,7 +1,8 @@
 """The interpreter of the IR as an executor: all windows of a block of rows at once, in float32.
 
-Its path tracer is the skeleton that path kernels have (compiler/emit_path.py), with all paths of a part as
-lanes: it defines what they add up. Its passes are the plain composition of its kernels [`passes.HostPasses`].
+Its path tracer is the skeleton that path kernels have (compiler/scenes/emit_path.py), with all paths of a
+part as lanes: it defines what they add up. Its passes are the plain composition of its kernels
+[`passes.HostPasses`].
 """
 
 from __future__ import annotations
@@ -13,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
-from ..compiler.emit import output_channels
-from ..compiler.encode_kernel import EncodeArtifact
-from ..compiler.interpret import interpret
-from ..compiler.lower_encode import SAMPLES, channel_name
-from ..compiler.lower_scene import PathPrograms
-from ..compiler.path_kernel import PathArtifact
+from ..compiler.core.interpret import interpret
+from ..compiler.scenes.encode_kernel import EncodeArtifact
+from ..compiler.scenes.lower_encode import SAMPLES, channel_name
+from ..compiler.scenes.lower_scene import PathPrograms
+from ..compiler.scenes.path_kernel import PathArtifact
+from ..compiler.schedules.emit import output_channels
 from ..refimpl import dataset
 from .executor import Executor, Images, Part, gather_of
 

@@ -19,11 +19,11 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
-from ..compiler.emit import output_channels
-from ..compiler.encode_kernel import EncodeArtifact
-from ..compiler.interface import BLOCK
-from ..compiler.path_kernel import PathArtifact
-from ..compiler.step_kernel import StepKernel
+from ..compiler.languages.interface import BLOCK
+from ..compiler.scenes.encode_kernel import EncodeArtifact
+from ..compiler.scenes.path_kernel import PathArtifact
+from ..compiler.schedules.emit import output_channels
+from ..compiler.training.step_kernel import StepKernel
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
 from .executor import INDEX_LIMIT, Executor, Images, Part, black, images_of, keep

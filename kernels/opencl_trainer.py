@@ -16,11 +16,11 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from ..compiler.emit_factors import KERNELS
-from ..compiler.emit_step import TILE
-from ..compiler.step import SQUARES, TRANSPOSED
-from ..compiler.step_kernel import StepKernel
-from ..compiler.step_layout import LANES, pack, unpack
+from ..compiler.training.emit_factors import KERNELS
+from ..compiler.training.emit_step import TILE
+from ..compiler.training.step import SQUARES, TRANSPOSED
+from ..compiler.training.step_kernel import StepKernel
+from ..compiler.training.step_layout import LANES, pack, unpack
 from ..refimpl.errors import InputError
 
 Arrays = Mapping[str, NDArray[np.float32]]

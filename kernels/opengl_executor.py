@@ -21,13 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
-from ..compiler.emit import output_channels
-from ..compiler.emit_packed import WEIGHTS_A_TEXEL
-from ..compiler.encode_kernel import EncodeArtifact
-from ..compiler.factor import HORIZONTAL
-from ..compiler.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
-from ..compiler.glsl_compute import SHADER_VERSION
-from ..compiler.path_kernel import PathArtifact
+from ..compiler.languages.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
+from ..compiler.scenes.encode_kernel import EncodeArtifact
+from ..compiler.scenes.path_kernel import PathArtifact
+from ..compiler.schedules.emit import output_channels
+from ..compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
+from ..compiler.schedules.factor import HORIZONTAL
+from ..compiler.schedules.glsl_compute import SHADER_VERSION
 from ..refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import osmesa
 from .executor import Executor, Images, Part, black, gather_of, keep

@@ -24,17 +24,17 @@ from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
 from ..compiler.compile import compile_plan
-from ..compiler.emit import kernel_gather, output_channels
-from ..compiler.emit_packed import WEIGHTS_A_TEXEL
-from ..compiler.encode_kernel import compile_encode
-from ..compiler.glsl_es import MOST_BUFFERS
-from ..compiler.ir import digest
-from ..compiler.lower import lower
-from ..compiler.lower_encode import layers_of, planes_of
-from ..compiler.lower_scene import lower_scene
-from ..compiler.path_kernel import PathArtifact, compile_path
+from ..compiler.core.ir import digest
+from ..compiler.core.lower import lower
+from ..compiler.languages.glsl_es import MOST_BUFFERS
 from ..compiler.plan import plan_program
-from ..compiler.scene_inputs import SceneInputs, varying
+from ..compiler.scenes.encode_kernel import compile_encode
+from ..compiler.scenes.lower_encode import layers_of, planes_of
+from ..compiler.scenes.lower_scene import lower_scene
+from ..compiler.scenes.path_kernel import PathArtifact, compile_path
+from ..compiler.scenes.scene_inputs import SceneInputs, varying
+from ..compiler.schedules.emit import kernel_gather, output_channels
+from ..compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
 from ..refimpl import factored, rng, transport
 from ..refimpl.denoise import Model, check_model, learned_feature_spp
 from ..refimpl.errors import InputError

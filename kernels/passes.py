@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.artifact import Artifact
-from ..compiler.encode_kernel import EncodeArtifact
-from ..compiler.path_kernel import PathArtifact
+from ..compiler.scenes.encode_kernel import EncodeArtifact
+from ..compiler.scenes.path_kernel import PathArtifact
 from .executor import Executor, Part, images_of
 
 PICTURE = "picture"

@@ -1,7 +1,7 @@
 """One pipeline: a noisy picture is path-traced, encoded and denoised without leaving the device.
 
 1. Three kernels of one executor: the scene's paths, which add up the planes that the features need; the
-   encoding of the features, traced from the reference (compiler/lower_encode.py); the model's denoiser
+   encoding of the features, traced from the reference (compiler/scenes/lower_encode.py); the model's denoiser
    [`Pipeline`].
 2. [`Pipeline.draw`] starts them one after another. Sums, feature images and the result stay on the device
    (kernels/passes.py).
@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.compile import compile_plan
-from ..compiler.encode_kernel import compile_encode
-from ..compiler.lower_encode import layers_of
-from ..compiler.lower_scene import lower_scene
-from ..compiler.path_kernel import PathArtifact, compile_path, most_unrolled
+from ..compiler.scenes.encode_kernel import compile_encode
+from ..compiler.scenes.lower_encode import layers_of
+from ..compiler.scenes.lower_scene import lower_scene
+from ..compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from ..compiler.variants import FULL, plan_model
 from ..refimpl.dataset import check_features
 from ..refimpl.denoise import Model, check_model

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler.emit_path import planes
-from ..compiler.ir import Type
-from ..compiler.lower_scene import PASSES, PathPrograms, lower_scene
-from ..compiler.passes import pipeline
-from ..compiler.path_kernel import compile_path
-from ..compiler.trace import trace
+from ..compiler.core.ir import Type
+from ..compiler.core.passes import pipeline
+from ..compiler.core.trace import trace
+from ..compiler.scenes.emit_path import planes
+from ..compiler.scenes.lower_scene import PASSES, PathPrograms, lower_scene
+from ..compiler.scenes.path_kernel import compile_path
 from ..refimpl import rng
 from ..refimpl.scenes import canonical
 from ..refimpl.transport import BLOCKS_PER_BOUNCE, Settings

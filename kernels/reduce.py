@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 from ..compiler.compile import compile_plan
-from ..compiler.ir import OUTPUT_ENCODING, Program, Type
-from ..compiler.lower import lower
+from ..compiler.core.ir import OUTPUT_ENCODING, Program, Type
+from ..compiler.core.lower import lower
+from ..compiler.core.trace import trace
 from ..compiler.targets import target_named
-from ..compiler.trace import trace
 from ..refimpl.activation import SINE, activation_named
 from ..refimpl.denoise import Model, as_dtype
 from ..refimpl.siren import Siren, forward

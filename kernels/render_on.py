@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler.emit_path import GROUPS
-from ..compiler.lower_scene import lower_scene
-from ..compiler.path_kernel import PathArtifact, compile_path, most_unrolled
+from ..compiler.scenes.emit_path import GROUPS
+from ..compiler.scenes.lower_scene import lower_scene
+from ..compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from ..refimpl.errors import InputError
 from ..refimpl.frame import LAYERS, Frame
 from ..refimpl.render import Job, Render, checked_rows, feature_job, render_info, with_own_features

@@ -6,7 +6,7 @@
    minibatches of the next [`Run.draw`].
 3. A loss that is not finite, or an interrupt, is reported and kept as the reference does it [`Run.settle`].
 
-The definition is refimpl/train.py; how far a step may be from it: compiler/step.py.
+The definition is refimpl/train.py; how far a step may be from it: compiler/training/step.py.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler.step import factor_names
-from ..compiler.step_kernel import FIRST, compile_step
+from ..compiler.training.step import factor_names
+from ..compiler.training.step_kernel import FIRST, compile_step
 from ..refimpl import adam, dataset, train
 from ..refimpl.adam import AdamState
 from ..refimpl.dataset import Dataset, Indices

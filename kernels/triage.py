@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler import ir
 from ..compiler.artifact import Artifact
 from ..compiler.compile import compile_plan
-from ..compiler.ir import Program
+from ..compiler.core import ir
+from ..compiler.core.ir import Program
 from ..compiler.plan import Expected, Plan, plan_program
-from ..compiler.schedules import PLAIN
+from ..compiler.schedules.schedules import PLAIN
 from ..compiler.targets import target_named
 from ..refimpl.errors import CompileError
 from .apart import Outcome, Runner

@@ -30,7 +30,7 @@ import numpy as np
 from .. import compiler
 from ..compiler.artifact import Artifact
 from ..compiler.compile import compile_plan
-from ..compiler.ir import Program
+from ..compiler.core.ir import Program
 from ..compiler.plan import Plan
 from ..refimpl import rng
 from ..refimpl.denoise import Model

@@ -21,7 +21,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ..refimpl.errors import CompileError
+from ...refimpl.errors import CompileError
 from . import sine
 from .ir import LEAST
 from .ops import Rounding
@@ -77,13 +77,13 @@ class Profile:
 
 
 def emitted_sine(degree: int = sine.DEGREE) -> SineContract:
-    """Return what a sine of compiler/sine.py promises."""
+    """Return what a sine of compiler/core/sine.py promises."""
     text = f"emitted, odd polynomial of degree {degree}"
     return SineContract(text, sine.POLYNOMIALS[degree].error, sine.DOMAIN)
 
 
 def emitted_cosine(degree: int = sine.DEGREE) -> SineContract:
-    """Return what a cosine of compiler/sine.py promises; denoisers have none, a sine's derivative does."""
+    """Return what a cosine of sine.py promises; denoisers have none, a sine's derivative does."""
     return replace(
         emitted_sine(degree), error=sine.POLYNOMIALS[degree].cosine_error, domain=sine.COSINE_DOMAIN
     )
@@ -94,6 +94,11 @@ EMITTED_SINE = emitted_sine()
 
 EMITTED_COSINE = emitted_cosine()
 """The cosine of the degree in use."""
+
+OPENCL_SINE = SineContract(
+    "sin() of OpenCL 1.2, 4 ulp on all arguments (full profile)", 4 * 2 * UNIT_ROUNDOFF
+)
+"""The only sine of a standard that is good enough for a proof: for its dialect and the checker."""
 
 EXPAND_SINE = "expand_sine"
 """The pass that emits the sine of the degree in use; that of another degree has its number behind it."""
@@ -106,7 +111,7 @@ EXACT_SINE = SineContract(
     sine.POLYNOMIALS[sine.DEGREE].error + LEAST,
     sine.DOMAIN,
 )
-"""The sine of compiler/sine.py in which no number is denormal."""
+"""The sine of compiler/core/sine.py in which no number is denormal."""
 
 PROFILES: Mapping[str, Profile] = {
     profile.name: profile

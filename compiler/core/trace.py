@@ -26,8 +26,8 @@ import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 
-from ..refimpl import vectors
-from ..refimpl.errors import CompileError
+from ...refimpl import vectors
+from ...refimpl.errors import CompileError
 from .ir import DTYPES, Attribute, Builder, Gather, Node, Program, Type, attributes
 from .ops import ELEMENTWISE, OPS, TypeRuleError
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ..refimpl.errors import CompileError
+from ...refimpl.errors import CompileError
 from .ir import DTYPES, Node, Program, Type
 from .loops import bodies, loop_number, split
 from .ops import OPS, TypeRuleError

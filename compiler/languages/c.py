@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..core.profiles import SineContract
 from .dialect import Dialect, Parts
 from .interface import DENOISE, ENCODE, PATH, SUMS, UNSIGNED, Interface
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
-from .profiles import SineContract
 
 PRAGMAS = """\
 #if defined(__GNUC__) && !defined(__clang__)

@@ -6,11 +6,11 @@ as IEEE 754 says unless an option relaxes them: do not pass -use_fast_math, -ftz
 
 from __future__ import annotations
 
+from ..core.profiles import UNIT_ROUNDOFF, SineContract
 from .c import C
 from .dialect import Dialect, Parts
 from .interface import DENOISE, ENCODE, PATH, Interface
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
-from .profiles import UNIT_ROUNDOFF, SineContract
 
 CLAMP = """\
 #ifndef WAMNET_CLAMP

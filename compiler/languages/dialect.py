@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.ir import LEAST, Node
+from ..core.profiles import SineContract
 from .interface import BUFFER, DENOISE, ENCODE, INTEGERS, PATH, Interface
-from .ir import LEAST, Node
-from .profiles import SineContract
 
 LONG_TABLE, TABLE_ROW = 200, 8
 """Length above which a constant table is written in rows, and the numbers of a row."""

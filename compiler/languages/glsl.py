@@ -8,9 +8,9 @@ planes a buffer, or one buffer for each image of an encoding.
 
 from __future__ import annotations
 
+from ..core.profiles import SineContract
 from .dialect import Dialect, Parts
 from .interface import BLOCK, DENOISE, ENCODE, PATH, RESULT, UNSIGNED, WEIGHTS, WRITE, Interface
-from .profiles import SineContract
 
 WEIGHT_TEXTURE_WIDTH = 1024
 """Texels in a row of the weight texture: every implementation takes 1024 rows of 1024, a million weights."""

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
+from ..core.profiles import SineContract
 from .c import C
 from .dialect import Parts
 from .glsl import GLSL
 from .interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Interface
 from .openings import Buffers
-from .profiles import SineContract
 
 GROUP = (8, 8)
 """Invocations (x, y) in a work group: 64, which every implementation of Vulkan and of OpenGL 4.3 takes."""

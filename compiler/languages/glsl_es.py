@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ..core.profiles import SineContract
 from .glsl import GLSL, WEIGHT_TEXTURE, fetch, said_of_denoiser
 from .glsl_inlined import GLSLInlined
 from .interface import DENOISE
-from .profiles import SineContract
 
 VERSION = "#version 300 es"
 """The first line of a shader: the language allows nothing before it."""

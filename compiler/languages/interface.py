@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from .ir import Image
+from ..core.ir import Image
 
 DENOISE, PATH, ENCODE = "denoise", "path", "encode"
 """What a kernel does."""

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..core.profiles import SineContract
 from .c import C
 from .dialect import Parts
 from .interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Interface
 from .openings import Buffers
-from .profiles import SineContract
 
 ASSUMES = (
     "the library is compiled with MTLCompileOptions.mathMode = .safe (fastMathEnabled = false before macOS "

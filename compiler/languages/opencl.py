@@ -6,10 +6,10 @@ so that a path kernel is not given their number; an encoding reads planes of any
 
 from __future__ import annotations
 
+from ..core.profiles import OPENCL_SINE
 from .dialect import Dialect, Parts
 from .interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
 from .openings import IMAGES, WEIGHTS_RESULT, Arguments
-from .profiles import UNIT_ROUNDOFF, SineContract
 
 
 class OpenCL(Arguments):
@@ -49,9 +49,7 @@ class OpenCL(Arguments):
     }
     max_output_channels = 2**16
     exact = ("#pragma OPENCL FP_CONTRACT OFF /* every operation is rounded */",)
-    native_sine = SineContract(
-        "sin() of OpenCL 1.2, 4 ulp on all arguments (full profile)", 4 * 2 * UNIT_ROUNDOFF
-    )
+    native_sine = OPENCL_SINE
     table = "__constant {type} {name}[{count}] = {{{values}}};"
     operations = {
         **Dialect.operations,

@@ -6,10 +6,10 @@ a compiler reorder a sum only where the result is at least as accurate, and a bo
 
 from __future__ import annotations
 
+from ..core.profiles import SineContract
 from .dialect import Dialect, Parts
 from .glsl_buffers import GROUP, SAID, Declared
 from .interface import BLOCK, DENOISE, ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
-from .profiles import SineContract
 
 ASSUMES = (
     "the compiler keeps the order of the operations of an expression, fused or not, or does better: the "

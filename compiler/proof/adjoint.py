@@ -24,9 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .enclosure import OUTWARD, RANGE_OUTWARD, Enclosure, sine_range
-from .ir import Program
-from .ops import OPS
+from ..core.enclosure import OUTWARD, RANGE_OUTWARD, Enclosure, sine_range
+from ..core.ir import Program
+from ..core.ops import OPS
 
 Array = NDArray[np.float64]
 

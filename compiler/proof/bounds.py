@@ -28,14 +28,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import adjoint, scaled
-from .enclosure import OUTWARD as OUTWARD
-from .enclosure import OVERFLOW, RANGE_OUTWARD
-from .enclosure import Enclosure as Enclosure
-from .enclosure import sine_range as sine_range
-from .ir import LEAST, Gather, Node, Program
-from .ops import LOOPS, OPS
-from .profiles import (
+from ..core.enclosure import OUTWARD as OUTWARD
+from ..core.enclosure import OVERFLOW, RANGE_OUTWARD
+from ..core.enclosure import Enclosure as Enclosure
+from ..core.enclosure import sine_range as sine_range
+from ..core.ir import LEAST, Gather, Node, Program
+from ..core.ops import LOOPS, OPS
+from ..core.profiles import (
     EXP2_ULPS,
     FLUSH,
     LARGEST_DIVISOR,
@@ -45,7 +44,8 @@ from .profiles import (
     UNIT_ROUNDOFF,
     SineContract,
 )
-from .sums import gamma, parts, rounding
+from ..core.sums import gamma, parts, rounding
+from . import adjoint, scaled
 
 Array = NDArray[np.float64]
 

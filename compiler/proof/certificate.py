@@ -19,17 +19,20 @@ import base64
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import bounds, ir, scaled
-from .enclosure import round_up
-from .ir import Program
-from .profiles import FLUSH, UNIT_ROUNDOFF, SineContract
-from .schedules import Schedule
-from .sums import parts, rounding
+from ..core import ir
+from ..core.enclosure import round_up
+from ..core.ir import Program
+from ..core.profiles import FLUSH, UNIT_ROUNDOFF, SineContract
+from ..core.sums import parts, rounding
+from . import bounds, scaled
+
+if TYPE_CHECKING:
+    from ..schedules.schedules import Schedule
 
 Array = NDArray[np.float64]
 

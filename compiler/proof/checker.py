@@ -23,15 +23,14 @@ from typing import Any
 
 import numpy as np
 
-from ..refimpl.reading import parse_json, plain_name, read_file, refusing, stated_bytes
-from .opencl import OpenCL
-from .profiles import emitted_sine
-from .sine import POLYNOMIALS
+from ...refimpl.reading import parse_json, plain_name, read_file, refusing, stated_bytes
+from ..core.profiles import OPENCL_SINE, emitted_sine
+from ..core.sine import POLYNOMIALS
 
 U, TINY, WIDER = 2.0**-24, 2.0**-126, 1 + 2.0**-34
 """float32's rounding and smallest normal number; a factor of more than float64 can be off in what follows."""
 
-PROMISES = {promise.text: promise for promise in (*map(emitted_sine, POLYNOMIALS), OpenCL.native_sine)}
+PROMISES = {promise.text: promise for promise in (*map(emitted_sine, POLYNOMIALS), OPENCL_SINE)}
 """What is known of sines, by the name that a certificate gives."""
 
 NODE = re.compile(r"  %(\d+) = (\w+)((?: %\d+,?)*)(?: \{(.*)\})? : \w+(?:\[(\d+)\])?")

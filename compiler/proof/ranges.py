@@ -31,13 +31,12 @@ from typing import Any
 
 import numpy as np
 
-from ..refimpl.errors import CompileError
-from .bounds import OUTWARD, power_error, sine_range
-from .interpret import apply, element
-from .ir import Node, Program
-from .loops import Loop, loops
-from .ops import LOOPS
-from .profiles import (
+from ...refimpl.errors import CompileError
+from ..core.interpret import apply, element
+from ..core.ir import Node, Program
+from ..core.loops import Loop, loops
+from ..core.ops import LOOPS
+from ..core.profiles import (
     EMITTED_COSINE,
     EMITTED_SINE,
     FLUSH,
@@ -45,6 +44,7 @@ from .profiles import (
     RELATIVE_ERROR,
     SineContract,
 )
+from .bounds import OUTWARD, power_error, sine_range
 
 SLACK = 2.0**-51
 """Relative widening of an end: float64's rounding of an operation, and of the widening, twice."""
@@ -207,7 +207,7 @@ class _Run:
         if node.op not in RULES or node.type.shape:
             raise CompileError(
                 f"operation {node.op!r} giving {node.type} has no rule for ranges; there are rules for "
-                f"numbers and for: {', '.join(RULES)}; add one to RULES of compiler/ranges.py"
+                f"numbers and for: {', '.join(RULES)}; add one to RULES of compiler/proof/ranges.py"
             )
         plain = apply(node, [o.plain for o in operands], parameters, np.dtype(np.float32))
         return RULES[node.op](Context(node, parameters, self.arithmetic, plain, self.guided), operands)

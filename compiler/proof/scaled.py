@@ -28,9 +28,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.enclosure import OUTWARD, Enclosure
+from ..core.ir import Program
 from .adjoint import unclamped
-from .enclosure import OUTWARD, Enclosure
-from .ir import Program
 
 Array = NDArray[np.float64]
 

@@ -25,15 +25,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refimpl.errors import CompileError
-from . import interface
-from .dialect import Dialect, Parts
-from .emit import framed
-from .ir import Node, Program, Type, attributes
-from .lines import Lines
-from .loops import Loop, loops
+from ...refimpl.errors import CompileError
+from ..core.ir import Node, Program, Type, attributes
+from ..core.lines import Lines
+from ..core.loops import Loop, loops
+from ..core.weights import tables
+from ..languages import interface
+from ..languages.dialect import Dialect, Parts
+from ..schedules.emit import framed
 from .lower_scene import LAYERS, PATH, SURFACE, PathPrograms, Values, kinds, names
-from .weights import tables
 
 FIRST = {layer: names({layer: value}) for layer, value in LAYERS.items()}
 """Planes of the first surface: outputs of `look`, by group."""

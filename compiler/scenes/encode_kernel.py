@@ -18,19 +18,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refimpl.dataset import FEATURES, Normalization
-from ..refimpl.errors import CompileError
-from ..refimpl.reading import SIZES
-from . import bounds, interface, ir, profiles
-from .artifact import OneSource
-from .dialect import Dialect, Parts
-from .emit import framed
-from .interface import Interface
-from .ir import Image, Program
+from ...refimpl.dataset import FEATURES, Normalization
+from ...refimpl.errors import CompileError
+from ...refimpl.reading import SIZES
+from ..artifact import OneSource
+from ..core import ir, profiles
+from ..core.ir import Image, Program
+from ..core.passes import pipeline
+from ..languages import interface
+from ..languages.dialect import Dialect, Parts
+from ..languages.interface import Interface
+from ..plan import sine_contract
+from ..proof import bounds
+from ..schedules.emit import framed
+from ..targets import integers_of, target_named
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
-from .passes import pipeline
-from .plan import sine_contract
-from .targets import integers_of, target_named
 
 SCHEMA = "wamnet-encode-kernel-1"
 """Name and version of the manifest's form; described in spec/pipeline.md."""

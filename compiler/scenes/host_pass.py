@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..refimpl.dataset import Normalization
-from .dialect import Parts
+from ...refimpl.dataset import Normalization
+from ..languages.dialect import Parts
+from ..languages.glsl_es import GLSLES
+from ..languages.hosts import NO_PRECISE, GodotDenoise
+from ..languages.interface import PATH, Interface
 from .emit_path import emit_path
 from .encode_kernel import encode_source
-from .glsl_es import GLSLES
-from .hosts import NO_PRECISE, GodotDenoise
-from .interface import PATH, Interface
 from .lower_encode import layers_of
 from .lower_scene import PathPrograms
 

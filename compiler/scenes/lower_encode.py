@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..refimpl import vectors
-from ..refimpl.dataset import FEATURES, Normalization, check_features, check_normalization, encode_sums
+from ...refimpl import vectors
+from ...refimpl.dataset import FEATURES, Normalization, check_features, check_normalization, encode_sums
+from ..core.ir import Program, Type
+from ..core.passes import pipeline
+from ..core.trace import trace
+from ..core.verify import verify
 from .emit_path import GROUPS
-from .ir import Program, Type
-from .passes import pipeline
-from .trace import trace
-from .verify import verify
 
 PASSES = ("scalarize", "fold", "eliminate_dead")
 """What the program goes through: numbers in place of vectors, constants in float64, rounded when emitted."""

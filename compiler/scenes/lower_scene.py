@@ -21,16 +21,16 @@ from typing import Any
 
 import numpy as np
 
-from ..refimpl import render, transport, vectors
-from ..refimpl.intersection import Hit, Surface, reflecting
-from ..refimpl.scene import Scene, primitives, scene_digest
-from ..refimpl.transport import Counters, Path, Settings, World
-from .ir import Program, Type
-from .loops import MOST_UNROLLED
-from .passes import pipeline
+from ...refimpl import render, transport, vectors
+from ...refimpl.intersection import Hit, Surface, reflecting
+from ...refimpl.scene import Scene, primitives, scene_digest
+from ...refimpl.transport import Counters, Path, Settings, World
+from ..core.ir import Program, Type
+from ..core.loops import MOST_UNROLLED
+from ..core.passes import pipeline
+from ..core.trace import Traced, trace
+from ..core.verify import verify
 from .scene_inputs import SceneInputs, lay_out
-from .trace import Traced, trace
-from .verify import verify
 
 XYZ, RGB, NUMBER = ("_x", "_y", "_z"), ("_r", "_g", "_b"), ("",)
 """Endings of the names of a vector's, a colour's and a number's components."""

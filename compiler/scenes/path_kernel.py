@@ -17,17 +17,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..refimpl.errors import CompileError
-from ..refimpl.reading import SIZES
-from . import emit_path, interface, ir, profiles
-from .artifact import OneSource
-from .compile import asdict_finite
-from .interface import Interface
+from ...refimpl.errors import CompileError
+from ...refimpl.reading import SIZES
+from ..artifact import OneSource
+from ..compile import asdict_finite
+from ..core import ir, profiles
+from ..core.passes import pipeline
+from ..core.profiles import Profile
+from ..languages import interface
+from ..languages.interface import Interface
+from ..plan import sine_contract
+from ..targets import integers_of, target_named
+from . import emit_path
 from .lower_scene import PASSES, PathPrograms
-from .passes import pipeline
-from .plan import sine_contract
-from .profiles import Profile
-from .targets import integers_of, target_named
 
 SCHEMA = "wamnet-path-kernel-1"
 """Name and version of the manifest's form; described in spec/path_kernel.md."""

@@ -24,13 +24,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refimpl import transport
-from ..refimpl.camera import camera_basis
-from ..refimpl.errors import CompileError
-from ..refimpl.scene import Scene
-from ..refimpl.transport import Settings
-from .ir import Builder, Node, Program, attributes
-from .passes.rewrite import rewrite
+from ...refimpl import transport
+from ...refimpl.camera import camera_basis
+from ...refimpl.errors import CompileError
+from ...refimpl.scene import Scene
+from ...refimpl.transport import Settings
+from ..core.ir import Builder, Node, Program, attributes
+from ..core.passes.rewrite import rewrite
 
 if TYPE_CHECKING:
     from .lower_scene import PathPrograms

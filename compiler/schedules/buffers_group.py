@@ -8,14 +8,14 @@ half as wide.
 
 from __future__ import annotations
 
-from .cuda import CLAMP, CUDA
-from .dialect import Parts
+from ..languages.cuda import CLAMP, CUDA
+from ..languages.dialect import Parts
+from ..languages.glsl_buffers import BUFFERS, Compute, Declared, Vulkan
+from ..languages.interface import DENOISE, WEIGHTS, Array, Interface
+from ..languages.metal import Metal
+from ..languages.openings import IMAGES, WEIGHTS_RESULT
+from ..languages.wgsl import WGSL
 from .emit_group import BufferGroup, GroupDialect, Grouped, Lifted
-from .glsl_buffers import BUFFERS, Compute, Declared, Vulkan
-from .interface import DENOISE, WEIGHTS, Array, Interface
-from .metal import Metal
-from .openings import IMAGES, WEIGHTS_RESULT
-from .wgsl import WGSL
 
 LEAST_SHARED = 2**14
 """Bytes that a group may share on every device: WebGPU's maxComputeWorkgroupStorageSize, and Vulkan's

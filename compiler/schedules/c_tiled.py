@@ -12,12 +12,12 @@
 
 from __future__ import annotations
 
-from .c import UNFUSED, C, includes
-from .dialect import Parts
+from ..languages.c import UNFUSED, C, includes
+from ..languages.dialect import Parts
+from ..languages.interface import DENOISE, Interface
+from ..languages.openings import IMAGES, WEIGHTS_RESULT
+from ..languages.tiled_dialect import OPERATIONS, TiledDialect
 from .emit_tiled import Tiled
-from .interface import DENOISE, Interface
-from .openings import IMAGES, WEIGHTS_RESULT
-from .tiled_dialect import OPERATIONS, TiledDialect
 
 FUSED = """\
 /* A product may be fused with a sum: the bound holds either way. */

@@ -15,15 +15,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from ..refimpl.errors import CompileError
-from . import interface
-from .dialect import Dialect, Parts
-from .interface import Interface
-from .ir import Gather, Image, Node, Program, users
-from .lines import Lines
-from .ops import LOOPS, OPS
-from .sums import is_split
-from .weights import layout, pack, tables
+from ...refimpl.errors import CompileError
+from ..core.ir import Gather, Image, Node, Program, users
+from ..core.lines import Lines
+from ..core.ops import LOOPS, OPS
+from ..core.sums import is_split
+from ..core.weights import layout, pack, tables
+from ..languages import interface
+from ..languages.dialect import Dialect, Parts
+from ..languages.interface import Interface
 
 
 @dataclass(frozen=True)

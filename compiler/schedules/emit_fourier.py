@@ -23,14 +23,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from . import bounds, fourier
-from .bounds import Enclosure
-from .dialect import Dialect
+from ..core.ir import Node, Program
+from ..core.profiles import SineContract
+from ..languages.dialect import Dialect
+from ..proof import bounds
+from ..proof.bounds import Enclosure
+from . import fourier
 from .emit import kernel_gather
 from .emit_tiled import LARGEST_PRIVATE, Tiled, TiledBody, readers_of_window, refused_by_vectors
-from .ir import Node, Program
 from .opencl_tiled import OpenCLTiled
-from .profiles import SineContract
 from .schedules import ALL, Images, windows
 
 COST = 3.0

@@ -25,13 +25,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .dialect import Dialect
+from ..core.ir import Gather, Image, Node, Program
+from ..languages.dialect import Dialect
+from ..languages.interface import Interface
+from ..languages.openings import Buffers
 from .emit import kernel_gather
 from .emit_inlined import InlinedBody
 from .emit_tiled import Tiled, refused_by_vectors
-from .interface import Interface
-from .ir import Gather, Image, Node, Program
-from .openings import Buffers
 from .schedules import PLAIN
 
 MOST_CHANNELS = 4

@@ -19,14 +19,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from . import weights
-from .dialect import Dialect
+from ..core import weights
+from ..core.ir import Node, Program
+from ..core.sums import is_split
+from ..core.weights import Slot
+from ..languages.dialect import Dialect
 from .emit import Body, emit, kernel_gather
 from .emit_tiled import refused_by_vectors
-from .ir import Node, Program
 from .schedules import Schedule
-from .sums import is_split
-from .weights import Slot
 
 LARGEST_WEIGHTS = 2**16
 """Most weights of a kernel: llvmpipe compiles some two thousand a second."""

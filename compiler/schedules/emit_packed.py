@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import weights
-from .dialect import Dialect
+from ..core import weights
+from ..core.ir import Node, Program
+from ..core.sums import is_split
+from ..core.weights import Slot
+from ..languages.dialect import Dialect
 from .emit import emit, kernel_gather
 from .emit_inlined import InlinedBody, _components, _vector
 from .emit_tiled import refused_by_vectors
-from .ir import Node, Program
 from .schedules import Schedule
-from .sums import is_split
-from .weights import Slot
 
 WEIGHTS_A_TEXEL = "weights_a_texel"
 """Key of a manifest's schedule: how many floats a texel of the weight texture has, if not one."""

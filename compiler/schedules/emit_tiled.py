@@ -23,15 +23,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from . import weights
-from .dialect import Dialect
+from ..core import weights
+from ..core.ir import Gather, Node, Program
+from ..core.ops import OPS
+from ..core.sums import is_split
+from ..core.weights import Slot
+from ..languages.dialect import Dialect
+from ..languages.tiled_dialect import TiledDialect
 from .emit import Body, emit, kernel_gather, output_channels, schedule
-from .ir import Gather, Node, Program
-from .ops import OPS
 from .schedules import Schedule
-from .sums import is_split
-from .tiled_dialect import TiledDialect
-from .weights import Slot
 
 LARGEST_PRIVATE = 2**19
 """Most bytes of arrays in a work item: a quarter of the smallest stack that glibc gives a thread."""

@@ -27,16 +27,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refimpl import dataset, factored
-from ..refimpl.errors import CompileError
-from . import bounds
-from .bounds import Enclosure
+from ...refimpl import dataset, factored
+from ...refimpl.errors import CompileError
+from ..core.ir import LEAST, Gather, Image, Node, Program, Type, attributes
+from ..core.passes.pin import pin
+from ..core.profiles import SineContract
+from ..core.trace import trace
+from ..core.verify import verify
+from ..proof import bounds
+from ..proof.bounds import Enclosure
 from .emit import kernel_gather
-from .ir import LEAST, Gather, Image, Node, Program, Type, attributes
-from .passes.pin import pin
-from .profiles import SineContract
-from .trace import trace
-from .verify import verify
 
 Array = NDArray[np.float64]
 

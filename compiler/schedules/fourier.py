@@ -37,13 +37,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refimpl import dataset
-from . import bounds
-from .bounds import Enclosure
+from ...refimpl import dataset
+from ..core.ir import Gather, Program
+from ..core.profiles import FLUSH, UNIT_ROUNDOFF, SineContract
+from ..core.sums import gamma
+from ..proof import bounds
+from ..proof.bounds import Enclosure
 from .emit import kernel_gather
-from .ir import Gather, Program
-from .profiles import FLUSH, UNIT_ROUNDOFF, SineContract
-from .sums import gamma
 
 Array = NDArray[np.float64]
 

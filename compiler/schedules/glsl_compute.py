@@ -5,10 +5,10 @@ The result is an image, the weights are a storage buffer of `vec4`: the source s
 
 from __future__ import annotations
 
-from .dialect import Parts
+from ..languages.dialect import Parts
+from ..languages.glsl_inlined import GLSLInlined
+from ..languages.interface import DENOISE, Interface
 from .emit_group import GroupDialect, Grouped
-from .glsl_inlined import GLSLInlined
-from .interface import DENOISE, Interface
 from .schedules import PLAIN
 
 SHADER_VERSION = 430

@@ -6,9 +6,9 @@ lie in further ones. Functions take arrays of the work item's own.
 
 from __future__ import annotations
 
-from .dialect import Parts
+from ..languages.dialect import Parts
+from ..languages.interface import DENOISE, Interface
 from .emit_fourier import Fourier
-from .interface import DENOISE, Interface
 from .opencl_tiled import ALIGNED, OpenCLTiled
 
 PLACES = """\

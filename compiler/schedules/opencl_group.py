@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .dialect import Parts
+from ..languages.dialect import Parts
+from ..languages.interface import DENOISE, Interface
 from .emit_group import BufferGroup, Grouped
-from .interface import DENOISE, Interface
 from .opencl_tiled import ALIGNED, OpenCLTiled
 
 

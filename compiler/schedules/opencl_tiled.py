@@ -7,12 +7,12 @@ that no operator means; clang has a name for it, and other compilers get the fun
 
 from __future__ import annotations
 
-from .dialect import Parts
+from ..languages.dialect import Parts
+from ..languages.interface import DENOISE, Interface
+from ..languages.opencl import OpenCL
+from ..languages.openings import IMAGES
+from ..languages.tiled_dialect import OPERATIONS, TiledDialect
 from .emit_tiled import Tiled
-from .interface import DENOISE, Interface
-from .opencl import OpenCL
-from .openings import IMAGES
-from .tiled_dialect import OPERATIONS, TiledDialect
 
 MACROS = """\
 typedef float{lanes} vector;

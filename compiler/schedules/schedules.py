@@ -20,15 +20,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refimpl import dataset
-from ..refimpl.errors import CompileError
-from . import bounds, ir, weights
-from .bounds import Enclosure
-from .dialect import Dialect
+from ...refimpl import dataset
+from ...refimpl.errors import CompileError
+from ..core import ir, weights
+from ..core.ir import Gather, Program
+from ..core.profiles import SineContract
+from ..core.weights import Slot
+from ..languages.dialect import Dialect
+from ..proof import bounds
+from ..proof.bounds import Enclosure
 from .emit import emit, kernel_gather, private_bytes
-from .ir import Gather, Program
-from .profiles import SineContract
-from .weights import Slot
 
 Images = Mapping[str, NDArray[np.float32]]
 

@@ -19,13 +19,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from ..refimpl.errors import CompileError
-from .dialect import Dialect
-from .emit import schedule
+from ...refimpl.errors import CompileError
+from ..core.ir import Node, Program, users
+from ..core.lines import Lines
+from ..core.ops import OPS
+from ..languages.dialect import Dialect
+from ..schedules.emit import schedule
 from .emit_factors import factor_defines
-from .ir import Node, Program, users
-from .lines import Lines
-from .ops import OPS
 from .step import SQUARES, TARGET, TRANSPOSED, WINDOW, Step, Sum
 from .step_layout import LANES, Slot, slots, transposed_slots, vectors_for
 

@@ -21,13 +21,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..refimpl import factored
-from ..refimpl.factored import Factors
-from .bounds import OUTWARD, Enclosure, enclose
-from .interpret import interpret
-from .ir import Program
-from .profiles import EMITTED_COSINE, EMITTED_SINE, FLUSH
-from .sums import gamma
+from ...refimpl import factored
+from ...refimpl.factored import Factors
+from ..core.interpret import interpret
+from ..core.ir import Program
+from ..core.profiles import EMITTED_COSINE, EMITTED_SINE, FLUSH
+from ..core.sums import gamma
+from ..proof.bounds import OUTWARD, Enclosure, enclose
 
 Array = NDArray[Any]
 

@@ -13,15 +13,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ..refimpl.activation import SINE
-from . import ir
+from ...refimpl.activation import SINE
+from ..core import ir
+from ..core.ir import Program
+from ..core.passes import pipeline
+from ..core.profiles import PROFILES
+from ..languages.opencl_path import of_lanes
 from .emit_factors import factors_text
 from .emit_step import WindowForm, step_text, update_text
-from .ir import Program
 from .lower_step import lower_adam, lower_step
-from .opencl_path import of_lanes
-from .passes import pipeline
-from .profiles import PROFILES
 from .step import Split, Step
 from .step_layout import LANES, Slot, slots, transposed_slots
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .ir import Program
+from ..core.ir import Program
 from .step import SQUARES, TRANSPOSED, Step
 
 LANES = 16

@@ -19,10 +19,10 @@ import numpy as np
 from sources import coloured
 
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.listing import Line, lines_of, within
-from wamnet.compiler.lower import lower
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.core.listing import Line, lines_of, within
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.refimpl import denoise, siren, transport
 from wamnet.refimpl.dataset import Normalization, Window
 from wamnet.refimpl.scene import Camera, Light, Quad, Scene, Sphere

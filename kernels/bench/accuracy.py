@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler import bounds
-from ...compiler.emit import kernel_gather
-from ...compiler.interpret import interpret
-from ...compiler.ir import Program
-from ...compiler.lower import lower
+from ...compiler.core.interpret import interpret
+from ...compiler.core.ir import Program
+from ...compiler.core.lower import lower
 from ...compiler.plan import Plan, plan_program
-from ...compiler.schedules import PLAIN, windows
+from ...compiler.proof import bounds
+from ...compiler.schedules.emit import kernel_gather
+from ...compiler.schedules.schedules import PLAIN, windows
 from ...refimpl import dataset, metrics
 from ...refimpl.denoise import Model, denoise
 from ...refimpl.frame import Frame

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler import profiles, sine
-from ...compiler.ir import Program
-from ...compiler.lower import lower
+from ...compiler.core import profiles, sine
+from ...compiler.core.ir import Program
+from ...compiler.core.lower import lower
 from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable
 from ..executor import Executor

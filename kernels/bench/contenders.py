@@ -14,9 +14,9 @@ from functools import partial
 
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_program
-from ...compiler.emit import kernel_gather
 from ...compiler.plan import analysed
-from ...compiler.schedules import PLAIN
+from ...compiler.schedules.emit import kernel_gather
+from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import TARGETS, schedule_named, target_named
 from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable, InputError

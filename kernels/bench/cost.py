@@ -20,8 +20,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...compiler.artifact import Artifact
-from ...compiler.emit import kernel_gather, output_channels
-from ...compiler.ir import Program
+from ...compiler.core.ir import Program
+from ...compiler.schedules.emit import kernel_gather, output_channels
 from ...refimpl.activation import SINE
 from ...refimpl.dataset import channels_of
 from ...refimpl.denoise import Model

@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_program
-from ...compiler.ir import Gather, Image, Program, Type
-from ...compiler.trace import trace
+from ...compiler.core.ir import Gather, Image, Program, Type
+from ...compiler.core.trace import trace
 from ...refimpl import rng
 from ...refimpl.dataset import Window
 from ..executor import Executor, Images

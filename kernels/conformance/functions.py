@@ -2,8 +2,9 @@
 
 1. A function of the reference is called with float64 numbers that float32 holds exactly: the expected value.
 2. The same function, traced, has for each output a range of what single precision may give, under the
-   promises of profile `ieee` (compiler/ranges.py): its farther end is the bound [`Function.bounded`]. Where a
-   decision is closer to its threshold than rounding, either way is accepted; the flag is `undecided`.
+   promises of profile `ieee` (compiler/proof/ranges.py): its farther end is the bound
+   [`Function.bounded`]. Where a decision is closer to its threshold than rounding, either way is accepted;
+   the flag is `undecided`.
 3. Cases are chosen numbers, edge cases first, and others from the project's own generator [`drawn`].
 """
 
@@ -18,17 +19,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler import ranges
-from ...compiler.ir import Program, Type
-from ...compiler.lower_scene import PASSES
-from ...compiler.passes import pipeline
-from ...compiler.trace import trace
+from ...compiler.core.ir import Program, Type
+from ...compiler.core.passes import pipeline
+from ...compiler.core.trace import trace
+from ...compiler.proof import ranges
+from ...compiler.scenes.lower_scene import PASSES
 from ...refimpl import rng, vectors
 from .case import Case, Kind, Output
 
 Numbers = Mapping[str, Any]
 
-SOURCE = "range of single precision under profile ieee (compiler/ranges.py)"
+SOURCE = "range of single precision under profile ieee (compiler/proof/ranges.py)"
 """Where these bounds come from."""
 
 SEED = 20_240_817

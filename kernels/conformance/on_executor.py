@@ -19,15 +19,15 @@ import numpy as np
 
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_program
-from ...compiler.emit_path import END
-from ...compiler.ir import Gather, Image, Program, Type
-from ...compiler.lower_scene import PATH, SURFACE, lower_scene
-from ...compiler.passes import pipeline
-from ...compiler.path_kernel import PathArtifact, compile_path, most_unrolled
-from ...compiler.profiles import profile_named
-from ...compiler.schedules import PLAIN
+from ...compiler.core.ir import Gather, Image, Program, Type
+from ...compiler.core.passes import pipeline
+from ...compiler.core.profiles import profile_named
+from ...compiler.core.trace import trace
+from ...compiler.scenes.emit_path import END
+from ...compiler.scenes.lower_scene import PATH, SURFACE, lower_scene
+from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
+from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import DENOISERS, TARGETS
-from ...compiler.trace import trace
 from ...refimpl import scene as scene_module
 from ...refimpl.dataset import Window
 from ...refimpl.errors import CompileError

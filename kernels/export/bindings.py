@@ -7,11 +7,11 @@ from dataclasses import asdict
 from typing import Any
 
 from ...compiler.artifact import Artifact
-from ...compiler.encode_kernel import EncodeArtifact
-from ...compiler.interface import BLOCK, PATH, READ, SUMS, WEIGHTS, WRITE, Interface
-from ...compiler.ir import OUTPUT_ENCODING
-from ...compiler.lower import lower
-from ...compiler.path_kernel import PathArtifact
+from ...compiler.core.ir import OUTPUT_ENCODING
+from ...compiler.core.lower import lower
+from ...compiler.languages.interface import BLOCK, PATH, READ, SUMS, WEIGHTS, WRITE, Interface
+from ...compiler.scenes.encode_kernel import EncodeArtifact
+from ...compiler.scenes.path_kernel import PathArtifact
 from ...refimpl.denoise import Model
 from .targets import Row
 

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.emit import output_channels
-from ...compiler.encode_kernel import EncodeArtifact
-from ...compiler.glsl_buffers import GROUP
-from ...compiler.interface import BLOCK, IMAGE, RESULT, SUMS, WEIGHTS, Interface
-from ...compiler.path_kernel import PathArtifact
+from ...compiler.languages.glsl_buffers import GROUP
+from ...compiler.languages.interface import BLOCK, IMAGE, RESULT, SUMS, WEIGHTS, Interface
+from ...compiler.scenes.encode_kernel import EncodeArtifact
+from ...compiler.scenes.path_kernel import PathArtifact
+from ...compiler.schedules.emit import output_channels
 from ..executor import Executor, Images, Part
 
 Kernel = Artifact | PathArtifact | EncodeArtifact

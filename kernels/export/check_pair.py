@@ -20,16 +20,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler import emit_path
-from ...compiler.emit import kernel_gather
-from ...compiler.interpret import interpret
-from ...compiler.ir import Gather, Program
-from ...compiler.lower import lower
-from ...compiler.lower_encode import layers_of
-from ...compiler.lower_scene import PathPrograms
-from ...compiler.path_kernel import compile_path
+from ...compiler.core.interpret import interpret
+from ...compiler.core.ir import Gather, Program
+from ...compiler.core.lower import lower
 from ...compiler.plan import Plan, plan_program
-from ...compiler.schedules import windows
+from ...compiler.scenes import emit_path
+from ...compiler.scenes.lower_encode import layers_of
+from ...compiler.scenes.lower_scene import PathPrograms
+from ...compiler.scenes.path_kernel import compile_path
+from ...compiler.schedules.emit import kernel_gather
+from ...compiler.schedules.schedules import windows
 from ...refimpl.dataset import FEATURES, encode_sums
 from ...refimpl.denoise import Model
 from ..executor import Part

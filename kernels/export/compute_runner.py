@@ -9,8 +9,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.glsl_compute import SHADER_VERSION
-from ...compiler.interface import BLOCK
+from ...compiler.languages.interface import BLOCK
+from ...compiler.schedules.glsl_compute import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..opengl_executor import OpenGLExecutor
 from .buffer_runner import BufferRunner, Kernel, Launch

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.glsl_es import VERSION
-from ...compiler.hosts import CHANNELS
-from ...compiler.interface import TABLE
+from ...compiler.languages.glsl_es import VERSION
+from ...compiler.languages.hosts import CHANNELS
+from ...compiler.languages.interface import TABLE
 from ..executor import Images
 from .gl_runner import ESRunner
 

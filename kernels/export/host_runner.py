@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.interface import BLOCK, PATH, TABLE, UNSIGNED, Interface
+from ...compiler.languages.interface import BLOCK, PATH, TABLE, UNSIGNED, Interface
 from ...refimpl.errors import ExecutorUnavailable
 from . import tools
 from .buffer_runner import BufferRunner, Kernel, Launch

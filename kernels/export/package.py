@@ -20,17 +20,17 @@ from typing import Any
 import numpy as np
 
 from ...compiler import artifact as artifacts
-from ...compiler import weights as weight_layout
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_plan
-from ...compiler.encode_kernel import EncodeArtifact, compile_encode
-from ...compiler.host_pass import feature_pass
-from ...compiler.ir import sha256
-from ...compiler.lower import lower
-from ...compiler.lower_encode import layers_of
-from ...compiler.lower_scene import PathPrograms, lower_scene
-from ...compiler.path_kernel import PathArtifact, compile_path, most_unrolled
+from ...compiler.core import weights as weight_layout
+from ...compiler.core.ir import sha256
+from ...compiler.core.lower import lower
 from ...compiler.plan import plan_program
+from ...compiler.scenes.encode_kernel import EncodeArtifact, compile_encode
+from ...compiler.scenes.host_pass import feature_pass
+from ...compiler.scenes.lower_encode import layers_of
+from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
+from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from ...compiler.targets import target_named
 from ...compiler.variants import FULL, parse, plan_model, vary
 from ...refimpl.denoise import Model, learned_feature_spp

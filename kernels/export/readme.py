@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...compiler.schedules import text
+from ...compiler.schedules.schedules import text
 from .targets import ONNX, TARGETS
 
 ONNX_CODE = """\

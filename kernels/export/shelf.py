@@ -24,9 +24,9 @@ from pathlib import Path
 import numpy as np
 
 from ...compiler.artifact import Artifact
+from ...compiler.core.writing import is_regular, write_together
 from ...compiler.model_file import load_model
-from ...compiler.schedules import PLAIN
-from ...compiler.writing import is_regular, write_together
+from ...compiler.schedules.schedules import PLAIN
 from ...refimpl import siren
 from ...refimpl.dataset import Normalization, Window
 from ...refimpl.denoise import Model

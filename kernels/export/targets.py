@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from ...compiler.emit_inlined import LARGEST_WEIGHTS
-from ...compiler.glsl import WEIGHT_TEXTURE_WIDTH
-from ...compiler.interface import BLOCK, TABLE
-from ...compiler.schedules import PLAIN
+from ...compiler.languages.glsl import WEIGHT_TEXTURE_WIDTH
+from ...compiler.languages.interface import BLOCK, TABLE
+from ...compiler.schedules.emit_inlined import LARGEST_WEIGHTS
+from ...compiler.schedules.schedules import PLAIN
 from . import tools
 
 BUFFER, TEXTURE = "buffer", "texture"

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.interface import BLOCK
+from ...compiler.languages.interface import BLOCK
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from . import tools
 from .buffer_runner import BufferRunner, Kernel, Launch

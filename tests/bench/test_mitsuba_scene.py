@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from statistical import SIGNIFICANCE, assert_all_plausible, sidak, welch_p
 
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels.executor import Part
 from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError

@@ -209,7 +209,7 @@ def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
 def test_an_executor_that_is_missing_is_told(finished, monkeypatch) -> None:
     """The report leaves it out and says why."""
     from wamnet.compiler.compile import compile_program
-    from wamnet.compiler.lower import lower
+    from wamnet.compiler.core.lower import lower
     from wamnet.kernels import open_executor
     from wamnet.refimpl.errors import ExecutorUnavailable
 

@@ -131,8 +131,8 @@ def test_compile_writes_a_kernel(wamnet, here, target, source) -> None:
 @pytest.mark.parametrize(("target", "source"), [("opencl", "path.cl"), ("glsl", "path.frag")])
 def test_compile_writes_a_scene_s_kernel(wamnet, here, target, source) -> None:
     """The bytes that the compiler gives for this scene, time and schedule; a scene file is a scene too."""
-    from wamnet.compiler.lower_scene import lower_scene
-    from wamnet.compiler.path_kernel import compile_path
+    from wamnet.compiler.scenes.lower_scene import lower_scene
+    from wamnet.compiler.scenes.path_kernel import compile_path
     from wamnet.refimpl.scenes import canonical
     from wamnet.refimpl.transport import Settings
 
@@ -190,7 +190,7 @@ def test_a_schedule_by_name(wamnet, refused, here) -> None:
 
 def test_a_schedule_that_does_not_hold_the_model(wamnet, here, monkeypatch) -> None:
     """The plain kernel is written, and the reason is said."""
-    monkeypatch.setattr("wamnet.compiler.emit_tiled.LARGEST_PRIVATE", 100)
+    monkeypatch.setattr("wamnet.compiler.schedules.emit_tiled.LARGEST_PRIVATE", 100)
     outcome = wamnet("compile", "model.safetensors", "--target", "opencl", "--schedule", "tile8")
     assert outcome.status == 0
     assert "schedule plain, not tile8: its arrays take" in outcome.out

@@ -31,7 +31,7 @@ def started(wamnet, capsys, monkeypatch):
 
     monkeypatch.setattr(render_frame, "render_frame", stop)
     monkeypatch.setattr("wamnet.kernels.frame_plan.carry_out", stop)
-    monkeypatch.setattr("wamnet.compiler.lower_scene.lower_scene", stop)
+    monkeypatch.setattr("wamnet.compiler.scenes.lower_scene.lower_scene", stop)
     return run
 
 

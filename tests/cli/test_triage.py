@@ -15,7 +15,7 @@ from wamnet.cli import exr
 from wamnet.cli.main import main
 from wamnet.compiler import artifact
 from wamnet.compiler import compile as compiling
-from wamnet.compiler.ir import sha256
+from wamnet.compiler.core.ir import sha256
 from wamnet.compiler.model_file import load_model
 from wamnet.kernels import apart
 from wamnet.kernels.denoise_on import images_of

@@ -160,7 +160,7 @@ def test_refusals(refused, here, message) -> None:
 
 
 def test_a_sine_is_not_trained(refused, here, monkeypatch) -> None:
-    from wamnet.compiler import sine
+    from wamnet.compiler.core import sine
 
     polynomial = sine.POLYNOMIALS[sine.DEGREE]
     monkeypatch.setattr(sine, "POLYNOMIALS", {7: polynomial, sine.DEGREE: polynomial})

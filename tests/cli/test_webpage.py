@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 
 from wamnet.cli import webpage
-from wamnet.compiler.encode_kernel import compile_encode, error_at
-from wamnet.compiler.lower_encode import layers_of
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
+from wamnet.compiler.scenes.lower_encode import layers_of
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels import page as P
 from wamnet.kernels.executor import Part
 from wamnet.kernels.numpy_executor import NumpyExecutor

@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.compiler import bounds, ops
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import Gather, Image, Type
-from wamnet.compiler.profiles import EMITTED_COSINE, EMITTED_SINE, SineContract
-from wamnet.compiler.sine import COSINE_DOMAIN, cosine
-from wamnet.compiler.trace import trace
+from wamnet.compiler.core import ops
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.profiles import EMITTED_COSINE, EMITTED_SINE, SineContract
+from wamnet.compiler.core.sine import COSINE_DOMAIN, cosine
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.proof import bounds
 from wamnet.refimpl.dataset import Window
 
 floats = st.floats(-100, 100, width=32)

@@ -11,11 +11,12 @@ import jsonschema
 import numpy as np
 import pytest
 
-from wamnet.compiler import artifact, checker, scaled
+from wamnet.compiler import artifact
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.ir import Type, sha256
-from wamnet.compiler.lower import lower
-from wamnet.compiler.trace import trace
+from wamnet.compiler.core.ir import Type, sha256
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.proof import checker, scaled
 from wamnet.refimpl import siren
 from wamnet.refimpl.dataset import Normalization, Window
 from wamnet.refimpl.denoise import Model

@@ -13,19 +13,19 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from wamnet.compiler import artifact as artifacts
-from wamnet.compiler import ir
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.emit_tiled import refused_by_vectors
-from wamnet.compiler.enclosure import round_up
-from wamnet.compiler.glsl_inlined import GLSLInlined
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import Gather, Image, Type
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core import ir
+from wamnet.compiler.core.enclosure import round_up
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.core.profiles import PROFILES
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.core.weights import layout, pack
+from wamnet.compiler.languages.glsl_inlined import GLSLInlined
 from wamnet.compiler.plan import analysed
-from wamnet.compiler.profiles import PROFILES
+from wamnet.compiler.schedules.emit_tiled import refused_by_vectors
 from wamnet.compiler.targets import DENOISERS
-from wamnet.compiler.trace import trace
-from wamnet.compiler.weights import layout, pack
 from wamnet.refimpl import dataset, siren
 from wamnet.refimpl.dataset import Window
 from wamnet.refimpl.denoise import Model, denoise_pixel

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.compiler.c import C
-from wamnet.compiler.dialect import Dialect
-from wamnet.compiler.glsl import GLSL
-from wamnet.compiler.opencl import OpenCL
-from wamnet.compiler.ops import ELEMENTWISE, OPS
+from wamnet.compiler.core.ops import ELEMENTWISE, OPS
+from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.dialect import Dialect
+from wamnet.compiler.languages.glsl import GLSL
+from wamnet.compiler.languages.opencl import OpenCL
 
 
 @pytest.mark.parametrize("dialect", [OpenCL, GLSL, C])

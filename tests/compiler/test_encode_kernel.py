@@ -7,10 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from wamnet.compiler import artifact, ir
-from wamnet.compiler.encode_kernel import compile_encode, error_at
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.lower_encode import SAMPLES, channel_name, layers_of, lower_encode, planes_of
+from wamnet.compiler import artifact
+from wamnet.compiler.core import ir
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
+from wamnet.compiler.scenes.lower_encode import SAMPLES, channel_name, layers_of, lower_encode, planes_of
 from wamnet.refimpl.dataset import FEATURES, Normalization, encode_sums
 from wamnet.refimpl.errors import CompileError, InputError
 

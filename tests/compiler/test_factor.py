@@ -8,12 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler import artifact, bounds, factor
+from wamnet.compiler import artifact
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import Gather, Image, Type, text
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Gather, Image, Type, text
+from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import analysed, sine_contract
-from wamnet.compiler.trace import trace
+from wamnet.compiler.proof import bounds
+from wamnet.compiler.schedules import factor
 from wamnet.refimpl import dataset, siren
 from wamnet.refimpl.denoise import denoise_pixel
 from wamnet.refimpl.errors import CompileError

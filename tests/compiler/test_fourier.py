@@ -9,15 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.compiler import bounds, emit_fourier, fourier, profiles
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.emit_tiled import LARGEST_PRIVATE
-from wamnet.compiler.enclosure import round_up
-from wamnet.compiler.ir import Gather, Image, Type
-from wamnet.compiler.opencl_fourier import OPENCL_FOURIER, fourier_schedule
-from wamnet.compiler.passes import pipeline
+from wamnet.compiler.core import profiles
+from wamnet.compiler.core.enclosure import round_up
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.passes import pipeline
+from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import analysed, sine_contract
-from wamnet.compiler.trace import trace
+from wamnet.compiler.proof import bounds
+from wamnet.compiler.schedules import emit_fourier, fourier
+from wamnet.compiler.schedules.emit_tiled import LARGEST_PRIVATE
+from wamnet.compiler.schedules.opencl_fourier import OPENCL_FOURIER, fourier_schedule
 from wamnet.refimpl import dataset, siren
 from wamnet.refimpl.denoise import denoise_pixel
 from wamnet.refimpl.errors import CompileError

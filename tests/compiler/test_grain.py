@@ -9,16 +9,16 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from wamnet.compiler import grain, sine
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.grain import READ, SINE, Size
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import LEAST, Gather, Image, Type
-from wamnet.compiler.ops import OPS
-from wamnet.compiler.passes import pipeline
+from wamnet.compiler.core import grain, sine
+from wamnet.compiler.core.grain import READ, SINE, Size
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import LEAST, Gather, Image, Type
+from wamnet.compiler.core.ops import OPS
+from wamnet.compiler.core.passes import pipeline
+from wamnet.compiler.core.profiles import EXACT_SINE, PROFILES
+from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import analysed
-from wamnet.compiler.profiles import EXACT_SINE, PROFILES
-from wamnet.compiler.trace import trace
 from wamnet.refimpl import siren
 from wamnet.refimpl.dataset import Window
 from wamnet.refimpl.denoise import denoise_pixel

@@ -14,7 +14,7 @@ import pytest
 from targets import tiny_model
 
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core.lower import lower
 from wamnet.compiler.targets import DENOISERS, EXPORTED, target_named
 from wamnet.refimpl.errors import CompileError
 

@@ -15,9 +15,9 @@ from itertools import product
 
 import pytest
 
-from wamnet.compiler.encode_kernel import compile_encode
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.scenes.encode_kernel import compile_encode
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.refimpl.dataset import Normalization
 from wamnet.refimpl.scenes import canonical

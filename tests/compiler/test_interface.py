@@ -6,12 +6,12 @@ import re
 
 import pytest
 
-from wamnet.compiler import interface
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.encode_kernel import compile_encode
-from wamnet.compiler.lower import lower
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.languages import interface
+from wamnet.compiler.scenes.encode_kernel import compile_encode
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import DENOISERS, EXPORTED, target_named
 from wamnet.kernels.export import package
 from wamnet.kernels.export.targets import TARGETS

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wamnet.compiler import ir
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.listing import SKELETON, Line, as_text, lines_of, within
-from wamnet.compiler.lower import lower
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
-from wamnet.compiler.trace import trace
+from wamnet.compiler.core import ir
+from wamnet.compiler.core.listing import SKELETON, Line, as_text, lines_of, within
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.refimpl import siren, vectors
 from wamnet.refimpl.dataset import Normalization, Window
 from wamnet.refimpl.denoise import Model

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import Gather, Image, Type, text
-from wamnet.compiler.loops import bodies, loops
-from wamnet.compiler.passes import pipeline
-from wamnet.compiler.passes.eliminate_dead import eliminate_dead
-from wamnet.compiler.passes.fold import fold, fold_float32
-from wamnet.compiler.passes.scalarize import scalarize
-from wamnet.compiler.trace import trace
-from wamnet.compiler.verify import verify
-from wamnet.compiler.weights import tables, weights
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Gather, Image, Type, text
+from wamnet.compiler.core.loops import bodies, loops
+from wamnet.compiler.core.passes import pipeline
+from wamnet.compiler.core.passes.eliminate_dead import eliminate_dead
+from wamnet.compiler.core.passes.fold import fold, fold_float32
+from wamnet.compiler.core.passes.scalarize import scalarize
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.core.verify import verify
+from wamnet.compiler.core.weights import tables, weights
 from wamnet.refimpl import vectors
 from wamnet.refimpl.dataset import Window
 from wamnet.refimpl.errors import CompileError

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.loops import loops as loops_of
-from wamnet.compiler.lower_scene import LAYERS, PATH, SURFACE, lower_scene, names, primitives
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.loops import loops as loops_of
+from wamnet.compiler.scenes.lower_scene import LAYERS, PATH, SURFACE, lower_scene, names, primitives
 from wamnet.refimpl import render as R
 from wamnet.refimpl import rng, scenes, transport
 from wamnet.refimpl.camera import camera_basis

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from wamnet.compiler import bounds, trace
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.dialect import Dialect
-from wamnet.compiler.glsl import GLSL
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import Gather, Image, Type
-from wamnet.compiler.opencl import OpenCL
-from wamnet.compiler.ops import OPS, _row
-from wamnet.compiler.profiles import EMITTED_SINE
+from wamnet.compiler.core import trace
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.ops import OPS, _row
+from wamnet.compiler.core.profiles import EMITTED_SINE
+from wamnet.compiler.languages.dialect import Dialect
+from wamnet.compiler.languages.glsl import GLSL
+from wamnet.compiler.languages.opencl import OpenCL
+from wamnet.compiler.proof import bounds
 from wamnet.refimpl.dataset import Window
 
 

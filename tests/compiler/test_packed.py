@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.emit_packed import WEIGHTS_A_TEXEL, Packed
-from wamnet.compiler.glsl_es import GLSLESPacked
+from wamnet.compiler.languages.glsl_es import GLSLESPacked
+from wamnet.compiler.schedules.emit_packed import WEIGHTS_A_TEXEL, Packed
 
 
 @pytest.fixture(scope="module")

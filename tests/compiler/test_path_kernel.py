@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import pytest
 
-from wamnet.compiler import ir
-from wamnet.compiler.emit_path import GROUPS, planes
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.core import ir
+from wamnet.compiler.scenes.emit_path import GROUPS, planes
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import CompileError

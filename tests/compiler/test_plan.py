@@ -7,12 +7,12 @@ import pickle
 import numpy as np
 import pytest
 
-from wamnet.compiler import bounds
 from wamnet.compiler import plan as module
 from wamnet.compiler.compile import compile_plan, compile_program
-from wamnet.compiler.factor import product
-from wamnet.compiler.interpret import interpret
+from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.plan import analysed, plan_program, sine_contract
+from wamnet.compiler.proof import bounds
+from wamnet.compiler.schedules.factor import product
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import open_executor
 from wamnet.refimpl.errors import CompileError

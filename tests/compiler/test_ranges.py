@@ -10,15 +10,16 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from wamnet.compiler import ops, ranges
-from wamnet.compiler.bounds import power_error
-from wamnet.compiler.interpret import apply, interpret
-from wamnet.compiler.ir import Node, Program, Type, attributes
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
-from wamnet.compiler.profiles import FLUSH, SineContract
-from wamnet.compiler.ranges import CORRECT, PROMISED, Range, evaluate
-from wamnet.compiler.trace import trace
+from wamnet.compiler.core import ops
+from wamnet.compiler.core.interpret import apply, interpret
+from wamnet.compiler.core.ir import Node, Program, Type, attributes
+from wamnet.compiler.core.profiles import FLUSH, SineContract
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.proof import ranges
+from wamnet.compiler.proof.bounds import power_error
+from wamnet.compiler.proof.ranges import CORRECT, PROMISED, Range, evaluate
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.scene import Sphere

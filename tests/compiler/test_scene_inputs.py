@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
-from wamnet.compiler.scene_inputs import SceneInputs, bind, lay_out, varying
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.compiler.scenes.scene_inputs import SceneInputs, bind, lay_out, varying
 from wamnet.kernels.executor import Part
 from wamnet.kernels.numpy_executor import NumpyExecutor
 from wamnet.refimpl import scenes

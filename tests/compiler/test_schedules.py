@@ -9,16 +9,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.compiler import schedules
-from wamnet.compiler.c_tiled import C_LADDER
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.emit_inlined import LARGEST_WEIGHTS
-from wamnet.compiler.emit_tiled import LARGEST_PRIVATE
-from wamnet.compiler.ir import Gather, Image, Type
-from wamnet.compiler.opencl_group import OPENCL_GROUPS
-from wamnet.compiler.opencl_tiled import OPENCL_LADDER
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.schedules import schedules
+from wamnet.compiler.schedules.c_tiled import C_LADDER
+from wamnet.compiler.schedules.emit_inlined import LARGEST_WEIGHTS
+from wamnet.compiler.schedules.emit_tiled import LARGEST_PRIVATE
+from wamnet.compiler.schedules.opencl_group import OPENCL_GROUPS
+from wamnet.compiler.schedules.opencl_tiled import OPENCL_LADDER
 from wamnet.compiler.targets import TARGETS
-from wamnet.compiler.trace import trace
 from wamnet.refimpl import siren
 from wamnet.refimpl.dataset import Window
 from wamnet.refimpl.denoise import denoise_pixel

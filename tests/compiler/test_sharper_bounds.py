@@ -7,13 +7,14 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.compiler import adjoint, bounds, scaled, sums
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import Gather, Image, Type
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core import sums
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.core.profiles import EMITTED_SINE
+from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import analysed
-from wamnet.compiler.profiles import EMITTED_SINE
-from wamnet.compiler.trace import trace
+from wamnet.compiler.proof import adjoint, bounds, scaled
 from wamnet.refimpl import siren
 from wamnet.refimpl.activation import ACTIVATIONS
 from wamnet.refimpl.dataset import Normalization, Window
@@ -133,8 +134,8 @@ def test_float32_is_within_both_bounds(seed, omega_0, scale, activation):
 
 
 def program_with_emitted_sines(program):
-    from wamnet.compiler.passes import pipeline
-    from wamnet.compiler.profiles import PROFILES
+    from wamnet.compiler.core.passes import pipeline
+    from wamnet.compiler.core.profiles import PROFILES
 
     return pipeline.run(program, PROFILES["ieee"].passes)
 

@@ -12,15 +12,15 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from wamnet.compiler import sine
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.enclosure import round_up
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import Type
-from wamnet.compiler.passes import pipeline
+from wamnet.compiler.core import sine
+from wamnet.compiler.core.enclosure import round_up
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Type
+from wamnet.compiler.core.passes import pipeline
+from wamnet.compiler.core.profiles import emitted_cosine, emitted_sine, profile_named
+from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import sine_contract
-from wamnet.compiler.profiles import emitted_cosine, emitted_sine, profile_named
-from wamnet.compiler.trace import trace
 from wamnet.refimpl.errors import CompileError
 
 DEGREES = sorted(sine.POLYNOMIALS)
@@ -336,7 +336,7 @@ def test_manifest_names_the_degree(target, gathered_sine):
 @pytest.fixture(scope="module")
 def gathered_sine():
     """A program of one pixel with a sine."""
-    from wamnet.compiler.ir import Gather, Image
+    from wamnet.compiler.core.ir import Gather, Image
     from wamnet.refimpl.dataset import Window
 
     gather = Gather(Window(1, "clamp"), (Image("a", 3, -1.0, 1.0),))

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wamnet.compiler import step
-from wamnet.compiler.emit_step import BLOCK, INPUTS
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import Node, Type, attributes
-from wamnet.compiler.lower_step import ADAM_INPUTS, lower_adam, lower_step, step_of
-from wamnet.compiler.step_kernel import compile_lowered, compile_step
-from wamnet.compiler.step_layout import LANES, pack, slots, transposed_slots, unpack
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Node, Type, attributes
+from wamnet.compiler.training import step
+from wamnet.compiler.training.emit_step import BLOCK, INPUTS
+from wamnet.compiler.training.lower_step import ADAM_INPUTS, lower_adam, lower_step, step_of
+from wamnet.compiler.training.step_kernel import compile_lowered, compile_step
+from wamnet.compiler.training.step_layout import LANES, pack, slots, transposed_slots, unpack
 from wamnet.refimpl import adam
 from wamnet.refimpl.errors import CompileError
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import Type, text
-from wamnet.compiler.trace import TRACEABLE, trace
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Type, text
+from wamnet.compiler.core.trace import TRACEABLE, trace
 from wamnet.refimpl.errors import CompileError
 
 W = np.arange(6, dtype=np.float32).reshape(2, 3)

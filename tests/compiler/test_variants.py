@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.compiler import sine, variants
+from wamnet.compiler import variants
 from wamnet.compiler.compile import compile_plan
+from wamnet.compiler.core import sine
 from wamnet.compiler.targets import TARGETS
 from wamnet.compiler.variants import parse, plan_model, vary
 from wamnet.refimpl import dataset, factored, siren

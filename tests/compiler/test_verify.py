@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler import verify as verifier
-from wamnet.compiler.ir import Gather, Image, Node, Program, Type, attributes
-from wamnet.compiler.verify import verify
+from wamnet.compiler.core import verify as verifier
+from wamnet.compiler.core.ir import Gather, Image, Node, Program, Type, attributes
+from wamnet.compiler.core.verify import verify
 from wamnet.refimpl.dataset import Window
 from wamnet.refimpl.errors import CompileError
 

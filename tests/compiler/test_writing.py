@@ -6,8 +6,8 @@ import os
 
 import pytest
 
-from wamnet.compiler import writing
 from wamnet.compiler.artifact import MANIFEST_NAME
+from wamnet.compiler.core import writing
 
 
 def test_temporary_names_cannot_be_guessed(tmp_path) -> None:

@@ -22,10 +22,11 @@ import numpy as np
 from wamnet.cli import dataset_files, demo, exr, images
 from wamnet.cli import inputs as cli_inputs
 from wamnet.cli.main import main
-from wamnet.compiler import artifact, checker, variants
+from wamnet.compiler import artifact, variants
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core.lower import lower
 from wamnet.compiler.model_file import load_checkpoint, save_checkpoint, save_model
+from wamnet.compiler.proof import checker
 from wamnet.kernels import cache, curve
 from wamnet.kernels.conformance import case, report
 from wamnet.refimpl import denoise, scene, siren, train, variation

@@ -19,7 +19,7 @@ import pytest
 from targets import Good
 
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core.lower import lower
 from wamnet.refimpl import siren
 from wamnet.refimpl.dataset import Normalization, Window
 from wamnet.refimpl.denoise import Model

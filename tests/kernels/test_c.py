@@ -11,7 +11,7 @@ import pytest
 
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.interpret import interpret
+from wamnet.compiler.core.interpret import interpret
 from wamnet.kernels import c_executor
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 

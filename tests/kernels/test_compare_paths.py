@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler import ranges
-from wamnet.compiler.lower_scene import lower_scene
+from wamnet.compiler.proof import ranges
+from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.kernels import compare_images, compare_paths, random_words
 from wamnet.kernels.compare_images import ImageReport, blocks
 from wamnet.kernels.compare_paths import QUANTITIES, View, kernel_of_states

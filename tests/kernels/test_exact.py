@@ -9,17 +9,18 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from wamnet.compiler import bounds, factor
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.encode_kernel import compile_encode
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import LEAST, Gather, Image, Type
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import LEAST, Gather, Image, Type
+from wamnet.compiler.core.profiles import EMITTED_SINE
+from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import analysed, sine_contract
-from wamnet.compiler.profiles import EMITTED_SINE
+from wamnet.compiler.proof import bounds
+from wamnet.compiler.scenes.encode_kernel import compile_encode
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.compiler.schedules import factor
 from wamnet.compiler.targets import DENOISERS
-from wamnet.compiler.trace import trace
 from wamnet.kernels import denoise_on
 from wamnet.refimpl import dataset, denoise, frame, scenes, siren
 from wamnet.refimpl.errors import CompileError

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from kit import LONG, trained_sizes
 
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import Gather, Image, Type
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import plan_program
-from wamnet.compiler.trace import trace
 from wamnet.kernels import denoise_on, open_executor
 from wamnet.kernels.executor import black
 from wamnet.refimpl import dataset, denoise, frame
@@ -327,8 +327,8 @@ WITHOUT_PRECISE = """
 import numpy as np
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.ir import Gather, Image, Type
-from wamnet.compiler.trace import trace
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.trace import trace
 from wamnet.refimpl.dataset import Window
 
 gather = Gather(Window(1, "clamp"), (Image("a", 1, -1.0, 1.0),))

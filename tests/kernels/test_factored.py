@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wamnet.compiler import bounds, factor
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.emit_fourier import Fourier
-from wamnet.compiler.interpret import interpret
+from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.plan import analysed, sine_contract
+from wamnet.compiler.proof import bounds
+from wamnet.compiler.schedules import factor
+from wamnet.compiler.schedules.emit_fourier import Fourier
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import Pipeline, denoise_on, opencl_executor
 from wamnet.refimpl import dataset, factored

@@ -15,10 +15,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wamnet.compiler import emit_fourier
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.ir import attributes
+from wamnet.compiler.core.ir import attributes
 from wamnet.compiler.plan import plan_program
+from wamnet.compiler.schedules import emit_fourier
 from wamnet.compiler.targets import DENOISERS, target_named
 
 EXAMPLES = max(settings.default.max_examples // 10, 1)

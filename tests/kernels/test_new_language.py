@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from wamnet.compiler import targets
-from wamnet.compiler.c import C
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.encode_kernel import compile_encode
-from wamnet.compiler.interface import DENOISE, ENCODE, PATH
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.openings import Arguments
-from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.interface import DENOISE, ENCODE, PATH
+from wamnet.compiler.languages.openings import Arguments
+from wamnet.compiler.scenes.encode_kernel import compile_encode
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels.executor import Part
 from wamnet.refimpl.dataset import Normalization
 from wamnet.refimpl.scenes import canonical

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from wamnet.compiler import targets, weights
+from wamnet.compiler import targets
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.emit import Body, emit, kernel_gather
-from wamnet.compiler.schedules import Plain
+from wamnet.compiler.core import weights
+from wamnet.compiler.schedules.emit import Body, emit, kernel_gather
+from wamnet.compiler.schedules.schedules import Plain
 
 
 @dataclass

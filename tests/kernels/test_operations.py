@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wamnet.compiler.bounds import NO_BOUND
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ops import LOOPS, OPS
-from wamnet.compiler.profiles import EMITTED_COSINE
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ops import LOOPS, OPS
+from wamnet.compiler.core.profiles import EMITTED_COSINE
+from wamnet.compiler.proof.bounds import NO_BOUND
 from wamnet.refimpl import rng
 
 W = np.array([[1.5, -2.0, 0.25, 3.0], [0.1, 0.2, -0.3, 0.7]], np.float32)

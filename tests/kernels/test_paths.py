@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler.emit_path import FRAME_GROUPS
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.scenes.emit_path import FRAME_GROUPS
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import target_named
 from wamnet.kernels.executor import Part
 from wamnet.kernels.render_on import compile_scene, render_on

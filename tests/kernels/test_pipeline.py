@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler import bounds, ir
-from wamnet.compiler.encode_kernel import error_at
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core import ir
+from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed, sine_contract
+from wamnet.compiler.proof import bounds
+from wamnet.compiler.scenes.encode_kernel import error_at
 from wamnet.compiler.variants import FULL, with_rank
 from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
 from wamnet.kernels.executor import Part

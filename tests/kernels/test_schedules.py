@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from kit import LONG, trained_sizes
 
-from wamnet.compiler import emit_fourier
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.schedules import emit_fourier
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import denoise_on, opencl_executor, opengl_executor
 from wamnet.refimpl import dataset, denoise, frame

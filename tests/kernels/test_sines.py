@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.compiler import sine
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.ir import Gather, Image, Type
-from wamnet.compiler.trace import trace
+from wamnet.compiler.core import sine
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.trace import trace
 from wamnet.refimpl.dataset import Window
 
 DEGREES = sorted(sine.POLYNOMIALS)

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler.ir import Type
-from wamnet.compiler.loops import MOST_UNROLLED
-from wamnet.compiler.lower_scene import lower_scene, primitives
-from wamnet.compiler.path_kernel import compile_path, most_unrolled
-from wamnet.compiler.trace import trace
-from wamnet.compiler.verify import verify
+from wamnet.compiler.core.ir import Type
+from wamnet.compiler.core.loops import MOST_UNROLLED
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.core.verify import verify
+from wamnet.compiler.scenes.lower_scene import lower_scene, primitives
+from wamnet.compiler.scenes.path_kernel import compile_path, most_unrolled
 from wamnet.kernels.executor import Part
 from wamnet.kernels.render_on import compile_scene, render_on
 from wamnet.refimpl import render as R

@@ -22,11 +22,11 @@ import pytest
 from wamnet.cli.inputs import load_model, shipped_models, unlike_training
 from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.ir import Program
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core.ir import Program
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.core.profiles import PROFILES
 from wamnet.compiler.plan import Expected, sine_contract
-from wamnet.compiler.profiles import PROFILES
-from wamnet.compiler.schedules import Schedule
+from wamnet.compiler.schedules.schedules import Schedule
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import denoise_on, registry
 from wamnet.kernels.denoise_on import images_of

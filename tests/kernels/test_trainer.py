@@ -17,10 +17,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from statistical import SIGNIFICANCE, welch_p
 
-from wamnet.compiler import lower_step, step, step_kernel
-from wamnet.compiler.bounds import enclose
-from wamnet.compiler.profiles import EMITTED_SINE, UNIT_ROUNDOFF
-from wamnet.compiler.step_kernel import StepKernel, compile_step
+from wamnet.compiler.core.profiles import EMITTED_SINE, UNIT_ROUNDOFF
+from wamnet.compiler.proof.bounds import enclose
+from wamnet.compiler.training import lower_step, step, step_kernel
+from wamnet.compiler.training.step_kernel import StepKernel, compile_step
 from wamnet.kernels import trainer
 from wamnet.kernels.opencl_trainer import OpenCLTrainer
 from wamnet.kernels.trainer import train_on

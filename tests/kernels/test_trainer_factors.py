@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wamnet.compiler import step
-from wamnet.compiler.step_kernel import StepKernel, compile_step
+from wamnet.compiler.training import step
+from wamnet.compiler.training.step_kernel import StepKernel, compile_step
 from wamnet.kernels import trainer
 from wamnet.kernels.trainer import train_on
 from wamnet.refimpl import dataset, factored, train

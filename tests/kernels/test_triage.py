@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.compile import compile_plan, compile_program
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import plan_program
 from wamnet.kernels import apart, triage
 from wamnet.kernels.apart import Apart, Inside, Outcome

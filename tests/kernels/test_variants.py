@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler import bounds, factor, sine, variants
+from wamnet.compiler import variants
 from wamnet.compiler.compile import compile_plan
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core import sine
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed, sine_contract
+from wamnet.compiler.proof import bounds
+from wamnet.compiler.schedules import factor
 from wamnet.compiler.targets import TARGETS, schedule_named
 from wamnet.compiler.variants import parse, plan_model, vary, with_rank
 from wamnet.kernels import denoise_on

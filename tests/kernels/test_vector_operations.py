@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wamnet.compiler.ir import Node, Type
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.opencl_path import LANES, of_lanes
-from wamnet.compiler.ops import OPS
-from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.core.ir import Node, Type
+from wamnet.compiler.core.ops import OPS
+from wamnet.compiler.languages.opencl_path import LANES, of_lanes
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.refimpl import scenes
 from wamnet.refimpl.transport import Settings
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import sys
+from collections import Counter
 from collections.abc import Iterator
 
 import pytest
@@ -53,6 +54,46 @@ def imports(source) -> Iterator[tuple[ast.AST, str]]:
             module = ".".join([*base, *(node.module or "").split(".")]).strip(".")
             for alias in node.names:
                 yield node, f"{module}.{alias.name}"
+
+
+ROOMS = {
+    "core": (),
+    "languages": ("core",),
+    "proof": ("core",),
+    "schedules": ("core", "languages", "proof"),
+    "": ("core", "languages", "proof", "schedules"),
+    "scenes": ("core", "languages", "proof", "schedules", ""),
+    "training": ("core", "languages", "proof", "schedules", ""),
+}
+"""The compiler's rooms, which are its folders, and what each may import; "" is the compiler's own folder."""
+
+MOST_FILES = 20
+"""Most modules of a folder."""
+
+
+def test_rooms_of_the_compiler_are_small_and_import_one_way(house):
+    """Imports for type checkers only may go the other way: they are no part of what runs."""
+    wrong, files = [], Counter()
+    for source in house.python("compiler"):
+        room = "/".join(source.path.split("/")[1:-1]).partition("/")[0]
+        files[source.path.rpartition("/")[0]] += 1
+        skipped = {id(node) for branch in checked_only(source.tree) for node in ast.walk(branch)}
+        for node, name in imports(source):
+            parts = name.split(".")
+            if parts[:2] != ["wamnet", "compiler"] or id(node) in skipped:
+                continue
+            target = parts[2] if parts[2] in ROOMS else ""
+            if target not in (room, *ROOMS[room]):
+                wrong.append(source.at(node, f"room {room or 'compiler'} imports {target or 'compiler'}"))
+    wrong += [f"{folder} has {count} modules" for folder, count in files.items() if count > MOST_FILES]
+    house.refuse(wrong, "A room has at most 20 modules and imports those before it: move the code.")
+
+
+def checked_only(tree):
+    """Yield what is under `if TYPE_CHECKING`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+            yield from node.body
 
 
 def test_imports_go_one_way(house):
@@ -154,8 +195,12 @@ def test_no_hidden_random_state(house):
 @pytest.mark.parametrize(
     ("path", "text", "names"),
     [
-        ("compiler/passes/fold.py", "from .. import ir", ["wamnet.compiler.ir"]),
-        ("compiler/passes/fold.py", "from ...refimpl.siren import forward", ["wamnet.refimpl.siren.forward"]),
+        ("compiler/core/passes/fold.py", "from .. import ir", ["wamnet.compiler.core.ir"]),
+        (
+            "compiler/core/ops.py",
+            "from ...refimpl.siren import forward",
+            ["wamnet.refimpl.siren.forward"],
+        ),
         ("cli/main.py", "def f():\n    import os.path, typer", ["os.path", "typer"]),
         ("kernels/__init__.py", "from .registry import open", ["wamnet.kernels.registry.open"]),
     ],

@@ -45,7 +45,7 @@ def test_named_paths_exist(house):
 @pytest.mark.parametrize(
     ("text", "paths"),
     [
-        ("see `compiler/ops.py`, and tests/kernels.", ["compiler/ops.py", "tests/kernels"]),
+        ("see `compiler/core/ops.py`, and tests/kernels.", ["compiler/core/ops.py", "tests/kernels"]),
         ("spec/<stem>.md and compiler/{target}.py and tests/*.py", []),
         ("out/cli/x, ./spec/none", []),
         (".ci/run runs it; the folder tests/meta/", [".ci/run", "tests/meta"]),

@@ -31,21 +31,24 @@ THIS = "tests/meta/test_words.py"
 """The list of words contains them."""
 
 KEPT = {
-    "compiler/c.py": ("unless it is told -ffp", "planes need that are not asked for"),  # comments of kernels
-    "compiler/emit_path.py": ("the path goes on",),  # a comment of kernels
-    "compiler/emit_step.py": ("Where the examples lie;",),  # a comment of kernels
-    "compiler/emit_tiled.py": (
+    "compiler/languages/c.py": (
+        "unless it is told -ffp",
+        "planes need that are not asked for",
+    ),  # comments of kernels
+    "compiler/scenes/emit_path.py": ("the path goes on",),  # a comment of kernels
+    "compiler/training/emit_step.py": ("Where the examples lie;",),  # a comment of kernels
+    "compiler/schedules/emit_tiled.py": (
         "something besides an affine map",  # a reason in manifests
         "what lies beyond the border",  # a comment of kernels
     ),
-    "compiler/glsl.py": (  # heads of kernels
+    "compiler/languages/glsl.py": (  # heads of kernels
         "it is read with texelFetch alone",
         "the window stands on its head",
     ),
-    "compiler/glsl_buffers.py": ("on [-pi, pi] alone",),  # a sine in manifests and heads of kernels
-    "compiler/glsl_compute.py": ("the window stands on its head",),  # heads of kernels
-    "compiler/weight_homes.py": ("whatever stands above",),  # heads of kernels
-    "compiler/wgsl.py": ("on [-pi, pi] alone",),  # a sine in manifests and heads of kernels
+    "compiler/languages/glsl_buffers.py": ("on [-pi, pi] alone",),  # a sine in manifests and heads of kernels
+    "compiler/schedules/glsl_compute.py": ("the window stands on its head",),  # heads of kernels
+    "compiler/languages/weight_homes.py": ("whatever stands above",),  # heads of kernels
+    "compiler/languages/wgsl.py": ("on [-pi, pi] alone",),  # a sine in manifests and heads of kernels
     "refimpl/dataset.py": ("were it matt and nothing in between",),  # manifests and heads of kernels
     "kernels/conformance/kinds/files.py": (  # notes of vectors
         "whole numbers are numbers",

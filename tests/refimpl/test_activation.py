@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.compiler import bounds
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.ir import Type
-from wamnet.compiler.lower import lower
-from wamnet.compiler.lower_step import lower_step
-from wamnet.compiler.profiles import EMITTED_SINE
+from wamnet.compiler.core.ir import Type
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.core.profiles import EMITTED_SINE
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.proof import bounds
 from wamnet.compiler.targets import DENOISERS, EXPORTED
-from wamnet.compiler.trace import trace
+from wamnet.compiler.training.lower_step import lower_step
 from wamnet.refimpl import activation, siren
 from wamnet.refimpl.activation import ACTIVATIONS, Activation, activation_named
 from wamnet.refimpl.dataset import Normalization, Window

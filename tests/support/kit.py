@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.ir import Gather, Image, Program, Type, sha256
-from wamnet.compiler.trace import trace
+from wamnet.compiler.core.ir import Gather, Image, Program, Type, sha256
+from wamnet.compiler.core.trace import trace
 from wamnet.kernels import Pipeline
 from wamnet.refimpl import dataset, siren
 from wamnet.refimpl.activation import SINE

@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.compiler import sine
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.encode_kernel import compile_encode
-from wamnet.compiler.lower import lower
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
-from wamnet.compiler.step_kernel import compile_step
+from wamnet.compiler.core import sine
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.scenes.encode_kernel import compile_encode
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.compiler.training.step_kernel import compile_step
 from wamnet.kernels.conformance.numbers import number_text
 from wamnet.refimpl import (
     adam,

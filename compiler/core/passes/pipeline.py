@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from ...refimpl.errors import CompileError
+from ....refimpl.errors import CompileError
 from ..ir import Program
 from ..profiles import EXPAND_SINE
 from ..sine import POLYNOMIALS

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from wamnet.compiler.ir import Type
-from wamnet.compiler.sine import POLYNOMIALS
-from wamnet.compiler.trace import trace
+from wamnet.compiler.core.ir import Type
+from wamnet.compiler.core.sine import POLYNOMIALS
+from wamnet.compiler.core.trace import trace
 
 KNOWN = {"input", "constant", "add", "subtract", "multiply", "floor", "minimum", "maximum", "negative"}
 """The operations that a sine may be made of."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import Type
-from wamnet.compiler.passes.eliminate_dead import eliminate_dead
-from wamnet.compiler.trace import trace
-from wamnet.compiler.verify import verify
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Type
+from wamnet.compiler.core.passes.eliminate_dead import eliminate_dead
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.core.verify import verify
 
 FUNCTIONS = {
     "a + (-b)": (lambda a, b: a + (-b), ["subtract"]),

@@ -1,6 +1,7 @@
 """Kinds of the network: initial parameters, activations layer by layer, derivatives, Adam over several steps.
 
-Bounds are those of compiler/bounds.py (PRO-6) at the case's own inputs, and for Adam ranges, step by step.
+Bounds are those of compiler/proof/bounds.py (PRO-6) at the case's own inputs; for Adam they are ranges, step
+by step.
 """
 
 from __future__ import annotations
@@ -12,15 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....compiler import bounds, ranges
-from ....compiler.ir import Type
-from ....compiler.lower_step import ADAM_INPUTS, lower_adam, step_of
+from ....compiler.core.ir import Type
+from ....compiler.core.profiles import EMITTED_SINE
+from ....compiler.core.sums import gamma
+from ....compiler.core.trace import trace
 from ....compiler.plan import analysed
-from ....compiler.profiles import EMITTED_SINE
-from ....compiler.ranges import Range
-from ....compiler.step import SQUARES, sum_errors
-from ....compiler.sums import gamma
-from ....compiler.trace import trace
+from ....compiler.proof import bounds, ranges
+from ....compiler.proof.ranges import Range
+from ....compiler.training.lower_step import ADAM_INPUTS, lower_adam, step_of
+from ....compiler.training.step import SQUARES, sum_errors
 from ....refimpl import adam, siren, train
 from ....refimpl.siren import Siren
 from ..case import Case, Kind, Output
@@ -28,7 +29,7 @@ from ..functions import drawn
 
 Array = NDArray[Any]
 
-POSTERIORI = "bounds of profile ieee at these inputs (compiler/bounds.py)"
+POSTERIORI = "bounds of profile ieee at these inputs (compiler/proof/bounds.py)"
 """Where the bounds of networks come from."""
 
 SIZES = (([4, 5, 3], 3.0, 1.0), ([6, 8, 8, 3], 1.0, 10.0), ([3, 4, 4, 4, 3], 30.0, 30.0), ([2, 3], 1.0, 1.0))
@@ -242,7 +243,7 @@ def _adam_cases() -> list[Case]:
 
 def ranges_text() -> str:
     """Return where the bounds of Adam's runs come from."""
-    return "ranges of single precision under profile ieee, from step to step (compiler/ranges.py)"
+    return "ranges of single precision under profile ieee, from step to step (compiler/proof/ranges.py)"
 
 
 NETWORK = {

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ....compiler import sine
+from ....compiler.core import sine
 from ....refimpl import adam, encoding, rng, sobol
 from ..case import Case, Kind, Output
 from ..functions import Field, Function, drawn

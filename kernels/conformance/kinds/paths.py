@@ -2,7 +2,7 @@
 
 1. A step is a function of a state: from the camera [`start`], to the next surface [`arrive`], and away from
    it [`scatter`]. Its bound is the range of what single precision may give at that state
-   (compiler/ranges.py).
+   (compiler/proof/ranges.py).
 2. A whole path is the steps one after another, each from the range of the one before: the bound grows from
    vertex to vertex. A case ends before the first vertex of which a decision is not sure [`followed`].
 """
@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....compiler import ranges
-from ....compiler.lower_scene import PATH, SURFACE, PathPrograms, Values, kinds, lower_scene
-from ....compiler.ranges import Range
+from ....compiler.proof import ranges
+from ....compiler.proof.ranges import Range
+from ....compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, Values, kinds, lower_scene
 from ....refimpl import camera, render, rng, scenes, transport
 from ....refimpl import scene as scene_module
 from ....refimpl.intersection import Hit, materials_by_id, reflecting
@@ -48,7 +48,7 @@ LARGEST_BOUND = 0.01
 MOST_VERTICES = 5
 """Most vertices of a whole path."""
 
-CHAIN = "ranges of single precision under profile ieee, from step to step (compiler/ranges.py)"
+CHAIN = "ranges of single precision under profile ieee, from step to step (compiler/proof/ranges.py)"
 """Where the bounds of whole paths come from."""
 
 SCENE_FIELD = "scene file (SCN-6)"

@@ -1,7 +1,7 @@
 """Kinds of whole pictures: denoising of a small frame, and a small render with a statistical verdict.
 
-1. A denoised picture has a bound at each pixel: the network's at its window (compiler/bounds.py), for encoded
-   features that may be one ulp of float32 off [`_denoise_cases`].
+1. A denoised picture has a bound at each pixel: the network's at its window (compiler/proof/bounds.py), for
+   encoded features that may be one ulp of float32 off [`_denoise_cases`].
 2. A rendered picture is an estimate. The answer holds the mean of each pixel and the variance of one sample;
    both are averaged over blocks of pixels, and the blocks' means are compared by Welch's test with those of
    the reference (welch.py) [`_render_cases`].
@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from ....compiler import bounds
-from ....compiler.lower import lower
+from ....compiler.core.lower import lower
+from ....compiler.core.profiles import EMITTED_SINE
 from ....compiler.plan import analysed
-from ....compiler.profiles import EMITTED_SINE
+from ....compiler.proof import bounds
 from ....refimpl import dataset, denoise, siren
 from ....refimpl import scene as scene_module
 from ....refimpl.dataset import Normalization, Window
@@ -92,7 +92,7 @@ def _denoise_cases() -> list[Case]:
         inputs = {**layers, "model": base64.b64encode(file_of(model)).decode()}
         picture = _denoise(inputs)["picture"]
         bound = _bound(model, frame_of(layers), picture)
-        text = "bounds of profile ieee at these pixels, features being one ulp off (compiler/bounds.py)"
+        text = "bounds of profile ieee at these pixels, features being one ulp off (compiler/proof/bounds.py)"
         expected = {"picture": Output(picture, bound, text)}
         cases.append(Case(f"picture.denoised/{index}", "DEN-2", inputs, expected, (), note))
     needy = _model(("color", "normal"), Window(2, "clamp"), [4], 0, MIDDLE)

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.compiler import step
-from wamnet.compiler.ir import Type
-from wamnet.compiler.lower_step import lower_step, step_of
-from wamnet.compiler.passes.eliminate_dead import eliminate_dead
-from wamnet.compiler.passes.fuse_bias import fuse_bias
-from wamnet.compiler.passes.gradient import RULES, gradient
-from wamnet.compiler.trace import trace
+from wamnet.compiler.core.ir import Type
+from wamnet.compiler.core.passes.eliminate_dead import eliminate_dead
+from wamnet.compiler.core.passes.fuse_bias import fuse_bias
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.training import step
+from wamnet.compiler.training.gradient import RULES, gradient
+from wamnet.compiler.training.lower_step import lower_step, step_of
 from wamnet.refimpl import siren, train
 from wamnet.refimpl.activation import ACTIVATIONS
 from wamnet.refimpl.errors import CompileError

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wamnet.compiler.interpret import interpret
-from wamnet.compiler.ir import Type
-from wamnet.compiler.passes import pipeline
-from wamnet.compiler.passes.eliminate_dead import eliminate_dead
-from wamnet.compiler.passes.expand_sine import expand_sine
-from wamnet.compiler.passes.expand_tables import expand_tables
-from wamnet.compiler.passes.fold import fold, fold_float32
-from wamnet.compiler.passes.fuse_bias import fuse_bias
-from wamnet.compiler.passes.scalarize import scalarize
-from wamnet.compiler.sine import cosine, sine
-from wamnet.compiler.trace import trace
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Type
+from wamnet.compiler.core.passes import pipeline
+from wamnet.compiler.core.passes.eliminate_dead import eliminate_dead
+from wamnet.compiler.core.passes.expand_sine import expand_sine
+from wamnet.compiler.core.passes.expand_tables import expand_tables
+from wamnet.compiler.core.passes.fold import fold, fold_float32
+from wamnet.compiler.core.passes.fuse_bias import fuse_bias
+from wamnet.compiler.core.passes.scalarize import scalarize
+from wamnet.compiler.core.sine import cosine, sine
+from wamnet.compiler.core.trace import trace
 from wamnet.refimpl.errors import CompileError
 
 W = np.arange(9, dtype=np.float32).reshape(3, 3)
@@ -72,7 +72,7 @@ def test_fold_computes_constants_in_float64():
 
 def _number(x, value):
     """Return a traced constant: Python would compute with a plain one itself."""
-    from wamnet.compiler.trace import Traced, _operand
+    from wamnet.compiler.core.trace import Traced, _operand
 
     return Traced(x.builder, _operand(x.builder, value))
 

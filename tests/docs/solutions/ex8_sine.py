@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wamnet.compiler.sine import PI_PARTS, POLYNOMIALS
+from wamnet.compiler.core.sine import PI_PARTS, POLYNOMIALS
 
 ONE_OVER_PI = float.fromhex("0x1.45f306p-2")
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from wamnet.compiler.ir import Node
-from wamnet.compiler.passes.rewrite import rewrite
+from wamnet.compiler.core.ir import Node
+from wamnet.compiler.core.passes.rewrite import rewrite
 
 
 def subtract(program):

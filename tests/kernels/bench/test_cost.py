@@ -7,7 +7,7 @@ import math
 import pytest
 
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed
 from wamnet.kernels.bench.cost import Rates, Stage, fused, layered, predicted_seconds, sines_of
 from wamnet.refimpl import siren

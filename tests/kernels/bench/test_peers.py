@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from packages import PACKAGES, needed
 
-from wamnet.compiler import bounds
-from wamnet.compiler.lower import lower
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.core.profiles import SineContract
 from wamnet.compiler.plan import analysed
-from wamnet.compiler.profiles import SineContract
+from wamnet.compiler.proof import bounds
 from wamnet.kernels.bench import contenders, workload
 from wamnet.kernels.bench.contender import Tools
 from wamnet.refimpl import dataset, siren

@@ -10,10 +10,10 @@ import pytest
 
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.encode_kernel import compile_encode
-from wamnet.compiler.lower_encode import layers_of
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.scenes.encode_kernel import compile_encode
+from wamnet.compiler.scenes.lower_encode import layers_of
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels.executor import Part
 from wamnet.kernels.export.gl_runner import ESRunner
 from wamnet.refimpl.dataset import Normalization

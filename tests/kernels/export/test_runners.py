@@ -13,10 +13,10 @@ import pytest
 
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.encode_kernel import compile_encode, error_at
-from wamnet.compiler.lower_encode import layers_of
-from wamnet.compiler.lower_scene import lower_scene
-from wamnet.compiler.path_kernel import compile_path
+from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
+from wamnet.compiler.scenes.lower_encode import layers_of
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.kernels.executor import Part
 from wamnet.kernels.export import check, runners, tools
@@ -104,7 +104,7 @@ def test_a_group_that_does_not_wait_is_found(runner, kit):
 
 def test_a_first_layer_in_two_passes(runner, kit, case):
     """The bound of both passes is against the program that was cut."""
-    from wamnet.compiler.interpret import interpret
+    from wamnet.compiler.core.interpret import interpret
     from wamnet.compiler.plan import analysed
 
     program, images = case

@@ -25,7 +25,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from ..refimpl.errors import CompileError
+from ...refimpl.errors import CompileError
 from .ir import LEAST, Node, Program
 
 NORMAL = -126

@@ -20,10 +20,10 @@ from dataclasses import replace
 import numpy as np
 
 from ...refimpl.errors import CompileError
-from ..ir import Builder, Node, Program, attributes
-from ..ops import OPS
-from ..step import TRANSPOSED, Sum
-from ..trace import Traced, emit
+from ..core.ir import Builder, Node, Program, attributes
+from ..core.ops import OPS
+from ..core.trace import Traced, emit
+from .step import TRANSPOSED, Sum
 
 Slopes = tuple[Traced, ...]
 """The slope of each operand."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
 from .results import Results
@@ -62,10 +62,14 @@ def _different(heads: list[str]) -> list[str]:
     return made
 
 
-def table(results: Results, number: int | None = None) -> str:
-    """Return one of the printed tables as Markdown, counted from 1, or all as one if headings agree."""
+def table(results: Results, number: int | None = None, without: Collection[str] = ()) -> str:
+    """Return one of the printed tables as Markdown, counted from 1, or all as one if headings agree.
+
+    `without`: headings of columns that are left out.
+    """
     rows = [record["values"] for record in results.records() if number in (None, record["values"]["table"])]
     rows = [row for row in rows if list(row) == list(rows[0])]
-    shown = [{head: cell for head, cell in row.items() if head != "table"} for row in rows]
+    hidden = {"table", *without}
+    shown = [{head: cell for head, cell in row.items() if head not in hidden} for row in rows]
     heads = [re.sub(r" #\d+$", "", head) for head in shown[0]] if shown else []
     return markdown(heads, [list(row.values()) for row in shown])

@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib
 import math
 import statistics
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -45,9 +45,13 @@ def intervals(found: Results, columns: Sequence[Column]) -> list[Column]:
     return [replace(column, interval=True) if column.value in kept else column for column in columns]
 
 
-def as_printed(record: str, number: int | None = None) -> TableOf:
+def as_printed(record: str, number: int | None = None, without: Collection[str] = ()) -> TableOf:
     """Return a table as a program has printed it; all of them as one without a number."""
-    return lambda records: printed.table(records[record], number)
+    return lambda records: printed.table(records[record], number, without)
+
+
+TIMES = ("s", "ms", "schedule")
+"""Columns of programs that measure quality: they ran beside other work, so their times say nothing."""
 
 
 def chosen(record: str, columns: Sequence[Column], rows: Mapping[str, str], first: str = "") -> TableOf:
@@ -575,7 +579,7 @@ TABLES: Mapping[str, TableOf] = {
     "lights": study("lights"),
     "losses": study("losses", "loss"),
     "pictures": pictures,
-    "presets": as_printed("presets"),
+    "presets": as_printed("presets", without=TIMES),
     "quality-ahead": differences,
     "quality-cornell": quality("cornell"),
     "quality-lamps": quality("minicubes-page"),
@@ -583,7 +587,7 @@ TABLES: Mapping[str, TableOf] = {
     "quality-outside": quality("minicubes", "outside"),
     "quality-readme": quality("minicubes", only=README_ROWS),
     "quality-times": quality_times,
-    "ranks": as_printed("ranks"),
+    "ranks": as_printed("ranks", without=TIMES),
     "savings": as_printed("savings"),
     "sines": sines,
     "sines-every": sines_every,
@@ -595,6 +599,6 @@ TABLES: Mapping[str, TableOf] = {
     "table1": table1,
     "table1-readme": table1_readme,
     "train-speed": train_speed,
-    "variants": as_printed("variants"),
+    "variants": as_printed("variants", without=TIMES),
 }
 """The tables by name."""

@@ -270,34 +270,39 @@ def generalisation(records: Records) -> str:
 # ---- speed ----------------------------------------------------------------------------------------------
 
 
+BENCH = {
+    "opencl:fft32": "OpenCL, PoCL, `fft32`: first layer from spectra",
+    "opencl:tile16": "OpenCL, PoCL, `tile16`: register tiles",
+    "opencl:plain": "OpenCL, PoCL, `plain`: the kernel to be read",
+    "opengl:inlined": "OpenGL, llvmpipe, `inlined`",
+    "torch.compile": "`torch.compile`",
+    "torch": "PyTorch, eager",
+    "onnxruntime": "ONNX Runtime",
+    "oidn:fast": "Open Image Denoise, fast; another denoiser",
+    "oidn:high": "Open Image Denoise, high",
+}
+"""Contenders of `wamnet bench` that a page shows, by configuration, with their names there."""
+
+
 def bench(record: str) -> TableOf:
-    """Return the contenders of `wamnet bench` that were measured, the fastest first."""
+    """Return the contenders of [`BENCH`], the fastest first."""
 
     def made(records: Records) -> str:
-        found = records[record]
-        rows = [r["values"] for r in found.records() if r["values"].get("ms.median") is not None]
-        rows = [row for row in rows if row.get("kind")]
+        rows = {r["configuration"]: r["values"] for r in records[record].records()}
         return tables.markdown(
-            [
-                "by",
-                "ms, median",
-                "frames/s",
-                "compile, s",
-                "largest error",
-                "bound of rounding",
-                "PSNR lost, dB",
-            ],
+            ["by", "ms, median", "spread", "frames/s", "compile, s", "largest error", "bound of rounding"],
             [
                 [
-                    row["text"],
-                    _short(row, "ms.median", ",.0f" if row["ms.median"] >= 100 else ".1f"),
+                    BENCH[name],
+                    _short(row, "ms.median", ",.0f"),
+                    _short(row, "ms.spread", ".0%"),
                     _short(row, "frames_per_s", ".1f"),
                     _short(row, "compile_s", ".1f"),
                     _short(row, "error.max", ".1e"),
                     _short(row, "rounding.bound", ".1e"),
-                    _short(row, "quality.psnr_loss_db", ".2f"),
                 ]
-                for row in sorted(rows, key=lambda row: row["ms.median"])
+                for name, row in sorted(rows.items(), key=lambda item: item[1].get("ms.median") or 0)
+                if name in BENCH
             ],
         )
 

@@ -51,7 +51,7 @@ def as_printed(record: str, number: int | None = None, without: Collection[str] 
 
 
 TIMES = ("s", "ms", "schedule")
-"""Columns of programs that measure quality: they ran beside other work, so their times say nothing."""
+"""Columns of programs that measure quality, whose times say nothing: other work ran beside them."""
 
 
 def chosen(record: str, columns: Sequence[Column], rows: Mapping[str, str], first: str = "") -> TableOf:
@@ -280,31 +280,22 @@ BENCH = {
     "onnxruntime": "ONNX Runtime",
     "oidn:fast": "Open Image Denoise, fast; another denoiser",
     "oidn:high": "Open Image Denoise, high",
-}
-"""Contenders of `wamnet bench` that a page shows, by configuration, with their names there."""
+}  # contenders of `wamnet bench` that a page shows, with their names there
 
 
 def bench(record: str) -> TableOf:
     """Return the contenders of [`BENCH`], the fastest first."""
+    heads = ("ms, median", "spread", "frames/s", "compile, s", "largest error", "bound of rounding")
+    keys = ("ms.median", "ms.spread", "frames_per_s", "compile_s", "error.max", "rounding.bound")
+    forms = dict(zip(keys, (",.0f", ".0%", ".1f", ".1f", ".1e", ".1e"), strict=True))
 
     def made(records: Records) -> str:
-        rows = {r["configuration"]: r["values"] for r in records[record].records()}
-        return tables.markdown(
-            ["by", "ms, median", "spread", "frames/s", "compile, s", "largest error", "bound of rounding"],
-            [
-                [
-                    BENCH[name],
-                    _short(row, "ms.median", ",.0f"),
-                    _short(row, "ms.spread", ".0%"),
-                    _short(row, "frames_per_s", ".1f"),
-                    _short(row, "compile_s", ".1f"),
-                    _short(row, "error.max", ".1e"),
-                    _short(row, "rounding.bound", ".1e"),
-                ]
-                for name, row in sorted(rows.items(), key=lambda item: item[1].get("ms.median") or 0)
-                if name in BENCH
-            ],
-        )
+        rows = {
+            r["configuration"]: r["values"] for r in records[record].records() if r["configuration"] in BENCH
+        }
+        ordered = sorted(rows.items(), key=lambda item: item[1]["ms.median"])
+        cells = [[BENCH[name], *(_short(row, key, forms[key]) for key in keys)] for name, row in ordered]
+        return tables.markdown(["by", *heads], cells)
 
     return made
 

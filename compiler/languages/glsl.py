@@ -31,7 +31,6 @@ PREAMBLE = f"""\
 #endif"""
 """First lines of a shader. `PRECISE` qualifies temporaries: it is `precise` where the compiler knows that."""
 
-
 WEIGHT_TEXTURE = "uniform sampler2D weight_texture;"
 """The declaration of the weights."""
 

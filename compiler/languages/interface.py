@@ -7,7 +7,7 @@ device binds it: none of them lists arrays or integers again.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ..core.ir import Image
 
@@ -98,10 +98,6 @@ class Interface:
         """Return the arrays in the order of their numbers."""
         numbers = self.numbers()
         return sorted(self.arrays, key=lambda array: numbers[array.name])
-
-    def without(self, name: str) -> Interface:
-        """Return the interface without an array."""
-        return replace(self, arrays=tuple(array for array in self.arrays if array.name != name))
 
 
 def _image(image: Image, access: str) -> Array:

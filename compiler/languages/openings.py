@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from .dialect import Dialect, Parts
-from .interface import ENCODE, PATH, UNSIGNED, Array, Interface
+from .interface import ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
 
 IMAGES = "each image: width * height * channels floats, rows from the top, channels interleaved"
 """What images are."""
@@ -147,7 +147,7 @@ class Arguments(Buffers):
 
     def array_argument(self, array: Array) -> str:
         """Return an argument that is an array."""
-        return (self.writes if array.access == "write" else self.reads).format(name=array.name)
+        return (self.writes if array.access == WRITE else self.reads).format(name=array.name)
 
     def cast(self, dtype: str, text: str) -> str:
         """Return the text of a number converted to another kind."""

@@ -68,7 +68,7 @@ def compile_encode(
 ) -> EncodeArtifact:
     """Return the kernel that turns sums over samples into the encoded images of features.
 
-    `planes` are those that the sums have, in order; by default only the features' own.
+    `planes` name those of the sums, in order; by default they are what the features need.
     """
     chosen, promised = target_named(target), profiles.unpinned(profile, "encodings of features")
     program = pipeline.run(lower_encode(features, normalization), promised.passes)
@@ -82,7 +82,9 @@ def compile_encode(
     known = [FEATURES[name] for name in features]
     images = tuple(Image(f.name, f.channels, f.low, f.high, f.encoding(normalization)) for f in known)
     if not chosen.encodes:
-        raise CompileError(f"target {target} has no kernels that encode features; export with passes instead")
+        raise CompileError(
+            f"target {target} has no kernels that encode features: compile for one that has, as opencl"
+        )
     dialect = chosen.dialect
     arguments = dialect.said[interface.ENCODE] if dialect else chosen.schedules[0].arguments
     arguments = arguments.format(planes="\n".join(textwrap.wrap(", ".join(planes), 98)))

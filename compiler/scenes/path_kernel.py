@@ -79,8 +79,10 @@ def compile_path(
 ) -> PathArtifact:
     """Return the kernel that follows the paths of a scene, `lanes` at once, and adds up groups of planes."""
     chosen, promised = target_named(target), profiles.unpinned(profile, "paths")
+    if not chosen.paths:
+        raise CompileError(f"target {target} has no path kernels: compile for one that has, as opencl")
     if lanes not in chosen.paths:
-        known = ", ".join(map(str, chosen.paths)) or "none: it has no path kernels"
+        known = ", ".join(map(str, chosen.paths))
         raise CompileError(f"target {target} does not follow {lanes} paths at once; it can do {known}")
     emitted, dialect = _passed(programs, promised.passes), chosen.paths[lanes]
     planes = tuple(emit_path.planes(groups))

@@ -39,7 +39,6 @@ STORE = "result[(y * width + x + {p} * GROUP_WIDTH) * {channels} + {i}] = {value
 PIXEL_AT = "image_{image}[(row * width + column) * {channels} + {c}]"
 """How a number of a pixel is read."""
 
-
 SAID = {DENOISE: f"{BUFFERS.format(sizes='width, height')}{HELD}.\n{GROUPED}"}
 """How those are called whose arrays have numbers."""
 

@@ -67,7 +67,7 @@ class Packed(Schedule):
         return {WEIGHTS_A_TEXEL: 4}
 
     def layout(self, program: Program) -> Mapping[str, Slot]:
-        """Return the slot of each weight, in floats; shapes are those that are stored."""
+        """Return the slot of each weight, in floats; a shape is the stored one."""
         slots: dict[str, Slot] = {}
         offset = 0
         for name, array in weights.weights(program).items():

@@ -25,6 +25,10 @@ Kernel = Artifact | PathArtifact | EncodeArtifact
 """A kernel of any role."""
 
 
+PART_OF = {"seed_number": "seed"}
+"""Integers of a path kernel that a part calls otherwise."""
+
+
 @dataclass(frozen=True)
 class Launch:
     """One call: `sizes` as 32-bit integers, buffers by binding, those that come back, threads (x, y).
@@ -96,10 +100,9 @@ class BufferRunner(Executor):
 
     def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
         shape = (len(kernel.planes), part.rows, part.width)
-        sizes = (part.width, part.height, part.first_row, part.rows, part.first_sample)
-        numbers = (*sizes, part.samples, part.seed)
+        given = {name: getattr(part, PART_OF.get(name, name)) for name in kernel.interface.integers}
         places, buffers = _numbered(kernel.interface, {SUMS: np.zeros(shape, np.float32)})
-        launch = Launch(numbers, buffers, (places[SUMS],), (part.width, part.rows))
+        launch = Launch(tuple(given.values()), buffers, (places[SUMS],), (part.width, part.rows))
         return self._launch(self._kernel(kernel), launch)[0].reshape(shape)
 
     def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
@@ -108,7 +111,9 @@ class BufferRunner(Executor):
         written = {f"{IMAGE}{name}": image for name, image in images.items()}
         numbers, buffers = _numbered(kernel.interface, {SUMS: sums, **written})
         places = [numbers[name] for name in written]
-        launch = Launch((width, height, samples), buffers, places, (width, height))
+        given = {"width": width, "height": height, "sample_count": samples}
+        sizes = [given[name] for name in kernel.interface.integers]
+        launch = Launch(sizes, buffers, places, (width, height))
         found = self._launch(self._kernel(kernel), launch)
         return {
             name: flat.reshape(image.shape) for (name, image), flat in zip(images.items(), found, strict=True)
@@ -118,6 +123,6 @@ class BufferRunner(Executor):
 def _numbered(
     interface: Interface, given: Mapping[str, NDArray[np.float32]]
 ) -> tuple[Mapping[str, int], dict[int, NDArray[np.float32]]]:
-    """Return the number of each array of a kernel, and the given arrays by number: those that it binds."""
+    """Return the number of each array of a kernel, and by number the given arrays that it binds."""
     numbers = interface.numbers()
     return numbers, {numbers[name]: data for name, data in given.items() if name in numbers}

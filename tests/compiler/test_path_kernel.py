@@ -82,7 +82,7 @@ def test_a_scene_s_text_has_nothing_that_it_lacks(target, lanes):
     assert "table_" in cubes
     arrivals = [text.partition("/* scatter:")[0].partition("/* arrive:")[2] for text in (furnace, cubes)]
     assert "sqrt" not in arrivals[0]
-    # Only the room's walls are told apart by an equality; each box and light is one more "nearer than".
+    # Only the room's walls need an equality; each box and light is one more "nearer than".
     nearer = [len(re.findall(r"= t\d+ < t\d+;", text)) for text in arrivals]
     assert nearer == [0, 27 + 2]
 

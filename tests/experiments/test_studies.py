@@ -323,7 +323,7 @@ def test_scores_of_several_kinds_of_frames_stand_side_by_side():
 
 
 def test_a_study_says_what_is_left_before_it_begins(tmp_path, cache, capsys):
-    """Frames that are there are not counted, nor those that are listed twice."""
+    """Neither frames that exist nor duplicates count."""
     fresh = Ground(PLANS["toy"], tmp_path, "numpy")
     shots = fresh.training_shots()
     assert left_to_render(fresh, [(shots, 2), (shots[:1], 2)]) == (4, 2 * 16 * 16 * (1 + 2))

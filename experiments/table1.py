@@ -93,7 +93,7 @@ SCALES: Mapping[str, Scale] = {
         short_frames=4,
         few=(0,),
         dncnn={"steps": 30_000, "batch": 16, "crop": 40, "half": True},
-        shrunk={"steps": 30_000, "batch": 8, "crop": 40, "half": True, "shrink": 4},
+        shrunk={"steps": 5000, "batch": 8, "crop": 40, "half": True, "shrink": 4},
         pix2pix={"steps": 40_000, "batch": 1, "crop": 128, "width": 32, "every": 200},
     ),
 }

@@ -20,10 +20,10 @@ from wamnet.kernels.export.check import HEAD, Verdict, check
 from wamnet.kernels.export.package import Request, export
 from wamnet.kernels.export.shelf import random_model
 from wamnet.kernels.export.targets import NAMES, ONNX, TARGETS
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
-from wamnet.refimpl.scene import Scene
-from wamnet.refimpl.scenes import CANONICAL, canonical
+from wamnet.refimpl.light.scene import Scene
+from wamnet.refimpl.light.scenes import CANONICAL, canonical
+from wamnet.refimpl.network.denoise import Model
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -4,7 +4,7 @@
 2. [`export`] turns a scene into Mitsuba's dictionary, shape by shape; [`check`] refuses what has no
    counterpart.
 3. Transport is Mitsuba's integrator `path`: light samples and BSDF samples combined by the power heuristic,
-   as in refimpl/transport.py, without Russian roulette. It counts edges of a path where wamnet counts
+   as in refimpl/light/transport.py, without Russian roulette. It counts edges of a path where wamnet counts
    scatterings: `max_depth` is one more. Reflectances and radiances are taken as they are (linear RGB).
 4. A room's wall is only there for rays that leave through it; Mitsuba's walls are there for all. Within a
    room that holds everything, both are the same for all rays but those of a camera outside. The sensor of
@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
-from wamnet.refimpl.scene import Box, Light, Quad, Room, Scene, Sphere
-from wamnet.refimpl.shapes.quad import light_radiance
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light.scene import Box, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.light.shapes.quad import light_radiance
+from wamnet.refimpl.light.transport import Settings
 
 LEAST_LLVM = 16
 """First version of LLVM that compiles Dr.Jit's code for AVX-512; earlier ones end the process."""

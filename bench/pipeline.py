@@ -26,10 +26,10 @@ from wamnet.compiler.core.lower import lower
 from wamnet.kernels import Pipeline, open_executor, render_on
 from wamnet.kernels.denoise_on import images_of
 from wamnet.kernels.passes import PICTURE
-from wamnet.refimpl import dataset, siren
-from wamnet.refimpl.denoise import Model
-from wamnet.refimpl.render import Job
-from wamnet.refimpl.scenes import CANONICAL, canonical
+from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.scenes import CANONICAL, canonical
+from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network.denoise import Model
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

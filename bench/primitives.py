@@ -29,8 +29,8 @@ from wamnet.compiler.scenes.path_kernel import PathArtifact, compile_path, most_
 from wamnet.kernels import open_executor
 from wamnet.kernels.executor import Executor, Part
 from wamnet.refimpl import vectors
-from wamnet.refimpl.scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sphere, Vector
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light.scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sphere, Vector
+from wamnet.refimpl.light.transport import Settings
 
 FORMS = {"unrolled": None, "looped": 0}
 """Most primitives that are unrolled, by the name of the form."""

@@ -34,10 +34,10 @@ import numpy as np
 from wamnet.cli import machine
 from wamnet.kernels import open_executor, render_on
 from wamnet.kernels.render_pool import render_parallel
-from wamnet.refimpl.render import Job
-from wamnet.refimpl.scene import Scene
-from wamnet.refimpl.scenes import CANONICAL, canonical
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.scene import Scene
+from wamnet.refimpl.light.scenes import CANONICAL, canonical
+from wamnet.refimpl.light.transport import Settings
 
 Frames = Callable[[int], Any]
 """From a seed to the colours (H, W, 3) of a frame."""

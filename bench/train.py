@@ -28,9 +28,9 @@ import numpy as np
 
 from wamnet.cli import machine
 from wamnet.kernels import open_executor
-from wamnet.refimpl import dataset, train
 from wamnet.refimpl.frame import LAYERS, Frame
-from wamnet.refimpl.train import PRESETS, Recipe
+from wamnet.refimpl.network import dataset, train
+from wamnet.refimpl.network.train import PRESETS, Recipe
 
 SGEMM_SIZE = 2048
 """Rows and columns of the two matrices whose product is the measure: large enough for BLAS's full rate."""

@@ -32,10 +32,10 @@ from .terminal import hint_on_interrupt, progress, say
 
 if TYPE_CHECKING:
     from ..kernels.executor import Executor
-    from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
-    from ..refimpl.render import Job
-    from ..refimpl.scene import Scene
+    from ..refimpl.light.render import Job
+    from ..refimpl.light.scene import Scene
+    from ..refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
 
@@ -106,7 +106,7 @@ def animate(
     After any interruption the same command resumes where it was.
     """
     from ..kernels.frame_plan import animation_times
-    from ..refimpl.denoise import learned_feature_spp
+    from ..refimpl.network.denoise import learned_feature_spp
 
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
@@ -188,7 +188,7 @@ def _check_names(output: Path, model: Path, fps: float) -> None:
 
 def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job) -> bool:
     """Tell whether a pipeline can draw: one device does both, features come from the colour's camera rays."""
-    from ..refimpl.render import feature_job
+    from ..refimpl.light.render import feature_job
 
     return renderer.value == executor.value != "numpy" and feature_job(noisy) is None
 
@@ -204,7 +204,7 @@ def _parameters(assignments: Sequence[str] | None) -> dict[str, Any]:
 
 def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) -> None:
     """Warn of pictures that are unlike those of the training: how many, and what the first one shows."""
-    from ..refimpl.render import render_info
+    from ..refimpl.light.render import render_info
 
     found = [unlike_training(model, render_info(shot.scene, shot.noisy)) for shot in shots]
     unlike = [sentences for sentences in found if sentences]
@@ -214,7 +214,7 @@ def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) 
 
 def scene_of(model: Model) -> str:
     """Return the canonical scene that a model has learned, or minicubes if that is not known."""
-    from ..refimpl.scenes import CANONICAL
+    from ..refimpl.light.scenes import CANONICAL
 
     found = model.info.get("trained_on_scene", "")
     return found if found in CANONICAL else "minicubes"
@@ -222,7 +222,7 @@ def scene_of(model: Model) -> str:
 
 def cut_facts(network: Model, rank: int) -> list[str]:
     """Return what a cut of the first layer adds to a picture's origin; refuse a rank that it cannot have."""
-    from ..refimpl.factored import check_rank
+    from ..refimpl.network.factored import check_rank
 
     if not rank:
         return []
@@ -242,9 +242,9 @@ def plan_shots(
     `named` are the scene's name, parameters and view; numbers are size, samples of the reference (or 0), seed
     and camera rays of the features (or 0).
     """
-    from ..refimpl.render import Job
-    from ..refimpl.scene import scene_digest
-    from ..refimpl.scenes import canonical
+    from ..refimpl.light.render import Job
+    from ..refimpl.light.scene import scene_digest
+    from ..refimpl.light.scenes import canonical
 
     (name, chosen, view), (size, spp, seed, rays) = named, numbers
     shots = []

@@ -25,7 +25,7 @@ from .terminal import hint_on_interrupt, progress, say, table
 if TYPE_CHECKING:
     from ..kernels.bench.contender import Variant
     from ..kernels.bench.contest import Contest, Request
-    from ..refimpl.denoise import Model
+    from ..refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
 

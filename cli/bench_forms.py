@@ -21,9 +21,9 @@ from .terminal import say
 
 if TYPE_CHECKING:
     from ..kernels.bench.contender import Variant
-    from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
-    from ..refimpl.train import Recipe, TrainState
+    from ..refimpl.network.denoise import Model
+    from ..refimpl.network.train import Recipe, TrainState
 
 FORMS = (
     *("full", "rank16", "rank12", "rank8", "window10", "window8", "window6"),
@@ -86,8 +86,8 @@ def trained(
 
 def start_of(model: Model, name: str, steps: int, pairs: Sequence[tuple[Frame, Frame]]) -> TrainState:
     """Return the state of a form before its first step, on the model's own scales."""
-    from ..refimpl import dataset
-    from ..refimpl.train import start
+    from ..refimpl.network import dataset
+    from ..refimpl.network.train import start
 
     recipe, network = train.varied(recipe_of(model, steps), model, name)
     scales = model.normalization
@@ -97,7 +97,7 @@ def start_of(model: Model, name: str, steps: int, pairs: Sequence[tuple[Frame, F
 
 def recipe_of(model: Model, steps: int) -> Recipe:
     """Return the recipe that a model was trained by, or the best preset, with other steps."""
-    from ..refimpl.train import PRESETS, recipe_from_json
+    from ..refimpl.network.train import PRESETS, recipe_from_json
 
     text = model.info.get("recipe")
     known = recipe_from_json(text) if text else PRESETS["best"]

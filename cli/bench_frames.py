@@ -23,8 +23,8 @@ from .terminal import say
 
 if TYPE_CHECKING:
     from ..kernels.frame_plan import Request
-    from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
+    from ..refimpl.network.denoise import Model
 
     Pair = tuple[Frame, Frame]
 
@@ -104,7 +104,7 @@ def _draw(frame: Mapping[str, Any], noisy: Frame, model: Model) -> dict[str, Any
 
 def scene_of(model: Model) -> str | None:
     """Return the canonical scene that a model was trained on; None where it names none, or several."""
-    from ..refimpl.scenes import CANONICAL
+    from ..refimpl.light.scenes import CANONICAL
 
     name = model.info.get("trained_on_scene", "")
     return name if name in CANONICAL else None
@@ -113,7 +113,7 @@ def scene_of(model: Model) -> str | None:
 def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     """Return the request of frames that are like those that a model was trained on."""
     from ..kernels.frame_plan import Request
-    from ..refimpl.denoise import learned_feature_spp
+    from ..refimpl.network.denoise import learned_feature_spp
 
     scene = scene_of(model)
     assert scene is not None, "whoever asks for frames has looked for a scene"
@@ -125,7 +125,7 @@ def request_for(model: Model, executor: str, **numbers: Any) -> Request:
 
 def ranges_of(model: Model) -> dict[str, Any]:
     """Return the ranges that a model has learned, as parts of a request; nothing where it names none."""
-    from ..refimpl.variation import RANGES, ranges_from_json
+    from ..refimpl.light.variation import RANGES, ranges_from_json
 
     if (text := model.info.get(f"trained_on_{RANGES}")) is None:
         return {}

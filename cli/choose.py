@@ -17,8 +17,8 @@ from .terminal import progress, say
 if TYPE_CHECKING:
     from ..kernels.curve import Choice, Curve, Limits
     from ..kernels.executor import Executor
-    from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
+    from ..refimpl.network.denoise import Model
 
 SMALLEST_PX, LARGEST_PX = 16, 4096
 """Sides of pictures on which times are taken."""

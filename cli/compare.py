@@ -111,8 +111,8 @@ def compare(
         compare_pictures(image, reference, exposure, as_json)
         return
     _refuse_given(context, OF_PICTURES, "with --paths")
-    from ..refimpl.render import Job
-    from ..refimpl.transport import Settings
+    from ..refimpl.light.render import Job
+    from ..refimpl.light.transport import Settings
     from .compare_paths import compare_paths
 
     job = Job(width, height, spp, seed, Settings(max_depth=max_depth), first_sample=sample)

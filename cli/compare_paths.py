@@ -15,7 +15,7 @@ from .terminal import progress, say, table
 if TYPE_CHECKING:
     from ..kernels.compare_images import ImageReport
     from ..kernels.compare_paths import PathReport
-    from ..refimpl.render import Job
+    from ..refimpl.light.render import Job
 
 STATUS_DIFFERENT = 1
 """Exit status when a difference has no explanation."""

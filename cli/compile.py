@@ -28,8 +28,8 @@ from .terminal import say
 if TYPE_CHECKING:
     from ..compiler.artifact import Artifact, Files
     from ..compiler.scenes.path_kernel import PathArtifact
-    from ..refimpl.denoise import Model
-    from ..refimpl.scene import Scene
+    from ..refimpl.light.scene import Scene
+    from ..refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
 
@@ -177,7 +177,7 @@ def _only_for(what: str, given: Mapping[str, Any], rule: str) -> None:
 
 def is_scene(name: str) -> bool:
     """Tell whether a name is that of a scene."""
-    from ..refimpl.scenes import CANONICAL
+    from ..refimpl.light.scenes import CANONICAL
 
     return name in CANONICAL or Path(name).suffix.lower() == ".json"
 
@@ -203,7 +203,7 @@ def _compiled_scene(
     """Return the kernel that follows a scene's paths; of a large scene it is said first how long it takes."""
     from ..compiler.scenes.lower_scene import lower_scene
     from ..compiler.scenes.path_kernel import compile_path, most_unrolled
-    from ..refimpl.transport import Settings
+    from ..refimpl.light.transport import Settings
 
     for line in said_of_compiling(scene):
         say(line)

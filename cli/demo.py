@@ -39,9 +39,9 @@ from .runs import Run, run_all
 from .terminal import hint_on_interrupt, progress, say, table
 
 if TYPE_CHECKING:
-    from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
-    from ..refimpl.train import TrainState
+    from ..refimpl.network.denoise import Model
+    from ..refimpl.network.train import TrainState
 
     Pair = tuple[Frame, Frame]
 
@@ -216,7 +216,7 @@ def begun(plan: Plan, folder: Path) -> Iterator[None]:
 
     Nobody else makes a demonstration there until the block has ended.
     """
-    from ..refimpl.render import Job
+    from ..refimpl.light.render import Job
 
     Job(plan.size_px, plan.size_px)  # Refuses a size that cannot be rendered.
     if folder.exists() and not folder.is_dir():
@@ -304,7 +304,7 @@ def _pairs(output: Path, split: str) -> list[tuple[float, Pair]]:
 def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Model, TrainState, float | None]:
     """Train, or finish what an earlier run began; return model, last state and seconds a step, if known."""
     from ..compiler.model_file import load_checkpoint
-    from ..refimpl.train import PRESETS, model_of
+    from ..refimpl.network.train import PRESETS, model_of
 
     recipe = replace(PRESETS[plan.preset], seed=plan.seed)
     if plan.steps is not None:

@@ -15,8 +15,8 @@ from .outputs import check_output
 from .terminal import say, table
 
 if TYPE_CHECKING:
-    from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
+    from ..refimpl.network.denoise import Model
 
 DENOISE_EXAMPLES = """Examples:
 
@@ -91,8 +91,8 @@ def denoise(
 
 def _say_what_is_no_number(path: Path, noisy: Frame, model: Model) -> None:
     """Warn of pixels that are read as something else."""
-    from ..refimpl.dataset import FEATURES
     from ..refimpl.frame import not_finite
+    from ..refimpl.network.dataset import FEATURES
 
     read = {FEATURES[name].layer for name in model.features}
     for layer, count in not_finite(noisy).items():

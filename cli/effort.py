@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..refimpl.scene import Scene
+    from ..refimpl.light.scene import Scene
 
 MANY_PRIMITIVES = 100_000
 """From so many primitives on a sentence is said."""
@@ -55,14 +55,14 @@ their means, and the frame."""
 
 def primitives_of(scene: Scene) -> int:
     """Return the number of things in a scene that a ray can meet."""
-    from ..refimpl.scene import primitives
+    from ..refimpl.light.scene import primitives
 
     return primitives(scene) + (scene.room is not None)
 
 
 def seconds_of(primitives: int, samples: int, pixels: int, executor: str, workers: int) -> float:
     """Return how long rendering may take, of pictures of so many pixels each."""
-    from ..refimpl.render import TILE_PIXELS
+    from ..refimpl.light.render import TILE_PIXELS
 
     if executor != "numpy":
         return primitives * samples * _KERNEL_SAMPLE_S

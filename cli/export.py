@@ -150,7 +150,7 @@ def _export(
     from ..compiler.variants import FULL
     from ..kernels.export.package import Request
     from ..kernels.export.package import export as exported
-    from ..refimpl.transport import Settings
+    from ..refimpl.light.transport import Settings
 
     settings = replace(Settings(max_depth=paths[0]), sampler=paths[1].value)
     loaded = load_scene(scene, *moment) if scene else None

@@ -22,9 +22,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..refimpl.dataset import FARTHEST_DEPTH
 from ..refimpl.errors import InputError
 from ..refimpl.frame import LAYERS, Floats, Frame, validate
+from ..refimpl.network.dataset import FARTHEST_DEPTH
 from ..refimpl.reading import check_room, refusing
 from .inputs import check_input
 from .outputs import replacing, unwritable

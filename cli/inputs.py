@@ -10,8 +10,8 @@ from ..refimpl.errors import InputError
 from .terminal import tell
 
 if TYPE_CHECKING:
-    from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
+    from ..refimpl.network.denoise import Model
 
 MODELS = Path(__file__).with_name("models")
 """Folder of the models that come with the package, each with its recipe and its scores."""
@@ -70,7 +70,7 @@ def load_model(path: Path) -> Model:
 
 def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what about a frame of this info a model has not learned, as sentences; not known is nothing."""
-    from ..refimpl.render import FEATURE_SPP
+    from ..refimpl.light.render import FEATURE_SPP
 
     told = []
     scenes, scene = model.info.get("trained_on_scene", ""), info.get("scene", "")
@@ -88,8 +88,8 @@ def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
 
 def outside_ranges(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what of a frame lies outside of the ranges that a model says it has learned."""
-    from ..refimpl.scenes import CANONICAL, canonical
-    from ..refimpl.variation import RANGES, outside, ranges_from_json
+    from ..refimpl.light.scenes import CANONICAL, canonical
+    from ..refimpl.light.variation import RANGES, outside, ranges_from_json
 
     text, scene = model.info.get(f"trained_on_{RANGES}"), info.get("scene", "")
     if text is None:
@@ -100,7 +100,7 @@ def outside_ranges(model: Model, info: Mapping[str, str]) -> list[str]:
 
 def need_layers(path: Path, frame: Frame, features: Sequence[str], because: str, way_out: str) -> None:
     """Refuse the frame in `path` if it lacks a layer that one of the features needs."""
-    from ..refimpl.dataset import FEATURES
+    from ..refimpl.network.dataset import FEATURES
 
     # Unknown features are refused where they come from.
     for layer in (FEATURES[name].layer for name in features if name in FEATURES):

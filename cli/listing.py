@@ -67,7 +67,7 @@ def _lines(model: str, target: str, profile: str) -> list[Line]:
     from ..compiler.core.lower import lower
     from ..compiler.scenes.lower_scene import lower_scene
     from ..compiler.scenes.path_kernel import compile_path, most_unrolled
-    from ..refimpl.transport import Settings
+    from ..refimpl.light.transport import Settings
 
     if is_scene(model):
         scene = load_scene(model, None, [])
@@ -79,6 +79,6 @@ def _lines(model: str, target: str, profile: str) -> list[Line]:
 
 
 def _reference(place: str) -> str:
-    """Return the text of a place, refimpl/siren.py:122."""
+    """Return the text of a place, refimpl/network/siren.py:122."""
     path, _, line = place.rpartition(":")
     return (Path(__file__).parents[1] / path).read_text(encoding="utf-8").splitlines()[int(line) - 1]

@@ -19,7 +19,7 @@ import typer
 from ..refimpl.errors import InputError
 
 if TYPE_CHECKING:
-    from ..refimpl.scene import Scene, Vector
+    from ..refimpl.light.scene import Scene, Vector
 
 SCENES = "minicubes, glossy, daylight, cornell, furnace, lone_light, empty"
 """Canonical scenes by name, for help texts; equal to the registry in refimpl, which they do not import."""
@@ -360,7 +360,7 @@ class View:
 
     def of(self, scene: Scene) -> Scene:
         """Return the scene from there and under these lamps; its info says so."""
-        from ..refimpl.variation import Variation, varied
+        from ..refimpl.light.variation import Variation, varied
 
         colors = parse_lights(self.lights, [light.color for light in scene.lights])
         return varied(scene, Variation(self.yaw_deg, self.pitch_deg, self.distance, colors))
@@ -368,7 +368,7 @@ class View:
 
 def parse_lights(texts: Sequence[str], own: Sequence[Vector]) -> tuple[Vector, ...]:
     """Return the lamps' colours from texts like `1=1,0.5,0.2`, as bright as their own; none without texts."""
-    from ..refimpl.variation import lamp_color
+    from ..refimpl.light.variation import lamp_color
 
     colors = dict(enumerate(own, start=1))
     chosen: set[int] = set()

@@ -17,7 +17,7 @@ from .outputs import check_output, write_text
 from .terminal import progress, say
 
 if TYPE_CHECKING:
-    from ..refimpl.scene import Scene
+    from ..refimpl.light.scene import Scene
 
 RENDER_EXAMPLES = """Examples:
 
@@ -83,8 +83,8 @@ def render(
     (OpenCL, OpenGL) give it up to rounding, much sooner.
     """
     from ..kernels.render_frame import render_frame, renderer
-    from ..refimpl.render import Job
-    from ..refimpl.transport import Settings
+    from ..refimpl.light.render import Job
+    from ..refimpl.light.transport import Settings
 
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     loaded = load_scene(scene, time, parameters or [], view)
@@ -130,7 +130,7 @@ def scene(
     light: options.Lights = None,
 ) -> None:
     """Write a scene as JSON text, to be changed and rendered."""
-    from ..refimpl.scene import to_json
+    from ..refimpl.light.scene import to_json
 
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     text = to_json(load_scene(name, time, parameters or [], view))
@@ -146,9 +146,9 @@ def load_scene(
     name: str, time: float | None, assignments: Sequence[str], view: options.View | None = None
 ) -> Scene:
     """Return a canonical scene by name, as a view has it, or the scene in a JSON file."""
+    from ..refimpl.light.scene import from_json
+    from ..refimpl.light.scenes import CANONICAL, canonical
     from ..refimpl.reading import read_file
-    from ..refimpl.scene import from_json
-    from ..refimpl.scenes import CANONICAL, canonical
 
     parameters = options.parse_parameters(assignments)
     if time is not None:

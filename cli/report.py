@@ -20,7 +20,7 @@ from .compare import scores_as_data
 from .outputs import write_text
 
 if TYPE_CHECKING:
-    from ..refimpl.denoise import Model
+    from ..refimpl.network.denoise import Model
     from .demo import Plan, Results, Unseen
 
 SCHEMA = "wamnet-demo-2"

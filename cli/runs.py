@@ -11,8 +11,8 @@ from ..refimpl.errors import CompileError, ExecutorUnavailable
 if TYPE_CHECKING:
     from ..compiler.artifact import Artifact
     from ..compiler.plan import Plan
-    from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
+    from ..refimpl.network.denoise import Model
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def run_all(
     """Run each executor that is here; return pictures (H, W, 3) by executor, and what was found about all."""
     import numpy as np
 
-    from ..refimpl.denoise import denoise
+    from ..refimpl.network.denoise import denoise
 
     truth = denoise(model, frame, np.float64)
     images: dict[str, Any] = {}

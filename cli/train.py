@@ -21,10 +21,10 @@ from .outputs import check_output
 from .terminal import hint_on_interrupt, progress, say
 
 if TYPE_CHECKING:
-    from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
-    from ..refimpl.siren import Siren
-    from ..refimpl.train import Recipe, TrainState
+    from ..refimpl.network.denoise import Model
+    from ..refimpl.network.siren import Siren
+    from ..refimpl.network.train import Recipe, TrainState
 
 EXAMPLES = """Examples:
 
@@ -158,7 +158,7 @@ def _wanted(
     activation: str | None,
 ) -> Recipe:
     """Return the recipe that the options ask for, checked."""
-    from ..refimpl.train import check_recipe, with_activation
+    from ..refimpl.network.train import check_recipe, with_activation
 
     names = None if features is None else options.parse_names(features)
     choices = {"features": names, "steps": steps, "seed": seed, "rank": rank}
@@ -200,7 +200,7 @@ def varied(recipe: Recipe, model: Model, name: str) -> tuple[Recipe, Siren]:
     """Return the recipe and the first network with which a variant of a model is trained."""
     from ..compiler import variants
     from ..compiler.core import sine
-    from ..refimpl.train import check_recipe
+    from ..refimpl.network.train import check_recipe
 
     varied = variants.vary(variants.parse(name), model)
     if varied.degree != sine.DEGREE:
@@ -263,7 +263,7 @@ def check_begin(saved: Path, preset: Preset | None, resume: bool, restart: bool)
 
 def choose_recipe(preset: str, state: TrainState | None, choices: dict[str, Any]) -> Recipe:
     """Return the checkpoint's recipe, or the preset's, with the choices that were made (not None)."""
-    from ..refimpl.train import PRESETS
+    from ..refimpl.network.train import PRESETS
 
     base = PRESETS[preset] if state is None else state.recipe
     return replace(base, **{name: value for name, value in choices.items() if value is not None})
@@ -318,7 +318,7 @@ def fit(
     The run continues from `state`, or begins with the weights of `network`, or with random ones.
     """
     from ..compiler.model_file import save_checkpoint, save_model
-    from ..refimpl.train import model_of
+    from ..refimpl.network.train import model_of
 
     saved, seen = checkpoint_path(output), state.step if state is not None else 0
     started = kept = monotonic()
@@ -350,7 +350,7 @@ def fit(
 def _trainer(executor: str) -> Iterator[Callable[..., TrainState]]:
     """Give the reference's trainer, or that of a device, which is closed afterwards."""
     if executor == "numpy":
-        from ..refimpl.train import train
+        from ..refimpl.network.train import train
 
         yield train
         return
@@ -365,7 +365,7 @@ def facts(pairs: Sequence[tuple[Frame, Frame]]) -> dict[str, str]:
 
     Frames that say their ranges need not list what each of them has drawn.
     """
-    from ..refimpl.variation import RANGES
+    from ..refimpl.light.variation import RANGES
 
     names = dict.fromkeys(name for pair in pairs for name in pair[0].info)
     values = {

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from ..kernels.executor import Images
     from ..kernels.reduce import Box, Reduced
     from ..kernels.triage import Compile, Kernel, Verdict
-    from ..refimpl.denoise import Model
     from ..refimpl.frame import Frame
+    from ..refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
 
@@ -255,7 +255,7 @@ def part_of(task: Task, box: Box) -> Frame:
     """
     import numpy as np
 
-    from ..refimpl.dataset import FEATURES
+    from ..refimpl.network.dataset import FEATURES
 
     names = dict.fromkeys(FEATURES[name].layer for name in task.model.features)
     largest = float(np.finfo(np.float32).max)

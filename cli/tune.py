@@ -19,7 +19,7 @@ from .terminal import say, table
 
 if TYPE_CHECKING:
     from ..kernels.tune import Table
-    from ..refimpl.denoise import Model
+    from ..refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
 
@@ -110,9 +110,9 @@ def paper() -> Model:
     """Return a network of the paper's shape, untrained: times do not depend on weights."""
     import numpy as np
 
-    from ..refimpl import siren
-    from ..refimpl.dataset import Normalization, Window
-    from ..refimpl.denoise import Model
+    from ..refimpl.network import siren
+    from ..refimpl.network.dataset import Normalization, Window
+    from ..refimpl.network.denoise import Model
 
     widths = (PAPER_WINDOW**2 * 6, *PAPER_LAYERS)
     network = siren.init(widths, PAPER_OMEGA, PAPER_OMEGA, 1, np.float32)

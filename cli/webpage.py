@@ -23,7 +23,7 @@ from .render import load_scene
 
 if TYPE_CHECKING:
     from ..kernels.page import Animation
-    from ..refimpl.denoise import Model
+    from ..refimpl.network.denoise import Model
 
 FOLDER = "templates"
 """Folder of the template and its parts, beside this module."""
@@ -62,7 +62,7 @@ def page_of(model: Path, scene: str | None, assignments: Sequence[str], fast: Pa
 
 def learned_scene(model: Model) -> str:
     """Return the canonical scene that a model has learned, minicubes if it names none; refuse others."""
-    from ..refimpl.scenes import CANONICAL
+    from ..refimpl.light.scenes import CANONICAL
 
     found = model.info.get("trained_on_scene", "") or "minicubes"
     if found not in CANONICAL:
@@ -74,7 +74,7 @@ def learned_scene(model: Model) -> str:
 def animation_of(name: str, assignments: Sequence[str] = ()) -> Animation:
     """Return a canonical scene at the times of a page, or the scene in a file, which is still."""
     from ..kernels.page import Animation
-    from ..refimpl.scenes import CANONICAL
+    from ..refimpl.light.scenes import CANONICAL
 
     if name not in CANONICAL:
         return Animation((0.0,), (load_scene(name, None, assignments),))

@@ -26,14 +26,14 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load as decode_tensors
 
-from ..refimpl import train
-from ..refimpl.activation import SINE, activation_named
-from ..refimpl.dataset import Window, normalization_from_json
-from ..refimpl.denoise import Model, check_model
 from ..refimpl.errors import InputError
+from ..refimpl.network import train
+from ..refimpl.network.activation import SINE, activation_named
+from ..refimpl.network.dataset import Window, normalization_from_json
+from ..refimpl.network.denoise import Model, check_model
+from ..refimpl.network.siren import Siren
+from ..refimpl.network.train import TrainState
 from ..refimpl.reading import BROKEN, parse_json, read_file, to_dataclass
-from ..refimpl.siren import Siren
-from ..refimpl.train import TrainState
 from .core.writing import write_bytes
 
 Tensors = Mapping[str, NDArray[Any]]

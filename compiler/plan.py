@@ -40,7 +40,7 @@ from .schedules.schedules import ALL, PLAIN, Images, Pick, Schedule, pick
 from .targets import Target, target_named
 
 if TYPE_CHECKING:
-    from ..refimpl.denoise import Model
+    from ..refimpl.network.denoise import Model
     from .variants import Varied
 
 BLOCK_NUMBERS = 2**20

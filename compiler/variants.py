@@ -27,10 +27,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refimpl import factored
-from ..refimpl.dataset import FEATURES, Window
-from ..refimpl.denoise import Model
 from ..refimpl.errors import InputError
+from ..refimpl.network import factored
+from ..refimpl.network.dataset import FEATURES, Window
+from ..refimpl.network.denoise import Model
 from .core import ir, sine
 from .core.enclosure import round_up
 from .core.lower import lower

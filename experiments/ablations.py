@@ -29,7 +29,7 @@ from lab.results import Results, Values
 from lab.sets import SETS
 from lab.tables import Column
 
-from wamnet.refimpl.train import PAPER, SHORT, Recipe
+from wamnet.refimpl.network.train import PAPER, SHORT, Recipe
 
 FRESH = 0
 """Number of windows that stands for fresh ones in each step."""

@@ -29,8 +29,8 @@ from wamnet.compiler.schedules.emit import kernel_gather
 from wamnet.compiler.targets import schedule_named
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import EXECUTORS, denoise_on, open_executor
-from wamnet.refimpl.denoise import denoise
 from wamnet.refimpl.errors import WamnetError
+from wamnet.refimpl.network.denoise import denoise
 
 TRIES = 200
 """Random starts of the search."""

@@ -47,7 +47,7 @@ from wamnet.kernels.measure import in_turns
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import LEVELS, to_display
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.train import PAPER
+from wamnet.refimpl.network.train import PAPER
 
 FRAME_PX = 1024
 """The paper's size of a frame."""

@@ -27,13 +27,14 @@ from lab.tables import markdown
 from numpy.typing import NDArray
 
 from wamnet.cli.outputs import write_text
-from wamnet.refimpl import adam, dataset, encoding, metrics, siren, train
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model, denoise
+from wamnet.refimpl import encoding, metrics
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.scenes import TURN_SECONDS
-from wamnet.refimpl.siren import Siren
-from wamnet.refimpl.train import PAPER, Recipe
+from wamnet.refimpl.light.scenes import TURN_SECONDS
+from wamnet.refimpl.network import adam, dataset, siren, train
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model, denoise
+from wamnet.refimpl.network.siren import Siren
+from wamnet.refimpl.network.train import PAPER, Recipe
 
 Array = NDArray[Any]
 

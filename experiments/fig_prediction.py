@@ -38,10 +38,10 @@ from lab.tables import Column
 
 from wamnet.cli.images import read_png
 from wamnet.kernels.bench import peer_oidn
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats
-from wamnet.refimpl.train import PAPER, SHORT, Recipe
+from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.train import PAPER, SHORT, Recipe
 
 ENLARGED = (0.44, 0.36, 0.28)
 """The part of the picture that is enlarged: its left and upper edge and its side, as shares of the whole."""

@@ -34,7 +34,7 @@ from lab.tables import Column
 from wamnet.kernels.bench import peer_oidn
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats, Frame
-from wamnet.refimpl.train import PAPER, SHORT, Recipe
+from wamnet.refimpl.network.train import PAPER, SHORT, Recipe
 
 FRAMES_PER_SECOND = 24
 """Rate of the animation, as in cinemas."""

@@ -41,9 +41,9 @@ from lab.results import Results, Values
 from lab.tables import Column
 
 from wamnet.kernels.draws import Draw, times
-from wamnet.refimpl.scenes import TURN_SECONDS
-from wamnet.refimpl.train import PAPER, SHORT, Recipe
-from wamnet.refimpl.variation import Ranges
+from wamnet.refimpl.light.scenes import TURN_SECONDS
+from wamnet.refimpl.light.variation import Ranges
+from wamnet.refimpl.network.train import PAPER, SHORT, Recipe
 
 RANGE = Ranges(yaw_deg=(-24.0, 24.0))
 """Orientations that the networks of a range are trained on; the width is that of the set `cornell`."""

@@ -27,7 +27,7 @@ from lab.ground import Cost, Ground, measure_all, start, write_table
 from lab.results import Results, Values, summary
 
 from wamnet.kernels import open_executor, train_on
-from wamnet.refimpl.train import PRESETS, Recipe, TrainState, model_of, train
+from wamnet.refimpl.network.train import PRESETS, Recipe, TrainState, model_of, train
 
 FIRST_STOP = 50
 """Steps before the first look."""
@@ -54,7 +54,7 @@ WINDOWS = 1.5e7
 """Windows of the preset `short` that take as long as one of the two trainings, on average and roughly."""
 
 Trainer = Callable[..., TrainState]
-"""What trains on pairs and hands out its states: [`refimpl.train.train`], or on a device [`train_on`]."""
+"""What trains on pairs and hands out its states: `train` of the reference, or [`train_on`] of a device."""
 
 
 def follow(

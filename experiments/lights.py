@@ -49,9 +49,9 @@ from lab.results import PER_FRAME, Results, Values
 from lab.tables import Column
 
 from wamnet.kernels.draws import variation_of
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.train import PAPER, SHORT
-from wamnet.refimpl.variation import AT_REST, Ranges, Variation
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.variation import AT_REST, Ranges, Variation
+from wamnet.refimpl.network.train import PAPER, SHORT
 
 EACH = 0
 """Number of light sets that stands for colours of its own in each frame."""

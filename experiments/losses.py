@@ -23,9 +23,9 @@ from lab.ground import Cost, Ground, measure_all, start, together, told, write_t
 from lab.results import Values
 from lab.tables import Column
 
-from wamnet.refimpl import train
-from wamnet.refimpl.denoise import Model
-from wamnet.refimpl.train import SHORT, Recipe
+from wamnet.refimpl.network import train
+from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.train import SHORT, Recipe
 
 DARKEST = 0.01
 """What SMAPE adds to its denominator, so that black pixels divide by no zero; as that of MET-7."""

@@ -25,8 +25,8 @@ from quality import PLANS, RAYS, ROWS, SHIPPED_SET, Bench, denoised
 from wamnet.cli.dataset_files import sum_of
 from wamnet.cli.outputs import write_text
 from wamnet.compiler.model_file import save_model
-from wamnet.refimpl.denoise import Model
-from wamnet.refimpl.variation import RANGES
+from wamnet.refimpl.light.variation import RANGES
+from wamnet.refimpl.network.denoise import Model
 
 MADE_BY = "experiments/models.py"
 """Fact of these models: what makes them."""

@@ -25,10 +25,11 @@ from lab.frames import Pair, Shot
 from numpy.typing import NDArray
 
 from wamnet.kernels import open_executor, train_on
-from wamnet.refimpl import dataset, metrics
-from wamnet.refimpl.denoise import denoise
-from wamnet.refimpl.scenes import TURN_SECONDS
-from wamnet.refimpl.train import PAPER, SHORT, Recipe, model_of, train
+from wamnet.refimpl import metrics
+from wamnet.refimpl.light.scenes import TURN_SECONDS
+from wamnet.refimpl.network import dataset
+from wamnet.refimpl.network.denoise import denoise
+from wamnet.refimpl.network.train import PAPER, SHORT, Recipe, model_of, train
 
 UNSEEN = 2
 """Number of test frames."""

@@ -42,11 +42,11 @@ from wamnet.kernels.bench.peer_oidn import filtered, prefiltered
 from wamnet.kernels.denoise_on import images_of
 from wamnet.kernels.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.kernels.measure import in_turns
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Floats, Frame
-from wamnet.refimpl.train import BEST, SHORT, Recipe
+from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.train import BEST, SHORT, Recipe
 
 SHIPPED_SET = "minicubes-page"
 """The set that the network of the web page learns from: everything that the page can move."""

@@ -20,10 +20,11 @@ from pathlib import Path
 
 from wamnet.cli import dataset_files
 from wamnet.kernels import open_executor, train_on
-from wamnet.refimpl import dataset, factored, metrics
-from wamnet.refimpl.denoise import Model, denoise
+from wamnet.refimpl import metrics
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.train import SHORT, Recipe, TrainState, model_of, train
+from wamnet.refimpl.network import dataset, factored
+from wamnet.refimpl.network.denoise import Model, denoise
+from wamnet.refimpl.network.train import SHORT, Recipe, TrainState, model_of, train
 
 Pair = tuple[Frame, Frame]
 Fit = Callable[..., TrainState]

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from wamnet.kernels import open_executor, render_on
-from wamnet.refimpl.render import Job
-from wamnet.refimpl.scene import Scene
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.scene import Scene
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.transport import Settings
 
 
 def main() -> None:

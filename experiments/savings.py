@@ -27,9 +27,10 @@ from numpy.typing import NDArray
 
 from wamnet.cli import dataset_files
 from wamnet.compiler.model_file import load_model
-from wamnet.refimpl import dataset, metrics
-from wamnet.refimpl.denoise import Model, denoise
+from wamnet.refimpl import metrics
 from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.network import dataset
+from wamnet.refimpl.network.denoise import Model, denoise
 
 Array = NDArray[Any]
 

@@ -36,9 +36,9 @@ from wamnet.compiler.core.profiles import DEGREE_WORD
 from wamnet.compiler.core.trace import trace
 from wamnet.kernels import open_executor
 from wamnet.kernels.measure import in_turns
-from wamnet.refimpl import siren
-from wamnet.refimpl.dataset import Window
-from wamnet.refimpl.denoise import denoise_pixel
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.denoise import denoise_pixel
 
 Array = NDArray[Any]
 

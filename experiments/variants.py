@@ -22,9 +22,10 @@ from wamnet.kernels import open_executor, train_on
 from wamnet.kernels.curve import Point
 from wamnet.kernels.executor import Executor
 from wamnet.kernels.measure_curve import NAMES, Pairs, measure, names_for
-from wamnet.refimpl import dataset, metrics
-from wamnet.refimpl.denoise import Model, denoise
-from wamnet.refimpl.train import SHORT, model_of
+from wamnet.refimpl import metrics
+from wamnet.refimpl.network import dataset
+from wamnet.refimpl.network.denoise import Model, denoise
+from wamnet.refimpl.network.train import SHORT, model_of
 
 MORE = ("window4", "hidden24", "hidden16", "without-normal", "without-albedo", "without-position")
 """Variants in addition to those of a curve, which lose much untouched."""

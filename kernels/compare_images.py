@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refimpl import render
 from ..refimpl.errors import InputError
-from ..refimpl.render import Job, Render
-from ..refimpl.scene import Scene
+from ..refimpl.light import render
+from ..refimpl.light.render import Job, Render
+from ..refimpl.light.scene import Scene
 from . import welch
 from .executor import Executor
 from .render_on import render_on

@@ -30,10 +30,10 @@ from ..compiler.proof.ranges import Arithmetic, Range
 from ..compiler.scenes.emit_path import END
 from ..compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, kinds, lower_scene, names
 from ..compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
-from ..refimpl import render
-from ..refimpl.render import Job
-from ..refimpl.scene import Scene
-from ..refimpl.transport import Settings
+from ..refimpl.light import render
+from ..refimpl.light.render import Job
+from ..refimpl.light.scene import Scene
+from ..refimpl.light.transport import Settings
 from . import random_words
 from .executor import Executor, Part
 from .numpy_executor import follow

@@ -14,9 +14,9 @@ from ..compiler.core.ir import sha256
 from ..compiler.schedules import schedules
 from ..compiler.schedules.schedules import PLAIN
 from ..compiler.variants import FULL, plan_model
-from ..refimpl.dataset import feature_image
-from ..refimpl.denoise import Model
 from ..refimpl.frame import Frame
+from ..refimpl.network.dataset import feature_image
+from ..refimpl.network.denoise import Model
 from .executor import Executor, Images
 from .memory import keep_freed_memory
 from .tune import choose

@@ -21,9 +21,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..refimpl.errors import InputError
+from ..refimpl.light.scene import Light
+from ..refimpl.light.variation import AT_REST, Ranges, Variation, lamp_color
 from ..refimpl.rng import counter, random_block
-from ..refimpl.scene import Light
-from ..refimpl.variation import AT_REST, Ranges, Variation, lamp_color
 
 DRAW_TAG = 0x44524157
 """Counter `block` of the words that draw frames ("DRAW" in ASCII); light paths use small numbers."""

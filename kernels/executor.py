@@ -115,7 +115,9 @@ class Executor(ABC):
     def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
         """Return a trainer (opencl_trainer.py) for pictures laid out end to end, or refuse."""
         rule = "it has no compiled trainer"
-        raise InputError("executor that trains", self.name, rule, "use executor opencl, or refimpl.train")
+        raise InputError(
+            "executor that trains", self.name, rule, "use executor opencl, or refimpl.network.train"
+        )
 
     def close(self) -> None:
         """Give the device back."""
@@ -199,7 +201,7 @@ def checked(artifact: Artifact, inputs: Images) -> Images:
                 f"image {image.name!r}",
                 f"{array.dtype} of shape {array.shape}",
                 f"must be float32 of shape (height, width, {image.channels}), all images of one size",
-                "encode the frame's features (refimpl.dataset.feature_image)",
+                "encode the frame's features (refimpl.network.dataset.feature_image)",
             )
         _check_range(image, array)
     return {image.name: np.ascontiguousarray(inputs[image.name]) for image in wanted}
@@ -225,7 +227,7 @@ def _check_range(image: Image, array: NDArray[np.float32]) -> None:
         f"image {image.name!r} at row {y}, column {x}",
         array[y, x].tolist(),
         f"the kernel's bound holds for numbers in {image.range_text}",
-        "encode the frame's features (refimpl.dataset.feature_image)",
+        "encode the frame's features (refimpl.network.dataset.feature_image)",
     )
 
 

@@ -24,11 +24,11 @@ import numpy as np
 
 from ..refimpl.errors import InputError
 from ..refimpl.frame import Frame
-from ..refimpl.render import TILE_PIXELS, Job
-from ..refimpl.scene import Scene, scene_digest
-from ..refimpl.scenes import TURN_SECONDS, canonical
-from ..refimpl.transport import Settings
-from ..refimpl.variation import RANGES, Ranges, check_ranges, varied
+from ..refimpl.light.render import TILE_PIXELS, Job
+from ..refimpl.light.scene import Scene, scene_digest
+from ..refimpl.light.scenes import TURN_SECONDS, canonical
+from ..refimpl.light.transport import Settings
+from ..refimpl.light.variation import RANGES, Ranges, check_ranges, varied
 from .draws import Draw, drawn, drawn_outside
 from .geometry import Comparison, Shown, compare
 from .render_frame import Progress, Rows, render_frame, renderer

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..refimpl.errors import InputError
-from ..refimpl.render import Job, render
-from ..refimpl.scene import Camera, Scene
-from ..refimpl.scenes import TURN_SECONDS
-from ..refimpl.transport import Settings
+from ..refimpl.light.render import Job, render
+from ..refimpl.light.scene import Camera, Scene
+from ..refimpl.light.scenes import TURN_SECONDS
+from ..refimpl.light.transport import Settings
 
 GRID_PX = 48
 """Rays of the grid along each side: 2,304 of them tell frames apart that differ by a fifth of a degree,

@@ -22,10 +22,11 @@ from ..compiler.artifact import Artifact
 from ..compiler.compile import compile_plan
 from ..compiler.plan import Plan
 from ..compiler.variants import plan_model
-from ..refimpl import dataset, metrics
-from ..refimpl.denoise import Model, denoise
+from ..refimpl import metrics
 from ..refimpl.errors import CompileError, InputError
 from ..refimpl.frame import Frame
+from ..refimpl.network import dataset
+from ..refimpl.network.denoise import Model, denoise
 from ..refimpl.rng import counter, random_block, uniform_floats
 from .curve import Curve, Point
 from .denoise_on import images_of

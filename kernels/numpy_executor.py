@@ -20,7 +20,7 @@ from ..compiler.scenes.lower_encode import SAMPLES, channel_name
 from ..compiler.scenes.lower_scene import PathPrograms
 from ..compiler.scenes.path_kernel import PathArtifact
 from ..compiler.schedules.emit import output_channels
-from ..refimpl import dataset
+from ..refimpl.network import dataset
 from .executor import Executor, Images, Part, gather_of
 
 BLOCK_NUMBERS = 2**22

@@ -35,15 +35,17 @@ from ..compiler.scenes.path_kernel import PathArtifact, compile_path
 from ..compiler.scenes.scene_inputs import SceneInputs, varying
 from ..compiler.schedules.emit import kernel_gather, output_channels
 from ..compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
-from ..refimpl import factored, rng, transport
-from ..refimpl.denoise import Model, check_model, learned_feature_spp
+from ..refimpl import rng
 from ..refimpl.errors import InputError
-from ..refimpl.render import Job, render
-from ..refimpl.scene import Scene
-from ..refimpl.scenes import TURN_SECONDS
-from ..refimpl.shapes.quad import quad_area_pdf
-from ..refimpl.transport import Settings
-from ..refimpl.variation import RANGES, ranges_from_json
+from ..refimpl.light import transport
+from ..refimpl.light.render import Job, render
+from ..refimpl.light.scene import Scene
+from ..refimpl.light.scenes import TURN_SECONDS
+from ..refimpl.light.shapes.quad import quad_area_pdf
+from ..refimpl.light.transport import Settings
+from ..refimpl.light.variation import RANGES, ranges_from_json
+from ..refimpl.network import factored
+from ..refimpl.network.denoise import Model, check_model, learned_feature_spp
 from .denoise_on import images_of
 
 SCHEMA = "wamnet-page-2"

@@ -25,12 +25,12 @@ from ..compiler.scenes.lower_encode import layers_of
 from ..compiler.scenes.lower_scene import lower_scene
 from ..compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from ..compiler.variants import FULL, plan_model
-from ..refimpl.dataset import check_features
-from ..refimpl.denoise import Model, check_model
 from ..refimpl.errors import InputError
-from ..refimpl.render import Job
-from ..refimpl.scene import Scene
-from ..refimpl.transport import Settings
+from ..refimpl.light.render import Job
+from ..refimpl.light.scene import Scene
+from ..refimpl.light.transport import Settings
+from ..refimpl.network.dataset import check_features
+from ..refimpl.network.denoise import Model, check_model
 from .executor import Executor, Part
 from .passes import PICTURE
 from .render_on import SAMPLES_AT_ONCE, compile_scene

@@ -22,8 +22,8 @@ from ..compiler.scenes.emit_path import planes
 from ..compiler.scenes.lower_scene import PASSES, PathPrograms, lower_scene
 from ..compiler.scenes.path_kernel import compile_path
 from ..refimpl import rng
-from ..refimpl.scenes import canonical
-from ..refimpl.transport import BLOCKS_PER_BOUNCE, Settings
+from ..refimpl.light.scenes import canonical
+from ..refimpl.light.transport import BLOCKS_PER_BOUNCE, Settings
 from .executor import Executor, Part
 
 COUNTERS = ("seed", "pixel", "sample_number")

@@ -22,9 +22,9 @@ from ..compiler.core.ir import OUTPUT_ENCODING, Program, Type
 from ..compiler.core.lower import lower
 from ..compiler.core.trace import trace
 from ..compiler.targets import target_named
-from ..refimpl.activation import SINE, activation_named
-from ..refimpl.denoise import Model, as_dtype
-from ..refimpl.siren import Siren, forward
+from ..refimpl.network.activation import SINE, activation_named
+from ..refimpl.network.denoise import Model, as_dtype
+from ..refimpl.network.siren import Siren, forward
 from .apart import Runner
 from .executor import Images
 from .triage import Compile, Judge, Kernel, Verdict, judged, kernels_of, odd_ones

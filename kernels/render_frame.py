@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..refimpl.errors import InputError
-from ..refimpl.render import Job, Render, render
-from ..refimpl.scene import Scene
+from ..refimpl.light.render import Job, Render, render
+from ..refimpl.light.scene import Scene
 from .executor import Executor
 from .memory import keep_freed_memory
 from .registry import open_executor

@@ -25,9 +25,9 @@ from ..compiler.scenes.lower_scene import lower_scene
 from ..compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from ..refimpl.errors import InputError
 from ..refimpl.frame import LAYERS, Frame
-from ..refimpl.render import Job, Render, checked_rows, feature_job, render_info, with_own_features
-from ..refimpl.scene import Scene
-from ..refimpl.transport import Settings
+from ..refimpl.light.render import Job, Render, checked_rows, feature_job, render_info, with_own_features
+from ..refimpl.light.scene import Scene
+from ..refimpl.light.transport import Settings
 from .executor import Executor, Part
 from .memory import keep_freed_memory
 

@@ -20,8 +20,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from ..refimpl.errors import InputError
-from ..refimpl.render import Job, Render, join_rows, render
-from ..refimpl.scene import Scene
+from ..refimpl.light.render import Job, Render, join_rows, render
+from ..refimpl.light.scene import Scene
 from .memory import keep_freed_memory
 from .orphans import end_with_parent
 

@@ -1,4 +1,4 @@
-"""Training on a device: refimpl.train.train with the arithmetic of a step done by compiled kernels.
+"""Training on a device: refimpl.network.train.train with the arithmetic of a step done by compiled kernels.
 
 1. Data, pool and minibatches are the reference's, to the bit, and so are first weights, learning rates and
    the form of states: a run may continue with either trainer [`train_on`].
@@ -6,7 +6,7 @@
    minibatches of the next [`Run.draw`].
 3. A loss that is not finite, or an interrupt, is reported and kept as the reference does it [`Run.settle`].
 
-The definition is refimpl/train.py; how far a step may be from it: compiler/training/step.py.
+The definition is refimpl/network/train.py; how far a step may be from it: compiler/training/step.py.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from ..compiler.training.step import factor_names
 from ..compiler.training.step_kernel import FIRST, compile_step
-from ..refimpl import adam, dataset, train
-from ..refimpl.adam import AdamState
-from ..refimpl.dataset import Dataset, Indices
 from ..refimpl.errors import InputError, TrainingError
-from ..refimpl.factored import Factors
 from ..refimpl.frame import Frame
-from ..refimpl.siren import Siren
-from ..refimpl.train import Checkpoint, Progress, Recipe, TrainState
+from ..refimpl.network import adam, dataset, train
+from ..refimpl.network.adam import AdamState
+from ..refimpl.network.dataset import Dataset, Indices
+from ..refimpl.network.factored import Factors
+from ..refimpl.network.siren import Siren
+from ..refimpl.network.train import Checkpoint, Progress, Recipe, TrainState
 from .executor import Executor
 
 BLOCK_STEPS = 32
@@ -133,7 +133,7 @@ def train_on(
     on_checkpoint: Checkpoint | None = None,
     checkpoint_every: int | None = None,
 ) -> TrainState:
-    """Train as refimpl.train.train does, in float32, with the steps done by the executor's device."""
+    """Train as refimpl.network.train.train does, in float32, with the steps done by the executor's device."""
     train.check_recipe(recipe)
     normalization = (
         dataset.normalization_of([noisy for noisy, _ in pairs]) if state is None else state.normalization

@@ -33,8 +33,8 @@ from ..compiler.compile import compile_plan
 from ..compiler.core.ir import Program
 from ..compiler.plan import Plan
 from ..refimpl import rng
-from ..refimpl.denoise import Model
 from ..refimpl.errors import CompileError
+from ..refimpl.network.denoise import Model
 from . import cache, measure
 from .executor import Executor, Images
 

@@ -2,7 +2,7 @@
 //
 // A kernel has every number of the scene as a constant but those that may move. Of these, what follows time
 // stands in a table, one row for each moment; camera and lights are computed here as the reference does
-// (refimpl/camera.py, refimpl/transport.py): in 64 bits, rounded to 32 once.
+// (refimpl/light/camera.py, refimpl/light/transport.py): in 64 bits, rounded to 32 once.
 
 const radians = (degrees) => (degrees * Math.PI) / 180;
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -27,7 +27,7 @@ function decodeFloats(text, Kind = Float32Array) {
   return new Kind(decodeBase64(text).buffer);
 }
 
-/** The camera's axes, as refimpl/camera.py: camera_basis. */
+/** The camera's axes, as refimpl/light/camera.py: camera_basis. */
 function cameraBasis(camera) {
   const forward = normalize(camera.look_at.map((x, i) => x - camera.position[i]));
   const right = normalize(cross(forward, camera.up));
@@ -53,7 +53,7 @@ function orbit(camera, turn) {
   return { ...camera, position: camera.look_at.map((x, i) => x + radius * offset[i]) };
 }
 
-/** Radiance of the lights, and the tables by which one is picked, as refimpl/transport.py: _build_lights. */
+/** Radiance of the lights, and the tables by which one is picked, as refimpl/light/transport.py: _build_lights. */
 function lightTables(lights, colors, share) {
   const radiance = lights.flatMap((light, i) =>
     colors[i].map((c) => (light.power * c) / (Math.PI * light.area)),
@@ -90,7 +90,7 @@ function sceneNumbers(data, frame, camera, colors) {
   return padded;
 }
 
-/** A colour's hue and saturation with the mean of a lamp's own channels, as refimpl/variation.py. */
+/** A colour's hue and saturation with the mean of a lamp's own channels, as refimpl/light/variation.py. */
 function asBright(color, own) {
   const sum = (channels) => channels.reduce((total, channel) => total + channel, 0);
   // A black lamp has no hue: a trace of light makes it grey.
@@ -98,10 +98,10 @@ function asBright(color, own) {
   return lit.map((channel) => (channel * sum(own)) / sum(lit));
 }
 
-const SATURATION_TOLERANCE = 0.005; // by rounding to eight bits, as refimpl/variation.py
+const SATURATION_TOLERANCE = 0.005; // by rounding to eight bits, as refimpl/light/variation.py
 
 /**
- * What of a picture a network has not learned, as refimpl/variation.py: outside; lamps are as bright as their
+ * What of a picture a network has not learned, as refimpl/light/variation.py: outside; lamps are as bright as their
  * own here. Each with its subject and the range; `all`: what could be said, for the longest sentence.
  */
 function outside(ranges, turnSeconds, { time, turn, colors }, lights, all = false) {

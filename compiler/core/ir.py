@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.dataset import Window
+from ...refimpl.network.dataset import Window
 
 Parameters = Mapping[str, NDArray[Any]]
 

@@ -7,8 +7,8 @@ from dataclasses import asdict
 
 import numpy as np
 
-from ...refimpl.dataset import DISPLAY_FORMULA, FEATURES
-from ...refimpl.denoise import Model, as_dtype, check_model, denoise_pixel
+from ...refimpl.network.dataset import DISPLAY_FORMULA, FEATURES
+from ...refimpl.network.denoise import Model, as_dtype, check_model, denoise_pixel
 from .ir import OUTPUT_ENCODING, Gather, Image, Program, Type
 from .trace import trace
 from .verify import verify

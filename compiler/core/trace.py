@@ -269,7 +269,7 @@ def _exact_float32(array: NDArray[Any]) -> NDArray[np.float32]:
     if not np.array_equal(rounded, array):
         raise CompileError(
             f"{_place()}: an array of {array.dtype}, shape {array.shape}, holds numbers that float32 cannot: "
-            "kernels keep weights in float32; round the weights first (refimpl.denoise.as_dtype)"
+            "kernels keep weights in float32; round the weights first (refimpl.network.denoise.as_dtype)"
         )
     return rounded
 
@@ -428,7 +428,7 @@ REFERENCE = Path(vectors.__file__).parent
 
 @cache
 def _reference_file(path: str) -> str:
-    """Return the name of a file of the reference, refimpl/siren.py; nothing for another file."""
+    """Return the name of a file of the reference, refimpl/network/siren.py; nothing for another file."""
     found = Path(path)
     return found.relative_to(REFERENCE.parent).as_posix() if REFERENCE in found.parents else ""
 

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.dataset import FEATURES, Normalization
 from ...refimpl.errors import CompileError
+from ...refimpl.network.dataset import FEATURES, Normalization
 from ...refimpl.reading import SIZES
 from ..artifact import OneSource
 from ..core import ir, profiles

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...refimpl.dataset import Normalization
+from ...refimpl.network.dataset import Normalization
 from ..languages.dialect import Parts
 from ..languages.glsl_es import GLSLES
 from ..languages.hosts import NO_PRECISE, GodotDenoise

@@ -11,7 +11,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...refimpl import vectors
-from ...refimpl.dataset import FEATURES, Normalization, check_features, check_normalization, encode_sums
+from ...refimpl.network.dataset import (
+    FEATURES,
+    Normalization,
+    check_features,
+    check_normalization,
+    encode_sums,
+)
 from ..core.ir import Program, Type
 from ..core.passes import pipeline
 from ..core.trace import trace

@@ -2,9 +2,9 @@
 
 A path is four pure functions of the reference, each a program; a kernel's skeleton calls them:
 
-1. `start`: pixel and counters -> the path at the camera (refimpl/render.py).
-2. `arrive`: path -> its next surface and the radiance gathered so far (refimpl/transport.py).
-3. `look`: the first surface -> the feature layers (refimpl/render.py).
+1. `start`: pixel and counters -> the path at the camera (refimpl/light/render.py).
+2. `arrive`: path -> its next surface and the radiance gathered so far (refimpl/light/transport.py).
+3. `look`: the first surface -> the feature layers (refimpl/light/render.py).
 4. `scatter`: path, surface, depth and counters -> the path after it, and whether it continues.
 
 Values between them have names [`PATH`, `SURFACE`, `COUNTERS`]: a vector is three numbers, `origin_x` and so
@@ -21,10 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from ...refimpl import render, transport, vectors
-from ...refimpl.intersection import Hit, Surface, reflecting
-from ...refimpl.scene import Scene, primitives, scene_digest
-from ...refimpl.transport import Counters, Path, Settings, World
+from ...refimpl import vectors
+from ...refimpl.light import render, transport
+from ...refimpl.light.intersection import Hit, Surface, reflecting
+from ...refimpl.light.scene import Scene, primitives, scene_digest
+from ...refimpl.light.transport import Counters, Path, Settings, World
 from ..core.ir import Program, Type
 from ..core.loops import MOST_UNROLLED
 from ..core.passes import pipeline
@@ -48,7 +49,7 @@ PATH: Values = {
     "radiance": (RGB, FLOAT),
     "pdf": (NUMBER, FLOAT),
 }
-"""State of a path between bounces, as refimpl/transport.py: Path."""
+"""State of a path between bounces, as refimpl/light/transport.py: Path."""
 
 SURFACE: Values = {
     "point": (XYZ, FLOAT),
@@ -60,7 +61,7 @@ SURFACE: Values = {
 """What a scattering needs to know of the surface that was hit."""
 
 COUNTERS: Values = dict.fromkeys(("seed", "pixel", "sample_number"), (NUMBER, COUNTER))
-"""Counters that name a path's random numbers, as refimpl/transport.py: Counters (GLSL reserves sample)."""
+"""What names a path's random numbers: Counters of refimpl/light/transport.py (GLSL reserves sample)."""
 
 LAYERS: Values = {
     "albedo": (RGB, FLOAT),
@@ -70,7 +71,7 @@ LAYERS: Values = {
     "direction": (XYZ, FLOAT),
     "unshadowed": (RGB, FLOAT),
 }
-"""The feature layers of the first hit, as refimpl/render.py: first_hit_layers."""
+"""The feature layers of the first hit, as refimpl/light/render.py: first_hit_layers."""
 
 PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "eliminate_dead")
 """What every program of a path goes through: numbers in place of vectors, the bits that float32 gives."""
@@ -116,7 +117,7 @@ def lower_scene(
     world_of = partial(_world, laid, moving)
 
     def start(given: Mapping[str, Any]) -> dict[str, Any]:
-        # A pixel's counter, as in refimpl/render.py: pixel_counter.
+        # A pixel's counter, as in refimpl/light/render.py: pixel_counter.
         pixel = given["x"] + np.uint32(render.MAX_IMAGE_SIDE_PX) * given["y"]
         counters = Counters(given["seed"], pixel, given["sample_number"])
         x, y = given["x"].astype(np.float32), given["y"].astype(np.float32)

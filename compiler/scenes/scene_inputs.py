@@ -1,7 +1,7 @@
 """Numbers of a scene as inputs of its programs: time, camera and light colours without another kernel.
 
-A world (refimpl/transport.py: World) and a camera's basis are tables of constants when paths are traced. Here
-some of their numbers are inputs:
+A world (refimpl/light/transport.py: World) and a camera's basis are tables of constants when paths are
+traced. Here some of their numbers are inputs:
 
 1. Scenes that differ in what shall move are laid out as worlds; what they have in common stays constant, each
    number that differs between any two of them becomes an input [`varying`]. Numbers that are equal in all the
@@ -24,11 +24,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl import transport
-from ...refimpl.camera import camera_basis
 from ...refimpl.errors import CompileError
-from ...refimpl.scene import Scene
-from ...refimpl.transport import Settings
+from ...refimpl.light import transport
+from ...refimpl.light.camera import camera_basis
+from ...refimpl.light.scene import Scene
+from ...refimpl.light.transport import Settings
 from ..core.ir import Builder, Node, Program, attributes
 from ..core.passes.rewrite import rewrite
 

@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl import dataset, factored
 from ...refimpl.errors import CompileError
+from ...refimpl.network import dataset, factored
 from ..core.ir import LEAST, Gather, Image, Node, Program, Type, attributes
 from ..core.passes.pin import pin
 from ..core.profiles import SineContract

@@ -37,7 +37,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl import dataset
+from ...refimpl.network import dataset
 from ..core.ir import Gather, Program
 from ..core.profiles import FLUSH, UNIT_ROUNDOFF, SineContract
 from ..core.sums import gamma

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl import dataset
 from ...refimpl.errors import CompileError
+from ...refimpl.network import dataset
 from ..core import ir, weights
 from ..core.ir import Gather, Program
 from ..core.profiles import SineContract

@@ -1,6 +1,6 @@
 """The extra work of a training step for a first layer of low rank: its factors' derivatives, their product.
 
-The step computes with the weights W = V H, and has their derivative dW, as refimpl/factored.py has it:
+The step computes with the weights W = V H, and has their derivative dW (refimpl/network/factored.py):
 
 1. `wamnet_vertical` adds up dW over the work items of the step, in their order, and gives dV = dW H^T.
 2. `wamnet_horizontal` gives dH = V^T dW. The second kernel of emit_step.py moves both factors with Adam, and

@@ -9,7 +9,7 @@
 
 Source: the chain rule in reverse order, as in Griewank and Walther, "Evaluating Derivatives", 2008, section
 3.2. tests/compiler/passes/test_gradient.py compares it with the backward pass written by hand in
-refimpl/siren.py, and each rule with central differences.
+refimpl/network/siren.py, and each rule with central differences.
 """
 
 from __future__ import annotations

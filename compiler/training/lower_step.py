@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from ...refimpl import adam, siren
-from ...refimpl.activation import SINE
-from ...refimpl.siren import Siren
-from ...refimpl.train import squared_error
+from ...refimpl.network import adam, siren
+from ...refimpl.network.activation import SINE
+from ...refimpl.network.siren import Siren
+from ...refimpl.network.train import squared_error
 from ..core.ir import Program, Type
 from ..core.passes import pipeline
 from ..core.trace import trace

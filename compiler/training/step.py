@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ...refimpl import factored
-from ...refimpl.factored import Factors
+from ...refimpl.network import factored
+from ...refimpl.network.factored import Factors
 from ..core.interpret import interpret
 from ..core.ir import Program
 from ..core.profiles import EMITTED_COSINE, EMITTED_SINE, FLUSH

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ...refimpl.activation import SINE
+from ...refimpl.network.activation import SINE
 from ..core import ir
 from ..core.ir import Program
 from ..core.passes import pipeline

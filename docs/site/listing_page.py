@@ -23,11 +23,12 @@ from wamnet.compiler.core.listing import Line, lines_of, within
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.refimpl import denoise, siren, transport
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.scene import Camera, Light, Quad, Scene, Sphere
-from wamnet.refimpl.shapes import sphere
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import transport
+from wamnet.refimpl.light.scene import Camera, Light, Quad, Scene, Sphere
+from wamnet.refimpl.light.shapes import sphere
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network import denoise, siren
+from wamnet.refimpl.network.dataset import Normalization, Window
 
 ROOT = Path(siren.__file__).parents[1]
 """The folder whose places are shown."""

@@ -11,8 +11,8 @@
    their recipe, the curve and the seconds of their training as JSON beside them. Neither is committed. A
    training that met its largest number of steps before the curve was flat says so: `flat` is false.
 
-Sources: those of the methods. Sampling is that of refimpl/dataset.py. Rates that fall where progress ends are
-those of He, Zhang, Ren, Sun, "Deep Residual Learning for Image Recognition", CVPR 2016, section 3.4.
+Sources: those of the methods. Sampling is that of refimpl/network/dataset.py. Rates that fall where progress
+ends are those of He, Zhang, Ren, Sun, "Deep Residual Learning for Image Recognition", CVPR 2016, section 3.4.
 """
 
 from __future__ import annotations
@@ -38,10 +38,11 @@ from safetensors.torch import load_file, save_file
 from wamnet.cli.exr import read_frame
 from wamnet.cli.outputs import replacing, write_text
 from wamnet.cli.terminal import hint_on_interrupt, progress
-from wamnet.refimpl import dataset, metrics
-from wamnet.refimpl.dataset import Normalization
+from wamnet.refimpl import metrics
 from wamnet.refimpl.errors import InputError, TrainingError
 from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.network import dataset
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.rng import counter, random_block
 
 Tensor = torch.Tensor

@@ -22,7 +22,7 @@ from lab.training import seconds_a_step
 
 from wamnet.kernels.bench.workload import noise
 from wamnet.kernels.render_frame import render_frame
-from wamnet.refimpl.train import BEST, PAPER, SHORT
+from wamnet.refimpl.network.train import BEST, PAPER, SHORT
 
 from .rows import EQUAL_RAYS, EQUAL_SPP, Bench
 

@@ -33,11 +33,11 @@ from wamnet.kernels.denoise_on import images_of
 from wamnet.kernels.executor import Executor
 from wamnet.kernels.geometry import Shown
 from wamnet.refimpl import metrics
-from wamnet.refimpl.denoise import Model, denoise
 from wamnet.refimpl.encoding import from_display, to_display
 from wamnet.refimpl.frame import Floats, Frame
-from wamnet.refimpl.scenes import TURN_SECONDS
-from wamnet.refimpl.train import BEST, PAPER, SHORT, Recipe
+from wamnet.refimpl.light.scenes import TURN_SECONDS
+from wamnet.refimpl.network.denoise import Model, denoise
+from wamnet.refimpl.network.train import BEST, PAPER, SHORT, Recipe
 
 from . import atrous
 

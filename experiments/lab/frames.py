@@ -26,10 +26,10 @@ from wamnet.kernels.frame_plan import version
 from wamnet.kernels.render_frame import render_frame
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import LAYERS, Frame
-from wamnet.refimpl.render import Job, feature_job, render_info
-from wamnet.refimpl.scene import Scene, scene_digest
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.variation import AT_REST, Variation, varied
+from wamnet.refimpl.light.render import Job, feature_job, render_info
+from wamnet.refimpl.light.scene import Scene, scene_digest
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.variation import AT_REST, Variation, varied
 
 NOISY_SPP = 1
 """Samples per pixel of what is denoised."""

@@ -25,12 +25,12 @@ from typing import Any
 
 from wamnet.cli.outputs import write_text
 from wamnet.kernels.draws import Draw, drawn
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.train import Recipe
-from wamnet.refimpl.variation import Ranges
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.variation import Ranges
+from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.train import Recipe
 
 from . import frames, scores, training
 from .frames import Pair, Shot

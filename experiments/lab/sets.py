@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from wamnet.kernels.draws import Draw
 from wamnet.kernels.frame_plan import OUTSIDE, TEST, TRAIN, Request, frame_draws
 from wamnet.kernels.geometry import Comparison, Shown, compare
-from wamnet.refimpl.variation import Ranges
+from wamnet.refimpl.light.variation import Ranges
 
 from .frames import Shot
 

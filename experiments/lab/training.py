@@ -21,10 +21,10 @@ from wamnet.cli.train import checkpoint_path, fit
 from wamnet.compiler.model_file import load_checkpoint, load_model
 from wamnet.kernels import denoise_on, open_executor, train_on
 from wamnet.kernels.executor import Executor
-from wamnet.refimpl import dataset
-from wamnet.refimpl.denoise import Model, denoise
 from wamnet.refimpl.frame import Floats, Frame
-from wamnet.refimpl.train import Recipe, recipe_to_json, train
+from wamnet.refimpl.network import dataset
+from wamnet.refimpl.network.denoise import Model, denoise
+from wamnet.refimpl.network.train import Recipe, recipe_to_json, train
 
 from .frames import DIGITS, Pair
 

@@ -24,9 +24,10 @@ from ...compiler.plan import Plan, plan_program
 from ...compiler.proof import bounds
 from ...compiler.schedules.emit import kernel_gather
 from ...compiler.schedules.schedules import PLAIN, windows
-from ...refimpl import dataset, metrics
-from ...refimpl.denoise import Model, denoise
+from ...refimpl import metrics
 from ...refimpl.frame import Frame
+from ...refimpl.network import dataset
+from ...refimpl.network.denoise import Model, denoise
 from ..executor import Images
 from .contender import Variant
 

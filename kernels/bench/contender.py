@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from ...compiler.core import profiles, sine
 from ...compiler.core.ir import Program
 from ...compiler.core.lower import lower
-from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable
+from ...refimpl.network.denoise import Model
 from ..executor import Executor
 from ..registry import open_executor
 from .cost import Stage

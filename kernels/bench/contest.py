@@ -26,9 +26,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable, WamnetError
 from ...refimpl.frame import Frame
+from ...refimpl.network.denoise import Model
 from ..measure import PAUSE_S, Times, in_turns
 from ..memory import keep_freed_memory
 from . import accuracy, rates

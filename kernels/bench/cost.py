@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from ...compiler.artifact import Artifact
 from ...compiler.core.ir import Program
 from ...compiler.schedules.emit import kernel_gather, output_channels
-from ...refimpl.activation import SINE
-from ...refimpl.dataset import channels_of
-from ...refimpl.denoise import Model
+from ...refimpl.network.activation import SINE
+from ...refimpl.network.dataset import channels_of
+from ...refimpl.network.denoise import Model
 
 FLOAT_BYTES = 4
 """Bytes of a float32."""

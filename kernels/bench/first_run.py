@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ...compiler.model_file import load_model, save_model
-from ...refimpl.denoise import Model
+from ...refimpl.network.denoise import Model
 from .contender import Tools
 from .contenders import chosen, of_machine
 from .workload import given, noise

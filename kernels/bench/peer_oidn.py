@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.denoise import Model
 from ...refimpl.encoding import to_display
 from ...refimpl.errors import InputError
 from ...refimpl.frame import Frame
+from ...refimpl.network.denoise import Model
 from .contender import Contender, Opened, Tools, told_as_missing
 from .workload import Given
 

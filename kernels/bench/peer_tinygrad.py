@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.activation import RELU, SINE
-from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable
+from ...refimpl.network.activation import RELU, SINE
+from ...refimpl.network.denoise import Model
 from .contender import Contender, Opened, Tools, activation_in, told_as_missing
 from .cost import layered
 from .workload import Given

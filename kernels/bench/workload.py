@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl import dataset, rng, siren
-from ...refimpl.denoise import Model
+from ...refimpl import rng
 from ...refimpl.errors import InputError
 from ...refimpl.frame import LAYERS, Frame
+from ...refimpl.network import dataset, siren
+from ...refimpl.network.denoise import Model
 from ..denoise_on import images_of
 from ..executor import Images
 

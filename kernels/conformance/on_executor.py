@@ -28,12 +28,12 @@ from ...compiler.scenes.lower_scene import PATH, SURFACE, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import DENOISERS, TARGETS
-from ...refimpl import scene as scene_module
-from ...refimpl.dataset import Window
 from ...refimpl.errors import CompileError
 from ...refimpl.frame import LAYERS
-from ...refimpl.render import Job
-from ...refimpl.transport import Settings
+from ...refimpl.light import scene as scene_module
+from ...refimpl.light.render import Job
+from ...refimpl.light.transport import Settings
+from ...refimpl.network.dataset import Window
 from ..denoise_on import denoise_on
 from ..executor import Executor, Part
 from ..export.buffer_runner import BufferRunner

@@ -12,7 +12,7 @@ from ...compiler.core.lower import lower
 from ...compiler.languages.interface import BLOCK, PATH, READ, SUMS, WEIGHTS, WRITE, Interface
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
-from ...refimpl.denoise import Model
+from ...refimpl.network.denoise import Model
 from .targets import Row
 
 Binding = dict[str, Any]

@@ -30,8 +30,8 @@ from ...compiler.scenes.lower_scene import PathPrograms
 from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.schedules.emit import kernel_gather
 from ...compiler.schedules.schedules import windows
-from ...refimpl.dataset import FEATURES, encode_sums
-from ...refimpl.denoise import Model
+from ...refimpl.network.dataset import FEATURES, encode_sums
+from ...refimpl.network.denoise import Model
 from ..executor import Part
 from ..registry import open_executor
 

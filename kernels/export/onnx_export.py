@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...refimpl.dataset import FEATURES
-from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable
+from ...refimpl.network.dataset import FEATURES
+from ...refimpl.network.denoise import Model
 from ..bench import peer_onnxruntime
 
 TEXT = f"ONNX, operators {peer_onnxruntime.OPERATORS}: Conv and Sin nodes, dynamic height and width"

@@ -33,11 +33,11 @@ from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from ...compiler.targets import target_named
 from ...compiler.variants import FULL, parse, plan_model, vary
-from ...refimpl.denoise import Model, learned_feature_spp
 from ...refimpl.errors import InputError
+from ...refimpl.light.scene import Scene
+from ...refimpl.light.transport import Settings
+from ...refimpl.network.denoise import Model, learned_feature_spp
 from ...refimpl.reading import SIZES
-from ...refimpl.scene import Scene
-from ...refimpl.transport import Settings
 from . import bindings, check_pair, onnx_export, readme
 from .targets import NAMES, ONNX, TARGETS, Limit, Place, Row
 

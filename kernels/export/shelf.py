@@ -27,10 +27,10 @@ from ...compiler.artifact import Artifact
 from ...compiler.core.writing import is_regular, write_together
 from ...compiler.model_file import load_model
 from ...compiler.schedules.schedules import PLAIN
-from ...refimpl import siren
-from ...refimpl.dataset import Normalization, Window
-from ...refimpl.denoise import Model
 from ...refimpl.errors import ExecutorUnavailable, InputError, WamnetError
+from ...refimpl.network import siren
+from ...refimpl.network.dataset import Normalization, Window
+from ...refimpl.network.denoise import Model
 from ..bench.cost import products_of
 from ..executor import Executor, Images, black
 from ..measure import in_turns

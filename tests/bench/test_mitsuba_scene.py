@@ -14,11 +14,11 @@ from statistical import SIGNIFICANCE, assert_all_plausible, sidak, welch_p
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels.executor import Part
-from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
-from wamnet.refimpl.scene import Box, Camera, Light, Quad, Scene, Sphere
-from wamnet.refimpl.transport import Settings
-from wamnet.refimpl.variation import Variation, varied
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Scene, Sphere
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.light.variation import Variation, varied
 
 WIDTH, HEIGHT, BLOCK = 16, 12, 4
 BATCHES = 32

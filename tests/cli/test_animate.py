@@ -16,11 +16,12 @@ from PIL import Image
 from wamnet.cli import animate, images
 from wamnet.cli.images import LABEL_PX, read_png
 from wamnet.compiler.model_file import load_model, save_model
-from wamnet.refimpl import encoding, factored
-from wamnet.refimpl.denoise import denoise, learned_feature_spp
-from wamnet.refimpl.render import Job, render
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.variation import Ranges, Variation, varied
+from wamnet.refimpl import encoding
+from wamnet.refimpl.light.render import Job, render
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.variation import Ranges, Variation, varied
+from wamnet.refimpl.network import factored
+from wamnet.refimpl.network.denoise import denoise, learned_feature_spp
 
 SHORT = ("--seconds", 0.4, "--fps", 5, "--size", 13)
 

@@ -15,7 +15,7 @@ from wamnet.compiler.model_file import load_model, save_checkpoint, save_model
 from wamnet.kernels.bench import contest, rates
 from wamnet.kernels.frame_plan import frame_draws
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.variation import Ranges
+from wamnet.refimpl.light.variation import Ranges
 
 SPEC = Path(__file__).resolve().parents[2] / "spec" / "bench.md"
 """The chapter that documents the keys of the result."""
@@ -293,7 +293,7 @@ def test_forms_are_trained_and_then_measured(wamnet, here, monkeypatch, executor
 
 def test_a_form_goes_on_where_an_interrupt_left_it(samples, tmp_path, monkeypatch) -> None:
     """To the weights of one go, by the checkpoint; the model's own scales stay."""
-    from wamnet.refimpl.train import train as train_steps
+    from wamnet.refimpl.network.train import train as train_steps
 
     model = load_model(samples / "model.safetensors")
     pairs = [(exr.read_frame(samples / "noisy.exr"), exr.read_frame(samples / "reference.exr"))]

@@ -17,7 +17,7 @@ import pytest
 
 from wamnet.cli import cluster
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.render import Job
+from wamnet.refimpl.light.render import Job
 
 TASKS = list(range(20))
 

@@ -18,11 +18,11 @@ from wamnet import kernels
 from wamnet.cli import cluster, dataset_files, exr
 from wamnet.kernels import draws, frame_plan, render_frame
 from wamnet.refimpl.errors import ExecutorUnavailable
-from wamnet.refimpl.render import Job, render
-from wamnet.refimpl.scene import scene_digest
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.transport import Settings
-from wamnet.refimpl.variation import Ranges, Variation, ranges_from_json, varied
+from wamnet.refimpl.light.render import Job, render
+from wamnet.refimpl.light.scene import scene_digest
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.light.variation import Ranges, Variation, ranges_from_json, varied
 
 TINY = ("minicubes", "--frames", 2, "--test", 1, "--size", 12, "--spp", 4)
 

@@ -17,7 +17,7 @@ from wamnet.cli.main import main
 from wamnet.compiler.model_file import load_model
 from wamnet.compiler.variants import plan_model
 from wamnet.refimpl import encoding, metrics
-from wamnet.refimpl.denoise import denoise
+from wamnet.refimpl.network.denoise import denoise
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +155,7 @@ def test_a_second_run_reuses_everything(finished, tmp_path, monkeypatch) -> None
         raise AssertionError("this was done before")
 
     monkeypatch.setattr("wamnet.kernels.frame_plan.render_frame", never)
-    monkeypatch.setattr("wamnet.refimpl.train.train_step", never)
+    monkeypatch.setattr("wamnet.refimpl.network.train.train_step", never)
     monkeypatch.setattr("wamnet.kernels.trainer.Run.enqueue", never)
     results = demo.carry_out(demo.for_this_machine(demo.QUICK), folder)
     assert results.state.step == demo.QUICK.steps

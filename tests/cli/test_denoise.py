@@ -133,8 +133,8 @@ def test_compile_writes_a_scene_s_kernel(wamnet, here, target, source) -> None:
     """The bytes that the compiler gives for this scene, time and schedule; a scene file is a scene too."""
     from wamnet.compiler.scenes.lower_scene import lower_scene
     from wamnet.compiler.scenes.path_kernel import compile_path
-    from wamnet.refimpl.scenes import canonical
-    from wamnet.refimpl.transport import Settings
+    from wamnet.refimpl.light.scenes import canonical
+    from wamnet.refimpl.light.transport import Settings
 
     lanes = ["--lanes", 16] if target == "opencl" else []
     options = ["--target", target, "--max-depth", 2, *lanes]

@@ -9,8 +9,8 @@ import pytest
 
 from wamnet.cli import effort
 from wamnet.kernels import render_frame
-from wamnet.refimpl.scene import Box, to_json
-from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.light.scene import Box, to_json
+from wamnet.refimpl.light.scenes import canonical
 
 
 class StoppedError(Exception):

@@ -12,10 +12,10 @@ import pytest
 
 from wamnet.cli import exr, inputs
 from wamnet.compiler.model_file import load_model, save_model
-from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.variation import Ranges, lamp_color
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.variation import Ranges, lamp_color
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ def test_a_model_s_kernel(wamnet, samples, target):
     assert outcome.status == 0
     lines = outcome.out.splitlines()
     sine = next(i for i, line in enumerate(lines) if "x = activate(_omega_0(siren, layer) * x)" in line)
-    assert lines[sine].startswith("refimpl/siren.py:")
+    assert lines[sine].startswith("refimpl/network/siren.py:")
     assert any("sin" in line for line in lines[sine + 1 : sine + 8])
     assert all(line.startswith(("refimpl/", "the kernel's own: ", "    |")) for line in lines)
 

@@ -17,9 +17,9 @@ from wamnet.cli import options
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import EXECUTORS
 from wamnet.refimpl.errors import TrainingError
-from wamnet.refimpl.scenes import CANONICAL
-from wamnet.refimpl.train import PRESETS
-from wamnet.refimpl.transport import SAMPLERS
+from wamnet.refimpl.light.scenes import CANONICAL
+from wamnet.refimpl.light.transport import SAMPLERS
+from wamnet.refimpl.network.train import PRESETS
 
 COMMANDS = (
     "render",

@@ -11,13 +11,13 @@ import pytest
 from wamnet.cli import options
 from wamnet.cli.inputs import MODELS, load_model, shipped_models
 from wamnet.refimpl import metrics
-from wamnet.refimpl.denoise import denoise
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.render import Job, render
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.train import recipe_from_json
-from wamnet.refimpl.variation import ranges_from_json
+from wamnet.refimpl.light.render import Job, render
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.variation import ranges_from_json
+from wamnet.refimpl.network.denoise import denoise
+from wamnet.refimpl.network.train import recipe_from_json
 
 NAMES = options.MODELS.split(", ")
 

@@ -11,11 +11,12 @@ import pytest
 
 from wamnet.cli import exr
 from wamnet.cli.images import read_png
-from wamnet.refimpl import encoding, scenes, variation
-from wamnet.refimpl.render import Job, render
-from wamnet.refimpl.scene import scene_digest
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl import encoding
+from wamnet.refimpl.light import scenes, variation
+from wamnet.refimpl.light.render import Job, render
+from wamnet.refimpl.light.scene import scene_digest
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.transport import Settings
 
 
 def test_the_frame_is_the_references(wamnet, tmp_path) -> None:

@@ -10,9 +10,9 @@ import pytest
 from wamnet.cli import exr, train
 from wamnet.compiler.model_file import load_checkpoint, load_model
 from wamnet.kernels import train_on
-from wamnet.refimpl import train as reference
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.network import train as reference
 
 
 @pytest.fixture

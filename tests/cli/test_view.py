@@ -16,7 +16,7 @@ import pytest
 
 from wamnet.cli import view, webpage
 from wamnet.compiler.model_file import load_model, save_model
-from wamnet.refimpl import scenes
+from wamnet.refimpl.light import scenes
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def test_the_model_s_own_scene_is_shown_at_all_its_times(wamnet, here):
 def test_scenes_move_without_changing_their_form(name):
     """All moments of each animation are one kernel."""
     from wamnet.kernels.page import moving_numbers
-    from wamnet.refimpl.transport import Settings
+    from wamnet.refimpl.light.transport import Settings
 
     animation = webpage.animation_of(name)
     inputs, numbers = moving_numbers(animation, Settings())

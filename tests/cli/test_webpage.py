@@ -24,10 +24,11 @@ from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels import page as P
 from wamnet.kernels.executor import Part
 from wamnet.kernels.numpy_executor import NumpyExecutor
-from wamnet.refimpl import dataset, scenes
-from wamnet.refimpl.denoise import Model
-from wamnet.refimpl.transport import Settings
-from wamnet.refimpl.variation import Ranges, Variation, outside, saturation_of, varied
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.light.variation import Ranges, Variation, outside, saturation_of, varied
+from wamnet.refimpl.network import dataset
+from wamnet.refimpl.network.denoise import Model
 
 SIZE, FRAME, SEED = 40, 3, 5
 SETTINGS = Settings(max_depth=2)

@@ -17,10 +17,10 @@ from wamnet.compiler.core.ir import Type, sha256
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.proof import checker, scaled
-from wamnet.refimpl import siren
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
 
 NAME = artifact.CERTIFICATE_NAME
 SPEC = Path(__file__).parents[2] / "spec"

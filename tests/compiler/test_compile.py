@@ -26,10 +26,10 @@ from wamnet.compiler.languages.glsl_inlined import GLSLInlined
 from wamnet.compiler.plan import analysed
 from wamnet.compiler.schedules.emit_tiled import refused_by_vectors
 from wamnet.compiler.targets import DENOISERS
-from wamnet.refimpl import dataset, siren
-from wamnet.refimpl.dataset import Window
-from wamnet.refimpl.denoise import Model, denoise_pixel
 from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.denoise import Model, denoise_pixel
 
 
 def model(widths=(24, 4, 3), window=None, omega_0=3.0):

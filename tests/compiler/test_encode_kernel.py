@@ -12,8 +12,8 @@ from wamnet.compiler.core import ir
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
 from wamnet.compiler.scenes.lower_encode import SAMPLES, channel_name, layers_of, lower_encode, planes_of
-from wamnet.refimpl.dataset import FEATURES, Normalization, encode_sums
 from wamnet.refimpl.errors import CompileError, InputError
+from wamnet.refimpl.network.dataset import FEATURES, Normalization, encode_sums
 
 SCALES = Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 ALL = tuple(FEATURES)

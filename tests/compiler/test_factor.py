@@ -16,9 +16,9 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import factor
-from wamnet.refimpl import dataset, siren
-from wamnet.refimpl.denoise import denoise_pixel
 from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network.denoise import denoise_pixel
 
 SIZE, CHANNELS = 4, 3
 CONTRACT = sine_contract("ieee", "opencl")

@@ -20,9 +20,9 @@ from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import emit_fourier, fourier
 from wamnet.compiler.schedules.emit_tiled import LARGEST_PRIVATE
 from wamnet.compiler.schedules.opencl_fourier import OPENCL_FOURIER, fourier_schedule
-from wamnet.refimpl import dataset, siren
-from wamnet.refimpl.denoise import denoise_pixel
 from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network.denoise import denoise_pixel
 
 POWERS = (1, 2, 4, 8, 16, 32, 64)
 """Lengths of transforms."""

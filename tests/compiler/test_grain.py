@@ -19,10 +19,10 @@ from wamnet.compiler.core.passes import pipeline
 from wamnet.compiler.core.profiles import EXACT_SINE, PROFILES
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import analysed
-from wamnet.refimpl import siren
-from wamnet.refimpl.dataset import Window
-from wamnet.refimpl.denoise import denoise_pixel
 from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.denoise import denoise_pixel
 
 NORMAL = np.float32(2.0**-126)
 FLOATS = st.floats(allow_nan=False, allow_infinity=False, width=32)

@@ -19,9 +19,9 @@ from wamnet.compiler.scenes.encode_kernel import compile_encode
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import DENOISERS, EXPORTED
-from wamnet.refimpl.dataset import Normalization
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network.dataset import Normalization
 
 LIMIT = 2**31
 """First number that 32 bits with a sign do not hold; the sums of a launch must be fewer."""

@@ -15,14 +15,15 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.refimpl import siren, vectors
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.shapes import quad
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl import vectors
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.shapes import quad
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
 
-ROOT = Path(siren.__file__).parents[1]
+ROOT = Path(siren.__file__).parents[2]
 
 MODEL = Model(siren.init([12, 4, 3], 2.0, 2.0, seed=5), ("color",), Window(2), Normalization())
 
@@ -77,7 +78,8 @@ def test_every_operation_of_a_path_is_asked_for_by_the_reference():
         line
         for line in lines
         if any(
-            within(place, "refimpl/shapes/quad.py", first, first + len(source) - 1) for place in line.places
+            within(place, "refimpl/light/shapes/quad.py", first, first + len(source) - 1)
+            for place in line.places
         )
     ]
     assert {line.part for line in own} == {"arrive", "scatter"}

@@ -17,8 +17,8 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.core.verify import verify
 from wamnet.compiler.core.weights import tables, weights
 from wamnet.refimpl import vectors
-from wamnet.refimpl.dataset import Window
 from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.network.dataset import Window
 
 ROWS = 5
 RANDOM = np.random.default_rng(2)

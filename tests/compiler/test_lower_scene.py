@@ -11,12 +11,13 @@ import pytest
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.loops import loops as loops_of
 from wamnet.compiler.scenes.lower_scene import LAYERS, PATH, SURFACE, lower_scene, names, primitives
-from wamnet.refimpl import render as R
-from wamnet.refimpl import rng, scenes, transport
-from wamnet.refimpl.camera import camera_basis
-from wamnet.refimpl.materials import Conductor, Dielectric, Lambertian, Mirror
-from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl import rng
+from wamnet.refimpl.light import render as R
+from wamnet.refimpl.light import scenes, transport
+from wamnet.refimpl.light.camera import camera_basis
+from wamnet.refimpl.light.materials import Conductor, Dielectric, Lambertian, Mirror
+from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.light.transport import Settings
 
 GREY = (0.5, 0.6, 0.7)
 LIGHT = Light((-1.0, 3.0, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), (1.0, 0.9, 0.8), 30.0)

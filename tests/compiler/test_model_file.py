@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 from safetensors import safe_open
 
 from wamnet.compiler import model_file
-from wamnet.refimpl import siren, train
-from wamnet.refimpl.dataset import FEATURES, Normalization, Window, n_inputs
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.train import Recipe
+from wamnet.refimpl.network import siren, train
+from wamnet.refimpl.network.dataset import FEATURES, Normalization, Window, n_inputs
+from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.train import Recipe
 
 
 def model_of(features: tuple[str, ...] = ("color", "depth"), size: int = 2, dtype: Any = np.float32) -> Model:

@@ -13,10 +13,10 @@ from wamnet.compiler.scenes.emit_path import GROUPS, planes
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import DENOISERS, EXPORTED
-from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.scene import Sphere
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.scene import Sphere
+from wamnet.refimpl.light.transport import Settings
 
 TRACED = [target.name for target in {**DENOISERS, **EXPORTED}.values() if target.paths]
 """Targets that have path kernels."""

@@ -20,10 +20,10 @@ from wamnet.compiler.proof.bounds import power_error
 from wamnet.compiler.proof.ranges import CORRECT, PROMISED, Range, evaluate
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.scene import Sphere
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.scene import Sphere
+from wamnet.refimpl.light.transport import Settings
 
 U = 2.0**-24
 """Unit roundoff of float32."""

@@ -12,9 +12,9 @@ from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import SceneInputs, bind, lay_out, varying
 from wamnet.kernels.executor import Part
 from wamnet.kernels.numpy_executor import NumpyExecutor
-from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.transport import Settings
 
 SETTINGS = Settings(max_depth=1)
 PART = Part(10, 8, 0, 8, 0, 1, 7)

@@ -19,10 +19,10 @@ from wamnet.compiler.schedules.emit_tiled import LARGEST_PRIVATE
 from wamnet.compiler.schedules.opencl_group import OPENCL_GROUPS
 from wamnet.compiler.schedules.opencl_tiled import OPENCL_LADDER
 from wamnet.compiler.targets import TARGETS
-from wamnet.refimpl import siren
-from wamnet.refimpl.dataset import Window
-from wamnet.refimpl.denoise import denoise_pixel
 from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.denoise import denoise_pixel
 
 
 def gathered(function, channels=(3,), size=1, border="clamp"):

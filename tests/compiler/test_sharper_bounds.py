@@ -15,10 +15,10 @@ from wamnet.compiler.core.profiles import EMITTED_SINE
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import analysed
 from wamnet.compiler.proof import adjoint, bounds, scaled
-from wamnet.refimpl import siren
-from wamnet.refimpl.activation import ACTIVATIONS
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.activation import ACTIVATIONS
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
 
 U = 2.0**-24
 

@@ -337,7 +337,7 @@ def test_manifest_names_the_degree(target, gathered_sine):
 def gathered_sine():
     """A program of one pixel with a sine."""
     from wamnet.compiler.core.ir import Gather, Image
-    from wamnet.refimpl.dataset import Window
+    from wamnet.refimpl.network.dataset import Window
 
     gather = Gather(Window(1, "clamp"), (Image("a", 3, -1.0, 1.0),))
     return trace(lambda window: np.sin(2.0 * window), {"window": Type(shape=(3,))}, gather)

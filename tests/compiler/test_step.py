@@ -15,8 +15,8 @@ from wamnet.compiler.training.emit_step import BLOCK, INPUTS
 from wamnet.compiler.training.lower_step import ADAM_INPUTS, lower_adam, lower_step, step_of
 from wamnet.compiler.training.step_kernel import compile_lowered, compile_step
 from wamnet.compiler.training.step_layout import LANES, pack, slots, transposed_slots, unpack
-from wamnet.refimpl import adam
 from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.network import adam
 
 WIDTHS = (3 * 3 * 3, 18, 5, 3)
 

@@ -14,10 +14,10 @@ from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.core import sine
 from wamnet.compiler.targets import TARGETS
 from wamnet.compiler.variants import parse, plan_model, vary
-from wamnet.refimpl import dataset, factored, siren
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model, check_model, denoise_pixel
 from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.network import dataset, factored, siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model, check_model, denoise_pixel
 
 FEATURES = ("color", "normal")
 """What the small model sees: 6 channels, colours in [0, 1], normals in [-1, 1]."""

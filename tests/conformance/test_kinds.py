@@ -14,20 +14,10 @@ from wamnet.kernels.conformance.functions import Field, Function
 from wamnet.kernels.conformance.kinds import FUNCTIONS, KINDS
 from wamnet.kernels.conformance.numbers import to_json
 from wamnet.kernels.conformance.on_executor import OnExecutor
-from wamnet.refimpl import (
-    adam,
-    camera,
-    dataset,
-    encoding,
-    environment,
-    intersection,
-    metrics,
-    rng,
-    sampling,
-    siren,
-    transport,
-)
-from wamnet.refimpl.materials import conductor, dielectric
+from wamnet.refimpl import encoding, metrics, rng
+from wamnet.refimpl.light import camera, environment, intersection, sampling, transport
+from wamnet.refimpl.light.materials import conductor, dielectric
+from wamnet.refimpl.network import adam, dataset, siren
 
 
 def judged(kind: str, answer) -> list[run.Verdict]:

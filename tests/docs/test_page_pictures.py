@@ -12,9 +12,10 @@ from PIL import Image
 
 from wamnet.cli import webpage
 from wamnet.kernels import page as P
-from wamnet.refimpl import dataset, scenes
-from wamnet.refimpl.denoise import Model
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network import dataset
+from wamnet.refimpl.network.denoise import Model
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 SIZE = 24

@@ -124,7 +124,7 @@ def test_search_finds_a_page_without_a_server(site, chromium):
 
 def test_a_listing_marks_the_partners_of_a_line(site, chromium):
     with chromium.tab(site / "listing.html", viewport={"width": 1300, "height": 800}) as tab:
-        left = tab.page.locator("#network-opencl-" + line_of("refimpl/siren.py", "x = activate("))
+        left = tab.page.locator("#network-opencl-" + line_of("refimpl/network/siren.py", "x = activate("))
         left.hover()
         marked = tab.page.locator(".listing .marked").all_text_contents()
     assert any("activate(" in text for text in marked)

@@ -11,8 +11,8 @@ from departures import CHOICES, SCALES
 from lab import frames
 from lab.frames import Shot
 
-from wamnet.refimpl import train
-from wamnet.refimpl.denoise import denoise
+from wamnet.refimpl.network import train
+from wamnet.refimpl.network.denoise import denoise
 
 TOY = SCALES["toy"]
 

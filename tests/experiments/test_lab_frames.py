@@ -14,9 +14,9 @@ from lab.frames import Shot
 from wamnet.kernels.frame_plan import version
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import LAYERS
-from wamnet.refimpl.render import Job, render
-from wamnet.refimpl.scene import scene_digest
-from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.light.render import Job, render
+from wamnet.refimpl.light.scene import scene_digest
+from wamnet.refimpl.light.scenes import canonical
 
 SHOT = Shot("minicubes", time=1.0, size=8, spp=2, seed=3)
 

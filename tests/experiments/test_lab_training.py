@@ -9,8 +9,8 @@ import pytest
 from lab import frames, training
 from lab.frames import Shot
 
-from wamnet.refimpl.dataset import Window
-from wamnet.refimpl.train import SHORT, train
+from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.train import SHORT, train
 
 RECIPE = replace(SHORT, features=("color",), window=Window(3), widths=(4,), batch=16, steps=6, log_every=2)
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from lab.ground import PLANS, Ground
 
-from wamnet.refimpl import train
-from wamnet.refimpl.train import SHORT
+from wamnet.refimpl.network import train
+from wamnet.refimpl.network.train import SHORT
 
 STEP = 2.0**-20
 """Of central differences: their error is STEP^2 times a third derivative, and u / STEP of rounding."""

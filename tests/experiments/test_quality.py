@@ -18,7 +18,7 @@ from wamnet.compiler.model_file import load_model
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.variation import ranges_from_json
+from wamnet.refimpl.light.variation import ranges_from_json
 
 TOY = quality.PLANS["toy"]
 

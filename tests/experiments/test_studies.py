@@ -19,9 +19,9 @@ from lab.results import Results
 
 from wamnet.kernels.geometry import ALIKE, Shown, compare
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.scenes import TURN_SECONDS, canonical
-from wamnet.refimpl.train import PAPER, SHORT
-from wamnet.refimpl.variation import AT_REST, saturation_of
+from wamnet.refimpl.light.scenes import TURN_SECONDS, canonical
+from wamnet.refimpl.light.variation import AT_REST, saturation_of
+from wamnet.refimpl.network.train import PAPER, SHORT
 
 pytest.importorskip("flip_evaluator", reason="flip-evaluator is not installed")
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
@@ -180,7 +180,7 @@ def test_light_sets_follow_no_pose(count):
 
 def test_the_networks_of_lights_are_of_one_size():
     """Unseen colours are won by what the network sees, not by more parameters."""
-    from wamnet.refimpl.dataset import channels_of
+    from wamnet.refimpl.network.dataset import channels_of
 
     inputs = importlib.import_module("lights").INPUTS
     assert (

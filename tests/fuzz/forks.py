@@ -34,7 +34,13 @@ IMPORTED = (
     *(f"wamnet.compiler.{name}" for name in ("compile", "checker", "path_kernel", "variants")),
     *(f"wamnet.kernels.{name}" for name in ("pipeline", "reduce", "measure_curve")),
     *(f"wamnet.kernels.{name}" for name in ("export.package", "conformance.run", "bench.contenders")),
-    *("wamnet.refimpl.train", "wamnet.refimpl.scenes", "scipy.fft", "skimage.metrics", "matplotlib.figure"),
+    *(
+        "wamnet.refimpl.network.train",
+        "wamnet.refimpl.light.scenes",
+        "scipy.fft",
+        "skimage.metrics",
+        "matplotlib.figure",
+    ),
 )
 """Modules that lines use."""
 

@@ -29,12 +29,13 @@ from wamnet.compiler.model_file import load_checkpoint, save_checkpoint, save_mo
 from wamnet.compiler.proof import checker
 from wamnet.kernels import cache, curve
 from wamnet.kernels.conformance import case, report
-from wamnet.refimpl import denoise, scene, siren, train, variation
-from wamnet.refimpl.dataset import Normalization, Window, normalization_from_json
 from wamnet.refimpl.errors import WamnetError
+from wamnet.refimpl.light import scene, variation
+from wamnet.refimpl.light.render import Job, render
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.network import denoise, siren, train
+from wamnet.refimpl.network.dataset import Normalization, Window, normalization_from_json
 from wamnet.refimpl.reading import parse_json
-from wamnet.refimpl.render import Job, render
-from wamnet.refimpl.scenes import canonical
 
 VECTORS = Path(case.__file__).parents[2] / "spec/vectors"
 """Where the vectors lie in a source tree; an installed package has them elsewhere."""

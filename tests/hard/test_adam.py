@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wamnet.refimpl import adam
+from wamnet.refimpl.network import adam
 
 U = 2.0**-24
 """Unit roundoff of float32."""

@@ -10,8 +10,9 @@ import pytest
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.plan import plan_program
 from wamnet.kernels import denoise_on
-from wamnet.refimpl import dataset, denoise, frame, siren
+from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.network import dataset, denoise, siren
 
 CHANNELS = {"a": 3}
 

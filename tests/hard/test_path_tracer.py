@@ -13,10 +13,10 @@ import pytest
 
 from wamnet.kernels import compare_paths
 from wamnet.kernels.compare_paths import View
-from wamnet.refimpl import render
-from wamnet.refimpl.render import Job
-from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene, Sphere, validate
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import render
+from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sphere, validate
+from wamnet.refimpl.light.transport import Settings
 
 VIEW = View(24, 16, seed=3)
 

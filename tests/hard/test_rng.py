@@ -9,7 +9,7 @@ from wamnet.kernels import compare_paths, random_words
 from wamnet.kernels.compare_paths import View
 from wamnet.refimpl import rng
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.render import Job
+from wamnet.refimpl.light.render import Job
 
 LAST = 2**32 - 1
 """Largest counter."""

@@ -12,14 +12,15 @@ from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.kernels import compare_images, compare_paths, random_words
 from wamnet.kernels.compare_images import ImageReport, blocks
 from wamnet.kernels.compare_paths import QUANTITIES, View, kernel_of_states
-from wamnet.refimpl import intersection, sampling, scenes, transport, vectors
+from wamnet.refimpl import vectors
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.render import Job, Render
-from wamnet.refimpl.scene import Camera, Light, Quad, Scene, Sphere
-from wamnet.refimpl.shapes import quad
-from wamnet.refimpl.shapes.shape import MISS
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import intersection, sampling, scenes, transport
+from wamnet.refimpl.light.render import Job, Render
+from wamnet.refimpl.light.scene import Camera, Light, Quad, Scene, Sphere
+from wamnet.refimpl.light.shapes import quad
+from wamnet.refimpl.light.shapes.shape import MISS
+from wamnet.refimpl.light.transport import Settings
 
 VIEW = View(48, 32, seed=5)
 

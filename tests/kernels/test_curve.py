@@ -13,11 +13,11 @@ from wamnet.compiler import variants
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import cache, curve, measure_curve
 from wamnet.kernels.curve import Curve, Limits, Point, choose
-from wamnet.refimpl import siren
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
 
 
 def point(variant, ms, error=0.1, loss=0.0, schedule="tile16", mean=0.01):

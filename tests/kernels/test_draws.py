@@ -10,8 +10,8 @@ from scipy import stats
 
 from wamnet.kernels import draws
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.scenes import TURN_SECONDS, canonical
-from wamnet.refimpl.variation import Ranges, outside, saturation_of, varied
+from wamnet.refimpl.light.scenes import TURN_SECONDS, canonical
+from wamnet.refimpl.light.variation import Ranges, outside, saturation_of, varied
 
 RANGES = Ranges((0.0, 7.0), (-24.0, 24.0), (-8.0, 8.0), (0.9, 1.1), (0.1, 0.7))
 CUBES = canonical("minicubes")

@@ -22,9 +22,11 @@ from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.schedules import factor
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import denoise_on
-from wamnet.refimpl import dataset, denoise, frame, scenes, siren
+from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network import dataset, denoise, siren
 
 EXAMPLES = settings.default.max_examples // 10
 """Each example compiles a kernel, up to a second on Mesa: a tenth of what other tests draw."""

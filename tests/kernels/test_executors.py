@@ -23,9 +23,10 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import plan_program
 from wamnet.kernels import denoise_on, open_executor
 from wamnet.kernels.executor import black
-from wamnet.refimpl import dataset, denoise, frame
-from wamnet.refimpl.activation import ACTIVATIONS
+from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError, InputError
+from wamnet.refimpl.network import dataset, denoise
+from wamnet.refimpl.network.activation import ACTIVATIONS
 
 EXAMPLES = settings.default.max_examples // 10
 """Each example compiles a kernel, up to a second on Mesa: a tenth of what other tests draw."""
@@ -329,7 +330,7 @@ from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
-from wamnet.refimpl.dataset import Window
+from wamnet.refimpl.network.dataset import Window
 
 gather = Gather(Window(1, "clamp"), (Image("a", 1, -1.0, 1.0),))
 program = trace(lambda x: np.sin(x), {"window": Type(shape=(1,))}, gather)

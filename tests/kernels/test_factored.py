@@ -17,11 +17,11 @@ from wamnet.compiler.schedules import factor
 from wamnet.compiler.schedules.emit_fourier import Fourier
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import Pipeline, denoise_on, opencl_executor
-from wamnet.refimpl import dataset, factored
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.network import dataset, factored
+from wamnet.refimpl.network.denoise import Model
 
 EXAMPLES = max(settings.default.max_examples // 20, 1)
 """Each example compiles two kernels, up to a second: a twentieth of what other tests draw."""

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from wamnet.kernels import frame_plan
 from wamnet.kernels.frame_plan import Request, carry_out, frame_draws, join, plan, tasks_of
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.render import render
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.variation import ranges_from_json
+from wamnet.refimpl.light.render import render
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.variation import ranges_from_json
 
 TINY = Request("minicubes", frames=2, test_frames=1, size_px=6, spp=2)
 

@@ -7,8 +7,8 @@ import pytest
 
 from wamnet.kernels import geometry as G
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.variation import Variation, varied
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.variation import Variation, varied
 
 DEGREE_S = 8.0 / 360.0
 """Seconds in which the mini cubes turn by a degree."""

@@ -18,7 +18,7 @@ GRACE_S = 10.0
 
 POOL = (
     "import sys; from wamnet.kernels.render_pool import render_parallel\n"
-    "from wamnet.refimpl.render import Job; from wamnet.refimpl.scenes import canonical\n"
+    "from wamnet.refimpl.light.render import Job; from wamnet.refimpl.light.scenes import canonical\n"
     "if __name__ == '__main__':\n"
     "    report = lambda samples: print('ready', flush=True)\n"
     "    render_parallel(canonical('minicubes'), Job(256, 256, 10000), workers=2, on_progress=report)\n"

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from wamnet.kernels import page as P
-from wamnet.refimpl import dataset, scenes
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import CompileError, InputError
-from wamnet.refimpl.scene import Sphere
-from wamnet.refimpl.transport import Settings
-from wamnet.refimpl.variation import Ranges
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.scene import Sphere
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.light.variation import Ranges
+from wamnet.refimpl.network import dataset
+from wamnet.refimpl.network.denoise import Model
 
 SETTINGS = Settings(max_depth=1)
 SCALES = dataset.Normalization(0.0, 12.0, (0.0, 0.0, 0.0), 6.0)

@@ -14,10 +14,11 @@ from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import target_named
 from wamnet.kernels.executor import Part
 from wamnet.kernels.render_on import compile_scene, render_on
-from wamnet.refimpl import frame, scenes
-from wamnet.refimpl import render as R
+from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError, InputError
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import render as R
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.transport import Settings
 
 WIDTH, HEIGHT, SEED = 48, 32, 5
 U = 2.0**-24

@@ -16,12 +16,13 @@ from wamnet.compiler.scenes.encode_kernel import error_at
 from wamnet.compiler.variants import FULL, with_rank
 from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
 from wamnet.kernels.executor import Part
-from wamnet.refimpl import dataset, scenes
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.render import Job
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network import dataset
+from wamnet.refimpl.network.denoise import Model
 
 SCALES = dataset.Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 SETTINGS = Settings(max_depth=3)

@@ -10,8 +10,8 @@ import pytest
 
 from wamnet.kernels.render_frame import RENDERERS, render_frame
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.render import Job, join_rows, render
-from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.light.render import Job, join_rows, render
+from wamnet.refimpl.light.scenes import canonical
 
 SCENE = canonical("cornell")
 

@@ -8,8 +8,8 @@ import threading
 import pytest
 
 from wamnet.kernels import render_pool
-from wamnet.refimpl.render import Job
-from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.scenes import canonical
 
 
 def test_an_interrupt_leaves_neither_threads_nor_processes(monkeypatch) -> None:

@@ -15,8 +15,9 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.schedules import emit_fourier
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import denoise_on, opencl_executor, opengl_executor
-from wamnet.refimpl import dataset, denoise, frame
+from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.network import dataset, denoise
 
 EXAMPLES = max(settings.default.max_examples // 20, 1)
 """Each example compiles a kernel, up to a second: a twentieth of what other tests draw."""

@@ -16,10 +16,10 @@ from wamnet.compiler.scenes.lower_scene import lower_scene, primitives
 from wamnet.compiler.scenes.path_kernel import compile_path, most_unrolled
 from wamnet.kernels.executor import Part
 from wamnet.kernels.render_on import compile_scene, render_on
-from wamnet.refimpl import render as R
 from wamnet.refimpl import vectors
-from wamnet.refimpl.scene import IDENTITY, Box, Camera, Light, Quad, Room, Scene, Sphere
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import render as R
+from wamnet.refimpl.light.scene import IDENTITY, Box, Camera, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.light.transport import Settings
 
 U = 2.0**-24
 """Unit roundoff of float32."""

@@ -32,13 +32,13 @@ from wamnet.kernels import denoise_on, registry
 from wamnet.kernels.denoise_on import images_of
 from wamnet.kernels.draws import drawn
 from wamnet.kernels.render_frame import render_frame
-from wamnet.refimpl.denoise import Model, denoise
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.render import Job
-from wamnet.refimpl.scene import Scene
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.transport import Settings
-from wamnet.refimpl.variation import RANGES, ranges_from_json, varied
+from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.scene import Scene
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.light.variation import RANGES, ranges_from_json, varied
+from wamnet.refimpl.network.denoise import Model, denoise
 
 MODELS = shipped_models()
 

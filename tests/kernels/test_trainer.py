@@ -24,13 +24,14 @@ from wamnet.compiler.training.step_kernel import StepKernel, compile_step
 from wamnet.kernels import trainer
 from wamnet.kernels.opencl_trainer import OpenCLTrainer
 from wamnet.kernels.trainer import train_on
-from wamnet.refimpl import adam, dataset, denoise, metrics, train
-from wamnet.refimpl.activation import ACTIVATIONS
-from wamnet.refimpl.dataset import Dataset, Window
+from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import from_display, to_display
 from wamnet.refimpl.errors import InputError, TrainingError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.train import Recipe, TrainState
+from wamnet.refimpl.network import adam, dataset, denoise, train
+from wamnet.refimpl.network.activation import ACTIVATIONS
+from wamnet.refimpl.network.dataset import Dataset, Window
+from wamnet.refimpl.network.train import Recipe, TrainState
 
 Arrays = Mapping[str, Any]
 

@@ -17,12 +17,12 @@ from wamnet.compiler.training import step
 from wamnet.compiler.training.step_kernel import StepKernel, compile_step
 from wamnet.kernels import trainer
 from wamnet.kernels.trainer import train_on
-from wamnet.refimpl import dataset, factored, train
-from wamnet.refimpl.dataset import Window
 from wamnet.refimpl.errors import InputError, TrainingError
-from wamnet.refimpl.factored import Factors
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.train import Recipe, TrainState
+from wamnet.refimpl.network import dataset, factored, train
+from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.factored import Factors
+from wamnet.refimpl.network.train import Recipe, TrainState
 
 SMALL = Recipe(
     features=("color",),

@@ -16,9 +16,9 @@ from wamnet.kernels import apart, triage
 from wamnet.kernels.apart import Apart, Inside, Outcome
 from wamnet.kernels.reduce import Box, Stage, first_stage, reduced, shrink, stage_program, stages
 from wamnet.kernels.registry import EXECUTORS, OPTIONS, WAYS
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
 
 SHAPE = (7, 9)
 """Height and width of the picture."""

@@ -13,8 +13,9 @@ from wamnet.compiler.targets import TARGETS
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import Pipeline, cache, denoise_on, tune
 from wamnet.kernels.tune import Row, Table, choose
-from wamnet.refimpl import dataset, denoise, frame, siren
-from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl import frame
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.network import dataset, denoise, siren
 
 SIZE = (12, 20)
 """Height and width of the pictures."""

@@ -18,10 +18,10 @@ from wamnet.compiler.schedules import factor
 from wamnet.compiler.targets import TARGETS, schedule_named
 from wamnet.compiler.variants import parse, plan_model, vary, with_rank
 from wamnet.kernels import denoise_on
-from wamnet.refimpl import dataset, siren
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network.denoise import Model
 
 NAMES = (
     *("full", "window4", "window3", "hidden7", "without-normal", "rank4", "window4+rank8"),

@@ -10,8 +10,8 @@ from wamnet.compiler.core.ops import OPS
 from wamnet.compiler.languages.opencl_path import LANES, of_lanes
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.refimpl import scenes
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.transport import Settings
 
 EDGES = [0.0, -0.0, 0.25, -0.25, 1.0, -1.0, 2.5, -2.5, 1e30, -1e30, 2.0**23 - 0.5, 0.5 - 2.0**23, 2.0**31]
 """Numbers where a floor by cutting off, or a comparison in place of a function, could go wrong."""

@@ -198,8 +198,8 @@ def test_no_hidden_random_state(house):
         ("compiler/core/passes/fold.py", "from .. import ir", ["wamnet.compiler.core.ir"]),
         (
             "compiler/core/ops.py",
-            "from ...refimpl.siren import forward",
-            ["wamnet.refimpl.siren.forward"],
+            "from ...refimpl.network.siren import forward",
+            ["wamnet.refimpl.network.siren.forward"],
         ),
         ("cli/main.py", "def f():\n    import os.path, typer", ["os.path", "typer"]),
         ("kernels/__init__.py", "from .registry import open", ["wamnet.kernels.registry.open"]),

@@ -49,7 +49,7 @@ KEPT = {
     "compiler/schedules/glsl_compute.py": ("the window stands on its head",),  # heads of kernels
     "compiler/languages/weight_homes.py": ("whatever stands above",),  # heads of kernels
     "compiler/languages/wgsl.py": ("on [-pi, pi] alone",),  # a sine in manifests and heads of kernels
-    "refimpl/dataset.py": ("were it matt and nothing in between",),  # manifests and heads of kernels
+    "refimpl/network/dataset.py": ("were it matt and nothing in between",),  # manifests and heads of kernels
     "kernels/conformance/kinds/files.py": (  # notes of vectors
         "whole numbers are numbers",
         "a version that is a truth value",

@@ -18,11 +18,11 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.compiler.training.lower_step import lower_step
-from wamnet.refimpl import activation, siren
-from wamnet.refimpl.activation import ACTIVATIONS, Activation, activation_named
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.network import activation, siren
+from wamnet.refimpl.network.activation import ACTIVATIONS, Activation, activation_named
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
 
 ROWS = pytest.mark.parametrize("row", ACTIVATIONS.values(), ids=ACTIVATIONS.keys())
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wamnet.refimpl import adam
+from wamnet.refimpl.network import adam
 
 U = 2.0**-53
 """Unit roundoff of float64."""

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from statistical import assert_all_plausible, z_p
 
-from wamnet.refimpl import render as R
-from wamnet.refimpl import scenes
-from wamnet.refimpl.scene import Camera, Light, Scene, Sphere, Vector
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import render as R
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.scene import Camera, Light, Scene, Sphere, Vector
+from wamnet.refimpl.light.transport import Settings
 
 
 def render(scene: Scene, width=16, height=16, spp=1, dtype="float64", seed=3, **settings) -> R.Render:

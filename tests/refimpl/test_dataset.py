@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.refimpl import dataset
-from wamnet.refimpl.dataset import FEATURES, Normalization, Window
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import LAYERS, Frame
+from wamnet.refimpl.network import dataset
+from wamnet.refimpl.network.dataset import FEATURES, Normalization, Window
 
 
 def frame_of(height: int, width: int, seed: int = 0, dtype: Any = np.float32) -> Frame:

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.refimpl import dataset, denoise, siren
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.network import dataset, denoise, siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
 
 
 def frame_of(height: int, width: int) -> Frame:

@@ -11,10 +11,11 @@ from scipy import integrate
 from statistical import SIGNIFICANCE, assert_all_plausible, chi_square_p, sidak, welch_p, z_p
 from vertices import uniforms
 
-from wamnet.refimpl import environment, scenes, transport, vectors
-from wamnet.refimpl import render as R
-from wamnet.refimpl.scene import Camera, Light, Quad, Scene, Sky, Sphere
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl import vectors
+from wamnet.refimpl.light import environment, scenes, transport
+from wamnet.refimpl.light import render as R
+from wamnet.refimpl.light.scene import Camera, Light, Quad, Scene, Sky, Sphere
+from wamnet.refimpl.light.transport import Settings
 
 SAMPLES = 1 << 16
 GREY = (0.5, 0.5, 0.5)

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.refimpl import dataset, factored, siren, train
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model, check_model
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.factored import Factors
-from wamnet.refimpl.render import Job, render
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.train import SHORT
+from wamnet.refimpl.light.render import Job, render
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.network import dataset, factored, siren, train
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model, check_model
+from wamnet.refimpl.network.factored import Factors
+from wamnet.refimpl.network.train import SHORT
 
 SIZE, CHANNELS, N_OUT = 5, 3, 4
 

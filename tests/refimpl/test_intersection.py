@@ -10,10 +10,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from wamnet.refimpl import intersection as I
-from wamnet.refimpl import rng, scenes, vectors
-from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
-from wamnet.refimpl.shapes import box
+from wamnet.refimpl import rng, vectors
+from wamnet.refimpl.light import intersection as I
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.light.shapes import box
 
 GREY = (0.5, 0.5, 0.5)
 CAMERA = Camera((0.0, 0.0, 5.0), (0.0, 0.0, 0.0))

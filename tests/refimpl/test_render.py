@@ -10,10 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wamnet.kernels.render_pool import bands, render_parallel
-from wamnet.refimpl import frame, scenes
-from wamnet.refimpl import render as R
+from wamnet.refimpl import frame
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.scene import Camera, Scene, Sphere
+from wamnet.refimpl.light import render as R
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.scene import Camera, Scene, Sphere
 
 CORNELL = scenes.canonical("cornell")
 

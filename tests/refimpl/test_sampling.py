@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from scipy import integrate
 from statistical import SIGNIFICANCE, chi_square_p, sidak
 
-from wamnet.refimpl import rng, sampling, vectors
+from wamnet.refimpl import rng, vectors
+from wamnet.refimpl.light import sampling
 
 UNIT = st.floats(0.0, 1.0, exclude_max=True, width=32)
 CORNER, EDGE_U, EDGE_V = (np.array(v) for v in ((0.3, -1.0, 2.0), (2.0, 0.5, 0.0), (-0.4, 1.5, 0.7)))

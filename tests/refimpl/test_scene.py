@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.refimpl import scene as S
-from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.materials import Conductor, Dielectric, Lambertian, Mirror
+from wamnet.refimpl.light import scene as S
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.materials import Conductor, Dielectric, Lambertian, Mirror
 
 GREY = (0.5, 0.5, 0.5)
 EVERYTHING = S.Scene(

@@ -7,9 +7,9 @@ from itertools import combinations
 
 import pytest
 
-from wamnet.refimpl import scenes
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.materials import Conductor, Dielectric
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.materials import Conductor, Dielectric
 
 
 def test_unknown_canonical_scene_lists_the_known_ones():

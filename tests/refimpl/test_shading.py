@@ -9,12 +9,13 @@ import pytest
 from statistical import assert_all_plausible, welch_p
 from vertices import uniforms
 
-from wamnet.refimpl import render as R
-from wamnet.refimpl import rng, scenes, shading, transport
-from wamnet.refimpl.camera import camera_basis
-from wamnet.refimpl.materials import MATERIALS, Conductor, Dielectric, Lambertian, Mirror
-from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl import rng
+from wamnet.refimpl.light import render as R
+from wamnet.refimpl.light import scenes, shading, transport
+from wamnet.refimpl.light.camera import camera_basis
+from wamnet.refimpl.light.materials import MATERIALS, Conductor, Dielectric, Lambertian, Mirror
+from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.light.transport import Settings
 
 GREY = (0.5, 0.6, 0.7)
 LIGHT = Light((-1.0, 1.9, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), (1.0, 0.9, 0.8), 30.0)

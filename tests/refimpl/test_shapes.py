@@ -11,14 +11,15 @@ import pytest
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels import open_executor, render_on
-from wamnet.refimpl import intersection, scene, vectors
+from wamnet.refimpl import vectors
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.materials import Material, Mirror
-from wamnet.refimpl.render import Job, render
-from wamnet.refimpl.scene import Camera, Light, Scene, Sphere, Vector
-from wamnet.refimpl.shapes import SHAPES, Shape, kinds
-from wamnet.refimpl.shapes.shape import BLACK, MISS, Met, away_from_zero, require
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import intersection, scene
+from wamnet.refimpl.light.materials import Material, Mirror
+from wamnet.refimpl.light.render import Job, render
+from wamnet.refimpl.light.scene import Camera, Light, Scene, Sphere, Vector
+from wamnet.refimpl.light.shapes import SHAPES, Shape, kinds
+from wamnet.refimpl.light.shapes.shape import BLACK, MISS, Met, away_from_zero, require
+from wamnet.refimpl.light.transport import Settings
 
 GREY = (0.5, 0.25, 0.125)
 

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.refimpl import siren
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.siren import Siren
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.siren import Siren
 
 U = 2.0**-53
 """Unit roundoff of float64."""

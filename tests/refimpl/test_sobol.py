@@ -13,10 +13,11 @@ from scipy import stats
 from scipy.stats import qmc
 from statistical import SIGNIFICANCE, assert_all_plausible, chi_square_p, sidak, welch_p
 
-from wamnet.refimpl import render as R
-from wamnet.refimpl import rng, scenes, sobol, transport
+from wamnet.refimpl import rng
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import render as R
+from wamnet.refimpl.light import scenes, sobol, transport
+from wamnet.refimpl.light.transport import Settings
 
 WORD = st.integers(0, 2**32 - 1)
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wamnet.refimpl import dataset, denoise, train
-from wamnet.refimpl.dataset import Normalization, Window
 from wamnet.refimpl.encoding import from_display, to_display
 from wamnet.refimpl.errors import InputError, TrainingError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.train import PRESETS, Recipe, TrainState
+from wamnet.refimpl.network import dataset, denoise, train
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.train import PRESETS, Recipe, TrainState
 
 SIGMA = 0.1
 """Standard deviation of the noise in the synthetic frames, in display-encoded units."""

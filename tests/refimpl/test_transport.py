@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 from scipy import stats
 from statistical import SIGNIFICANCE, assert_all_plausible, welch_p
 
-from wamnet.refimpl import render as R
-from wamnet.refimpl import rng, scenes, transport
-from wamnet.refimpl.camera import camera_basis, camera_ray
+from wamnet.refimpl import rng
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.intersection import Surface
-from wamnet.refimpl.scene import Box, Camera, Light, Quad, Room, Scene
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import render as R
+from wamnet.refimpl.light import scenes, transport
+from wamnet.refimpl.light.camera import camera_basis, camera_ray
+from wamnet.refimpl.light.intersection import Surface
+from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene
+from wamnet.refimpl.light.transport import Settings
 
 
 def render(scene, size=12, spp=64, seed=1, dtype="float32", **settings) -> R.Render:

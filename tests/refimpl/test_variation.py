@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.refimpl import variation as V
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.scene import Camera
-from wamnet.refimpl.scenes import canonical
+from wamnet.refimpl.light import variation as V
+from wamnet.refimpl.light.scene import Camera
+from wamnet.refimpl.light.scenes import canonical
 
 CUBES = canonical("minicubes")
 OWN = [light.color for light in CUBES.lights]

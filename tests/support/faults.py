@@ -200,11 +200,11 @@ def prepare(folder: Path) -> None:
 
     from wamnet.cli import exr
     from wamnet.compiler.model_file import save_model
-    from wamnet.refimpl import siren
-    from wamnet.refimpl.dataset import Normalization, Window
-    from wamnet.refimpl.denoise import Model
-    from wamnet.refimpl.render import Job, render
-    from wamnet.refimpl.scenes import canonical
+    from wamnet.refimpl.light.render import Job, render
+    from wamnet.refimpl.light.scenes import canonical
+    from wamnet.refimpl.network import siren
+    from wamnet.refimpl.network.dataset import Normalization, Window
+    from wamnet.refimpl.network.denoise import Model
 
     scene = canonical("minicubes", time=1.0)
     for name, spp in (("n.exr", 1), ("r.exr", 8)):

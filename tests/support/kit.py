@@ -15,12 +15,12 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Program, Type, sha256
 from wamnet.compiler.core.trace import trace
 from wamnet.kernels import Pipeline
-from wamnet.refimpl import dataset, siren
-from wamnet.refimpl.activation import SINE
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model, denoise_pixel
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network.activation import SINE
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model, denoise_pixel
 
 LONG = os.environ.get("HYPOTHESIS_PROFILE") == "long"
 """Whether this run draws other cases each time, and wide networks among them."""

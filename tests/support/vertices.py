@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from wamnet.refimpl import rng, sampling
-from wamnet.refimpl.materials import Site
+from wamnet.refimpl import rng
+from wamnet.refimpl.light import sampling
+from wamnet.refimpl.light.materials import Site
 
 NORMAL = np.array([2.0, -1.0, 2.0]) / 3.0
 """A normal that is parallel to no axis."""

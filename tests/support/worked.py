@@ -26,26 +26,20 @@ from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.training.step_kernel import compile_step
 from wamnet.kernels.conformance.numbers import number_text
-from wamnet.refimpl import (
-    adam,
+from wamnet.refimpl import encoding, metrics, rng
+from wamnet.refimpl.light import (
     camera,
-    dataset,
-    encoding,
-    factored,
     intersection,
-    metrics,
     render,
-    rng,
     sampling,
     scene,
     scenes,
     shading,
-    siren,
     sobol,
-    train,
     transport,
 )
-from wamnet.refimpl.denoise import Model
+from wamnet.refimpl.network import adam, dataset, factored, siren, train
+from wamnet.refimpl.network.denoise import Model
 
 SEED, SAMPLE, X, Y, SIZE_PX = 7, 5, 6, 10, 16
 """The path that several chapters follow: sample 5 of pixel (6, 10) of a picture of 16 x 16, seed 7."""

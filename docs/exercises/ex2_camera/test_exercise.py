@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wamnet.refimpl.scene import Camera
+from wamnet.refimpl.light.scene import Camera
 
 CAMERA = Camera((0.5, 1.0, 4.0), (0.0, -0.2, 0.0), vertical_fov_deg=41.0)
 """The camera of the vectors; the image is 97 x 64."""

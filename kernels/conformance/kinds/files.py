@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from ....compiler import model_file
-from ....refimpl import scene as scene_module
-from ....refimpl import siren
-from ....refimpl.dataset import Normalization, Window
-from ....refimpl.denoise import Model
+from ....refimpl.light import scene as scene_module
+from ....refimpl.network import siren
+from ....refimpl.network.dataset import Normalization, Window
+from ....refimpl.network.denoise import Model
 from ..case import Case, Kind, Output
 from .paths import scene_text
 

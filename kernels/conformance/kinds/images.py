@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....refimpl import dataset, metrics, rng
-from ....refimpl.dataset import Normalization, Window
+from ....refimpl import metrics, rng
 from ....refimpl.frame import LAYERS, Frame
+from ....refimpl.network import dataset
+from ....refimpl.network.dataset import Normalization, Window
 from ..case import Case, Kind, Output
 
 Array = NDArray[Any]

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from ....refimpl import camera, sampling, vectors
-from ....refimpl.scene import Camera
-from ....refimpl.shapes.quad import quad_distance
-from ....refimpl.shapes.shape import MISS
-from ....refimpl.shapes.sphere import sphere_distance
+from ....refimpl import vectors
+from ....refimpl.light import camera, sampling
+from ....refimpl.light.scene import Camera
+from ....refimpl.light.shapes.quad import quad_distance
+from ....refimpl.light.shapes.shape import MISS
+from ....refimpl.light.shapes.sphere import sphere_distance
 from ..functions import Field, Function, Numbers
 
 CAMERA = Camera((0.5, 1.0, 4.0), (0.0, -0.2, 0.0), (0.0, 1.0, 0.0), 41.0)

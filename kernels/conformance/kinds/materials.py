@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ....refimpl import environment, transport
-from ....refimpl.intersection import reflecting
-from ....refimpl.materials import Conductor, Dielectric, Lambertian, Mirror
-from ....refimpl.materials.material import Site
-from ....refimpl.scene import Sky
+from ....refimpl.light import environment, transport
+from ....refimpl.light.intersection import reflecting
+from ....refimpl.light.materials import Conductor, Dielectric, Lambertian, Mirror
+from ....refimpl.light.materials.material import Site
+from ....refimpl.light.scene import Sky
 from ..functions import Field, Function, Numbers
 from .light import UNIFORM, _unit
 from .terrace import TERRACE

@@ -22,8 +22,8 @@ from ....compiler.proof import bounds, ranges
 from ....compiler.proof.ranges import Range
 from ....compiler.training.lower_step import ADAM_INPUTS, lower_adam, step_of
 from ....compiler.training.step import SQUARES, sum_errors
-from ....refimpl import adam, siren, train
-from ....refimpl.siren import Siren
+from ....refimpl.network import adam, siren, train
+from ....refimpl.network.siren import Siren
 from ..case import Case, Kind, Output
 from ..functions import drawn
 

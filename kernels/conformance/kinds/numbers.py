@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from ....compiler.core import sine
-from ....refimpl import adam, encoding, rng, sobol
+from ....refimpl import encoding, rng
+from ....refimpl.light import sobol
+from ....refimpl.network import adam
 from ..case import Case, Kind, Output
 from ..functions import Field, Function, drawn
 

@@ -20,12 +20,13 @@ import numpy as np
 from ....compiler.proof import ranges
 from ....compiler.proof.ranges import Range
 from ....compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, Values, kinds, lower_scene
-from ....refimpl import camera, render, rng, scenes, transport
-from ....refimpl import scene as scene_module
-from ....refimpl.intersection import Hit, materials_by_id, reflecting
-from ....refimpl.materials import Dielectric
+from ....refimpl import rng
+from ....refimpl.light import camera, render, scenes, transport
+from ....refimpl.light import scene as scene_module
+from ....refimpl.light.intersection import Hit, materials_by_id, reflecting
+from ....refimpl.light.materials import Dielectric
+from ....refimpl.light.transport import Counters, Path, Settings
 from ....refimpl.reading import to_dataclass
-from ....refimpl.transport import Counters, Path, Settings
 from ..case import Case, Kind, Output
 from ..functions import SOURCE
 from .terrace import TERRACE

@@ -20,12 +20,12 @@ from ....compiler.core.lower import lower
 from ....compiler.core.profiles import EMITTED_SINE
 from ....compiler.plan import analysed
 from ....compiler.proof import bounds
-from ....refimpl import dataset, denoise, siren
-from ....refimpl import scene as scene_module
-from ....refimpl.dataset import Normalization, Window
-from ....refimpl.denoise import Model
 from ....refimpl.frame import LAYERS, Frame, validate
-from ....refimpl.render import Job, render
+from ....refimpl.light import scene as scene_module
+from ....refimpl.light.render import Job, render
+from ....refimpl.network import dataset, denoise, siren
+from ....refimpl.network.dataset import Normalization, Window
+from ....refimpl.network.denoise import Model
 from .. import blocks
 from ..case import Case, Kind, Output
 from . import paths

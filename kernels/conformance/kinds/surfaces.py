@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ....refimpl import intersection
-from ....refimpl.scene import Box, Camera, Quad, Room, Scene, Sphere
+from ....refimpl.light import intersection
+from ....refimpl.light.scene import Box, Camera, Quad, Room, Scene, Sphere
 from ..functions import Field, Function, Numbers
 from .light import RAY_FIELDS, T, _aimed
 

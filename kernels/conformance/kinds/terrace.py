@@ -6,8 +6,8 @@ rotations alternate (so that their numbers differ from their order), glass betwe
 
 from __future__ import annotations
 
-from ....refimpl.materials import Conductor, Dielectric, Mirror
-from ....refimpl.scene import Box, Camera, Light, Quad, Scene, Sky, Sphere
+from ....refimpl.light.materials import Conductor, Dielectric, Mirror
+from ....refimpl.light.scene import Box, Camera, Light, Quad, Scene, Sky, Sphere
 
 TURN = ((0.8, 0.0, 0.6), (0.0, 1.0, 0.0), (-0.6, 0.0, 0.8))
 """A rotation about y."""

@@ -16,10 +16,10 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.training import step
 from wamnet.compiler.training.gradient import RULES, gradient
 from wamnet.compiler.training.lower_step import lower_step, step_of
-from wamnet.refimpl import siren, train
-from wamnet.refimpl.activation import ACTIVATIONS
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.siren import Siren
+from wamnet.refimpl.network import siren, train
+from wamnet.refimpl.network.activation import ACTIVATIONS
+from wamnet.refimpl.network.siren import Siren
 
 W = np.array([[0.5, -0.25, 0.75], [1.0, 0.5, -0.5]], np.float32)
 B = np.array([1.5, 2.0], np.float32)

@@ -14,11 +14,11 @@ from wamnet.compiler.plan import sine_contract
 from wamnet.kernels.bench import accuracy, contenders, contest, rates, workload
 from wamnet.kernels.bench.contender import FULL, Contender, Opened, Tools, Variant, parameters_of
 from wamnet.kernels.bench.cost import Stage
-from wamnet.refimpl import siren
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model, denoise
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model, denoise
 
 SIZE = 20
 """Width and height of pictures: more than a window, less than a crop."""
@@ -263,7 +263,7 @@ def test_quality_is_a_loss_against_the_full_network(model) -> None:
 
 
 def _encoded(model: Model, clean: Frame) -> np.ndarray:
-    from wamnet.refimpl.dataset import target_image
+    from wamnet.refimpl.network.dataset import target_image
 
     return target_image(clean, model.normalization)
 

@@ -16,11 +16,11 @@ from wamnet.compiler.plan import analysed
 from wamnet.compiler.proof import bounds
 from wamnet.kernels.bench import contenders, workload
 from wamnet.kernels.bench.contender import Tools
-from wamnet.refimpl import dataset, siren
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model, denoise
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model, denoise
 
 pytestmark = pytest.mark.filterwarnings("default")
 """Warnings of a peer are not faults of the project."""

@@ -16,10 +16,10 @@ from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels.executor import Part
 from wamnet.kernels.export.gl_runner import ESRunner
-from wamnet.refimpl.dataset import Normalization
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network.dataset import Normalization
 
 FEATURES = ("color", "normal")
 """What a shader of paths adds up here: planes for two buffers of the four that there are."""

@@ -19,12 +19,12 @@ from wamnet.kernels.conformance.run import judge, read_vectors
 from wamnet.kernels.conformance.vectors import FOLDER
 from wamnet.kernels.export import check, runners, targets, tools
 from wamnet.kernels.export.package import Request, export
-from wamnet.refimpl import siren
-from wamnet.refimpl.dataset import Normalization, Window
-from wamnet.refimpl.denoise import Model
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
 
 ROOT = Path(__file__).resolve().parents[3]
 """The repository's root folder."""

@@ -21,10 +21,10 @@ from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.kernels.executor import Part
 from wamnet.kernels.export import check, runners, tools
 from wamnet.kernels.export.buffer_runner import BufferRunner
-from wamnet.refimpl.dataset import Normalization, encode_sums
 from wamnet.refimpl.errors import ExecutorUnavailable
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network.dataset import Normalization, encode_sums
 
 FEATURES = ("color", "normal")
 """What paths add up here."""

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from statistical import SIGNIFICANCE, assert_all_plausible, chi_square_p, sidak, z_p
 from vertices import local, local_direction, site, uniforms, world
 
-from wamnet.refimpl import render as R
 from wamnet.refimpl import vectors
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.materials import Conductor
-from wamnet.refimpl.materials import conductor as C
-from wamnet.refimpl.scene import Camera, Scene, Sphere
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import render as R
+from wamnet.refimpl.light.materials import Conductor
+from wamnet.refimpl.light.materials import conductor as C
+from wamnet.refimpl.light.scene import Camera, Scene, Sphere
+from wamnet.refimpl.light.transport import Settings
 
 SAMPLES = 1 << 16
 EPS = 2.0**-52

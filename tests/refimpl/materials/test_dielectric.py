@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from statistical import SIGNIFICANCE, z_p
 from vertices import NORMAL, local, local_direction, site, uniforms
 
-from wamnet.refimpl import render as R
 from wamnet.refimpl import vectors
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.materials import Dielectric
-from wamnet.refimpl.materials.dielectric import fresnel, refract
-from wamnet.refimpl.materials.material import SINGLE_PDF
-from wamnet.refimpl.scene import Box, Camera, Light, Quad, Scene, Sphere
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import render as R
+from wamnet.refimpl.light.materials import Dielectric
+from wamnet.refimpl.light.materials.dielectric import fresnel, refract
+from wamnet.refimpl.light.materials.material import SINGLE_PDF
+from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Scene, Sphere
+from wamnet.refimpl.light.transport import Settings
 
 EPS = 2.0**-52
 WHITE = (1.0, 1.0, 1.0)

@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from vertices import local, local_direction, site
 
-from wamnet.refimpl import render as R
-from wamnet.refimpl.materials import Mirror
-from wamnet.refimpl.materials.material import SINGLE_PDF
-from wamnet.refimpl.scene import Camera, Light, Quad, Scene, Sphere
-from wamnet.refimpl.transport import STRATEGIES, Settings
+from wamnet.refimpl.light import render as R
+from wamnet.refimpl.light.materials import Mirror
+from wamnet.refimpl.light.materials.material import SINGLE_PDF
+from wamnet.refimpl.light.scene import Camera, Light, Quad, Scene, Sphere
+from wamnet.refimpl.light.transport import STRATEGIES, Settings
 
 EPS = 2.0**-52
 

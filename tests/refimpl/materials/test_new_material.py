@@ -10,13 +10,13 @@ import pytest
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels import open_executor, render_on
-from wamnet.refimpl import scene
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.materials import MATERIALS
-from wamnet.refimpl.materials.material import SINGLE_PDF, Scattered, Single, Site
-from wamnet.refimpl.render import Job, render
-from wamnet.refimpl.scenes import canonical
-from wamnet.refimpl.transport import Settings
+from wamnet.refimpl.light import scene
+from wamnet.refimpl.light.materials import MATERIALS
+from wamnet.refimpl.light.materials.material import SINGLE_PDF, Scattered, Single, Site
+from wamnet.refimpl.light.render import Job, render
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.vectors import Floats
 
 

@@ -21,9 +21,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
-from .errors import InputError
+from ..errors import InputError
+from ..reading import Special, parse_json, to_dataclass
 from .materials import MATERIALS, Material
-from .reading import Special, parse_json, to_dataclass
 from .shapes import SHAPES, Shape
 from .shapes import Box as Box
 from .shapes import Light as Light

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import vectors
+from ... import vectors
+from ...vectors import Directions, Floats, Normals, Points
 from ..materials import Material
-from ..vectors import Directions, Floats, Normals, Points
 from .shape import (
     BLACK,
     MISS,

@@ -25,9 +25,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import sampling, vectors
-from ..errors import InputError
-from ..vectors import Colors, Directions, Floats, Normals
+from ... import vectors
+from ...errors import InputError
+from ...vectors import Colors, Directions, Floats, Normals
+from .. import sampling
 from .material import LEAST_SQUARE, Material, Scattered, Site, unit
 
 LEAST_ROUGHNESS = 1e-3

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..vectors import Floats
+from ...vectors import Floats
 from .material import SINGLE_PDF, Scattered, Single, Site, mirrored
 
 

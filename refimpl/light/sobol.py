@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from . import rng
+from .. import rng
 
 JOE_KUO: Sequence[tuple[int, int, tuple[int, ...]]] = ((1, 0, (1,)), (2, 1, (1, 3)), (3, 1, (1, 3, 1)))
 """Degree, coefficients and initial numbers of the second to fourth dimension; from the authors' published

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ...vectors import Colors, Directions, Floats
 from .. import sampling
-from ..vectors import Colors, Directions, Floats
 from .material import Material, Scattered, Site
 
 

@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
-from .. import vectors
-from ..errors import InputError
+from ... import vectors
+from ...errors import InputError
+from ...vectors import Directions, Floats, Ids, Normals, Points
 from ..materials import Material
-from ..vectors import Directions, Floats, Ids, Normals, Points
 
 if TYPE_CHECKING:
     from ..scene import Scene

@@ -26,15 +26,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from ..errors import InputError, TrainingError
+from ..frame import Frame
+from ..reading import parse_json, to_dataclass
 from . import adam, dataset, factored, siren
 from .activation import SINE, activation_named
 from .adam import AdamState
 from .dataset import Dataset, Normalization, Window
 from .denoise import OUTPUT_CHANNELS, Model
-from .errors import InputError, TrainingError
 from .factored import Factors
-from .frame import Frame
-from .reading import parse_json, to_dataclass
 from .siren import Siren
 
 Array = NDArray[np.floating[Any]]

@@ -21,8 +21,8 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from .errors import InputError
-from .reading import BROKEN, parse_json, to_dataclass
+from ..errors import InputError
+from ..reading import BROKEN, parse_json, to_dataclass
 from .scene import Camera, Scene, Vector
 from .scenes import LARGEST_TIME_S, TURN_SECONDS
 

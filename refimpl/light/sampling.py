@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import vectors
-from .vectors import Directions, Floats, Ids, Normals, Points
+from .. import vectors
+from ..vectors import Directions, Floats, Ids, Normals, Points
 
 INV_PI = 1.0 / np.pi
 """1 / pi: the normalisation of the cosine density over the hemisphere, in 1 / sr."""

@@ -17,9 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import DTypeLike
 
-from . import sampling, vectors
+from .. import vectors
+from ..vectors import Directions, Floats, Radiance
+from . import sampling
 from .scene import Sky
-from .vectors import Directions, Floats, Radiance
 
 
 @dataclass(frozen=True)

@@ -20,14 +20,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from . import intersection, rng, transport, vectors
+from .. import rng, vectors
+from ..errors import InputError
+from ..frame import LAYERS, Frame
+from ..vectors import Directions, Ids
+from . import intersection, transport
 from .camera import CameraBasis, camera_basis, camera_ray
-from .errors import InputError
-from .frame import LAYERS, Frame
 from .intersection import Hit, Surface
 from .scene import Scene, scene_digest
 from .transport import Counters, Path, Settings, World
-from .vectors import Directions, Ids
 
 MAX_IMAGE_SIDE_PX = 1 << 16
 """Largest width or height, in pixels: x and y share one 32-bit counter of the random generator."""

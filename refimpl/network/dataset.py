@@ -23,12 +23,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .encoding import to_display
-from .errors import InputError
-from .frame import Frame, check_finite
-from .reading import parse_json, to_dataclass
-from .rng import counter, random_block
-from .vectors import vector
+from ..encoding import to_display
+from ..errors import InputError
+from ..frame import Frame, check_finite
+from ..reading import parse_json, to_dataclass
+from ..rng import counter, random_block
+from ..vectors import vector
 
 Array = NDArray[Any]
 Indices = NDArray[np.int64]

@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from ..errors import InputError
+from ..rng import counter, random_block, uniform_floats
 from .activation import SINE, activation_named
-from .errors import InputError
-from .rng import counter, random_block, uniform_floats
 
 Array = NDArray[np.floating[Any]]
 

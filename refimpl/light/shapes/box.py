@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import vectors
+from ... import vectors
+from ...vectors import Directions, Floats, Ids, Normals, Points, Truths
 from ..materials import Material
-from ..vectors import Directions, Floats, Ids, Normals, Points, Truths
 from .shape import (
     BLACK,
     MISS,

@@ -31,16 +31,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike
 
-from . import environment, intersection, rng, sampling, shading, sobol, vectors
+from .. import rng, vectors
+from ..errors import InputError
+from ..vectors import Colors, Directions, Floats, Ids, Normals, Points, Radiance, Truths
+from . import environment, intersection, sampling, shading, sobol
 from .environment import Environment
-from .errors import InputError
 from .intersection import Geometry, Hit, Surface
 from .materials.material import SINGLE_PDF, Site
 from .scene import Scene
 from .shading import Materials
 from .shapes.quad import light_radiance, quad_area_pdf
 from .shapes.shape import MISS
-from .vectors import Colors, Directions, Floats, Ids, Normals, Points, Radiance, Truths
 
 HEURISTICS = {"balance": 1, "power": 2}
 """Exponent of the densities in the multiple importance sampling weight, by the heuristic's name."""

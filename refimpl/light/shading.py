@@ -19,11 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from . import intersection, vectors
+from .. import vectors
+from ..vectors import Colors, Directions, Floats, Truths
+from . import intersection
 from .intersection import Hit, Surface
 from .materials import Lambertian, Material, Scattered, Site
 from .scene import Scene
-from .vectors import Colors, Directions, Floats, Truths
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import vectors
-from ..errors import InputError
-from ..vectors import Floats
+from ... import vectors
+from ...errors import InputError
+from ...vectors import Floats
 from .material import LEAST_SQUARE, SINGLE_PDF, Scattered, Single, Site, mirrored, unit
 
 LEAST_INDEX, LARGEST_INDEX = 1.0, 4.0

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import InputError
+from ..errors import InputError
 from .materials import Conductor, Dielectric, Mirror
 from .scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sky, Sphere, Vector, validate
 

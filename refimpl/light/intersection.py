@@ -20,14 +20,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from . import vectors
+from .. import vectors
+from ..vectors import Colors, Directions, Floats, Ids, Normals, Points, Radiance, Truths
 from .materials import Material
 from .scene import WALLS, Scene
 from .shapes import Group, Light, Shape, kinds
 from .shapes.box import axis_normal, least_axis, room_distance, slabs
 from .shapes.quad import light_radiance
 from .shapes.shape import BLACK, MISS, Met, Take, Values, Vector, inverse
-from .vectors import Colors, Directions, Floats, Ids, Normals, Points, Radiance, Truths
 
 SPAWN_OFFSET = 64 * 2.0**-24
 """Offset of a spawned ray's origin along the normal, relative to the size of the numbers involved. A hit

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import DTypeLike
 
-from . import vectors
+from .. import vectors
+from ..vectors import Directions, Floats, Points
 from .scene import Camera
-from .vectors import Directions, Floats, Points
 
 
 @dataclass(frozen=True)

@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from ..errors import InputError
+from ..frame import Frame
 from . import dataset
 from .activation import activation_named
 from .dataset import Normalization, Window
-from .errors import InputError
-from .frame import Frame
 from .siren import LARGEST_PARAMETER, Siren, check_shape, forward
 
 Array = NDArray[np.floating[Any]]

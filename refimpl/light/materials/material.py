@@ -18,8 +18,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from .. import vectors
-from ..vectors import Colors, Directions, Floats, Normals, Truths
+from ... import vectors
+from ...vectors import Colors, Directions, Floats, Normals, Truths
 
 SINGLE_PDF = 1e30
 """Density of a direction that is no random one, in 1/sr: a mirror's, and a camera ray's. Light sampling is no

@@ -1,0 +1,1 @@
+"""Light: cameras, shapes, materials, sampling and the path tracer."""

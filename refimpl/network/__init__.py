@@ -1,0 +1,1 @@
+"""The network: features, SIREN with its backward pass, Adam, training and denoising."""

@@ -15,7 +15,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from wamnet.cli.inputs import load_model
+from wamnet.cli.common.inputs import load_model
 from wamnet.kernels.export.check import HEAD, Verdict, check
 from wamnet.kernels.export.package import Request, export
 from wamnet.kernels.export.shelf import random_model

@@ -20,12 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.cli import machine
+from wamnet.cli.reports import machine
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.kernels import Pipeline, open_executor, render_on
-from wamnet.kernels.denoise_on import images_of
-from wamnet.kernels.passes import PICTURE
+from wamnet.kernels.devices.passes import PICTURE
+from wamnet.kernels.run.denoise_on import images_of
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.scenes import CANONICAL, canonical
 from wamnet.refimpl.network import dataset, siren

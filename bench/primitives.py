@@ -23,11 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.cli import machine
+from wamnet.cli.reports import machine
 from wamnet.compiler.scenes.lower_scene import lower_scene, primitives
 from wamnet.compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from wamnet.kernels import open_executor
-from wamnet.kernels.executor import Executor, Part
+from wamnet.kernels.devices.executor import Executor, Part
 from wamnet.refimpl import vectors
 from wamnet.refimpl.light.scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sphere, Vector
 from wamnet.refimpl.light.transport import Settings

@@ -31,9 +31,9 @@ from typing import Any
 import mitsuba_scene
 import numpy as np
 
-from wamnet.cli import machine
+from wamnet.cli.reports import machine
 from wamnet.kernels import open_executor, render_on
-from wamnet.kernels.render_pool import render_parallel
+from wamnet.kernels.run.render_pool import render_parallel
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.scene import Scene
 from wamnet.refimpl.light.scenes import CANONICAL, canonical

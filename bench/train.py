@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.cli import machine
+from wamnet.cli.reports import machine
 from wamnet.kernels import open_executor
 from wamnet.refimpl.frame import LAYERS, Frame
 from wamnet.refimpl.network import dataset, train
@@ -144,7 +144,7 @@ def _begun(recipe: Recipe, pairs: Sequence[Pair]) -> tuple[Any, Any, Any]:
 
 def _opencl(recipe: Recipe, pairs: Sequence[Pair]) -> Way:
     """Return the compiled trainer's steps, without the data's way to the device."""
-    from wamnet.kernels.trainer import begin
+    from wamnet.kernels.run.trainer import begin
 
     executor = open_executor("opencl")
     data, state, _ = _begun(recipe, pairs)

@@ -19,7 +19,7 @@ from typing import Annotated, Any
 import typer
 
 from ..refimpl.errors import WamnetError
-from . import (
+from .commands import (
     animate,
     bench,
     certify,
@@ -36,9 +36,9 @@ from . import (
     tune,
     view,
 )
-from .compile import EXAMPLES as COMPILE_EXAMPLES
-from .compile import compile_model
-from .terminal import tell
+from .commands.compile import EXAMPLES as COMPILE_EXAMPLES
+from .commands.compile import compile_model
+from .common.terminal import tell
 
 STATUS_BAD_INPUT = 2
 """Exit status when a file, an option or the machine is not as it must be."""

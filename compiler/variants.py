@@ -13,7 +13,7 @@
    [`enclose`]. The rules of bounds.py carry that to the output, and add what rounding does.
 
 The bound speaks of all images. Taps that are left out may hold anything: it says little for cuts (a picture
-may be made to suit them) and much for sines; on frames the error is measured [kernels/curve.py].
+may be made to suit them) and much for sines; on frames the error is measured [kernels/run/curve.py].
 """
 
 from __future__ import annotations

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.cli import exr
-from wamnet.cli.runs import frame_bound
+from wamnet.cli.files import exr
+from wamnet.cli.reports.runs import frame_bound
 from wamnet.compiler.core import sums
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.profiles import EMITTED_SINE

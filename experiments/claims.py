@@ -39,10 +39,10 @@ from lab.training import TIMED_STEPS, seconds_a_step
 from lab.verdicts import HOLDS, Answer, Measured, Question, Untested, decide, said, together
 from numpy.typing import NDArray
 
-from wamnet.cli.outputs import write_text
+from wamnet.cli.files.outputs import write_text
 from wamnet.kernels import denoise_on, open_executor
 from wamnet.kernels.bench.workload import noise, paper_model
-from wamnet.kernels.executor import Executor
+from wamnet.kernels.devices.executor import Executor
 from wamnet.kernels.measure import in_turns
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import LEVELS, to_display

@@ -26,7 +26,7 @@ from lab.results import Results, fill, summary
 from lab.tables import markdown
 from numpy.typing import NDArray
 
-from wamnet.cli.outputs import write_text
+from wamnet.cli.files.outputs import write_text
 from wamnet.refimpl import encoding, metrics
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.scenes import TURN_SECONDS

@@ -36,7 +36,7 @@ from lab.ground import (
 from lab.results import Results, Values
 from lab.tables import Column
 
-from wamnet.cli.images import read_png
+from wamnet.cli.files.images import read_png
 from wamnet.kernels.bench import peer_oidn
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats

@@ -48,7 +48,7 @@ from lab.ground import (
 from lab.results import PER_FRAME, Results, Values
 from lab.tables import Column
 
-from wamnet.kernels.draws import variation_of
+from wamnet.kernels.run.draws import variation_of
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.variation import AT_REST, Ranges, Variation
 from wamnet.refimpl.network.train import PAPER, SHORT

@@ -22,8 +22,8 @@ from lab import command, scores
 from lab.sets import SETS
 from quality import PLANS, RAYS, ROWS, SHIPPED_SET, Bench, denoised
 
-from wamnet.cli.dataset_files import sum_of
-from wamnet.cli.outputs import write_text
+from wamnet.cli.files.dataset_files import sum_of
+from wamnet.cli.files.outputs import write_text
 from wamnet.compiler.model_file import save_model
 from wamnet.refimpl.light.variation import RANGES
 from wamnet.refimpl.network.denoise import Model

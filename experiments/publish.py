@@ -28,8 +28,8 @@ from lab.command import begin
 from lab.records import BENCH, DEMO, FOLDER, ROOT, checked, of_bench, of_demo
 from lab.results import PACKAGES, SCHEMA, Results, written
 
-from wamnet.cli import machine
-from wamnet.cli.outputs import replacing, write_text
+from wamnet.cli.files.outputs import replacing, write_text
+from wamnet.cli.reports import machine
 from wamnet.refimpl.errors import InputError
 
 LARGEST_BYTES = 400_000

@@ -34,14 +34,15 @@ from lab.frames import Pair, Shot, frames, noisy, reference
 from lab.results import PER_FRAME, Results, Values
 from lab.sets import SETS, Counts, compared
 
-from wamnet.cli.outputs import write_text
+from wamnet.cli.files.outputs import write_text
 from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.variants import plan_model
-from wamnet.kernels import open_executor, tune
+from wamnet.kernels import open_executor
 from wamnet.kernels.bench.peer_oidn import filtered, prefiltered
-from wamnet.kernels.denoise_on import images_of
-from wamnet.kernels.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.kernels.measure import in_turns
+from wamnet.kernels.run import tune
+from wamnet.kernels.run.denoise_on import images_of
+from wamnet.kernels.run.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Floats, Frame

@@ -18,7 +18,7 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
-from wamnet.cli import dataset_files
+from wamnet.cli.files import dataset_files
 from wamnet.kernels import open_executor, train_on
 from wamnet.refimpl import metrics
 from wamnet.refimpl.frame import Frame

@@ -20,7 +20,7 @@ from lab.command import begin
 from lab.records import ROOT, Records, pending
 from lab.shown import FIGURES, PLOTS, TABLES
 
-from wamnet.cli.outputs import replacing, write_text
+from wamnet.cli.files.outputs import replacing, write_text
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

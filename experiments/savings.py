@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.cli import dataset_files
+from wamnet.cli.files import dataset_files
 from wamnet.compiler.model_file import load_model
 from wamnet.refimpl import metrics
 from wamnet.refimpl.frame import Frame

@@ -40,13 +40,13 @@ from lab import command, figures, results, scores, tables
 from lab.frames import Shot
 from lab.results import PER_FRAME, Results, Summary, Values
 
-from wamnet.cli import exr
-from wamnet.cli.images import write_png
-from wamnet.cli.outputs import write_text
-from wamnet.cli.terminal import hint_on_interrupt
+from wamnet.cli.common.terminal import hint_on_interrupt
+from wamnet.cli.files import exr
+from wamnet.cli.files.images import write_png
+from wamnet.cli.files.outputs import write_text
 from wamnet.kernels import open_executor
 from wamnet.kernels.measure import in_turns
-from wamnet.kernels.render_frame import render_frame
+from wamnet.kernels.run.render_frame import render_frame
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 
@@ -342,7 +342,7 @@ def curves(folder: Path, kept: Results) -> None:
 
 def drawn(folder: Path, pictures: Path, size: int, patch: int) -> None:
     """Draw crops around the corner of four patches, and their errors (FLIP), of rows that have a picture."""
-    from wamnet.cli.images import read_png
+    from wamnet.cli.files.images import read_png
 
     at = (size // patch // 2 or 1) * patch
     low = max(0, min(at - CROP_PX // 2, size - CROP_PX))

@@ -15,13 +15,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from wamnet.cli import dataset_files
+from wamnet.cli.files import dataset_files
 from wamnet.compiler import variants
 from wamnet.compiler.model_file import load_model, save_model
 from wamnet.kernels import open_executor, train_on
-from wamnet.kernels.curve import Point
-from wamnet.kernels.executor import Executor
-from wamnet.kernels.measure_curve import NAMES, Pairs, measure, names_for
+from wamnet.kernels.devices.executor import Executor
+from wamnet.kernels.run.curve import Point
+from wamnet.kernels.run.measure_curve import NAMES, Pairs, measure, names_for
 from wamnet.refimpl import metrics
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model, denoise

@@ -30,7 +30,7 @@ from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import denoise, siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 
-ROOT = Path(siren.__file__).parents[1]
+ROOT = Path(siren.__file__).parents[2]
 """The folder whose places are shown."""
 
 MARK = "<p>LISTING {}</p>"

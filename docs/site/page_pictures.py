@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from wamnet.cli.webpage import page_of
+from wamnet.cli.reports.webpage import page_of
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "support"))
 from browser import Chromium, Tab

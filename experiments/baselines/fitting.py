@@ -35,9 +35,9 @@ from lab.frames import DIGITS
 from numpy.typing import NDArray
 from safetensors.torch import load_file, save_file
 
-from wamnet.cli.exr import read_frame
-from wamnet.cli.outputs import replacing, write_text
-from wamnet.cli.terminal import hint_on_interrupt, progress
+from wamnet.cli.common.terminal import hint_on_interrupt, progress
+from wamnet.cli.files.exr import read_frame
+from wamnet.cli.files.outputs import replacing, write_text
 from wamnet.refimpl import metrics
 from wamnet.refimpl.errors import InputError, TrainingError
 from wamnet.refimpl.frame import Frame

@@ -21,7 +21,7 @@ from lab.frames import Shot
 from lab.training import seconds_a_step
 
 from wamnet.kernels.bench.workload import noise
-from wamnet.kernels.render_frame import render_frame
+from wamnet.kernels.run.render_frame import render_frame
 from wamnet.refimpl.network.train import BEST, PAPER, SHORT
 
 from .rows import EQUAL_RAYS, EQUAL_SPP, Bench

@@ -26,12 +26,13 @@ import numpy as np
 from lab import frames, training
 from lab.frames import Shot
 
-from wamnet.cli import exr
-from wamnet.cli.packages import need
-from wamnet.kernels import denoise_on, draws, geometry
-from wamnet.kernels.denoise_on import images_of
-from wamnet.kernels.executor import Executor
-from wamnet.kernels.geometry import Shown
+from wamnet.cli.common.packages import need
+from wamnet.cli.files import exr
+from wamnet.kernels import denoise_on
+from wamnet.kernels.devices.executor import Executor
+from wamnet.kernels.run import draws, geometry
+from wamnet.kernels.run.denoise_on import images_of
+from wamnet.kernels.run.geometry import Shown
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import from_display, to_display
 from wamnet.refimpl.frame import Floats, Frame

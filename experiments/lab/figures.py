@@ -1,6 +1,6 @@
 """Figures as PNG: contact sheets of pictures, and curves with their spread; written all at once or not.
 
-Drawn on white, to be looked at by themselves, with the colours of the reports [`cli/plots.py`].
+Drawn on white, to be looked at by themselves, with the colours of the reports [`cli/reports/plots.py`].
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.cli.outputs import replacing
-from wamnet.cli.plots import DOTS_PER_INCH, PAPER
+from wamnet.cli.files.outputs import replacing
+from wamnet.cli.reports.plots import DOTS_PER_INCH, PAPER
 from wamnet.refimpl.encoding import to_8bit
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Floats

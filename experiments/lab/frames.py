@@ -18,12 +18,12 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from wamnet.cli import exr
-from wamnet.cli.dataset_files import sum_of
-from wamnet.cli.terminal import hint_on_interrupt, progress
-from wamnet.kernels.draws import times
-from wamnet.kernels.frame_plan import version
-from wamnet.kernels.render_frame import render_frame
+from wamnet.cli.common.terminal import hint_on_interrupt, progress
+from wamnet.cli.files import exr
+from wamnet.cli.files.dataset_files import sum_of
+from wamnet.kernels.run.draws import times
+from wamnet.kernels.run.frame_plan import version
+from wamnet.kernels.run.render_frame import render_frame
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import LAYERS, Frame
 from wamnet.refimpl.light.render import Job, feature_job, render_info

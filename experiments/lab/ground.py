@@ -23,8 +23,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from wamnet.cli.outputs import write_text
-from wamnet.kernels.draws import Draw, drawn
+from wamnet.cli.files.outputs import write_text
+from wamnet.kernels.run.draws import Draw, drawn
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats
 from wamnet.refimpl.light.scenes import canonical

@@ -23,9 +23,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from wamnet.cli import machine
-from wamnet.cli.outputs import write_text
-from wamnet.cli.terminal import hint_on_interrupt, progress
+from wamnet.cli.common.terminal import hint_on_interrupt, progress
+from wamnet.cli.files.outputs import write_text
+from wamnet.cli.reports import machine
 from wamnet.refimpl.errors import InputError
 
 from .command import line

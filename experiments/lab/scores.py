@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.cli.packages import need
+from wamnet.cli.common.packages import need
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import LEVELS, from_display, to_8bit, to_display
 from wamnet.refimpl.errors import InputError

@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from wamnet.kernels.draws import Draw
-from wamnet.kernels.frame_plan import OUTSIDE, TEST, TRAIN, Request, frame_draws
-from wamnet.kernels.geometry import Comparison, Shown, compare
+from wamnet.kernels.run.draws import Draw
+from wamnet.kernels.run.frame_plan import OUTSIDE, TEST, TRAIN, Request, frame_draws
+from wamnet.kernels.run.geometry import Comparison, Shown, compare
 from wamnet.refimpl.light.variation import Ranges
 
 from .frames import Shot

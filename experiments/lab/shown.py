@@ -15,8 +15,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from wamnet.cli import bench_report
-from wamnet.cli.plots import PAPER, trade_off_figure
+from wamnet.cli.reports import bench_report
+from wamnet.cli.reports.plots import PAPER, trade_off_figure
 from wamnet.refimpl.errors import InputError
 
 from . import plots, printed, tables

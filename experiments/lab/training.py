@@ -16,11 +16,11 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from wamnet.cli.outputs import write_text
-from wamnet.cli.train import checkpoint_path, fit
+from wamnet.cli.commands.train import checkpoint_path, fit
+from wamnet.cli.files.outputs import write_text
 from wamnet.compiler.model_file import load_checkpoint, load_model
 from wamnet.kernels import denoise_on, open_executor, train_on
-from wamnet.kernels.executor import Executor
+from wamnet.kernels.devices.executor import Executor
 from wamnet.refimpl.frame import Floats, Frame
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model, denoise

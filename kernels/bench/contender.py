@@ -21,8 +21,8 @@ from ...compiler.core.ir import Program
 from ...compiler.core.lower import lower
 from ...refimpl.errors import ExecutorUnavailable
 from ...refimpl.network.denoise import Model
-from ..executor import Executor
-from ..registry import open_executor
+from ..devices.executor import Executor
+from ..devices.registry import open_executor
 from .cost import Stage
 from .workload import Given
 

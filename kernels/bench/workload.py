@@ -17,8 +17,8 @@ from ...refimpl.errors import InputError
 from ...refimpl.frame import LAYERS, Frame
 from ...refimpl.network import dataset, siren
 from ...refimpl.network.denoise import Model
-from ..denoise_on import images_of
-from ..executor import Images
+from ..devices.executor import Images
+from ..run.denoise_on import images_of
 
 HIDDEN = (32, 32, 32, 32, 3)
 """The paper's layers after the window."""

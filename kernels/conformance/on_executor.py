@@ -34,10 +34,10 @@ from ...refimpl.light import scene as scene_module
 from ...refimpl.light.render import Job
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.dataset import Window
-from ..denoise_on import denoise_on
-from ..executor import Executor, Part
+from ..devices.executor import Executor, Part
 from ..export.buffer_runner import BufferRunner
-from ..render_on import render_on
+from ..run.denoise_on import denoise_on
+from ..run.render_on import render_on
 from .case import given
 from .functions import Function, components, names
 from .kinds import FUNCTIONS

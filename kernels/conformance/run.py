@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.errors import InputError
-from ..welch import sidak, welch_p
+from ..judge.welch import sidak, welch_p
 from . import blocks
 from . import case as cases_module
 from .case import Case, Output

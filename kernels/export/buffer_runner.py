@@ -19,7 +19,7 @@ from ...compiler.languages.interface import BLOCK, IMAGE, RESULT, SUMS, WEIGHTS,
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.schedules.emit import output_channels
-from ..executor import Executor, Images, Part
+from ..devices.executor import Executor, Images, Part
 
 Kernel = Artifact | PathArtifact | EncodeArtifact
 """A kernel of any role."""

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..bench import peer_onnxruntime
-from ..executor import Executor, Part
+from ..devices.executor import Executor, Part
 from . import tools
 from .check_pair import SEED
 from .package import Export

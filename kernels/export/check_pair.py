@@ -32,8 +32,8 @@ from ...compiler.schedules.emit import kernel_gather
 from ...compiler.schedules.schedules import windows
 from ...refimpl.network.dataset import FEATURES, encode_sums
 from ...refimpl.network.denoise import Model
-from ..executor import Part
-from ..registry import open_executor
+from ..devices.executor import Part
+from ..devices.registry import open_executor
 
 SIDES = (1, 3)
 """Rows and columns beyond the window's."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...compiler.languages.interface import BLOCK
 from ...compiler.schedules.glsl_compute import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from ..opengl_executor import OpenGLExecutor
+from ..devices.opengl_executor import OpenGLExecutor
 from .buffer_runner import BufferRunner, Kernel, Launch
 
 

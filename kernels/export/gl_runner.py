@@ -6,7 +6,7 @@ An OpenGL driver with ARB_ES3_compatibility, as Mesa's, takes GLSL ES 3.00 with 
 from __future__ import annotations
 
 from ...compiler.languages.glsl_es import VERSION
-from ..opengl_executor import OpenGLExecutor
+from ..devices.opengl_executor import OpenGLExecutor
 
 
 class ESRunner(OpenGLExecutor):

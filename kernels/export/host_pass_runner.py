@@ -13,7 +13,7 @@ from ...compiler.artifact import Artifact
 from ...compiler.languages.glsl_es import VERSION
 from ...compiler.languages.hosts import CHANNELS
 from ...compiler.languages.interface import TABLE
-from ..executor import Images
+from ..devices.executor import Images
 from .gl_runner import ESRunner
 
 TOP = f"""\

@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 
-from ..executor import Executor
-from ..registry import open_executor
+from ..devices.executor import Executor
+from ..devices.registry import open_executor
 
 Opener = Callable[[], Executor]
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from wamnet.cli import exr
+from wamnet.cli.files import exr
 from wamnet.cli.main import main
 from wamnet.compiler.model_file import save_model
 from wamnet.refimpl.light.render import Job, render

@@ -9,11 +9,11 @@ import sys
 
 import pytest
 
-from wamnet.cli.alone import BESIDE, LOCK, alone_at, alone_in, signals_wait
+from wamnet.cli.files.alone import BESIDE, LOCK, alone_at, alone_in, signals_wait
 from wamnet.refimpl.errors import InputError
 
 HOLD = (
-    "import sys; from pathlib import Path; from wamnet.cli.alone import alone_in\n"
+    "import sys; from pathlib import Path; from wamnet.cli.files.alone import alone_in\n"
     "with alone_in(Path('.'), 'waiting'):\n"
     "    print('ready', flush=True); sys.stdin.read()\n"
 )

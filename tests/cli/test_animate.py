@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from wamnet.cli import animate, images
-from wamnet.cli.images import LABEL_PX, read_png
+from wamnet.cli.commands import animate
+from wamnet.cli.files import images
+from wamnet.cli.files.images import LABEL_PX, read_png
 from wamnet.compiler.model_file import load_model, save_model
 from wamnet.refimpl import encoding
 from wamnet.refimpl.light.render import Job, render

@@ -10,10 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.cli import bench, bench_forms, bench_frames, bench_report, exr, plots, report, train
+from wamnet.cli.commands import bench, bench_forms, bench_frames, train
+from wamnet.cli.files import exr
+from wamnet.cli.reports import bench_report, plots, report
 from wamnet.compiler.model_file import load_model, save_checkpoint, save_model
 from wamnet.kernels.bench import contest, rates
-from wamnet.kernels.frame_plan import frame_draws
+from wamnet.kernels.run.frame_plan import frame_draws
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.variation import Ranges
 

@@ -15,7 +15,7 @@ from operator import neg
 import distributed
 import pytest
 
-from wamnet.cli import cluster
+from wamnet.cli.common import cluster
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.render import Job
 

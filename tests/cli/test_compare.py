@@ -8,10 +8,10 @@ import shutil
 import numpy as np
 import pytest
 
-from wamnet.cli import exr
-from wamnet.cli.images import write_png
-from wamnet.kernels import random_words
-from wamnet.kernels.compare_paths import QUANTITIES, Unexplained
+from wamnet.cli.files import exr
+from wamnet.cli.files.images import write_png
+from wamnet.kernels.judge import random_words
+from wamnet.kernels.judge.compare_paths import QUANTITIES, Unexplained
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Frame

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from wamnet import kernels
-from wamnet.cli import cluster, dataset_files, exr
-from wamnet.kernels import draws, frame_plan, render_frame
+from wamnet.cli.common import cluster
+from wamnet.cli.files import dataset_files, exr
+from wamnet.kernels.run import draws, frame_plan, render_frame
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scene import scene_digest

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.cli import dataset_files as files
-from wamnet.cli.alone import LOCK
-from wamnet.kernels import frame_plan
-from wamnet.kernels.frame_plan import Request, carry_out, plan
+from wamnet.cli.files import dataset_files as files
+from wamnet.cli.files.alone import LOCK
+from wamnet.kernels.run import frame_plan
+from wamnet.kernels.run.frame_plan import Request, carry_out, plan
 from wamnet.refimpl.errors import InputError
 
 REQUEST = Request("cornell", frames=2, test_frames=1, size_px=6, spp=2)
@@ -164,7 +164,7 @@ def test_layers_of_another_program_are_told_once(tmp_path, monkeypatch) -> None:
     said: list[str] = []
     files.read_pairs(tmp_path, tell=said.append)
     assert said == []
-    monkeypatch.setattr("wamnet.cli.exr._taken", lambda _found: ["color is taken from a, b, c"])
+    monkeypatch.setattr("wamnet.cli.files.exr._taken", lambda _found: ["color is taken from a, b, c"])
     pairs = files.read_pairs(tmp_path, tell=said.append)
     assert said == [f"{tmp_path}, {2 * len(pairs)} of {2 * len(pairs)} pictures: color is taken from a, b, c"]
 

@@ -15,9 +15,9 @@ import pytest
 from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from wamnet.cli import dataset_files as files
-from wamnet.kernels import frame_plan
-from wamnet.kernels.frame_plan import Request, Task, carry_out, plan
+from wamnet.cli.files import dataset_files as files
+from wamnet.kernels.run import frame_plan
+from wamnet.kernels.run.frame_plan import Request, Task, carry_out, plan
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 

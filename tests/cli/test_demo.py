@@ -11,9 +11,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from wamnet.cli import bench, bench_forms, demo, exr, machine, runs
-from wamnet.cli.images import read_png
+from wamnet.cli.commands import bench, bench_forms, demo
+from wamnet.cli.files import exr
+from wamnet.cli.files.images import read_png
 from wamnet.cli.main import main
+from wamnet.cli.reports import machine, runs
 from wamnet.compiler.model_file import load_model
 from wamnet.compiler.variants import plan_model
 from wamnet.refimpl import encoding, metrics
@@ -154,9 +156,9 @@ def test_a_second_run_reuses_everything(finished, tmp_path, monkeypatch) -> None
     def never(*_args: object, **_options: object) -> None:
         raise AssertionError("this was done before")
 
-    monkeypatch.setattr("wamnet.kernels.frame_plan.render_frame", never)
+    monkeypatch.setattr("wamnet.kernels.run.frame_plan.render_frame", never)
     monkeypatch.setattr("wamnet.refimpl.network.train.train_step", never)
-    monkeypatch.setattr("wamnet.kernels.trainer.Run.enqueue", never)
+    monkeypatch.setattr("wamnet.kernels.run.trainer.Run.enqueue", never)
     results = demo.carry_out(demo.for_this_machine(demo.QUICK), folder)
     assert results.state.step == demo.QUICK.steps
     assert results.seconds_per_step > 0
@@ -279,8 +281,8 @@ def test_an_interrupt_tells_how_to_go_on(wamnet, tmp_path, monkeypatch, quick) -
 @pytest.mark.parametrize("content", [None, b"", b"fast", b"\xff", b"nan", b"-1"])
 def test_an_unknown_time_is_no_error(finished, report, tmp_path, content) -> None:
     """The report has a dash, and the curve no second axis."""
-    from wamnet.cli import plots
-    from wamnet.cli.report import page
+    from wamnet.cli.reports import plots
+    from wamnet.cli.reports.report import page
 
     path = tmp_path / "seconds.txt"
     if content is not None:

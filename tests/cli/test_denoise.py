@@ -10,11 +10,12 @@ import shutil
 import numpy as np
 import pytest
 
-from wamnet.cli import denoise, exr
-from wamnet.cli.images import read_png
+from wamnet.cli.commands import denoise
+from wamnet.cli.files import exr
+from wamnet.cli.files.images import read_png
 from wamnet.compiler.model_file import load_model
 from wamnet.kernels import denoise_on, open_executor
-from wamnet.kernels.registry import CONTEXT_VARIABLE
+from wamnet.kernels.devices.registry import CONTEXT_VARIABLE
 from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame

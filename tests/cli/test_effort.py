@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from wamnet.cli import effort
-from wamnet.kernels import render_frame
+from wamnet.cli.common import effort
+from wamnet.kernels.run import render_frame
 from wamnet.refimpl.light.scene import Box, to_json
 from wamnet.refimpl.light.scenes import canonical
 
@@ -30,7 +30,7 @@ def started(wamnet, capsys, monkeypatch):
         return capsys.readouterr().out
 
     monkeypatch.setattr(render_frame, "render_frame", stop)
-    monkeypatch.setattr("wamnet.kernels.frame_plan.carry_out", stop)
+    monkeypatch.setattr("wamnet.kernels.run.frame_plan.carry_out", stop)
     monkeypatch.setattr("wamnet.compiler.scenes.lower_scene.lower_scene", stop)
     return run
 
@@ -64,7 +64,7 @@ def test_demonstrations_say_what_learning_takes(wamnet, capsys, monkeypatch):
     def stop(*_args):
         raise StoppedError("the work begins")
 
-    monkeypatch.setattr("wamnet.cli.demo.render_frames", stop)
+    monkeypatch.setattr("wamnet.cli.commands.demo.render_frames", stop)
     with pytest.raises(StoppedError, match="the work begins"):
         wamnet("demo", "--size", 2048, "-o", "large")
     assert "to learn from: by a rule of thumb " in capsys.readouterr().out

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from wamnet.cli import export as command
+from wamnet.cli.commands import export as command
 from wamnet.kernels.export import check, targets
 
 

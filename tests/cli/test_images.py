@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.cli import exr, images
-from wamnet.cli.images import read_image, read_png, write_png
+from wamnet.cli.files import exr, images
+from wamnet.cli.files.images import read_image, read_png, write_png
 from wamnet.refimpl import encoding, reading
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wamnet.cli import exr, inputs
+from wamnet.cli.common import inputs
+from wamnet.cli.files import exr
 from wamnet.compiler.model_file import load_model, save_model
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
@@ -96,8 +97,8 @@ def test_a_name_that_no_file_system_takes(refused, here, monkeypatch, command) -
     def never(*_args: object, **_options: object) -> None:
         raise AssertionError("this is the work")
 
-    monkeypatch.setattr("wamnet.kernels.denoise_on", never)
-    monkeypatch.setattr("wamnet.kernels.render_pool.render_parallel", never)
+    monkeypatch.setattr("wamnet.kernels.run.denoise_on", never)
+    monkeypatch.setattr("wamnet.kernels.run.render_pool.render_parallel", never)
     line = refused(*command, "-o", "n" * 300 + ".exr")
     assert "cannot be written (File name too long)" in line
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from wamnet.cli import main as module
-from wamnet.cli import options
+from wamnet.cli.common import options
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import EXECUTORS
 from wamnet.refimpl.errors import TrainingError
@@ -130,7 +130,7 @@ def test_ctrl_c(wamnet, monkeypatch) -> None:
     monkeypatch.setattr(module, "app", interrupt)
     assert wamnet("render") == (130, "", "wamnet: interrupted\n")
     monkeypatch.undo()
-    monkeypatch.setattr("wamnet.cli.render.load_scene", interrupt)
+    monkeypatch.setattr("wamnet.cli.commands.render.load_scene", interrupt)
     assert wamnet("render", "minicubes").status == 130
 
 
@@ -192,7 +192,7 @@ def test_too_little_memory_is_one_line(refused, monkeypatch) -> None:
 def test_a_worker_that_is_killed_is_one_line(tmp_path) -> None:
     """As the system does when the memory ends."""
     code = (
-        "import sys, os; import wamnet.kernels.render_pool as pool; from wamnet.cli.main import main\n"
+        "import sys, os; import wamnet.kernels.run.render_pool as pool; from wamnet.cli.main import main\n"
         "if __name__ == '__main__':\n"
         "    pool._render_band = os._exit; pool.bands = lambda job, workers: [7, 8]\n"
         "    submit = pool.ProcessPoolExecutor.submit\n"

@@ -8,8 +8,8 @@ import json
 import numpy as np
 import pytest
 
-from wamnet.cli import options
-from wamnet.cli.inputs import MODELS, load_model, shipped_models
+from wamnet.cli.common import options
+from wamnet.cli.common.inputs import MODELS, load_model, shipped_models
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Frame

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wamnet.cli.images import write_panels
-from wamnet.cli.movie import WRITERS, write_movie
+from wamnet.cli.files.images import write_panels
+from wamnet.cli.files.movie import WRITERS, write_movie
 from wamnet.refimpl.errors import InputError
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.cli.outputs import check_output, replacing, write_text
+from wamnet.cli.files.outputs import check_output, replacing, write_text
 from wamnet.refimpl.errors import InputError
 
 
@@ -110,7 +110,7 @@ def test_a_full_disk_while_exr_is_written(tmp_path: Path) -> None:
     """OpenEXR tells it by errors of its own; here the largest size of a file is the limit."""
     code = (
         "import resource, sys; from pathlib import Path; import numpy as np; import OpenEXR\n"
-        "from wamnet.cli import exr; from wamnet.refimpl.frame import Frame\n"
+        "from wamnet.cli.files import exr; from wamnet.refimpl.frame import Frame\n"
         "from wamnet.refimpl.errors import InputError\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
         "noise = np.random.default_rng(1).random((64, 64, 3)).astype(np.float32)\n"
@@ -128,8 +128,8 @@ def test_a_full_disk_while_a_kernel_is_written(
     tmp_path: Path, samples: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The folder is named."""
-    from wamnet.cli.compile import compile_model
-    from wamnet.cli.options import Target
+    from wamnet.cli.commands.compile import compile_model
+    from wamnet.cli.common.options import Target
 
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(InputError, match=r"output folder is .*kernel: cannot be written \(No space left"):

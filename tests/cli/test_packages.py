@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from wamnet.cli.packages import need
+from wamnet.cli.common.packages import need
 from wamnet.refimpl.errors import InputError
 
 

@@ -9,8 +9,8 @@ import os
 import numpy as np
 import pytest
 
-from wamnet.cli import exr
-from wamnet.cli.images import read_png
+from wamnet.cli.files import exr
+from wamnet.cli.files.images import read_png
 from wamnet.refimpl import encoding
 from wamnet.refimpl.light import scenes, variation
 from wamnet.refimpl.light.render import Job, render

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.cli import main, terminal
+from wamnet.cli import main
+from wamnet.cli.common import terminal
 
 NAME = "out[bold]/[/]:smile:[red].exr"
 """A file name that rich would read as markup and emoji."""

@@ -7,7 +7,8 @@ import shutil
 import numpy as np
 import pytest
 
-from wamnet.cli import exr, train
+from wamnet.cli.commands import train
+from wamnet.cli.files import exr
 from wamnet.compiler.model_file import load_checkpoint, load_model
 from wamnet.kernels import train_on
 from wamnet.refimpl.errors import ExecutorUnavailable

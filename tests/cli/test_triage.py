@@ -11,15 +11,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.cli import exr
+from wamnet.cli.files import exr
 from wamnet.cli.main import main
 from wamnet.compiler import artifact
 from wamnet.compiler import compile as compiling
 from wamnet.compiler.core.ir import sha256
 from wamnet.compiler.model_file import load_model
-from wamnet.kernels import apart
-from wamnet.kernels.denoise_on import images_of
-from wamnet.kernels.registry import WAYS
+from wamnet.kernels.devices.registry import WAYS
+from wamnet.kernels.judge import apart
+from wamnet.kernels.run.denoise_on import images_of
 from wamnet.refimpl.errors import ExecutorUnavailable
 
 TWO = ("--executor", "numpy", "--executor", "opencl", "--schedules", "plain")

@@ -7,9 +7,9 @@ import shutil
 
 import pytest
 
-from wamnet.cli import tune
-from wamnet.kernels import cache
-from wamnet.kernels import tune as tuning
+from wamnet.cli.commands import tune
+from wamnet.kernels.run import cache
+from wamnet.kernels.run import tune as tuning
 
 
 @pytest.fixture

@@ -8,13 +8,15 @@ import shutil
 import numpy as np
 import pytest
 
-from wamnet.cli import choose, exr
-from wamnet.cli.choose import Request, check_request
-from wamnet.cli.images import read_png
+from wamnet.cli.commands import choose
+from wamnet.cli.commands.choose import Request, check_request
+from wamnet.cli.files import exr
+from wamnet.cli.files.images import read_png
 from wamnet.compiler import variants
 from wamnet.compiler.model_file import load_model
-from wamnet.kernels import cache, denoise_on, measure_curve, open_executor
-from wamnet.kernels.curve import Curve, Point
+from wamnet.kernels import denoise_on, open_executor
+from wamnet.kernels.run import cache, measure_curve
+from wamnet.kernels.run.curve import Curve, Point
 from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import InputError
 

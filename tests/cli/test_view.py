@@ -14,7 +14,8 @@ from dataclasses import replace
 
 import pytest
 
-from wamnet.cli import view, webpage
+from wamnet.cli.commands import view
+from wamnet.cli.reports import webpage
 from wamnet.compiler.model_file import load_model, save_model
 from wamnet.refimpl.light import scenes
 
@@ -56,7 +57,7 @@ def test_the_model_s_own_scene_is_shown_at_all_its_times(wamnet, here):
 @pytest.mark.parametrize("name", ["minicubes", "glossy", "daylight"])
 def test_scenes_move_without_changing_their_form(name):
     """All moments of each animation are one kernel."""
-    from wamnet.kernels.page import moving_numbers
+    from wamnet.kernels.run.page import moving_numbers
     from wamnet.refimpl.light.transport import Settings
 
     animation = webpage.animation_of(name)

@@ -16,14 +16,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wamnet.cli import webpage
+from wamnet.cli.reports import webpage
 from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
 from wamnet.compiler.scenes.lower_encode import layers_of
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.kernels import page as P
-from wamnet.kernels.executor import Part
-from wamnet.kernels.numpy_executor import NumpyExecutor
+from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.numpy_executor import NumpyExecutor
+from wamnet.kernels.run import page as P
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Ranges, Variation, outside, saturation_of, varied
@@ -414,7 +414,9 @@ def test_it_plays_where_motion_is_welcome(chromium, path):
 
 def test_it_stands_still_where_motion_is_not(still):
     assert still.state("playing") is False
-    assert still.text("status").startswith("Ready. The animation is paused.")
+    paused = "Ready. The animation is paused."
+    still.until(f"document.getElementById('status').textContent.startsWith('{paused}')")
+    assert still.text("status").startswith(paused)
 
 
 @pytest.mark.parametrize(
@@ -504,7 +506,7 @@ def test_scripts_are_javascript(name, tmp_path):
     if node is None:
         pytest.skip("node is not installed; Chromium runs the scripts in the other tests")
     script = tmp_path / "script.mjs"
-    script.write_text((resources.files("wamnet.cli") / webpage.FOLDER / name).read_text(encoding="utf-8"))
+    script.write_text((resources.files(webpage.__package__) / webpage.FOLDER / name).read_text(encoding="utf-8"))
     found = subprocess.run([node, "--check", str(script)], capture_output=True, text=True, check=False)
     assert found.returncode == 0, found.stderr
 

@@ -10,8 +10,8 @@ import pytest
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import SceneInputs, bind, lay_out, varying
-from wamnet.kernels.executor import Part
-from wamnet.kernels.numpy_executor import NumpyExecutor
+from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.numpy_executor import NumpyExecutor
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.transport import Settings

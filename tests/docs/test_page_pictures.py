@@ -10,8 +10,8 @@ import page_pictures
 import pytest
 from PIL import Image
 
-from wamnet.cli import webpage
-from wamnet.kernels import page as P
+from wamnet.cli.reports import webpage
+from wamnet.kernels.run import page as P
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import dataset

@@ -11,7 +11,7 @@ import pytest
 from lab import frames
 from lab.frames import Shot
 
-from wamnet.kernels.frame_plan import version
+from wamnet.kernels.run.frame_plan import version
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import LAYERS
 from wamnet.refimpl.light.render import Job, render

@@ -13,7 +13,7 @@ from lab.records import Records, bench_of, checked, flat, nested, of_bench, of_d
 from lab.results import Results
 from results_of import data_of
 
-from wamnet.cli import bench_report
+from wamnet.cli.reports import bench_report
 from wamnet.refimpl.errors import InputError
 
 

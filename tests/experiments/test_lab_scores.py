@@ -122,7 +122,7 @@ def test_flip_of_the_authors_pair():
         pytest.skip(
             "WAMNET_FLIP_IMAGES does not name the folder with reference.png and test.png of NVlabs/flip"
         )
-    from wamnet.cli.images import read_png
+    from wamnet.cli.files.images import read_png
 
     reference, test = (read_png(Path(folder) / name) for name in ("reference.png", "test.png"))
     assert abs(scores.flip(test, reference) - 0.159691) <= 0.5e-6

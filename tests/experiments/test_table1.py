@@ -15,9 +15,10 @@ from lab import scores
 from lab.results import Results
 from packages import needed
 
-from wamnet.cli import exr
-from wamnet.cli.images import read_png
-from wamnet.kernels import geometry, open_executor
+from wamnet.cli.files import exr
+from wamnet.cli.files.images import read_png
+from wamnet.kernels import open_executor
+from wamnet.kernels.run import geometry
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 from targets import VECTORS, Target
 
-from wamnet.cli.view import HOST, handler_of
+from wamnet.cli.commands.view import HOST, handler_of
 from wamnet.kernels.conformance import report
 from wamnet.kernels.conformance.case import Case, load
 from wamnet.kernels.conformance.numbers import to_json

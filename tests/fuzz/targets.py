@@ -19,16 +19,17 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.cli import dataset_files, demo, exr, images
-from wamnet.cli import inputs as cli_inputs
+from wamnet.cli.commands import demo
+from wamnet.cli.common import inputs as cli_inputs
+from wamnet.cli.files import dataset_files, exr, images
 from wamnet.cli.main import main
 from wamnet.compiler import artifact, variants
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.model_file import load_checkpoint, save_checkpoint, save_model
 from wamnet.compiler.proof import checker
-from wamnet.kernels import cache, curve
 from wamnet.kernels.conformance import case, report
+from wamnet.kernels.run import cache, curve
 from wamnet.refimpl.errors import WamnetError
 from wamnet.refimpl.light import scene, variation
 from wamnet.refimpl.light.render import Job, render

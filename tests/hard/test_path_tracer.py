@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.kernels import compare_paths
-from wamnet.kernels.compare_paths import View
+from wamnet.kernels.judge import compare_paths
+from wamnet.kernels.judge.compare_paths import View
 from wamnet.refimpl.light import render
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sphere, validate

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wamnet.kernels import compare_paths, random_words
-from wamnet.kernels.compare_paths import View
+from wamnet.kernels.judge import compare_paths, random_words
+from wamnet.kernels.judge.compare_paths import View
 from wamnet.refimpl import rng
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.render import Job

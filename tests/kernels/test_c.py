@@ -12,7 +12,7 @@ import pytest
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.interpret import interpret
-from wamnet.kernels import c_executor
+from wamnet.kernels.devices import c_executor
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror")

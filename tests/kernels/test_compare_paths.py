@@ -9,9 +9,9 @@ import pytest
 
 from wamnet.compiler.proof import ranges
 from wamnet.compiler.scenes.lower_scene import lower_scene
-from wamnet.kernels import compare_images, compare_paths, random_words
-from wamnet.kernels.compare_images import ImageReport, blocks
-from wamnet.kernels.compare_paths import QUANTITIES, View, kernel_of_states
+from wamnet.kernels.judge import compare_images, compare_paths, random_words
+from wamnet.kernels.judge.compare_images import ImageReport, blocks
+from wamnet.kernels.judge.compare_paths import QUANTITIES, View, kernel_of_states
 from wamnet.refimpl import vectors
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame

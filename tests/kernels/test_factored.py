@@ -16,7 +16,8 @@ from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import factor
 from wamnet.compiler.schedules.emit_fourier import Fourier
 from wamnet.compiler.targets import DENOISERS
-from wamnet.kernels import Pipeline, denoise_on, opencl_executor
+from wamnet.kernels import Pipeline, denoise_on
+from wamnet.kernels.devices import opencl_executor
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.scenes import canonical

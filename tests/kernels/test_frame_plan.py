@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.kernels import frame_plan
-from wamnet.kernels.frame_plan import Request, carry_out, frame_draws, join, plan, tasks_of
+from wamnet.kernels.run import frame_plan
+from wamnet.kernels.run.frame_plan import Request, carry_out, frame_draws, join, plan, tasks_of
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.render import render
 from wamnet.refimpl.light.scenes import canonical

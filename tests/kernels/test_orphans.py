@@ -17,7 +17,7 @@ GRACE_S = 10.0
 """Seconds after which a process that is still there counts as one that stays: a guard, no speed."""
 
 POOL = (
-    "import sys; from wamnet.kernels.render_pool import render_parallel\n"
+    "import sys; from wamnet.kernels.run.render_pool import render_parallel\n"
     "from wamnet.refimpl.light.render import Job; from wamnet.refimpl.light.scenes import canonical\n"
     "if __name__ == '__main__':\n"
     "    report = lambda samples: print('ready', flush=True)\n"
@@ -26,14 +26,14 @@ POOL = (
 """A render on two processes that reports when they work."""
 
 APART = (
-    "import time; from wamnet.kernels.apart import Apart\n"
+    "import time; from wamnet.kernels.judge.apart import Apart\n"
     "if __name__ == '__main__':\n"
     "    with Apart('numpy'): print('ready', flush=True); time.sleep(600)\n"
 )
 """An executor in a process of its own."""
 
 CLUSTER = (
-    "import time; from wamnet.cli.cluster import open_client\n"
+    "import time; from wamnet.cli.common.cluster import open_client\n"
     "if __name__ == '__main__':\n"
     "    with open_client(2, None): print('ready', flush=True); time.sleep(600)\n"
 )

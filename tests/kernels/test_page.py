@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from wamnet.kernels import page as P
+from wamnet.kernels.run import page as P
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.scene import Sphere

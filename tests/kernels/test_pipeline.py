@@ -15,7 +15,7 @@ from wamnet.compiler.proof import bounds
 from wamnet.compiler.scenes.encode_kernel import error_at
 from wamnet.compiler.variants import FULL, with_rank
 from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
-from wamnet.kernels.executor import Part
+from wamnet.kernels.devices.executor import Part
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import scenes

@@ -7,7 +7,7 @@ import weakref
 
 import pytest
 
-from wamnet.kernels import pocl_cpu
+from wamnet.kernels.devices import pocl_cpu
 
 libc = ctypes.CDLL(None)
 libc.malloc.restype, libc.malloc.argtypes = ctypes.c_void_p, [ctypes.c_size_t]

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from wamnet import kernels
-from wamnet.kernels import registry
+from wamnet.kernels.devices import registry
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 
 
@@ -50,7 +50,7 @@ def test_opencl_device_is_chosen_by_a_part_of_its_name(executor_named, monkeypat
 
 def test_no_opencl_platform(executor_named, monkeypatch):
     executor_named("opencl")
-    from wamnet.kernels import opencl_executor
+    from wamnet.kernels.devices import opencl_executor
 
     monkeypatch.setattr(opencl_executor.cl, "get_platforms", list)
     with pytest.raises(
@@ -61,7 +61,7 @@ def test_no_opencl_platform(executor_named, monkeypatch):
 
 def test_opencl_platform_that_fails_is_passed_over(executor_named, monkeypatch):
     device = executor_named("opencl").device
-    from wamnet.kernels import opencl_executor
+    from wamnet.kernels.devices import opencl_executor
 
     class Broken:
         def get_devices(self):
@@ -90,7 +90,7 @@ def test_opencl_platform_that_fails_is_passed_over(executor_named, monkeypatch):
 )
 def test_opencl_device_with_other_arithmetic(executor_named, monkeypatch, profile, rounding, message):
     executor_named("opencl")
-    from wamnet.kernels import opencl_executor
+    from wamnet.kernels.devices import opencl_executor
 
     nearest = opencl_executor.cl.device_fp_config.ROUND_TO_NEAREST if rounding else 0
     device = SimpleNamespace(profile=profile, single_fp_config=nearest)
@@ -108,7 +108,7 @@ def test_unknown_opengl_context(executor_named):
 
 def test_no_opengl_context_names_what_was_tried(executor_named, monkeypatch):
     executor_named("opengl-egl")
-    from wamnet.kernels import opengl_executor
+    from wamnet.kernels.devices import opengl_executor
 
     def fails():
         raise OSError("no library")
@@ -121,7 +121,7 @@ def test_no_opengl_context_names_what_was_tried(executor_named, monkeypatch):
 
 
 def test_osmesa_library_that_is_missing(monkeypatch):
-    from wamnet.kernels import osmesa
+    from wamnet.kernels.devices import osmesa
 
     monkeypatch.setattr(osmesa, "LIBRARIES", ("libnowhere.so",))
     monkeypatch.setattr(osmesa.ctypes.util, "find_library", lambda name: None)
@@ -138,7 +138,7 @@ def test_osmesa_library_that_is_missing(monkeypatch):
 )
 def test_osmesa_that_refuses(executor_named, monkeypatch, function, message):
     executor_named("opengl-osmesa")
-    from wamnet.kernels import osmesa
+    from wamnet.kernels.devices import osmesa
 
     library = osmesa._load()
     setattr(library, function, lambda *_: 0)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.kernels.render_frame import RENDERERS, render_frame
+from wamnet.kernels.run.render_frame import RENDERERS, render_frame
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.render import Job, join_rows, render
 from wamnet.refimpl.light.scenes import canonical

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from wamnet.kernels import render_pool
+from wamnet.kernels.run import render_pool
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.scenes import canonical
 

@@ -14,7 +14,8 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.schedules import emit_fourier
 from wamnet.compiler.targets import DENOISERS
-from wamnet.kernels import denoise_on, opencl_executor, opengl_executor
+from wamnet.kernels import denoise_on
+from wamnet.kernels.devices import opencl_executor, opengl_executor
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, denoise

@@ -14,8 +14,8 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.core.verify import verify
 from wamnet.compiler.scenes.lower_scene import lower_scene, primitives
 from wamnet.compiler.scenes.path_kernel import compile_path, most_unrolled
-from wamnet.kernels.executor import Part
-from wamnet.kernels.render_on import compile_scene, render_on
+from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.run.render_on import compile_scene, render_on
 from wamnet.refimpl import vectors
 from wamnet.refimpl.light import render as R
 from wamnet.refimpl.light.scene import IDENTITY, Box, Camera, Light, Quad, Room, Scene, Sphere

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wamnet.cli.inputs import load_model, shipped_models, unlike_training
+from wamnet.cli.common.inputs import load_model, shipped_models, unlike_training
 from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Program
@@ -28,10 +28,11 @@ from wamnet.compiler.core.profiles import PROFILES
 from wamnet.compiler.plan import Expected, sine_contract
 from wamnet.compiler.schedules.schedules import Schedule
 from wamnet.compiler.targets import DENOISERS
-from wamnet.kernels import denoise_on, registry
-from wamnet.kernels.denoise_on import images_of
-from wamnet.kernels.draws import drawn
-from wamnet.kernels.render_frame import render_frame
+from wamnet.kernels import denoise_on
+from wamnet.kernels.devices import registry
+from wamnet.kernels.run.denoise_on import images_of
+from wamnet.kernels.run.draws import drawn
+from wamnet.kernels.run.render_frame import render_frame
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.scene import Scene

@@ -21,9 +21,9 @@ from wamnet.compiler.core.profiles import EMITTED_SINE, UNIT_ROUNDOFF
 from wamnet.compiler.proof.bounds import enclose
 from wamnet.compiler.training import lower_step, step, step_kernel
 from wamnet.compiler.training.step_kernel import StepKernel, compile_step
-from wamnet.kernels import trainer
-from wamnet.kernels.opencl_trainer import OpenCLTrainer
-from wamnet.kernels.trainer import train_on
+from wamnet.kernels.devices.opencl_trainer import OpenCLTrainer
+from wamnet.kernels.run import trainer
+from wamnet.kernels.run.trainer import train_on
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import from_display, to_display
 from wamnet.refimpl.errors import InputError, TrainingError
@@ -527,7 +527,7 @@ def test_refusals(opencl: Any, executor_named: Any, monkeypatch: Any) -> None:
             InputError, match=r"device that trains is .*: the step is scheduled for processors"
         ):
             train_on(opencl, SMALL, PAIRS)
-    monkeypatch.setattr("wamnet.kernels.opencl_trainer.INDEX_LIMIT", 100)
+    monkeypatch.setattr("wamnet.kernels.devices.opencl_trainer.INDEX_LIMIT", 100)
     with pytest.raises(
         InputError, match=r"numbers of all training pictures is .*: the device takes fewer than 100"
     ):

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from wamnet.compiler.training import step
 from wamnet.compiler.training.step_kernel import StepKernel, compile_step
-from wamnet.kernels import trainer
-from wamnet.kernels.trainer import train_on
+from wamnet.kernels.run import trainer
+from wamnet.kernels.run.trainer import train_on
 from wamnet.refimpl.errors import InputError, TrainingError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import dataset, factored, train

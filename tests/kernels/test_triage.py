@@ -12,10 +12,10 @@ import pytest
 from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import plan_program
-from wamnet.kernels import apart, triage
-from wamnet.kernels.apart import Apart, Inside, Outcome
-from wamnet.kernels.reduce import Box, Stage, first_stage, reduced, shrink, stage_program, stages
-from wamnet.kernels.registry import EXECUTORS, OPTIONS, WAYS
+from wamnet.kernels.devices.registry import EXECUTORS, OPTIONS, WAYS
+from wamnet.kernels.judge import apart, triage
+from wamnet.kernels.judge.apart import Apart, Inside, Outcome
+from wamnet.kernels.judge.reduce import Box, Stage, first_stage, reduced, shrink, stage_program, stages
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
@@ -314,7 +314,7 @@ def test_an_executor_that_is_not_here(monkeypatch):
 
 @pytest.mark.needs("devices")
 def test_ways_are_those_of_the_executors():
-    from wamnet.kernels import opengl_executor
+    from wamnet.kernels.devices import opengl_executor
 
     assert [options["context"] for options in OPTIONS["opengl"]] == list(opengl_executor.CONTEXTS)
     assert {name for name, _ in WAYS.values()} == set(EXECUTORS)

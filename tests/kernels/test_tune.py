@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from wamnet.compiler.targets import TARGETS
 from wamnet.compiler.variants import plan_model
-from wamnet.kernels import Pipeline, cache, denoise_on, tune
-from wamnet.kernels.tune import Row, Table, choose
+from wamnet.kernels import Pipeline, denoise_on
+from wamnet.kernels.run import cache, tune
+from wamnet.kernels.run.tune import Row, Table, choose
 from wamnet.refimpl import frame
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.network import dataset, denoise, siren

@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy import special, stats
 
-from wamnet.kernels import welch
+from wamnet.kernels.judge import welch
 
 
 @given(t=st.floats(0, 40), freedom=st.floats(0.5, 1e6))

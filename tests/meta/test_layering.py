@@ -57,34 +57,57 @@ def imports(source) -> Iterator[tuple[ast.AST, str]]:
 
 
 ROOMS = {
-    "core": (),
-    "languages": ("core",),
-    "proof": ("core",),
-    "schedules": ("core", "languages", "proof"),
-    "": ("core", "languages", "proof", "schedules"),
-    "scenes": ("core", "languages", "proof", "schedules", ""),
-    "training": ("core", "languages", "proof", "schedules", ""),
+    "refimpl": {"": (), "light": ("",), "network": ("",)},
+    "compiler": {
+        "core": (),
+        "languages": ("core",),
+        "proof": ("core",),
+        "schedules": ("core", "languages", "proof"),
+        "": ("core", "languages", "proof", "schedules"),
+        "scenes": ("core", "languages", "proof", "schedules", ""),
+        "training": ("core", "languages", "proof", "schedules", ""),
+    },
+    "kernels": {
+        "": (),
+        "devices": ("",),
+        "run": ("", "devices"),
+        "judge": ("", "devices", "run"),
+        "bench": ("", "devices", "run"),
+        "export": ("", "devices", "run", "bench"),
+        "conformance": ("", "devices", "run", "judge", "export"),
+    },
+    "cli": {
+        "common": (),
+        "files": ("common",),
+        "reports": ("common", "files"),
+        "commands": ("common", "files", "reports"),
+        "": ("commands", "common"),
+    },
 }
-"""The compiler's rooms, which are its folders, and what each may import; "" is the compiler's own folder."""
+"""The rooms of each part, which are its folders, and what each may import; "" is the part's own folder."""
 
 MOST_FILES = 20
-"""Most modules of a folder."""
+"""Most modules of a folder, its `__init__` apart."""
 
 
-def test_rooms_of_the_compiler_are_small_and_import_one_way(house):
-    """Imports for type checkers only may go the other way: they are no part of what runs."""
+def test_rooms_are_small_and_import_one_way(house):
+    """Imports for type checkers only may go the other way: they are no part of what runs.
+
+    A part's own `__init__` hands out what its rooms have.
+    """
     wrong, files = [], Counter()
-    for source in house.python("compiler"):
+    for source in house.parts():
+        part, rooms = source.part, ROOMS[source.part]
         room = "/".join(source.path.split("/")[1:-1]).partition("/")[0]
-        files[source.path.rpartition("/")[0]] += 1
+        files[source.path.rpartition("/")[0]] += not source.path.endswith("__init__.py")
         skipped = {id(node) for branch in checked_only(source.tree) for node in ast.walk(branch)}
         for node, name in imports(source):
             parts = name.split(".")
-            if parts[:2] != ["wamnet", "compiler"] or id(node) in skipped:
+            if parts[:2] != ["wamnet", part] or id(node) in skipped or source.path == f"{part}/__init__.py":
                 continue
-            target = parts[2] if parts[2] in ROOMS else ""
-            if target not in (room, *ROOMS[room]):
-                wrong.append(source.at(node, f"room {room or 'compiler'} imports {target or 'compiler'}"))
+            target = parts[2] if parts[2] in rooms else ""
+            if target not in (room, *rooms[room]):
+                wrong.append(source.at(node, f"room {room or part} imports {target or part}"))
     wrong += [f"{folder} has {count} modules" for folder, count in files.items() if count > MOST_FILES]
     house.refuse(wrong, "A room has at most 20 modules and imports those before it: move the code.")
 
@@ -202,7 +225,11 @@ def test_no_hidden_random_state(house):
             ["wamnet.refimpl.network.siren.forward"],
         ),
         ("cli/main.py", "def f():\n    import os.path, typer", ["os.path", "typer"]),
-        ("kernels/__init__.py", "from .registry import open", ["wamnet.kernels.registry.open"]),
+        (
+            "kernels/__init__.py",
+            "from .devices.registry import open",
+            ["wamnet.kernels.devices.registry.open"],
+        ),
     ],
 )
 def test_the_rules_see_every_form_of_import(house, path, text, names):

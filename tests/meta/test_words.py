@@ -271,7 +271,7 @@ def test_texts_of_python_are_prose_and_its_names_are_not():
         "say(f\"{path}: {'; '.join(told)} {{{told}}} {told:.2f}\")",
         "text = 'input file is none.exr: it does not exist'  # see alone.py",
         "text = 'training pairs is none: at least one is needed'",
-        "program = 'from cli.alone import alone_in'",
+        "program = 'from cli.files.alone import alone_in'",
         "text = 'the numbers are None'",
     ],
 )

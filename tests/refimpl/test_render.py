@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wamnet.kernels.render_pool import bands, render_parallel
+from wamnet.kernels.run.render_pool import bands, render_parallel
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light import render as R

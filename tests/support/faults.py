@@ -72,12 +72,12 @@ RUN = "import sys; from wamnet.cli.entry import run; sys.exit(run())"
 """What starts a command after a prelude."""
 
 SMALLER = (
-    "from dataclasses import replace; from wamnet.cli import demo; demo.QUICK = replace(demo.QUICK, "
+    "from dataclasses import replace; from wamnet.cli.commands import demo; demo.QUICK = replace(demo.QUICK, "
     "size_px=12, test_frames=1, train_spp=2, reference_spp=2, feature_spp=1, steps=8)"
 )
 """Prelude: a demonstration of some seconds."""
 
-OFTEN = "from wamnet.cli import train; train.CHECKPOINT_INTERVAL_S = 0.0"
+OFTEN = "from wamnet.cli.commands import train; train.CHECKPOINT_INTERVAL_S = 0.0"
 """Prelude: a checkpoint after every step that may have one."""
 
 
@@ -198,7 +198,7 @@ def prepare(folder: Path) -> None:
     """Make a small model and two frames, which all runs begin with."""
     import numpy as np
 
-    from wamnet.cli import exr
+    from wamnet.cli.files import exr
     from wamnet.compiler.model_file import save_model
     from wamnet.refimpl.light.render import Job, render
     from wamnet.refimpl.light.scenes import canonical

@@ -18,7 +18,7 @@ from wamnet.compiler.scenes.lower_encode import layers_of
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import DENOISERS, EXPORTED
-from wamnet.kernels.executor import Part
+from wamnet.kernels.devices.executor import Part
 from wamnet.kernels.export import check, runners, tools
 from wamnet.kernels.export.buffer_runner import BufferRunner
 from wamnet.refimpl.errors import ExecutorUnavailable

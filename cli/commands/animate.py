@@ -1,0 +1,345 @@
+"""`wamnet animate`: noisy, denoised and reference pictures of an animation side by side, as PNG, MP4 or GIF.
+
+1. Each time of the animation is rendered and denoised, and drawn as one labelled picture: by one pipeline
+   where one device does both [`draw_frames`], else one after the other [`draw_apart`].
+2. A picture carries what it was made from, so that an interrupted run resumes; pictures of another animation
+   are refused [`missing`].
+3. A film is made from the pictures when all are there; they lie in FILE.frames until then
+   [`movie.write_movie`].
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ...compiler.core.writing import remove_temporaries
+from ...refimpl.errors import InputError
+from ..common import options
+from ..common.effort import said_of_rendering
+from ..common.inputs import load_model, model_path, unlike_training
+from ..common.options import ExecutorName, Renderer
+from ..common.terminal import hint_on_interrupt, progress, say
+from ..files import movie
+from ..files.alone import working_in
+from ..files.outputs import check_output, check_parent, check_real_folder
+from ..reports import machine
+
+if TYPE_CHECKING:
+    from ...kernels.devices.executor import Executor
+    from ...refimpl.frame import Frame
+    from ...refimpl.light.render import Job
+    from ...refimpl.light.scene import Scene
+    from ...refimpl.network.denoise import Model
+
+EXAMPLES = """Examples:
+
+wamnet animate model.safetensors -o turning.mp4
+
+wamnet animate minicubes --seconds 2 --fps 5 -o turning.gif
+
+wamnet animate model.safetensors --seconds 2 --fps 5 --reference-spp 64 -o turning.gif
+
+wamnet animate minicubes --yaw 20 --light 1=1,0.3,0.3 --seconds 2 -o turning.mp4
+
+wamnet animate small.safetensors --rank 16 --executor opencl --renderer opencl -o turning.mp4"""
+"""Shown below the help of `wamnet animate`."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One picture of an animation: its file, the scene at its time, its jobs, and what names all that."""
+
+    path: Path
+    scene: Scene
+    noisy: Job
+    reference: Job | None
+    origin: str
+
+
+SceneToShow = Annotated[
+    str | None, typer.Option(help="Canonical scene.", show_default="the one that the model has learned")
+]
+Rays = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Camera rays per pixel of the features; with more than the colour's, pictures are rendered and "
+        "denoised one after the other.",
+        show_default="as in training",
+    ),
+]
+
+
+def animate(
+    model: options.ModelFile,
+    scene: SceneToShow = None,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="PATH", help="Film (.mp4, .gif), or folder of pictures.")
+    ] = Path("animation"),
+    start: Annotated[float, typer.Option(help="Begin, in seconds of the animation.")] = 0.0,
+    seconds: Annotated[float, typer.Option(help="Length; minicubes turn in 8 s.")] = 8.0,
+    fps: Annotated[float, typer.Option(help="Pictures per second.")] = 10.0,
+    size: Annotated[int, typer.Option(help="Width and height of each of the pictures, in pixels.")] = 128,
+    reference_spp: Annotated[
+        int, typer.Option(help="Paths per pixel of a reference beside them; 0 shows none.")
+    ] = 0,
+    seed: options.Seed = 0,
+    feature_spp: Rays = None,
+    parameters: options.Parameters = None,
+    yaw: options.Yaw = 0.0,
+    pitch: options.Pitch = 0.0,
+    distance: options.Distance = 1.0,
+    light: options.Lights = None,
+    executor: options.Executor = ExecutorName.numpy,
+    renderer: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    rank: options.CutRank = 0,
+    context: options.OpenGLContext = None,
+) -> None:
+    """Show what a model does over an animation: noisy, denoised and reference side by side.
+
+    After any interruption the same command resumes where it was.
+    """
+    from ...kernels.run.frame_plan import animation_times
+    from ...refimpl.network.denoise import learned_feature_spp
+
+    is_film = output.suffix.lower() in movie.WRITERS
+    folder = output.with_name(output.name + ".frames") if is_film else output
+    _check_names(output, model, fps)
+    model = model_path(model)
+    network = load_model(model)
+    facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
+    facts += cut_facts(network, rank)
+    rays = learned_feature_spp(network) if feature_spp is None else feature_spp
+    view = options.View(yaw, pitch, distance, tuple(light or ()))
+    named = scene or scene_of(network), _parameters(parameters), view
+    times = animation_times(start, seconds, fps)
+    shots = plan_shots(folder, named, times, (size, reference_spp, seed, rays), facts)
+    if is_film:
+        check_real_folder(folder)
+    missing(folder, shots)
+    _say_what_is_not_learned(output, shots, network)
+    with (
+        working_in(folder, "drawing pictures"),
+        hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"),
+    ):
+        made = _draw(shots, folder, network, (executor, renderer), rank)
+        if is_film:
+            movie.write_movie(output, [shot.path for shot in shots], fps)
+            _remove(shots)
+    if is_film:
+        with suppress(OSError):  # there is more in it than the pictures that have become the film
+            folder.rmdir()
+    say(f"{output}: {len(shots)} pictures, {made} of them made now")
+
+
+def _remove(shots: Sequence[Shot]) -> None:
+    """Remove the pictures that have become a film."""
+    for shot in shots:
+        shot.path.unlink()
+
+
+def _draw(
+    shots: Sequence[Shot], folder: Path, network: Model, by: tuple[ExecutorName, Renderer], rank: int
+) -> int:
+    """Draw the pictures that are not in the folder, which only this process uses; return how many."""
+    from ...compiler.variants import FULL, with_rank
+    from ...kernels import open_executor
+
+    executor, renderer = by
+    # It was another process's until now.
+    left = missing(folder, shots)
+    remove_temporaries(folder)
+    for line in _said_of(left, renderer):
+        say(line)
+    with (
+        open_executor(executor.value) as runner,
+        progress("drawing", len(left)) as advance,
+    ):
+        draw = draw_frames if _one_device(executor, renderer, shots[0].noisy) else draw_apart
+        for _ in draw(left, network, runner, renderer.value, with_rank(FULL, rank)):
+            advance(1)
+    return len(left)
+
+
+def _said_of(shots: Sequence[Shot], renderer: Renderer) -> list[str]:
+    """Return the sentence about large work."""
+    if not shots:
+        return []
+    jobs = [job for shot in shots for job in (shot.noisy, shot.reference) if job is not None]
+    pixels = shots[0].noisy.width * shots[0].noisy.height
+    return said_of_rendering(shots[0].scene, sum(job.samples for job in jobs), pixels, renderer.value, None)
+
+
+def _check_names(output: Path, model: Path, fps: float) -> None:
+    """Refuse an output that is no film and no folder, and a film that cannot be written."""
+    if output.suffix.lower() in movie.WRITERS:
+        check_output(output, tuple(movie.WRITERS), [model])
+        movie.check(output, fps)
+    elif output.suffix:
+        rule = f"a film's name must end in {' or '.join(movie.WRITERS)}, a folder's in none"
+        raise InputError("output", str(output), rule, "rename it")
+
+
+def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job) -> bool:
+    """Tell whether a pipeline can draw: one device does both, features come from the colour's camera rays."""
+    from ...refimpl.light.render import feature_job
+
+    return renderer.value == executor.value != "numpy" and feature_job(noisy) is None
+
+
+def _parameters(assignments: Sequence[str] | None) -> dict[str, Any]:
+    """Return the scene's parameters; refuse a time."""
+    chosen = options.parse_parameters(assignments or [])
+    if "time" in chosen:
+        value = chosen["time"]
+        raise InputError("parameter time", value, "each picture has its own", "use --start and --seconds")
+    return dict(chosen)
+
+
+def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) -> None:
+    """Warn of pictures that are unlike those of the training: how many, and what the first one shows."""
+    from ...refimpl.light.render import render_info
+
+    found = [unlike_training(model, render_info(shot.scene, shot.noisy)) for shot in shots]
+    unlike = [sentences for sentences in found if sentences]
+    for sentence in unlike[0] if unlike else ():
+        say(f"{output}: {len(unlike)} of {len(shots)} pictures are unlike those of the training: {sentence}")
+
+
+def scene_of(model: Model) -> str:
+    """Return the canonical scene that a model has learned, or minicubes if that is not known."""
+    from ...refimpl.light.scenes import CANONICAL
+
+    found = model.info.get("trained_on_scene", "")
+    return found if found in CANONICAL else "minicubes"
+
+
+def cut_facts(network: Model, rank: int) -> list[str]:
+    """Return what a cut of the first layer adds to a picture's origin; refuse a rank that it cannot have."""
+    from ...refimpl.network.factored import check_rank
+
+    if not rank:
+        return []
+    check_rank(rank, network.window.size, *network.siren.widths[:2])
+    return [f"rank {rank}"]
+
+
+def plan_shots(
+    folder: Path,
+    named: tuple[str, dict[str, Any], options.View],
+    times: Sequence[float],
+    numbers: tuple[int, int, int, int],
+    facts: Sequence[str],
+) -> list[Shot]:
+    """Return the pictures of an animation at some times.
+
+    `named` are the scene's name, parameters and view; numbers are size, samples of the reference (or 0), seed
+    and camera rays of the features (or 0).
+    """
+    from ...refimpl.light.render import Job
+    from ...refimpl.light.scene import scene_digest
+    from ...refimpl.light.scenes import canonical
+
+    (name, chosen, view), (size, spp, seed, rays) = named, numbers
+    shots = []
+    for index, time in enumerate(times):
+        scene = view.of(canonical(name, **{**chosen, "time": time}))
+        noisy = Job(size, size, 1, seed + 2 * index, feature_spp=rays)
+        reference = Job(size, size, spp, seed + 2 * index + 1) if spp else None
+        made_from = [scene_digest(scene), asdict(noisy), reference and asdict(reference), *facts]
+        text = json.dumps([*made_from, machine.versions()["wamnet"]])
+        origin = hashlib.sha256(text.encode()).hexdigest()
+        shots.append(Shot(folder / f"{index:05d}.png", scene, noisy, reference, origin))
+    return shots
+
+
+def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
+    """Return the pictures that are not there or damaged; refuse a folder with anything else in it."""
+    from ..files import images
+
+    if folder.exists() and not folder.is_dir():
+        raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
+    check_parent(folder)
+    known = {shot.path: shot for shot in shots}
+    there = {}
+    for path in sorted(folder.iterdir()) if folder.exists() else []:
+        if path.name.startswith("."):
+            continue
+        origin = images.read_origin(path) if path in known else ""
+        if path not in known or origin not in (None, known[path].origin):
+            rule = f"it holds something else: {path.name}"
+            raise InputError("output folder", str(folder), rule, "choose another with -o, or empty it")
+        there[path] = origin
+    return [shot for shot in shots if there.get(shot.path) is None]
+
+
+def draw_apart(
+    shots: Sequence[Shot], model: Model, executor: Executor, renderer: str, variant: str
+) -> Iterator[None]:
+    """Render, denoise and write pictures, rendering and denoising on different devices."""
+    from ...kernels import denoise_on
+    from ...kernels.run.render_frame import render_frame
+    from ...refimpl.encoding import to_display
+
+    for shot in shots:
+        frame = render_frame(renderer, shot.scene, shot.noisy, workers=None).frame
+        noisy = to_display(frame["color"], model.normalization.exposure_stops)
+        denoised = denoise_on(executor, model, frame, variant=variant, pictures=len(shots)).image
+        reference = None
+        if shot.reference is not None:
+            reference = render_frame(renderer, shot.scene, shot.reference, workers=None).frame
+        write_shot(shot, model, noisy, denoised, reference)
+        yield
+
+
+def draw_frames(
+    shots: Sequence[Shot], model: Model, executor: Executor, renderer: str, variant: str
+) -> Iterator[None]:
+    """Render, denoise and write pictures by one pipeline, on the device that does both."""
+    from contextlib import ExitStack
+
+    from ...kernels import Pipeline, render_on
+
+    with ExitStack() as stack:
+        pipeline = None
+        for shot in shots:
+            if pipeline is None:
+                size, whole = (shot.noisy.height, shot.noisy.width), shot.reference is not None
+                made = Pipeline(
+                    executor,
+                    shot.scene,
+                    model,
+                    size,
+                    settings=shot.noisy.settings,
+                    show=("color",),
+                    whole=whole,
+                    variant=variant,
+                    pictures=len(shots),
+                )
+                pipeline = stack.enter_context(made)
+            else:
+                pipeline.set_scene(shot.scene)
+            denoised = pipeline.run(shot.noisy.seed)
+            reference = render_on(executor, shot.scene, shot.reference).frame if shot.reference else None
+            write_shot(shot, model, pipeline.image("color"), denoised, reference)
+            yield
+
+
+def write_shot(shot: Shot, model: Model, noisy: Any, denoised: Any, reference: Frame | None) -> None:
+    """Write a picture: noisy and denoised (H, W, 3), display-encoded, and the reference if there is one."""
+    from ...refimpl.encoding import to_display
+    from ..files import images
+
+    panels = [("noisy, 1 spp", noisy), ("denoised", denoised)]
+    if reference is not None and shot.reference is not None:
+        shown = to_display(reference["color"], model.normalization.exposure_stops)
+        panels.append((f"reference, {shot.reference.spp} spp", shown))
+    images.write_panels(shot.path, panels, shot.origin)

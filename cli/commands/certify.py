@@ -1,0 +1,74 @@
+"""`wamnet certify`: check a certificate, and show where the error that it bounds comes from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ...refimpl.errors import InputError
+from ..common.terminal import say, table
+
+EXAMPLES = """Examples:
+
+wamnet certify kernel-opencl/denoise.certificate.json
+
+wamnet certify kernel-opencl"""
+"""Shown below the help of `wamnet certify`."""
+
+STATUS_REFUSED = 1
+"""Exit status when a step of a certificate does not hold; others end in 2, as bad files do."""
+
+
+def certify(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="A denoise.certificate.json, or the folder of its kernel.",
+            show_default=False,
+        ),
+    ],
+) -> None:
+    """Check the proof of a kernel's error bound, step by step, and show what each layer adds.
+
+    The checker derives every number again, from the weights and the program's text. It ends with status 0 if
+    all steps hold, 1 if one does not, which it names, and 2 if the file is no certificate.
+    """
+    from ...compiler.artifact import CERTIFICATE_NAME
+    from ...compiler.proof.checker import Refused, check
+
+    path = file / CERTIFICATE_NAME if file.is_dir() else file
+    if not path.is_file():
+        rule = "no such file"
+        raise InputError(
+            "certificate", str(path), rule, "kernels of profile ieee have one; see wamnet compile"
+        )
+    try:
+        held = check(path)
+    except Refused as step:
+        say(f"refused: {step}")
+        raise typer.Exit(STATUS_REFUSED) from None
+    table(*layers_table(held))
+    bound = max(held["bound"]["output"])
+    say(f"holds: |output - reference| <= {bound:g} for all images in their ranges, {steps_of(bound)}")
+
+
+def layers_table(held: Any) -> tuple[str, tuple[str, ...], list[list[str]]]:
+    """Return title, heads and rows: what each layer makes itself, and how much of it reaches the outputs."""
+    reaches = [output["layer_bounds"] for output in held["outputs"]]
+    rows = []
+    for number, layer in enumerate(held["layers"]):
+        share = [f"{reach[number]:.2e}" for reach in reaches]
+        own = f"{max(layer['rounding_bound']):.2e}"
+        sine = f"{held['sine']['error_bound']:.2e}" if number + 1 < len(held["layers"]) else ""
+        rows.append([str(number), f"{layer['argument_bound']:.4g}", own, sine, *share])
+    rows.append(["all", "", "", "", *(f"{output['error_bound']:.2e}" for output in held["outputs"])])
+    heads = ("layer", "values up to", "rounding", "sine", *(f"output {o['output']}" for o in held["outputs"]))
+    return "Where the error comes from", heads, rows
+
+
+def steps_of(bound: float) -> str:
+    """Say how much this is of half an 8-bit step, which decides between two neighbouring levels."""
+    return f"{bound * 510:.2g} of half an 8-bit step"

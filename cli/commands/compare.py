@@ -1,0 +1,126 @@
+"""`wamnet compare`: how far a picture is from its reference, in every metric, and a kernel's paths."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ...refimpl.errors import InputError
+from ..common import options
+from ..common.options import ExecutorName
+from ..common.terminal import table
+
+EXAMPLES = """Examples:
+
+wamnet compare denoised.png reference.png
+
+wamnet compare noisy.exr reference.exr --json
+
+wamnet compare --paths minicubes
+
+wamnet compare --paths cornell --executor opengl --width 32 --height 32 --max-depth 3"""
+"""Shown below the help of `wamnet compare`."""
+
+PANEL = "Paths"
+"""Title of the options that go with `--paths`."""
+
+OF_PATHS = ("executor", "width", "height", "sample", "spp", "seed", "max_depth")
+"""Options that go only with `--paths`."""
+
+OF_SCENE = ("time", "parameters")
+"""Options of the scene."""
+
+OF_PICTURES = ("image", "reference", "exposure")
+"""Arguments and options of pictures."""
+
+
+def compare(
+    context: typer.Context,
+    image: Annotated[
+        Path | None, typer.Argument(metavar="IMAGE", help="Picture (.exr or .png).", show_default=False)
+    ] = None,
+    reference: Annotated[
+        Path | None, typer.Argument(metavar="REFERENCE", help="What it should be.", show_default=False)
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of a table.")] = False,
+    exposure: options.Exposure = 0.0,
+    paths: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENE",
+            help="In place of pictures, compare the paths of a kernel with the reference's in this scene.",
+            show_default=False,
+            rich_help_panel=PANEL,
+        ),
+    ] = None,
+    executor: Annotated[ExecutorName, typer.Option(rich_help_panel=PANEL)] = ExecutorName.opencl,
+    width: Annotated[int, typer.Option(help="Width in pixels.", rich_help_panel=PANEL)] = 64,
+    height: Annotated[int, typer.Option(help="Height in pixels.", rich_help_panel=PANEL)] = 64,
+    sample: Annotated[
+        int, typer.Option(help="Number of the sample whose paths are compared.", rich_help_panel=PANEL)
+    ] = 0,
+    spp: Annotated[
+        int, typer.Option(help="Paths per pixel of the reference's picture.", rich_help_panel=PANEL)
+    ] = 64,
+    seed: Annotated[int, typer.Option(help="Seed of the random numbers.", rich_help_panel=PANEL)] = 0,
+    max_depth: Annotated[
+        int, typer.Option(help="Greatest number of bounces of a path.", rich_help_panel=PANEL)
+    ] = 5,
+    time: options.Time = None,
+    parameters: options.Parameters = None,
+) -> None:
+    """Measure how far a picture is from its reference, or a path kernel from the reference's path tracer.
+
+    MSE, PSNR and SSIM compare what is seen (sRGB-encoded, clipped to white); relMSE and SMAPE compare linear
+    radiance.
+
+    With --paths each step of each path has a bound of what rounding may change: what differs more is
+    [bold]unexplained[/]. A step with a decision within the bound of its threshold is [bold]undecided[/]; if
+    it went another way than the reference, [bold]different[/]. Of the reference's own paths, [bold]parted[/]
+    have gone another way so far; the vertices of the others have [bold]moved[/]. Welch's test compares
+    pictures. Exit status 1 if anything is unexplained or the test fails.
+    """
+    if paths is None:
+        _refuse_given(context, (*OF_PATHS, *OF_SCENE), "without --paths SCENE")
+        if image is None or reference is None:
+            rule = "it needs IMAGE and REFERENCE, or --paths SCENE"
+            raise InputError("wamnet compare", "incomplete", rule, "see wamnet compare --help")
+        compare_pictures(image, reference, exposure, as_json)
+        return
+    _refuse_given(context, OF_PICTURES, "with --paths")
+    from ...refimpl.light.render import Job
+    from ...refimpl.light.transport import Settings
+    from .compare_paths import compare_paths
+
+    job = Job(width, height, spp, seed, Settings(max_depth=max_depth), first_sample=sample)
+    compare_paths(paths, executor.value, job, time, parameters or [], as_json)
+
+
+def _refuse_given(context: typer.Context, names: Sequence[str], where: str) -> None:
+    """Refuse arguments and options that were given and have no meaning."""
+    for name in names:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name != "DEFAULT":
+            shown = {"parameters": "--set", "image": "IMAGE"}.get(name, f"--{name.replace('_', '-')}")
+            raise InputError("argument", shown, f"it has no meaning {where}", "leave it out")
+
+
+def compare_pictures(image: Path, reference: Path, exposure: float, as_json: bool) -> None:
+    """Print the score of a picture in each metric."""
+    from ..files.images import read_image
+    from ..reports.scores import as_data, measure
+
+    a, b = read_image(image, exposure), read_image(reference, exposure)
+    if a.display.shape != b.display.shape:
+        (height, width, _), (rows, columns, _) = a.display.shape, b.display.shape
+        rule = f"{reference} has {columns}x{rows}"
+        raise InputError(f"size of {image}", f"{width}x{height}", rule, "compare pictures of one size")
+    scores = measure(a, b)
+    if as_json:
+        typer.echo(json.dumps({"image": str(image), "reference": str(reference), **as_data(scores)}))
+    else:
+        table(f"{image} against {reference}", ("metric", "value"), [(s.metric, str(s)) for s in scores])

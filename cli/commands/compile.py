@@ -1,0 +1,253 @@
+"""`wamnet compile`: from a model or a scene to the source of a kernel and its manifest.
+
+A name of a canonical scene, or a file that ends in .json, is a scene; anything else is a model: a file, or
+one that ships with the package, as in model:minicubes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ...refimpl.errors import InputError
+from ...refimpl.reading import parse_json, read_file
+from ..common import options
+from ..common.effort import said_of_compiling
+from ..common.inputs import MODEL_PREFIX, load_model, load_scene
+from ..common.options import Sampler, Target
+from ..common.terminal import say
+from ..files.outputs import check_parent, unwritable
+from .choose import Request, check_request, choose
+
+if TYPE_CHECKING:
+    from ...compiler.artifact import Artifact, Files
+    from ...compiler.scenes.path_kernel import PathArtifact
+    from ...refimpl.light.scene import Scene
+    from ...refimpl.network.denoise import Model
+
+EXAMPLES = """Examples:
+
+wamnet compile model.safetensors --target glsl -o kernel-glsl
+
+wamnet compile model:minicubes --target opencl -o kernel-minicubes
+
+wamnet compile model.safetensors --target opencl --profile native -o kernel-opencl
+
+wamnet compile model.safetensors --target opencl --variant window8+rank16 -o kernel-small
+
+wamnet compile model.safetensors --target opencl --max-loss-db 0.1 --frames cubes -o kernel-fast
+
+wamnet compile model.safetensors --target c --profile exact -o kernel-c
+
+wamnet compile minicubes --time 2.5 --target glsl -o scene-glsl
+
+wamnet compile mine.json --target opencl --lanes 16 -o scene-opencl"""
+"""Shown below the help of `wamnet compile`."""
+
+HERE_SIZE, HERE_PICTURES = (1024, 1024), 1000
+"""What a kernel for this machine is chosen for: the paper's pictures (height, width), and many of them."""
+
+EXECUTOR_OF = {Target.opencl: "opencl", Target.glsl: "opengl", Target.c: "c"}
+"""The compiler names a target by the executor that runs it; people know the language."""
+
+
+def compile_model(
+    model: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODEL",
+            help="Trained model (.safetensors), model:NAME, canonical scene or scene file (.json).",
+            show_default=False,
+        ),
+    ],
+    target: Annotated[Target, typer.Option(help="Language of the kernel.", show_default=False)],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FOLDER", help="Folder for the files.", show_default="TARGET"),
+    ] = None,
+    profile: options.Profile = "ieee",
+    time: options.Time = None,
+    parameters: options.Parameters = None,
+    max_depth: Annotated[
+        int | None, typer.Option(help="Greatest number of bounces of a scene's paths.", show_default="5")
+    ] = None,
+    sampler: Annotated[
+        Sampler | None, typer.Option(help="Random numbers of a scene's paths.", show_default="pcg4d")
+    ] = None,
+    lanes: Annotated[
+        int | None,
+        typer.Option(help="Paths that a work item follows: 16 suit CPUs, 1 GPUs.", show_default="1"),
+    ] = None,
+    schedule: options.Schedule = None,
+    here: options.Here = False,
+    variant: options.Variant = None,
+    max_error: options.MaxError = None,
+    max_ms: options.MaxMs = None,
+    max_loss_db: options.MaxLoss = None,
+    curve: options.CurveFile = None,
+    frames: options.CurveFrames = None,
+    size: options.CurveSize = None,
+) -> None:
+    """Compile a model, or a scene, to a kernel: source, weights, and a manifest with its interface.
+
+    The source is meant to be read and pasted into another program: a model's denoises, with a bound on its
+    error; a scene's traces paths. No device is needed, except for --here, or to choose a variant by limits.
+    The fastest one that keeps them is taken, from a curve that is measured once for each device.
+    """
+    folder, name = output or Path(target.value), EXECUTOR_OF[target]
+    request = Request(max_error, max_ms, max_loss_db, curve, frames, size)
+    kernel: Files
+    if is_scene(model):
+        of_models = {"--schedule": schedule, "--variant": variant, "--here": here or None}
+        rule = f"{model} is a scene, whose kernels have one schedule, no variants"
+        _only_for("a model", of_models | request.options(), rule)
+        check_folder(folder, name, of_scene=True)
+        scene = load_scene(model, time, parameters or [])
+        kernel = _compiled_scene(scene, name, profile, max_depth, sampler, lanes)
+    else:
+        of_scenes: dict[str, object] = {"--time": time, "--set": parameters, "--lanes": lanes}
+        of_scenes |= {"--max-depth": max_depth, "--sampler": sampler and sampler.value}
+        _check_name(model, of_scenes)
+        check_folder(folder, name)
+        kernel = _compiled_model(Path(model), name, profile, schedule, variant, request, here)
+    _write(kernel, folder)
+
+
+def _write(kernel: Files, folder: Path) -> None:
+    """Write a kernel, and say its files, and why its schedule is another one."""
+    for path in write_kernel(kernel, folder):
+        say(str(path))
+    picked = kernel.manifest.get("schedule", {})
+    if "reason" in picked:
+        say(f"schedule {picked['name']}, not {picked['asked']}: {picked['reason']}")
+
+
+def _chosen_here(model: Model, executor: str, profile: str, schedule: str | None, variant: str) -> str:
+    """Return the schedule of a variant for this machine's device, and say why."""
+    from ...compiler.variants import plan_model
+    from ...kernels import open_executor
+    from ...kernels.run import tune
+
+    if schedule is not None:
+        raise InputError("--schedule", schedule, "--here chooses another", "leave one of them out")
+    plan = plan_model(model, executor, profile, variant=variant)
+    with open_executor(executor) as runner:
+        found = tune.choose(runner, plan, HERE_SIZE, HERE_PICTURES)
+        say(f"schedule {found.schedule} for {runner.device}: {found.reason}")
+    return found.schedule
+
+
+def _compiled_model(
+    path: Path,
+    target: str,
+    profile: str,
+    schedule: str | None,
+    variant: str | None,
+    request: Request,
+    here: bool,
+) -> Artifact:
+    """Return the kernel of a model: of a variant that is named, or that keeps limits, or of all of it."""
+    from ...compiler.compile import compile_plan
+    from ...compiler.schedules.schedules import PLAIN
+    from ...compiler.variants import FULL, plan_model
+
+    check_request(request, variant)
+    model = load_model(path)
+    if request.limited:
+        if here:
+            rule = "limits choose the schedule too"
+            raise InputError("--here", "given", rule, "leave it out")
+        variant, schedule = choose(model, request, target, profile, schedule)
+    elif here:
+        schedule = _chosen_here(model, target, profile, schedule, variant or FULL)
+    return compile_plan(plan_model(model, target, profile, schedule or PLAIN, variant or FULL))
+
+
+def _only_for(what: str, given: Mapping[str, Any], rule: str) -> None:
+    """Refuse options that are given though what is compiled is something else."""
+    for option, value in given.items():
+        if value is not None:
+            raise InputError(option, value, rule, f"leave it out, or name {what}")
+
+
+def is_scene(name: str) -> bool:
+    """Tell whether a name is that of a scene."""
+    from ...refimpl.light.scenes import CANONICAL
+
+    return name in CANONICAL or Path(name).suffix.lower() == ".json"
+
+
+def _check_name(name: str, of_scenes: Mapping[str, Any]) -> None:
+    """Refuse options of scenes, and what looks like a scene's name but is not one: a model's file exists."""
+    _only_for("a scene", of_scenes, f"{name} is no scene: neither a canonical one nor a .json file")
+    comes_along = name.startswith(MODEL_PREFIX)
+    if not comes_along and not Path(name).suffix and not Path(name).exists():
+        rule = "neither a canonical scene nor a file"
+        way_out = f"scenes are {options.SCENES}; shipped models: {MODEL_PREFIX}NAME, {options.MODELS}"
+        raise InputError("model or scene", name, rule, way_out)
+
+
+def _compiled_scene(
+    scene: Scene,
+    target: str,
+    profile: str,
+    max_depth: int | None,
+    sampler: Sampler | None,
+    lanes: int | None,
+) -> PathArtifact:
+    """Return the kernel that follows a scene's paths; of a large scene it is said first how long it takes."""
+    from ...compiler.scenes.lower_scene import lower_scene
+    from ...compiler.scenes.path_kernel import compile_path, most_unrolled
+    from ...refimpl.light.transport import Settings
+
+    for line in said_of_compiling(scene):
+        say(line)
+    settings = Settings() if max_depth is None else Settings(max_depth=max_depth)
+    if sampler is not None:
+        settings = replace(settings, sampler=sampler.value)
+    programs = lower_scene(scene, settings, most_unrolled(target))
+    return compile_path(programs, target, profile, 1 if lanes is None else lanes)
+
+
+def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:
+    """Refuse a folder where a kernel cannot be, or that holds files of another program, kind or target."""
+    from ...compiler import artifact
+    from ...compiler.scenes import path_kernel
+
+    if folder.exists() and not folder.is_dir():
+        raise InputError("output folder", str(folder), "it is a file", "choose another name with -o")
+    check_parent(folder)
+    path = folder / artifact.MANIFEST_NAME
+    data: Any = None
+    if not path.exists():
+        return
+    with suppress(InputError):
+        data = parse_json(read_file(path), "manifest", "choose another folder")
+    kinds = {artifact.SCHEMA: "a model's kernel", path_kernel.SCHEMA: "a scene's kernel"}
+    data = data if isinstance(data, dict) else {}
+    schema = data.get("schema")
+    if schema not in kinds:
+        rule = f"its {artifact.MANIFEST_NAME} is not one that wamnet wrote"
+        raise InputError("output folder", str(folder), rule, "choose another with -o")
+    wanted = path_kernel.SCHEMA if of_scene else artifact.SCHEMA
+    if schema != wanted:
+        rule = f"it holds {kinds[schema]}, and this is {kinds[wanted]}"
+        raise InputError("output folder", str(folder), rule, "choose another with -o")
+    if data.get("target") != target:
+        rule = f"it holds a kernel for {data.get('target')}, and this one is for {target}"
+        raise InputError("output folder", str(folder), rule, "choose another with -o")
+
+
+def write_kernel(kernel: Files, folder: Path) -> tuple[Path, ...]:
+    """Write a kernel's files; what the system refuses is reported with the folder's name."""
+    from ...compiler import artifact
+
+    try:
+        return artifact.write(kernel, folder)
+    except OSError as error:
+        raise unwritable(folder, error, "output folder") from None

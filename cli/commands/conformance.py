@@ -1,0 +1,251 @@
+"""`wamnet conformance`: hold any program, or the project's own executors, to the vectors of the spec."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ...refimpl.errors import InputError
+from ..common import options
+from ..common.terminal import progress, say, table
+from ..files.outputs import check_output, write_text
+
+if TYPE_CHECKING:
+    from ...kernels.conformance.case import Case
+    from ...kernels.conformance.run import Verdict
+
+EXAMPLES = """Examples:
+
+wamnet conformance --executor numpy -k random -k camera
+
+wamnet conformance --program "./mine --fast" --junit report.xml
+
+wamnet conformance --program ./mine --track mine.json"""
+"""Shown below the help of `wamnet conformance`."""
+
+STATUS_FAILED = 1
+"""Exit status when a case fails."""
+
+SHOWN_FAILURES = 10
+"""Failures that are printed in full; the reports hold all."""
+
+REFERENCE = "reference"
+"""Name that stands for the reference among the executors."""
+
+
+Program = Annotated[
+    str | None,
+    typer.Option("--program", metavar="CMD", help="Command of the program under test.", show_default=False),
+]
+Executor = Annotated[
+    str | None,
+    typer.Option(
+        "--executor",
+        metavar="NAME",
+        help="In its place an executor of this project (numpy, opencl, opengl, c), or [bold]reference[/].",
+        show_default=False,
+    ),
+]
+Words = Annotated[
+    list[str] | None,
+    typer.Option(
+        "-k",
+        metavar="WORD",
+        help="Only cases whose id holds this word, or whose clause or flag it is; repeat for more.",
+        show_default=False,
+    ),
+]
+Vectors = Annotated[
+    Path | None,
+    typer.Option("--vectors", metavar="DIR", help="Folder of vectors.", show_default="those of this wamnet"),
+]
+Track = Annotated[
+    Path | None,
+    typer.Option(
+        "--track",
+        metavar="FILE",
+        help="Keep the verdicts here, show what has changed, and fail only where it is worse.",
+        show_default=False,
+    ),
+]
+Timeout = Annotated[float, typer.Option("--timeout", help="Longest time for an answer, in seconds.")]
+Json = Annotated[
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write a report as JSON.", show_default=False),
+]
+Junit = Annotated[
+    Path | None,
+    typer.Option("--junit", metavar="FILE", help="Write a report as JUnit.", show_default=False),
+]
+Write = Annotated[
+    Path | None,
+    typer.Option(
+        "--write",
+        metavar="DIR",
+        help="Make the vectors again with the reference, and end.",
+        show_default=False,
+    ),
+]
+
+
+def conformance(
+    program: Program = None,
+    executor: Executor = None,
+    profile: options.Profile = "ieee",
+    words: Words = None,
+    vectors: Vectors = None,
+    track: Track = None,
+    timeout: Timeout = 60.0,
+    as_json: Json = None,
+    junit: Junit = None,
+    write: Write = None,
+) -> None:
+    """Ask a program the questions of the spec's vectors, and hold its answers to their bounds.
+
+    The program reads one JSON request a line and writes one answer a line: spec/conformance.md says how, and
+    has a program of forty lines. Ends with status 1 if a case fails.
+    """
+    from ...compiler.core.profiles import profile_named
+    from ...kernels.conformance import report, run
+    from ...kernels.conformance import vectors as all_vectors
+
+    if write is not None:
+        _refuse_others(write, program, executor)
+        say(f"wrote {all_vectors.write(write)} files to {write}")
+        return
+    profile_named(profile)
+    command = _command(program, executor)
+    _check_options(timeout, [path for path in (track, as_json, junit) if path is not None])
+    cases = run.chosen(run.read_vectors(vectors or all_vectors.FOLDER), words or ())
+    _check_words(cases, words or ())
+    before = None if track is None else report.read_track(track)
+    verdicts = _asked(command, cases, profile, timeout)
+    name = program or f"executor {executor}"
+    again = _again(program, executor, profile, vectors, timeout)
+    if as_json is not None:
+        write_text(as_json, report.to_json(name, profile, verdicts, again))
+    if junit is not None:
+        write_text(junit, report.to_junit(name, verdicts, again))
+    _print_counts(name, profile, verdicts)
+    failed = [verdict for verdict in verdicts if verdict.failed]
+    if track is not None and before is not None:
+        changed = report.changes(before, verdicts)
+        failed = [change.verdict for change in changed if change.worse]
+        for change in changed:
+            say(str(change))
+        say(f"{len(changed)} verdicts changed since {track} was written, {len(failed)} for the worse")
+    _print_failures(failed, cases, again)
+    if track is not None and (before is None or not failed):
+        write_text(track, report.track_text(before, verdicts))
+    if failed:
+        raise typer.Exit(STATUS_FAILED)
+
+
+def _refuse_others(write: Path, program: str | None, executor: str | None) -> None:
+    """Refuse to write vectors and to ask a program in one command."""
+    if program is not None or executor is not None:
+        rule = "it makes vectors and asks nobody"
+        raise InputError("--write", str(write), rule, "leave --program and --executor out")
+
+
+def _command(program: str | None, executor: str | None) -> list[str]:
+    """Return the command of the program under test."""
+    if (program is None) == (executor is None):
+        value = "neither given" if program is None else "both given"
+        way_out = "for example --executor numpy"
+        raise InputError("--program, --executor", value, "exactly one says who is asked", way_out)
+    if program is not None:
+        try:
+            command = shlex.split(program)
+        except ValueError as error:
+            raise InputError(
+                "--program", program, f"it is no command ({error})", "close quotation marks"
+            ) from None
+        if not command:
+            raise InputError("--program", repr(program), "it is no command", "name a program")
+        return command
+    from ...kernels.devices.registry import EXECUTORS
+    from ...kernels.export.runners import RUNNERS
+
+    if executor not in (REFERENCE, *EXECUTORS, *RUNNERS):
+        known = ", ".join(dict.fromkeys((REFERENCE, *EXECUTORS, *RUNNERS)))
+        raise InputError("--executor", executor, "it is unknown", f"known are {known}")
+    return [sys.executable, "-m", "wamnet.kernels.conformance.program", "--executor", str(executor)]
+
+
+def _check_options(timeout: float, outputs: Sequence[Path]) -> None:
+    """Refuse what could not be done at the end."""
+    if not 0.0 < timeout < math.inf:
+        raise InputError("--timeout", timeout, "it must be a positive number of seconds", "60 is usual")
+    for path in outputs:
+        check_output(path)
+
+
+def _check_words(cases: Mapping[str, Sequence[Case]], words: Sequence[str]) -> None:
+    """Refuse words that choose nothing."""
+    if not cases:
+        rule = "no case has such an id, clause or flag"
+        raise InputError("-k", " ".join(words), rule, "for example -k random, -k RNG-3 or -k random.block/0")
+
+
+def _asked(
+    command: Sequence[str], cases: Mapping[str, Sequence[Case]], profile: str, timeout: float
+) -> list[Verdict]:
+    """Ask all cases and return the verdicts."""
+    from ...kernels.conformance import run
+    from ...kernels.conformance.protocol import Session
+
+    total = sum(map(len, cases.values()))
+    with Session(command, timeout) as session, progress("asking", total) as advance:
+        return list(run.run(session, cases, profile, advance))
+
+
+def _again(
+    program: str | None, executor: str | None, profile: str, vectors: Path | None, timeout: float
+) -> str:
+    """Return the command that asks again; a case's id is to be added."""
+    who = ["--program", program] if program is not None else ["--executor", str(executor)]
+    more = ["--profile", profile] if profile != "ieee" else []
+    more += ["--vectors", str(vectors)] if vectors is not None else []
+    more += ["--timeout", f"{timeout:g}"] if timeout != 60.0 else []
+    return shlex.join(["wamnet", "conformance", *who, *more, "-k"])
+
+
+def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:
+    """Print a table with a line a kind."""
+    from ...kernels.conformance.report import counts
+    from ...kernels.conformance.run import PASS, UNSUPPORTED
+
+    rows = []
+    for known in counts(verdicts):
+        passed, unsupported = known.found.get(PASS, 0), known.found.get(UNSUPPORTED, 0)
+        others = {word: n for word, n in known.found.items() if word not in (PASS, UNSUPPORTED)}
+        text = ", ".join(f"{n} {word}" for word, n in others.items()) or "0"
+        rows.append((known.kind, str(known.cases), str(passed), text, str(unsupported), f"{known.ratio:.2f}"))
+    header = ("kind", "cases", "pass", "failed", "unsupported", "error / bound")
+    table(f"Conformance of {name}, profile {profile}", header, rows)
+    failed = sum(verdict.failed for verdict in verdicts)
+    passed = sum(verdict.verdict == PASS for verdict in verdicts)
+    rest = len(verdicts) - passed - failed
+    say(f"{passed} of {len(verdicts)} cases passed, {failed} failed, {rest} unsupported")
+
+
+def _print_failures(failed: Sequence[Verdict], cases: Mapping[str, Sequence[Case]], again: str) -> None:
+    """Print the first failures in full."""
+    from ...kernels.conformance.report import about, first_blamed
+
+    first = first_blamed(failed)
+    if first is not None and len(failed) > 1:
+        say(f"look first at {first.clause}: {first.id} fails, and what others are made of comes before them")
+    by_id = {case.id: case for some in cases.values() for case in some}
+    for verdict in failed[:SHOWN_FAILURES]:
+        for line in about(verdict, by_id[verdict.id], f"{again} {verdict.id}"):
+            say(line)
+    if len(failed) > SHOWN_FAILURES:
+        say(f"... and {len(failed) - SHOWN_FAILURES} more; --json or --junit report all")

@@ -1,0 +1,249 @@
+"""`wamnet dataset`: pairs of noisy pictures and targets over an animation, on as many processes as there are.
+
+1. The request says what the data set consists of [`kernels/run/frame_plan.py`]; the folder says what of it is
+   there [`cli/files/dataset_files.py`].
+2. Before anything is rendered, what the frames show is compared; test frames that are not unseen are refused
+   [`compared`].
+3. What is missing or damaged is made by this process, or on a cluster [`make`]; the bytes of every file are
+   the same.
+4. `--check` compares every file with its checksum and changes nothing [`check`].
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ...refimpl.errors import InputError
+from ..common import cluster, options
+from ..common.effort import said_of_rendering
+from ..common.options import Renderer, Sampler
+from ..common.terminal import hint_on_interrupt, progress, say
+from ..files import dataset_files
+
+if TYPE_CHECKING:
+    from ...kernels.run.frame_plan import FramePlan, Request
+
+EXAMPLES = """Examples:
+
+wamnet dataset minicubes -o cubes
+
+wamnet dataset minicubes --frames 64 --size 256 --feature-spp 16 --executor opencl -o cubes
+
+wamnet dataset minicubes --frames 64 --yaw -45:45 --pitch -15:20 --saturation 0:0.7 --outside 4 -o moving
+
+wamnet dataset minicubes --frames 1000 --test 100 --size 1024 --spp 1024 -o large
+
+wamnet dataset minicubes --frames 1000 --scheduler tcp://10.0.0.1:8786 -o large
+
+wamnet dataset --check -o cubes"""
+"""Shown below the help of `wamnet dataset`."""
+
+LIMITS = "LOW:HIGH"
+"""How a range is written."""
+
+LEAST_SAMPLES = 1 << 20
+"""Samples below which one process is sooner done than a cluster has started (about five seconds)."""
+
+SceneOrNone = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="SCENE",
+        help=f"Canonical scene ({options.SCENES}); --check needs none.",
+        show_default=False,
+    ),
+]
+
+
+Outside = Annotated[
+    int, typer.Option(help="Test frames in the arc, 10 degrees beyond --yaw, beyond --saturation.")
+]
+TestSpp = Annotated[int, typer.Option(help="Paths per pixel of a test target.", show_default="as --spp")]
+Arc = Annotated[float, typer.Option(help="Seconds at the animation's end that training leaves out.")]
+Yaw = Annotated[str, typer.Option(metavar=LIMITS, help="Camera about the vertical, degrees.")]
+Pitch = Annotated[str, typer.Option(metavar=LIMITS, help="Camera up and down, degrees.")]
+Distance = Annotated[str, typer.Option(metavar=LIMITS, help="Camera's distance, as a factor.")]
+Saturation = Annotated[
+    str | None,
+    typer.Option(
+        metavar=LIMITS,
+        help="Lamps of any hue and such a saturation, as bright as their own.",
+        show_default="the lamps' own colours",
+    ),
+]
+Workers = Annotated[
+    int | None, typer.Option(help="Processes that share the work.", show_default="one per core")
+]
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Running Dask scheduler whose workers share the work.")
+]
+
+
+def dataset(
+    scene: SceneOrNone = None,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the data set.")
+    ] = Path("dataset"),
+    frames: Annotated[int, typer.Option(help="Frames to train on.")] = 8,
+    test: Annotated[int, typer.Option(help="Test frames inside of the ranges, at other draws.")] = 2,
+    outside: Outside = 0,
+    size: Annotated[int, typer.Option(help="Width and height in pixels.")] = 64,
+    spp: Annotated[int, typer.Option(help="Paths per pixel of a target; a noisy picture has 1.")] = 64,
+    test_spp: TestSpp = 0,
+    feature_spp: options.FeatureSpp = 0,
+    start: Annotated[float, typer.Option(help="Begin of the animation, in seconds.")] = 0.0,
+    seconds: Annotated[float, typer.Option(help="Length of the animation; minicubes turn in 8 s.")] = 8.0,
+    arc: Arc = 0.0,
+    yaw: Yaw = "0:0",
+    pitch: Pitch = "0:0",
+    distance: Distance = "1:1",
+    saturation: Saturation = None,
+    seed: options.Seed = 0,
+    parameters: options.Parameters = None,
+    max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
+    executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    context: options.OpenGLContext = None,
+    sampler: options.SamplerName = Sampler.pcg4d,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    only_check: Annotated[
+        bool, typer.Option("--check", help="Compare the files with their checksums; change nothing.")
+    ] = False,
+) -> None:
+    """Render the frames of a data set: noisy pictures and their targets over an animation.
+
+    Each frame draws a time, and a camera and lamps from the ranges that are given. Test frames that show what
+    another frame shows are refused. The folder gets a manifest with draws, seeds and checksums. After any
+    interruption the same command resumes where it was; a file that is damaged or missing is made again. The
+    number of workers changes no byte.
+    """
+    from ...kernels.run.frame_plan import Request, plan
+
+    if only_check:
+        check(output, scene)
+        return
+    scene = scene or _missing_scene()
+    chosen = options.parse_parameters(parameters or [])
+    numbers = (start, seconds, frames, test, size, spp, seed, max_depth)
+    ways = (executor.value, sampler.value, feature_spp, test_spp, outside, arc)
+    limits = {"--yaw": yaw, "--pitch": pitch, "--distance": distance, "--saturation": saturation}
+    ranges = (text and options.parse_limits(option, text) for option, text in limits.items())
+    request = Request(scene, chosen, *numbers, *ways, *ranges)  # type: ignore[arg-type]
+    _check_workers(workers, scheduler)
+    with hint_on_interrupt(lambda: f"the same command resumes where it was, in {output}"):
+        make(output, request, plan(request), workers, scheduler)
+
+
+def _missing_scene() -> str:
+    """Refuse a command without a scene."""
+    rule = "a data set shows a scene"
+    raise InputError("argument SCENE", "missing", rule, f"name one: {options.SCENES}")
+
+
+def _check_workers(workers: int | None, scheduler: str | None) -> None:
+    """Refuse numbers of processes that mean nothing."""
+    if scheduler is not None and workers is not None:
+        rule = "a running scheduler has its own workers"
+        raise InputError("--workers", workers, rule, "leave out --workers or --scheduler")
+    if workers is not None and workers < 1:
+        raise InputError("workers", workers, "at least one process must work", "use 1 or more")
+
+
+def make(
+    folder: Path, request: Request, frames: Sequence[FramePlan], workers: int | None, scheduler: str | None
+) -> None:
+    """Make what is missing in the folder; on a cluster if there is more than one worker (None: per core)."""
+    from ...kernels import open_executor
+
+    nearest = compared(frames)
+    known = 0
+    if (folder / dataset_files.MANIFEST).exists():
+        known = dataset_files.bytes_of(dataset_files.read_manifest(folder))
+    elif scheduler is None:
+        # A device that is missing here is reported before a folder needs it.
+        open_executor(request.executor).close()
+    with (
+        progress("checking", known) as look,
+        dataset_files.Store.open(folder, request, frames, look, nearest) as store,
+    ):
+        made, again = len(store.missing), [name for name, what in store.missing.items() if what == "damaged"]
+        for name in again:
+            say(f"{folder / name}: damaged, is made again")
+        if made:
+            _render(store, workers, scheduler)
+    for name in store.changed:
+        say(f"{folder / name}: has other bytes than before; another NumPy or processor made it")
+    for line in summed_up(nearest):
+        say(line)
+    count = len(store.pictures)
+    say(f"{folder}: {count} pictures of {len(frames)} frames, {made} of them made now")
+
+
+def compared(frames: Sequence[FramePlan]) -> dict[str, dict[str, float]]:
+    """Return how far the nearest training frame is, by split of test frames; refuse frames that are alike."""
+    from ...kernels.run import frame_plan
+
+    tests = any(frame.split != frame_plan.TRAIN for frame in frames)
+    with progress("comparing what the frames show", len(frames) if tests else 0) as advance:
+        found = frame_plan.compared(frames, advance)
+    return {split: comparison.as_data() for split, comparison in found.items()}
+
+
+def summed_up(nearest: Mapping[str, Mapping[str, float]]) -> list[str]:
+    """Return a sentence for each split of test frames: how far training is, each number by itself."""
+    return [
+        f"{split} frames differ from the nearest training frame in {100 * d['differing']:.0f} % of the "
+        f"pixels at least; nearest time {d['time_s']:.3f} s, camera {d['camera_deg']:.2f} degrees, distance "
+        f"{100 * d['distance']:.2f} %, lamps {d['lamps']:.3f}"
+        for split, d in nearest.items()
+    ]
+
+
+def _render(store: dataset_files.Store, workers: int | None, scheduler: str | None) -> None:
+    """Do the tasks that are left in the store."""
+    from ...kernels.run.frame_plan import Task, carry_out
+    from ...kernels.run.render_frame import renderer
+    from ...refimpl.frame import Frame
+
+    tasks = store.tasks()
+    total = sum(task.samples for task in tasks)
+    if workers is None:
+        alone = total < LEAST_SAMPLES or renderer(store.request.executor).shares_work
+        workers = 1 if alone else len(os.sched_getaffinity(0))
+    if not tasks:
+        return
+    shown, pixels = next(iter(store.pictures.values())).scene, store.request.size_px**2
+    for line in said_of_rendering(shown, total, pixels, store.request.executor, workers):
+        say(line)
+    with progress("rendering", total) as advance:
+        if scheduler is None and workers == 1:
+            cluster.do_here(tasks, lambda task: carry_out(task, advance), store.put)
+            return
+
+        def keep(task: Task, band: Frame) -> None:
+            store.put(task, band)
+            advance(task.samples)
+
+        with cluster.open_client(workers, scheduler) as client:
+            cluster.do_on_cluster(client, tasks, carry_out, keep)
+
+
+def check(folder: Path, scene: str | None = None) -> None:
+    """Compare the files of a data set with its manifest: report each that is wrong, and refuse the data set.
+
+    A scene beside it is refused: the folder says what it shows.
+    """
+    if scene is not None:
+        rule = "--check looks at the folder, whatever it shows"
+        raise InputError("argument SCENE", scene, rule, "leave it out: wamnet dataset --check -o FOLDER")
+    manifest = dataset_files.read_manifest(folder)
+    with progress("checking", dataset_files.bytes_of(manifest)) as look:
+        wrong = dataset_files.verify(folder, manifest, look)
+    for name, what in wrong.items():
+        say(f"{folder / name}: {what}")
+    dataset_files.refuse_wrong(folder, wrong)
+    say(f"{folder}: {2 * len(manifest['frames'])} pictures are as {dataset_files.MANIFEST} says")

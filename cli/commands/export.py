@@ -1,0 +1,194 @@
+"""`wamnet export`: a model, and a scene's path tracer with it, for other programs and engines."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ...refimpl.errors import InputError
+from ..common import options
+from ..common.inputs import load_model, load_scene
+from ..common.options import Sampler
+from ..common.terminal import say
+from ..files.outputs import check_new_folder, making_folder
+from ..reports import webpage
+
+if TYPE_CHECKING:
+    from ...kernels.export.package import Export
+
+EXAMPLES = """Examples:
+
+wamnet export model.safetensors --target wgsl -o for-webgpu
+
+wamnet export model.safetensors --scene minicubes --target glsl-es -o for-webgl
+
+wamnet export model.safetensors --target c --weights inline --check -o header
+
+wamnet export model.safetensors --target cuda --schedule plain -o to-read
+
+wamnet export model.safetensors --target hlsl --variant window8+rank16 -o for-direct3d
+
+wamnet export model.safetensors --scene minicubes --target html -o page"""
+"""Shown below the help of `wamnet export`."""
+
+TARGETS = (
+    "opencl, glsl, glsl-compute, glsl-es, glsl-vulkan, wgsl, hlsl, metal, spirv, c, cuda, shadertoy, godot, "
+    "onnx, html"
+)
+"""Targets by name, for help texts: those of the registry in kernels, and the page."""
+
+HTML, PAGE_NAME = "html", "index.html"
+"""The target that is a web page, and its file."""
+
+DEPTH = 5
+"""Bounces of a path, if nobody asks for another number."""
+
+STATUS_WRONG = 1
+"""Exit status when an export was written, and what runs it here finds it off, or refuses it."""
+
+
+Place = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PLACE",
+        help="Where the weights are: inline, uniform, texture or buffer, as far as the target has it.",
+        show_default="the target's usual place",
+    ),
+]
+
+
+ScheduleName = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="How the denoiser's work is ordered: plain, the one that is made to be read, or a faster one.",
+        show_default="the fastest that the target has for this model",
+    ),
+]
+
+
+def export(
+    model: options.ModelFile,
+    target: Annotated[
+        str, typer.Option(metavar="NAME", help=f"Where it is going: {TARGETS}.", show_default=False)
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FOLDER", help="New folder for the files.", show_default="TARGET"
+        ),
+    ] = None,
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENE",
+            help="The path tracer too, of this scene: a canonical one or a file (.json).",
+            show_default="only the denoiser",
+        ),
+    ] = None,
+    time: options.Time = None,
+    parameters: options.Parameters = None,
+    max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = DEPTH,
+    sampler: options.SamplerName = Sampler.pcg4d,
+    profile: options.Profile = "ieee",
+    variant: options.Variant = None,
+    weights: Place = None,
+    schedule: ScheduleName = None,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="Compile and run it here, and compare with the reference's picture."),
+    ] = False,
+) -> None:
+    """Write a denoiser for another program: kernels, a manifest, a README, and a pair to check with.
+
+    Each target's files were compiled by its own tools, run, and checked against the bound in the manifest.
+    With a scene the path tracer and the encoding of its features are written too; with --target html, a web
+    page that does all of it.
+    """
+    folder = output or Path(target)
+    if target == HTML:
+        of_kernels = {"--weights": weights, "--variant": variant, "--check": check or None, "--time": time}
+        of_kernels["--schedule"] = schedule
+        _refuse(of_kernels, "a web page has its own", "leave it out")
+        _write(folder, {PAGE_NAME: webpage.page_of(model, scene, parameters or [], None).encode()})
+        return
+    check_new_folder(folder)
+    if scene is None:
+        turned = None if sampler is Sampler.pcg4d else sampler.value
+        depth = None if max_depth == DEPTH else max_depth
+        given = {"--time": time, "--set": parameters, "--sampler": turned, "--max-depth": depth}
+        _refuse(given, "there is no scene", "name one with --scene, or leave it out")
+    moment, paths = (time, parameters or []), (max_depth, sampler)
+    asked = (variant, weights, schedule)
+    made = _export(model, target, scene, moment, paths, profile, asked)
+    _write(folder, made.contents())
+    _tell(made)
+    if check:
+        _checked(made)
+
+
+def _refuse(given: dict[str, Any], rule: str, way_out: str) -> None:
+    """Refuse options that are given though they mean nothing."""
+    for option, value in given.items():
+        if value is not None:
+            raise InputError(option, value, rule, way_out)
+
+
+def _export(
+    model: Path,
+    target: str,
+    scene: str | None,
+    moment: tuple[float | None, list[str]],
+    paths: tuple[int, Sampler],
+    profile: str,
+    asked: tuple[str | None, str | None, str | None],
+) -> Export:
+    """Return the export that the options ask for: `asked` are variant, place of the weights and schedule."""
+    from ...compiler.variants import FULL
+    from ...kernels.export.package import Request
+    from ...kernels.export.package import export as exported
+    from ...refimpl.light.transport import Settings
+
+    settings = replace(Settings(max_depth=paths[0]), sampler=paths[1].value)
+    loaded = load_scene(scene, *moment) if scene else None
+    variant, weights, schedule = (text or "" for text in asked)
+    options_of = (weights, variant or FULL, settings, schedule)
+    return exported(Request(load_model(model), target, loaded, profile, *options_of))
+
+
+def _tell(made: Export) -> None:
+    """Say which schedule an export has, which limits it keeps, and what its bound rests on."""
+    from ...compiler.schedules.schedules import text
+
+    for picked in filter(None, (kernel.get("schedule") for kernel in made.manifest["kernels"])):
+        say(f"schedule {text(picked)}")
+    for limit in made.manifest["limits"]:
+        say(f"{limit['name']}: {limit['needs']} of {limit['most']}")
+    if made.manifest["assumes"]:
+        say(f"the bound assumes: {made.manifest['assumes']}")
+
+
+def _write(folder: Path, contents: Any) -> None:
+    """Write all files into a new folder, which appears as a whole."""
+    with making_folder(folder) as new:
+        for name, data in contents.items():
+            (new / name).parent.mkdir(parents=True, exist_ok=True)
+            (new / name).write_bytes(data)
+    for name in sorted(contents):
+        say(str(folder / name))
+
+
+def _checked(made: Export) -> None:
+    """Say what compiles and runs an export here, and how far off it is; end with status 1 if wrong."""
+    from ...kernels.export.check import HEAD
+    from ...kernels.export.check import check as checked
+
+    verdict = checked(made)
+    for name, value in zip(HEAD, verdict.cells(), strict=True):
+        say(f"{name}: {value}")
+    if not verdict.holds:
+        say(f"wrong: {verdict.wrong}")
+        raise typer.Exit(STATUS_WRONG)

@@ -1,0 +1,83 @@
+"""`wamnet listing`: a kernel, and above its lines those of the reference that they came from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..common import options
+from ..common.inputs import load_model, load_scene
+from ..common.options import Target
+from ..common.terminal import say
+from ..files.outputs import check_output, write_text
+from .compile import EXECUTOR_OF, is_scene
+
+if TYPE_CHECKING:
+    from ...compiler.core.listing import Line
+
+EXAMPLES = """Examples:
+
+wamnet listing model.safetensors --target glsl
+
+wamnet listing minicubes --target opencl --profile native -o minicubes.txt"""
+"""Shown below the help of `wamnet listing`."""
+
+
+def listing(
+    model: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODEL",
+            help="Trained model (.safetensors), canonical scene or scene file (.json).",
+            show_default=False,
+        ),
+    ],
+    target: Annotated[Target, typer.Option(help="Language of the kernel.", show_default=False)],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="Write it there.", show_default="the terminal"),
+    ] = None,
+    profile: options.Profile = "ieee",
+) -> None:
+    """Show a kernel, and above its lines those of the reference that they came from.
+
+    A denoiser has the plain schedule, a scene one path at a time. Nothing is written but with -o.
+    """
+    from ...compiler.core.listing import as_text
+
+    if output is not None:
+        check_output(output, inputs=[Path(model)])
+    name = EXECUTOR_OF[target]
+    text = as_text(_lines(model, name, profile), _reference)
+    if output is None:
+        for line in text.rstrip("\n").split("\n"):
+            say(line)
+    else:
+        write_text(output, text)
+        say(str(output))
+
+
+def _lines(model: str, target: str, profile: str) -> list[Line]:
+    """Return the lines of the kernel of a model or a scene, with their places."""
+    from ...compiler.compile import compile_program
+    from ...compiler.core.listing import lines_of
+    from ...compiler.core.lower import lower
+    from ...compiler.scenes.lower_scene import lower_scene
+    from ...compiler.scenes.path_kernel import compile_path, most_unrolled
+    from ...refimpl.light.transport import Settings
+
+    if is_scene(model):
+        scene = load_scene(model, None, [])
+        programs = lower_scene(scene, Settings(), most_unrolled(target), keep_places=True)
+        path_kernel = compile_path(programs, target, profile)
+        return lines_of(path_kernel.source, path_kernel.programs.parts())
+    kernel = compile_program(lower(load_model(Path(model)), keep_places=True), target, profile)
+    return lines_of(kernel.source, {"": kernel.program})
+
+
+def _reference(place: str) -> str:
+    """Return the text of a place, refimpl/network/siren.py:122."""
+    path, _, line = place.rpartition(":")
+    return (Path(__file__).parents[2] / path).read_text(encoding="utf-8").splitlines()[int(line) - 1]

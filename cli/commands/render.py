@@ -1,0 +1,139 @@
+"""`wamnet render` and `wamnet scene`: from a scene to a frame, and from a scene's name to its text."""
+
+from __future__ import annotations
+
+import time as clock
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ...refimpl.errors import InputError
+from ..common import options
+from ..common.effort import said_of_rendering
+from ..common.inputs import load_scene
+from ..common.options import FloatType, Renderer, Sampler
+from ..common.terminal import progress, say
+from ..files.outputs import check_output, write_text
+
+RENDER_EXAMPLES = """Examples:
+
+wamnet render minicubes
+
+wamnet render minicubes --feature-spp 16 -o noisy.exr
+
+wamnet render minicubes --time 2.5 --spp 64 --width 512 --height 512 -o reference.exr
+
+wamnet render minicubes --yaw 20 --light 1=1,0.3,0.3 --light 2=0.3,0.6,1
+
+wamnet render minicubes --spp 1024 --executor opencl -o reference.exr
+
+wamnet render furnace --set albedo=0.8 --max-depth 20 -o furnace.png"""
+"""Shown below the help of `wamnet render`."""
+
+SCENE_EXAMPLES = """Examples:
+
+wamnet scene minicubes
+
+wamnet scene minicubes --time 2.5 --set warm=1,0.5,0.2 -o mine.json
+
+wamnet render mine.json"""
+"""Shown below the help of `wamnet scene`."""
+
+
+def render(
+    scene: options.SceneName,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Frame with all layers (.exr), or a picture of its colour (.png).",
+            show_default="SCENE.exr",
+        ),
+    ] = None,
+    width: Annotated[int, typer.Option(help="Width in pixels.")] = 256,
+    height: Annotated[int, typer.Option(help="Height in pixels.")] = 256,
+    spp: Annotated[int, typer.Option(help="Paths per pixel: 1 is noisy, 1024 is smooth.")] = 1,
+    feature_spp: options.FeatureSpp = 0,
+    seed: options.Seed = 0,
+    time: options.Time = None,
+    parameters: options.Parameters = None,
+    yaw: options.Yaw = 0.0,
+    pitch: options.Pitch = 0.0,
+    distance: options.Distance = 1.0,
+    light: options.Lights = None,
+    max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
+    sampler: options.SamplerName = Sampler.pcg4d,
+    dtype: Annotated[FloatType, typer.Option(help="Arithmetic; files hold float32.")] = FloatType.float32,
+    executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    context: options.OpenGLContext = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes that share NumPy's work.", show_default="one per core")
+    ] = None,
+    exposure: options.Exposure = 0.0,
+) -> None:
+    """Path-trace a scene: colour, and albedo, normal, depth, position and ray direction with it.
+
+    The same scene, size, samples and seed give the same frame, whatever the number of workers; kernels
+    (OpenCL, OpenGL) give it up to rounding, much sooner.
+    """
+    from ...kernels.run.render_frame import render_frame, renderer
+    from ...refimpl.light.render import Job
+    from ...refimpl.light.transport import Settings
+
+    view = options.View(yaw, pitch, distance, tuple(light or ()))
+    loaded = load_scene(scene, time, parameters or [], view)
+    path = output or Path(f"{Path(scene).stem}.exr")
+    check_output(path, (".exr", ".png"), [Path(scene)])
+    settings = Settings(max_depth=max_depth, sampler=sampler.value)
+    job = Job(width, height, spp, seed, settings, dtype.value, feature_spp=feature_spp)
+    if workers is not None and renderer(executor.value).shares_work:
+        rule = f"{executor.value} shares the work by itself"
+        raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
+    for line in said_of_rendering(loaded, job.samples, width * height, executor.value, workers):
+        say(line)
+    started = clock.perf_counter()
+    with progress(f"rendering {scene}", job.samples) as advance:
+        frame = render_frame(executor.value, loaded, job, workers=workers, on_progress=advance).frame
+    seconds = clock.perf_counter() - started
+    write_picture(path, frame, exposure)
+    say(f"{path}: {width}x{height} pixels, {spp} spp, {seconds:.1f} s")
+
+
+def write_picture(path: Path, frame: Any, exposure: float) -> None:
+    """Write all layers of a frame as EXR, or its colour at an exposure as PNG, as the name says."""
+    from ...refimpl.encoding import to_display
+    from ..files import exr, images
+
+    if path.suffix.lower() == ".exr":
+        exr.write_frame(path, frame)
+    else:
+        images.write_png(path, to_display(frame["color"], exposure))
+
+
+def scene(
+    name: options.SceneName,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default="the terminal"),
+    ] = None,
+    time: options.Time = None,
+    parameters: options.Parameters = None,
+    yaw: options.Yaw = 0.0,
+    pitch: options.Pitch = 0.0,
+    distance: options.Distance = 1.0,
+    light: options.Lights = None,
+) -> None:
+    """Write a scene as JSON text, to be changed and rendered."""
+    from ...refimpl.light.scene import to_json
+
+    view = options.View(yaw, pitch, distance, tuple(light or ()))
+    text = to_json(load_scene(name, time, parameters or [], view))
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    check_output(output, (".json",), [Path(name)])
+    write_text(output, text)
+    say(str(output))

@@ -1,0 +1,384 @@
+"""`wamnet train`: from pairs of a noisy frame and its reference to a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ...refimpl.errors import InputError
+from ..common import options
+from ..common.inputs import CHECKPOINT_MARK, need_layers
+from ..common.options import Preset, TrainerName
+from ..common.terminal import hint_on_interrupt, progress, say
+from ..files.alone import alone_at
+from ..files.outputs import check_output
+
+if TYPE_CHECKING:
+    from ...refimpl.frame import Frame
+    from ...refimpl.network.denoise import Model
+    from ...refimpl.network.siren import Siren
+    from ...refimpl.network.train import Recipe, TrainState
+
+EXAMPLES = """Examples:
+
+wamnet train -i noisy.exr -t reference.exr -o model.safetensors
+
+wamnet train --dataset cubes --steps 20000 --executor opencl
+
+wamnet train -i n0.exr -t r0.exr -i n1.exr -t r1.exr --features color,normal --steps 4000
+
+wamnet train -i noisy.exr -t reference.exr --resume --steps 20000
+
+wamnet train --dataset cubes --from model.safetensors --variant window8+rank16 --steps 2000
+
+wamnet train --dataset cubes --from model.safetensors --rank 12 --executor opencl -o small.safetensors"""
+"""Shown below the help of `wamnet train`."""
+
+CHECKPOINT_INTERVAL_S = 30.0
+"""Seconds between two checkpoints: what a power cut may cost. Ctrl-C costs nothing."""
+
+
+Inputs = Annotated[
+    list[Path] | None,
+    typer.Option("-i", "--input", metavar="FILE", help="Noisy frame (.exr); repeat.", show_default=False),
+]
+Targets = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "-t", "--target", metavar="FILE", help="Its reference, in the same order.", show_default=False
+    ),
+]
+DataSet = Annotated[
+    Path | None,
+    typer.Option(metavar="FOLDER", help="Data set, in place of frames.", show_default=False),
+]
+Rank = Annotated[
+    int | None,
+    typer.Option(
+        help="Rank of the first layer: 16 takes a fifth of the operations; 0 for no restriction.",
+        show_default="the preset's",
+    ),
+]
+Begin = Annotated[
+    Path | None,
+    typer.Option(
+        "--from",
+        metavar="MODEL",
+        help="Begin with the weights of this model, cut to --rank or --variant, not with random ones.",
+        show_default=False,
+    ),
+]
+Cut = Annotated[
+    str | None,
+    typer.Option(
+        "--variant",
+        metavar="NAME",
+        help="Train on this variant of the model that --from names, as in window8+rank16.",
+        show_default=False,
+    ),
+]
+
+
+def train(
+    inputs: Inputs = None,
+    targets: Targets = None,
+    dataset: DataSet = None,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Model to write (.safetensors).")
+    ] = Path("model.safetensors"),
+    preset: Annotated[
+        Preset | None,
+        typer.Option(
+            help="Protocol: the project's best, the paper's own, or one of half the best's time.",
+            show_default="best",
+        ),
+    ] = None,
+    features: Annotated[
+        str | None,
+        typer.Option(
+            help="What the network sees, with commas: color, normal, albedo, depth, position, direction.",
+            show_default="the preset's",
+        ),
+    ] = None,
+    rank: Rank = None,
+    begin: Begin = None,
+    variant: Cut = None,
+    activation: options.ActivationName = None,
+    steps: Annotated[int | None, typer.Option(help="Training steps.", show_default="the preset's")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the first weights and of the draws.")] = None,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Resume from the checkpoint beside the model, with its own recipe."),
+    ] = False,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="Start again, and replace the checkpoint of an earlier run.")
+    ] = False,
+    executor: options.Trainer = TrainerName.numpy,
+) -> None:
+    """Train a network on noisy frames and their references, or on the training frames of a data set.
+
+    A checkpoint is kept beside the model. After Ctrl-C, --resume continues from there, to the same bits. With
+    more --steps it continues after the end; the learning rate, which falls over the length of the run, then
+    jumps, so the model differs from that of a run which had this length from the start.
+    """
+    from ...compiler.model_file import load_checkpoint
+
+    inputs, targets = inputs or [], targets or []
+    check_output(output, (".safetensors",), [*inputs, *targets])
+    check_output(checkpoint_path(output))
+    saved = checkpoint_path(output)
+    # Two runs would leave a model of one and a checkpoint of the other.
+    with alone_at(output, "training a model"), alone_at(saved, "training a model"):
+        check_begin(saved, preset, resume, restart)
+        state = load_checkpoint(saved) if resume else None
+        recipe = _wanted(preset, state, features, steps, seed, rank, activation)
+        network = _first_network(begin, state)
+        if variant is not None:
+            _check_alone(variant, {"--rank": rank, "--features": features, "--activation": activation})
+            recipe, network = _begin_varied(recipe, begin, variant)
+        pairs = read_training(dataset, inputs, targets, recipe.features)
+        state = _fit_to_the_end(recipe, pairs, output, state, network, executor.value)
+        say(f"{output}: {state.step} steps; checkpoint in {saved}")
+
+
+def _wanted(
+    preset: Preset | None,
+    state: TrainState | None,
+    features: str | None,
+    steps: int | None,
+    seed: int | None,
+    rank: int | None,
+    activation: str | None,
+) -> Recipe:
+    """Return the recipe that the options ask for, checked."""
+    from ...refimpl.network.train import check_recipe, with_activation
+
+    names = None if features is None else options.parse_names(features)
+    choices = {"features": names, "steps": steps, "seed": seed, "rank": rank}
+    recipe = choose_recipe((preset or Preset.best).value, state, choices)
+    if activation is not None:
+        recipe = with_activation(recipe, activation)
+    check_recipe(recipe)
+    return recipe
+
+
+def _first_network(begin: Path | None, state: TrainState | None) -> Siren | None:
+    """Return the network to begin with, if one is named."""
+    from ..common.inputs import load_model
+
+    if begin is None:
+        return None
+    if state is not None:
+        raise InputError("--from", str(begin), "a resumed run continues from its checkpoint", "leave it out")
+    return load_model(begin).siren
+
+
+def _check_alone(variant: str, options: dict[str, Any]) -> None:
+    """Refuse options beside the name of a variant that choose what it chooses."""
+    for option, value in options.items():
+        if value is not None:
+            raise InputError("--variant", variant, f"it chooses what {option} does", f"leave out {option}")
+
+
+def _begin_varied(recipe: Recipe, begin: Path | None, name: str) -> tuple[Recipe, Siren]:
+    """Return the recipe and the first network of a variant of the model that a run begins with."""
+    from ..common.inputs import load_model
+
+    if begin is None:
+        raise InputError("--variant", name, "it is cut from a trained model", "name one with --from")
+    return varied(recipe, load_model(begin), name)
+
+
+def varied(recipe: Recipe, model: Model, name: str) -> tuple[Recipe, Siren]:
+    """Return the recipe and the first network with which a variant of a model is trained."""
+    from ...compiler import variants
+    from ...compiler.core import sine
+    from ...refimpl.network.train import check_recipe
+
+    varied = variants.vary(variants.parse(name), model)
+    if varied.degree != sine.DEGREE:
+        rule = "the degree of a sine is chosen when a kernel is compiled, not trained"
+        raise InputError("--variant", name, rule, "leave it out of the name here")
+    network = varied.model.siren
+    found = replace(
+        recipe,
+        features=varied.model.features,
+        window=varied.model.window,
+        widths=network.widths[1:-1],
+        omega_0_first=network.omega_0_first,
+        omega_0_hidden=network.omega_0_hidden,
+        rank=varied.rank,
+        activation=network.activation,
+    )
+    check_recipe(found)
+    return found, network
+
+
+def _fit_to_the_end(
+    recipe: Recipe,
+    pairs: Sequence[tuple[Frame, Frame]],
+    output: Path,
+    begin: TrainState | None,
+    network: Siren | None,
+    executor: str,
+) -> TrainState:
+    """Train, and say how to resume after an interrupt, and that a longer run is another one."""
+    saved = checkpoint_path(output)
+
+    def hint() -> str:
+        return f"continue with --resume, from {saved}" if saved.exists() else "no step was done"
+
+    with hint_on_interrupt(hint):
+        state, _ = fit(recipe, pairs, output, begin, network, executor)
+    if begin is not None and recipe.steps != begin.recipe.steps:
+        before, now = begin.recipe.steps, recipe.steps
+        say(f"the run of {before} steps became one of {now}: another model than with {now} from the start")
+    return state
+
+
+def check_begin(saved: Path, preset: Preset | None, resume: bool, restart: bool) -> None:
+    """Refuse options that contradict each other, and to replace an earlier run's checkpoint unasked."""
+    if resume and restart:
+        rule = "a run resumes or starts again"
+        raise InputError("pair of options", "--resume, --restart", rule, "choose one of them")
+    if resume and preset is not None:
+        rule = "with --resume the checkpoint's own recipe counts"
+        raise InputError("--preset", preset.value, rule, "leave it out, or start again with --restart")
+    if saved.exists() and not (resume or restart):
+        rule = "it is there from an earlier run, which would be lost"
+        raise InputError(
+            "checkpoint",
+            str(saved),
+            rule,
+            "continue with --resume, replace it with --restart, or choose another -o",
+        )
+
+
+def choose_recipe(preset: str, state: TrainState | None, choices: dict[str, Any]) -> Recipe:
+    """Return the checkpoint's recipe, or the preset's, with the choices that were made (not None)."""
+    from ...refimpl.network.train import PRESETS
+
+    base = PRESETS[preset] if state is None else state.recipe
+    return replace(base, **{name: value for name, value in choices.items() if value is not None})
+
+
+def read_training(
+    dataset: Path | None, inputs: Sequence[Path], targets: Sequence[Path], features: Sequence[str]
+) -> list[tuple[Frame, Frame]]:
+    """Read the pairs to train on: a data set's, or those of the named frames; one of the two."""
+    from ..files import dataset_files
+
+    if dataset is None and not inputs and not targets:
+        rule = "training needs frames"
+        raise InputError("list of frames", "empty", rule, "give -i and -t, or --dataset")
+    if dataset is None:
+        return read_pairs(inputs, targets, features)
+    if inputs or targets:
+        rule = "the frames come from there"
+        raise InputError("--dataset", str(dataset), rule, "leave out --dataset, or -i and -t")
+    return dataset_files.read_pairs(dataset, tell=say)
+
+
+def read_pairs(
+    inputs: Sequence[Path], targets: Sequence[Path], features: Sequence[str]
+) -> list[tuple[Frame, Frame]]:
+    """Read the noisy frames, which must have the layers of the features, and their references."""
+    from ..files import exr
+
+    if len(inputs) != len(targets):
+        rule = f"each --input needs its --target, and there are {len(inputs)} inputs"
+        raise InputError("number of targets", len(targets), rule, "repeat -i and -t in the same order")
+    pairs = []
+    for noisy, target in zip(inputs, targets, strict=True):
+        pair = exr.read_frame(noisy, tell=say), exr.read_frame(target, tell=say)
+        way_out = "render or export it too, or choose other --features"
+        need_layers(noisy, pair[0], features, "the network is to see it", way_out)
+        need_layers(target, pair[1], ("color",), "it is what the network learns", "export it too")
+        pairs.append(pair)
+    return pairs
+
+
+def fit(
+    recipe: Recipe,
+    pairs: Sequence[tuple[Frame, Frame]],
+    output: Path,
+    state: TrainState | None = None,
+    network: Siren | None = None,
+    executor: str = "numpy",
+) -> tuple[TrainState, float]:
+    """Train with a progress bar and checkpoints beside `output`; write the model there. Seconds come too.
+
+    The run continues from `state`, or begins with the weights of `network`, or with random ones.
+    """
+    from ...compiler.model_file import save_checkpoint, save_model
+    from ...refimpl.network.train import model_of
+
+    saved, seen = checkpoint_path(output), state.step if state is not None else 0
+    started = kept = monotonic()
+    with progress("training", recipe.steps - seen) as advance:
+
+        def on_progress(now: TrainState, _loss: float) -> None:
+            nonlocal kept, seen
+            advance(now.step - seen)
+            seen = now.step
+            if monotonic() - kept > CHECKPOINT_INTERVAL_S:
+                save_checkpoint(saved, now)
+                kept = monotonic()
+
+        with _trainer(executor) as train:
+            state = train(
+                recipe,
+                pairs,
+                state=state,
+                network=network,
+                on_progress=on_progress,
+                on_checkpoint=lambda now: save_checkpoint(saved, now),
+            )
+    seconds = monotonic() - started
+    save_model(output, model_of(state, facts(pairs)))
+    return state, seconds
+
+
+@contextmanager
+def _trainer(executor: str) -> Iterator[Callable[..., TrainState]]:
+    """Give the reference's trainer, or that of a device, which is closed afterwards."""
+    if executor == "numpy":
+        from ...refimpl.network.train import train
+
+        yield train
+        return
+    from ... import kernels
+
+    with kernels.open_executor(executor) as device:
+        yield partial(kernels.train_on, device)
+
+
+def facts(pairs: Sequence[tuple[Frame, Frame]]) -> dict[str, str]:
+    """Return what the training frames say of themselves, each value once: facts for the model's reader.
+
+    Frames that say their ranges need not list what each of them has drawn.
+    """
+    from ...refimpl.light.variation import RANGES
+
+    names = dict.fromkeys(name for pair in pairs for name in pair[0].info)
+    values = {
+        name: dict.fromkeys(noisy.info[name] for noisy, _ in pairs if name in noisy.info) for name in names
+    }
+    drawn = RANGES in values
+    return {
+        f"trained_on_{name}": ", ".join(found)
+        for name, found in values.items()
+        if len(found) == 1 or not drawn
+    }
+
+
+def checkpoint_path(output: Path) -> Path:
+    """Return the file beside a model that keeps the state of its training: NAME.checkpoint.safetensors."""
+    return output.with_suffix(CHECKPOINT_MARK + output.suffix)

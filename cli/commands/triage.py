@@ -1,0 +1,449 @@
+"""`wamnet triage`: one frame on every executor, each held against its bound, and who is the odd one out.
+
+1. Run the model's kernels and judge them [kernels/judge/triage.py].
+2. If one deviates, make the failure small [kernels/judge/reduce.py], and keep it: model, part of the frame,
+   the odd kernels' files and a report, all or nothing [`keep`]. Its README has the command that repeats it.
+3. `--kernel` runs such a kernel's files, as they are or as somebody has changed them, instead of what the
+   compiler makes [`kept_kernel`].
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ...refimpl.errors import ExecutorUnavailable, InputError
+from ...refimpl.reading import SIZES, parse_json, read_file, refusing
+from ..common import options
+from ..common.inputs import load_model, model_path, need_layers
+from ..common.terminal import progress, say, table
+from ..files.outputs import check_new_folder, making_folder
+from ..reports import machine
+
+if TYPE_CHECKING:
+    from ...compiler.artifact import Artifact
+    from ...compiler.plan import Plan
+    from ...kernels.devices.executor import Images
+    from ...kernels.judge.apart import Runner
+    from ...kernels.judge.reduce import Box, Reduced
+    from ...kernels.judge.triage import Compile, Kernel, Verdict
+    from ...refimpl.frame import Frame
+    from ...refimpl.network.denoise import Model
+
+EXAMPLES = """Examples:
+
+wamnet triage model.safetensors noisy.exr
+
+wamnet triage model.safetensors noisy.exr --schedules all --profile exact
+
+wamnet triage model.safetensors noisy.exr --executor opencl --executor numpy -o odd"""
+"""Shown below the help of `wamnet triage`."""
+
+STATUS_DEVIATES = 1
+"""Exit status when a kernel is beyond its bound."""
+
+SCHEMA = "wamnet-triage-1"
+"""Name and version of the report's form; described in spec/triage.md."""
+
+REPORT, README, MODEL, FRAME = "report.json", "README.md", "model.safetensors", "frame.exr"
+"""Files of a reproducer."""
+
+Executors = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--executor",
+        metavar="NAME",
+        help="Only this executor; repeat for more. opengl means opengl-egl and opengl-osmesa.",
+        show_default="all that are here",
+    ),
+]
+Schedules = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME",
+        help="Schedules: [bold]picked[/] by each executor, [bold]all[/] that its target has, or one by name.",
+    ),
+]
+KeptKernel = Annotated[
+    Path | None,
+    typer.Option(
+        "--kernel",
+        metavar="FOLDER",
+        help="Run this kernel's files instead of what the compiler makes for its target and schedule.",
+        show_default=False,
+    ),
+]
+
+
+def triage(
+    model: options.ModelFile,
+    frame: Annotated[
+        Path,
+        typer.Argument(metavar="FRAME", help="Frame with the model's layers (.exr).", show_default=False),
+    ],
+    executor: Executors = None,
+    profile: options.Profile = "ieee",
+    schedules: Schedules = "picked",
+    kernel: KeptKernel = None,
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the reproducer, if one is needed."),
+    ] = Path("triage"),
+) -> None:
+    """Run a model on every executor, and name the one that is beyond its error bound.
+
+    Each kernel is held against the float64 reference and the bound that its schedule has at this frame. If
+    one deviates, the first stage that does is looked for, and the smallest part of the frame that shows it is
+    kept in FOLDER with the kernel's source. Exit status 1 says that a kernel deviates.
+    """
+    from ...compiler.core.profiles import profile_named
+    from ...kernels.run.denoise_on import images_of
+    from ..files import exr
+
+    check_new_folder(output)
+    profile_named(profile)
+    model = model_path(model)
+    network, noisy = load_model(model), exr.read_frame(frame, finite=False, tell=say)
+    need_layers(
+        frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
+    )
+    kept = kept_kernel(kernel, network, profile) if kernel else None
+    task = Task(network, noisy, images_of(network, noisy), profile, schedules, kept)
+    with ExitStack() as opened:
+        runners = open_runners(executor or [], opened)
+        verdicts = _judged(task, runners)
+        _print(f"{model} on {frame}, {noisy.width}x{noisy.height}, profile {profile}", verdicts)
+        found = _concluded(task, verdicts)
+    if found is None:
+        return
+    keep(output, task, verdicts, found, model)
+    say(f"{output}: kept what repeats it; {output / README} has the command")
+    raise typer.Exit(STATUS_DEVIATES)
+
+
+@dataclass(frozen=True)
+class Task:
+    """What to do: a model on a frame, whose encoded images are `images`, and how.
+
+    `kept`: the kernel that runs instead of what the compiler makes for its target and schedule.
+    """
+
+    model: Model
+    frame: Frame
+    images: Images
+    profile: str
+    schedules: str
+    kept: Kept | None
+
+    @property
+    def compiled(self) -> Compile:
+        """Return the compiler, which has the kept kernel for its own where there is one."""
+        from ...compiler.compile import compile_plan
+
+        return self.kept.compiled if self.kept else compile_plan
+
+
+def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Runner]:
+    """Open executors by name, each in a process of its own: all that are here, or those that are wanted."""
+    from ...kernels.devices.registry import EXECUTORS, WAYS
+    from ...kernels.judge.apart import Apart
+
+    for name in wanted:
+        if name not in {*WAYS, *EXECUTORS}:
+            rule = f"must be one of {', '.join(dict.fromkeys([*EXECUTORS, *WAYS]))}"
+            raise InputError("--executor", name, rule, "see wamnet executors")
+    runners: list[Runner] = []
+    for way, (name, _) in WAYS.items():
+        if wanted and not {way, name} & set(wanted):
+            continue
+        try:
+            runners.append(opened.enter_context(Apart(way)))
+        except ExecutorUnavailable as error:
+            if way in wanted:
+                raise
+            say(f"not here: {error}")
+    if not runners:
+        raise ExecutorUnavailable(f"none of {', '.join(wanted)} is here; see wamnet executors")
+    return runners
+
+
+def _judged(task: Task, runners: Sequence[Runner]) -> list[Verdict]:
+    """Run all kernels on the whole frame."""
+    from ...compiler.core.lower import lower
+    from ...kernels.judge.triage import Judge, kernels_of
+
+    program, size = lower(task.model), (task.frame.height, task.frame.width)
+    # The schedule that an executor would pick is not that of the kept kernel.
+    instead = {task.kept.kernel.target: task.kept.schedule} if task.kept else {}
+    kernels = kernels_of(runners, program, task.profile, size, task.schedules, task.compiled, instead)
+    if task.kept:
+        task.kept.check_ran(kernels)
+    judge, verdicts = Judge(task.images), []
+    with progress("kernels", len(kernels)) as advance:
+        for kernel in kernels:
+            verdicts.append(judge.verdict(kernel))
+            advance(1)
+    return verdicts
+
+
+def _concluded(task: Task, verdicts: Sequence[Verdict]) -> Reduced | None:
+    """Say who is the odd one out; return the failure made small, or None where there is none."""
+    from ...kernels.judge.reduce import reduced
+    from ...kernels.judge.triage import conclusion, odd_ones
+
+    text = conclusion(verdicts)
+    if not any(verdict.ran for verdict in verdicts):
+        raise InputError("--schedules", task.schedules, text, f"the first reason: {verdicts[0].state}")
+    say(text)
+    if not odd_ones(verdicts):
+        return None
+    found = reduced(verdicts, task.model, task.profile, task.images, task.compiled)
+    again = "" if found.repeats else ", because it did not show again"
+    say(f"smallest part that shows it: {found.box.text}{again}")
+    for stage in found.stages:
+        say(stage.text)
+    if task.kept:
+        say("stages are compiled again: the kept kernel's files have none")
+    return found
+
+
+def _print(title: str, verdicts: Sequence[Verdict]) -> None:
+    """Print a line for each kernel."""
+    heads = ("executor", "schedule", "device", "verdict", "worst number", "largest error", "error / bound")
+    rows = []
+    for v in verdicts:
+        numbers = (f"{v.error:.3g}", f"{v.ratio:.3g}" if v.promised else "-") if v.pixel else ("", "")
+        where = "row {}, column {}, channel {}".format(*v.pixel) if v.pixel else ""
+        runner = v.kernel.runner
+        rows.append((runner.way, v.kernel.schedule, runner.device, v.state, where, *numbers))
+    table(title, heads, rows, texts=5)
+
+
+# ---- the reproducer -----------------------------------------------------------------------------------
+
+
+def keep(folder: Path, task: Task, verdicts: Sequence[Verdict], found: Reduced, model_file: Path) -> None:
+    """Write model, part of the frame, the odd kernels and the report: all of it or nothing."""
+    from ...compiler import artifact
+    from ...kernels.judge.triage import odd_ones
+    from ..files import exr
+
+    odd = [verdict.kernel for verdict in odd_ones(found.verdicts)]
+    with making_folder(folder) as new:
+        (new / MODEL).write_bytes(model_file.read_bytes())
+        exr.write_frame(new / FRAME, part_of(task, found.box))
+        for kernel in odd:
+            assert kernel.artifact is not None
+            artifact.write(kernel.artifact, new / _folder_of(kernel))
+        report = _report(task, verdicts, found)
+        text = json.dumps(report, indent=2, sort_keys=True, allow_nan=False) + "\n"
+        (new / REPORT).write_text(text, encoding="utf-8")
+        (new / README).write_text(_readme(task, report, odd), encoding="utf-8")
+
+
+def part_of(task: Task, box: Box) -> Frame:
+    """Return the part of the frame with the layers that the model reads, in numbers that files may hold.
+
+    NaN is 0, and infinities the largest numbers: they are encoded alike.
+    """
+    import numpy as np
+
+    from ...refimpl.network.dataset import FEATURES
+
+    names = dict.fromkeys(FEATURES[name].layer for name in task.model.features)
+    largest = float(np.finfo(np.float32).max)
+    layers = {
+        name: np.nan_to_num(array, nan=0.0, posinf=largest, neginf=-largest)
+        for name, array in box.cut({name: task.frame[name] for name in names}).items()
+    }
+    return replace(task.frame, layers=layers)
+
+
+def _folder_of(kernel: Kernel) -> str:
+    """Return the name of a kernel's folder in a reproducer."""
+    return f"{kernel.runner.way}-{kernel.schedule}"
+
+
+def _report(task: Task, verdicts: Sequence[Verdict], found: Reduced) -> dict[str, Any]:
+    """Return what report.json holds; numbers that JSON does not know are words."""
+    from dataclasses import asdict
+
+    from ...compiler.core import ir
+    from ...compiler.core.lower import lower
+    from ...compiler.plan import analysed
+    from ...kernels.judge.triage import conclusion
+
+    return {
+        "schema": SCHEMA,
+        "conclusion": conclusion(verdicts),
+        "profile": task.profile,
+        "schedules": task.schedules,
+        "program": ir.digest(analysed(lower(task.model), task.profile)),
+        "frame": {"height": task.frame.height, "width": task.frame.width},
+        "verdicts": [_entry(verdict) for verdict in verdicts],
+        "part": {**asdict(found.box), "verdicts": [_entry(verdict) for verdict in found.verdicts]},
+        "stages": [
+            {
+                "executor": s.kernel.runner.way,
+                "schedule": s.kernel.schedule,
+                "stage": s.stage.text if s.stage else None,
+                "neurons_from": s.stage.first if s.stage else None,
+                "worst": _entry(s.verdict) if s.verdict else None,
+            }
+            for s in found.stages
+        ],
+        "machine": machine.describe(),
+        "versions": machine.versions(),
+    }
+
+
+def _entry(verdict: Verdict) -> dict[str, Any]:
+    """Return a verdict for JSON; a pixel is (row, column), its channel beside it."""
+    runner, pixel = verdict.kernel.runner, verdict.pixel
+    return {
+        "executor": runner.way,
+        "schedule": verdict.kernel.schedule,
+        "device": runner.device,
+        "kernel": verdict.kernel.artifact.digest if verdict.kernel.artifact else None,
+        "state": verdict.state,
+        "deviates": verdict.deviates,
+        "largest_error": _number(verdict.error),
+        "error_over_bound": _number(verdict.ratio),
+        "pixel": pixel and pixel[:2],
+        "channel": pixel and pixel[2],
+        "found": _number(verdict.found),
+        "expected": _number(verdict.expected),
+        "bound": _number(verdict.bound),
+        "other_bits": verdict.bits,
+    }
+
+
+def _number(value: float) -> float | str:
+    """Return a number for JSON, or its name: nan, inf, -inf."""
+    return value if math.isfinite(value) else str(value)
+
+
+def _readme(task: Task, report: dict[str, Any], odd: Sequence[Kernel]) -> str:
+    """Return the text that says what this is, and the commands that repeat it."""
+    lines = [
+        "# A kernel beyond its bound",
+        "",
+        f"{report['conclusion']}.",
+        "",
+        "In this folder:",
+        "",
+        "```sh",
+    ]
+    lines += [shlex.join(_command(task, kernel, kept=True)) for kernel in odd]
+    lines += [
+        "```",
+        "",
+        "With the kernel that the compiler makes now, in place of the kept one:",
+        "",
+        "```sh",
+    ]
+    lines += [shlex.join(_command(task, kernel, kept=False)) for kernel in odd]
+    lines += ["```", "", f"{REPORT} holds what was found, expected and promised, devices and versions.", ""]
+    return "\n".join(lines)
+
+
+def _command(task: Task, kernel: Kernel, kept: bool) -> list[str]:
+    """Return the command that runs one kernel on the kept frame."""
+    words = ["wamnet", "triage", MODEL, FRAME, "--executor", kernel.runner.way]
+    words += ["--profile", task.profile, "--schedules", kernel.schedule]
+    return [*words, "--kernel", _folder_of(kernel)] if kept else words
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A kernel whose files somebody kept: what they are a kernel of, and the artifact that has them in it."""
+
+    folder: Path
+    kernel: Artifact
+
+    @property
+    def schedule(self) -> str:
+        """Return the name of its schedule."""
+        return str(self.kernel.manifest["schedule"]["name"])
+
+    def compiled(self, plan: Plan) -> Artifact:
+        """Return the kept kernel where it is the plan's, else a new one."""
+        from ...compiler.compile import compile_plan
+
+        made = compile_plan(plan)
+        same = all(
+            made.manifest[key] == self.kernel.manifest[key] for key in ("program", "target", "schedule")
+        )
+        return self.kernel if same else made
+
+    def check_ran(self, kernels: Sequence[Kernel]) -> None:
+        """Refuse kernels among which the kept one is not: nobody may take their verdicts for its own."""
+        if not any(kernel.artifact is self.kernel for kernel in kernels):
+            rule = (
+                f"none of the kernels to run is of {self.kernel.target} in schedule {self.schedule}, as it is"
+            )
+            way_out = f"choose --executor {self.kernel.target}, and leave out --schedules"
+            raise InputError("--kernel", str(self.folder), rule, way_out)
+
+
+def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
+    """Return the kernel whose manifest and files are in a folder.
+
+    They may have been changed: neither their hashes nor their lengths are checked. The manifest says what
+    they are the kernel of.
+    """
+    from ...compiler import artifact
+    from ...compiler.compile import compile_program
+    from ...compiler.core import ir
+    from ...compiler.core.lower import lower
+    from ...compiler.plan import analysed
+
+    way_out = "give a folder that triage or compile wrote"
+    rule = f"it must hold a {artifact.MANIFEST_NAME} that wamnet wrote beside a model's kernel"
+    with refusing("--kernel", str(folder), rule, way_out):
+        path = folder / artifact.MANIFEST_NAME
+        manifest = parse_json(read_file(path, "--kernel", way_out), f"--kernel {path}", way_out)
+        wanted, name = manifest["program"], str(manifest["profile"]["name"])
+        target, schedule = str(manifest["target"]), str(manifest["schedule"]["name"])
+    program = lower(model)
+    if wanted != ir.digest(analysed(program, profile)) or name != profile:
+        rule = f"its kernel is of another model or profile ({name})"
+        raise InputError("--kernel", str(folder), rule, "give the model and --profile that it was made with")
+    made = compile_program(program, target, profile, schedule)
+    if made.manifest["schedule"] != manifest["schedule"]:
+        rule = f"the compiler makes no kernel of this model for {target} in schedule {schedule} any more"
+        raise InputError("--kernel", str(folder), rule, "compile the model again")
+    return Kept(folder, _with_files(made, folder))
+
+
+def _with_files(made: Artifact, folder: Path) -> Artifact:
+    """Return an artifact with the source and the weights in a folder instead of its own."""
+    import numpy as np
+
+    from ...compiler import artifact
+    from ...compiler.core import ir
+
+    content = read_file(folder / made.source_name, "--kernel")
+    raw = read_file(folder / artifact.WEIGHTS_NAME, "--kernel")
+    if len(raw) != 4 * made.weights.size:
+        rule = f"it must hold {made.weights.size} float32 weights, {4 * made.weights.size} bytes"
+        raise InputError(f"--kernel: length of {artifact.WEIGHTS_NAME}", len(raw), rule, "restore the file")
+    with refusing(f"--kernel: {made.source_name}", str(folder), "it must be UTF-8", "restore the file"):
+        source = content.decode("utf-8")
+    own = {made.source_name: ir.sha256(content), artifact.WEIGHTS_NAME: ir.sha256(raw)}
+    files = {**made.manifest["files"], **own}
+    sizes = {**made.manifest[SIZES], made.source_name: len(content), artifact.WEIGHTS_NAME: len(raw)}
+    return replace(
+        made,
+        source=source,
+        weights=np.frombuffer(raw, "<f4").astype(np.float32),
+        manifest={**made.manifest, "digest": ir.sha256(content, raw), "files": files, SIZES: sizes},
+    )

@@ -1,0 +1,138 @@
+"""`wamnet tune`: measure a denoiser's schedules on this machine, and remember the fastest."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ...refimpl.errors import InputError
+from ..common import options
+from ..common.inputs import load_model
+from ..common.options import ExecutorName
+from ..common.terminal import say, table
+from ..files.alone import alone_in
+
+if TYPE_CHECKING:
+    from ...kernels.run.tune import Table
+    from ...refimpl.network.denoise import Model
+
+EXAMPLES = """Examples:
+
+wamnet tune
+
+wamnet tune model.safetensors --executor opengl --size 512 --force"""
+"""Shown below the help of `wamnet tune`."""
+
+LARGEST_SIZE = 2**13
+"""Largest width and height that is measured: a picture of 64 million pixels takes gigabytes."""
+
+PAPER_WINDOW, PAPER_LAYERS, PAPER_OMEGA = 12, (32, 32, 32, 32, 3), 3.0
+"""The paper's network, where no model is given."""
+
+MANY = 1000
+"""Pictures of an animation, for which a long compilation may pay."""
+
+
+def tune(
+    model: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="MODEL", help="Trained model (.safetensors).", show_default="a network like the paper's"
+        ),
+    ] = None,
+    executor: options.Executor = ExecutorName.opencl,
+    size: Annotated[int, typer.Option(help="Width and height of the picture, in pixels.")] = 512,
+    rank: options.CutRank = 0,
+    context: options.OpenGLContext = None,
+    force: Annotated[bool, typer.Option("--force", help="Measure again what is known.")] = False,
+    cache: Annotated[
+        Path | None,
+        typer.Option(
+            "--cache",
+            metavar="DIR",
+            help="Folder for what is measured; other commands look there if WAMNET_CACHE names it.",
+            show_default="~/.cache/wamnet",
+        ),
+    ] = None,
+) -> None:
+    """Measure which schedule of the denoiser is fastest here, and remember it.
+
+    Every schedule that the device holds is checked against the reference, then timed. Other commands take the
+    fastest for networks of this shape and pictures of about this size.
+    """
+    from ...compiler.variants import FULL, plan_model, with_rank
+    from ...kernels import open_executor
+    from ...kernels.run import tune as tuning
+
+    if not 1 <= size <= LARGEST_SIZE:
+        raise InputError("--size", size, f"it must be from 1 to {LARGEST_SIZE}", "for example --size 512")
+    if cache is not None:
+        os.environ["WAMNET_CACHE"] = str(cache)
+    network = load_model(model) if model else paper()
+    square = (size, size)
+    with _alone(), open_executor(executor.value) as runner:
+        plan = plan_model(network, runner.name, variant=with_rank(FULL, rank))
+        known = None if force else tuning.remembered(runner, plan, square)
+        found = known or tuning.tune(runner, plan, square)
+        picks = {n: tuning.choose(runner, plan, square, n) for n in (1, MANY)}
+    show(found)
+    if known:
+        say(f"measured on {found.day}; --force measures again")
+    for count, pick in picks.items():
+        say(f"for {count} picture{'s' if count > 1 else ''}: {pick.schedule}; {pick.reason}")
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """Keep out another process that tunes on this machine: each would measure the other's load."""
+    from ...kernels.run import cache
+
+    folder = cache.folder()
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        writable = os.access(folder, os.W_OK | os.X_OK)
+    except OSError:
+        writable = False
+    # A cache that cannot be written costs time, never a run.
+    if not writable:
+        yield
+        return
+    with alone_in(folder, "tuning", "wait for it, or choose another with --cache"):
+        yield
+
+
+def paper() -> Model:
+    """Return a network of the paper's shape, untrained: times do not depend on weights."""
+    import numpy as np
+
+    from ...refimpl.network import siren
+    from ...refimpl.network.dataset import Normalization, Window
+    from ...refimpl.network.denoise import Model
+
+    widths = (PAPER_WINDOW**2 * 6, *PAPER_LAYERS)
+    network = siren.init(widths, PAPER_OMEGA, PAPER_OMEGA, 1, np.float32)
+    return Model(network, ("color", "normal"), Window(PAPER_WINDOW, "clamp"), Normalization(), {})
+
+
+def show(found: Table) -> None:
+    """Print what was measured, the fastest first."""
+    rows = sorted(found.rows, key=lambda row: float("inf") if row.ms is None else row.ms)
+    texts = [
+        (
+            row.schedule,
+            "" if row.ms is None else f"{row.ms:.3g}",
+            f"{row.first_s:.2f}" if row.first_s else "",
+            f"{row.again_s:.2f}" if row.again_s else "",
+            row.note,
+        )
+        for row in rows
+    ]
+    height, width = found.size
+    heads = ("schedule", "ms", "s to compile", "s again", "why it was not timed")
+    say(f"{found.device}, {width}x{height}, {found.network}")
+    table("Schedules", heads, texts, texts=len(heads))

@@ -1,0 +1,192 @@
+"""Independent tasks in this process, on processes of this machine, or on a running Dask scheduler.
+
+1. One process does the tasks in their order [`do_here`]; it yields results one by one.
+2. A cluster does them in any order [`do_on_cluster`]: workers of this machine, or those that a scheduler at
+   an address has [`open_client`]. A task whose worker is lost is done again by another; the scheduler does
+   that.
+3. Only a few more tasks than there are workers are under way at a time, so that neither the scheduler nor
+   this process keeps many results.
+"""
+
+from __future__ import annotations
+
+import logging
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import islice
+from multiprocessing import resource_tracker
+from typing import Any, TypeVar
+
+from ...compiler.core.writing import signals_wait
+from ...refimpl.errors import InputError
+from .packages import need
+
+_Task = TypeVar("_Task")
+_Result = TypeVar("_Result")
+
+PURPOSE = "to share the work (one process, --workers 1, needs it not)"
+"""What Dask is needed for, and the way to do without."""
+
+CONNECT_S = 10.0
+"""Seconds in which a scheduler must answer and have a worker: longer than a network's hiccup."""
+
+UNDER_WAY_PER_THREAD = 3
+"""Tasks under way for each of the workers' threads: one at work, one waiting, one whose result travels."""
+
+
+def do_here(
+    tasks: Sequence[_Task], do: Callable[[_Task], _Result], on_result: Callable[[_Task, _Result], None]
+) -> None:
+    """Do the tasks one after another."""
+    for task in tasks:
+        on_result(task, do(task))
+
+
+def do_on_cluster(
+    client: Any,
+    tasks: Sequence[_Task],
+    do: Callable[[_Task], _Result],
+    on_result: Callable[[_Task, _Result], None],
+) -> None:
+    """Do the tasks on a Dask client's workers; `do` must be importable there. Results come in any order."""
+    distributed = need("distributed", PURPOSE, "cluster")
+    cloudpickle = need("cloudpickle", PURPOSE, "cluster")
+
+    def call(parcel: bytes) -> _Result:
+        """Do a task on a worker: a nested function travels whole, and needs nothing there but Python.
+
+        A worker without this package then answers with an error. Were the task sent as it is, Dask would drop
+        the connection when it could not read it, and this process would wait for ever.
+        """
+        import pickle
+
+        function, argument = pickle.loads(parcel)
+        result: _Result = function(argument)
+        return result
+
+    waiting = iter(tasks)
+    under_way: dict[Any, _Task] = {}
+    finished = distributed.as_completed(loop=client.loop, with_results=True)
+    try:
+        while True:
+            threads = max(1, sum(client.nthreads().values()))
+            for task in islice(waiting, max(0, UNDER_WAY_PER_THREAD * threads - len(under_way))):
+                future = client.submit(call, cloudpickle.dumps((do, task)), pure=False)
+                under_way[future] = task
+                finished.add(future)
+            if not under_way:
+                return
+            future, result = next(finished)
+            on_result(under_way.pop(future), result)
+            del future, result  # lets the scheduler forget it
+    except ImportError as error:
+        rule = "a worker needs what this process has"
+        way_out = "install it there: pip install 'wamnet[cluster]'"
+        raise InputError(f"Python package {error.name!r} on a worker", "missing", rule, way_out) from None
+    except distributed.KilledWorker:
+        rule = "several workers have ended while they did the same task"
+        raise InputError("cluster", "short of memory, perhaps", rule, "use fewer workers") from None
+    except (distributed.comm.CommClosedError, distributed.CancelledError):
+        rule = "the connection to it was lost"
+        raise InputError("Dask scheduler", "gone", rule, "run the same command again to resume") from None
+
+
+@contextmanager
+def open_client(workers: int, scheduler: str | None) -> Iterator[Any]:
+    """Yield a Dask client: of the scheduler at an address, or of `workers` processes that end with it."""
+    distributed = need("distributed", PURPOSE, "cluster")
+    with _quiet_logs():
+        if scheduler is not None:
+            with _connected(distributed, scheduler) as client:
+                yield client
+            return
+        cluster = None
+        try:
+            # Dask leaves a cluster half made, or half closed, that complains when Python ends.
+            with signals_wait():
+                cluster = _local(distributed, workers)
+            with distributed.Client(cluster) as client:
+                yield client
+        finally:
+            if cluster is not None:
+                with signals_wait():
+                    _close(distributed, cluster)
+
+
+def _close(distributed: Any, cluster: Any) -> None:
+    """Close a cluster, whatever its workers do.
+
+    When all else is closed Dask asserts that each worker is, too. The successor of a lost worker may not be:
+    it was never started and has no process. At the end of Python Dask would wait for it once more.
+    """
+    try:
+        cluster.close()
+    except AssertionError:
+        cluster.status = distributed.Status.closed
+
+
+def _local(distributed: Any, workers: int) -> Any:
+    """Return a cluster of processes of this machine, or say that they did not start."""
+    try:
+        with _undisturbed():
+            return distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL,
+            )
+    except (RuntimeError, OSError, TimeoutError):
+        rule = "one of them ended, or did not answer, before it had begun"
+        way_out = "run the same command again to resume, perhaps with fewer --workers"
+        raise InputError("worker processes", workers, rule, way_out) from None
+
+
+@contextmanager
+def _connected(distributed: Any, scheduler: str) -> Iterator[Any]:
+    """Yield a client of a scheduler that has a worker, or say what is not there."""
+    try:
+        client = distributed.Client(scheduler, timeout=CONNECT_S)
+    except (OSError, ValueError, TimeoutError):
+        rule = "no Dask scheduler answers there"
+        raise InputError(
+            "--scheduler", scheduler, rule, "start one: dask scheduler; or leave it out"
+        ) from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=CONNECT_S)
+        except TimeoutError:
+            rule = "this scheduler has no worker"
+            raise InputError("--scheduler", scheduler, rule, f"start one: dask worker {scheduler}") from None
+        yield client
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Start processes that Ctrl-C in the terminal does not reach: this process ends them in order.
+
+    Threads and processes inherit the mask of signals, so that the cluster's thread, and every worker that it
+    starts, also in place of a lost one, has SIGINT blocked; one that comes meanwhile is delivered afterwards.
+    Python's tracker of shared resources unblocks SIGINT in the thread that starts it: it is started before.
+    """
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _quiet_logs() -> Iterator[None]:
+    """Silence Dask's log in this process: what matters arrives as an error."""
+    loggers = [logging.getLogger(name) for name in ("distributed", "tornado.application", "asyncio")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)

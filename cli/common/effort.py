@@ -1,0 +1,127 @@
+"""What large work will take, said before it starts: nothing is forbidden, but nobody should have to guess.
+
+1. Every path meets every primitive at each bounce, so rendering takes a time in proportion to samples times
+   primitives; the reference also starts some operations for each primitive and tile [`seconds_of`].
+2. Memory goes into the primitives' tables and the layers of the picture [`bytes_of`].
+3. From a stated size on a sentence says both [`said_of_rendering`], [`said_of_compiling`],
+   [`said_of_measuring`], [`said_of_learning`].
+
+The factors of time, and of memory for a primitive, were measured with minicubes and copies of its cubes, 27
+to 27,000 of them: processor time on one core for NumPy and compilation, time on two busy cores for
+OpenCL, with 30 primitives. The memory of a pixel is counted, not measured. A rule of thumb, no more.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ...refimpl.light.scene import Scene
+
+MANY_PRIMITIVES = 100_000
+"""From so many primitives on a sentence is said."""
+
+MANY_SAMPLES = 10**9
+"""From so many samples (of all pixels and pictures) on a sentence is said."""
+
+MANY_PIXELS = 10**8
+"""From so many pixels that are in memory at once on a sentence is said."""
+
+LONG_S = 1800.0
+"""From so many seconds of measurements on a sentence is said."""
+
+_PAIR_BYTES = 92
+"""Bytes of a pixel to learn from: 20 channels of a noisy frame and the colour of its target, in float32."""
+
+_PICTURE_BYTES = 160
+"""Bytes of a pixel that is denoised: features as rendered and as encoded, at most 40 numbers in float32."""
+
+_NUMPY_SAMPLE_S, _NUMPY_START_S = 2e-7, 1.5e-4
+"""Seconds of the reference on a core: for a sample and a primitive, for a tile of samples and a primitive."""
+
+_KERNEL_SAMPLE_S = 1e-8
+"""Seconds for a sample and a primitive of a kernel on two cores; graphics processors take far less."""
+
+_COMPILE_S = 7e-5
+"""Seconds that a compilation takes for a primitive."""
+
+_PRIMITIVE_BYTES, _PIXEL_BYTES = 2_000, 500
+"""Bytes of a primitive, in Python and in tables, and of a pixel: the sums of 20 channels in double precision,
+their means, and the frame."""
+
+
+def primitives_of(scene: Scene) -> int:
+    """Return the number of things in a scene that a ray can meet."""
+    from ...refimpl.light.scene import primitives
+
+    return primitives(scene) + (scene.room is not None)
+
+
+def seconds_of(primitives: int, samples: int, pixels: int, executor: str, workers: int) -> float:
+    """Return how long rendering may take, of pictures of so many pixels each."""
+    from ...refimpl.light.render import TILE_PIXELS
+
+    if executor != "numpy":
+        return primitives * samples * _KERNEL_SAMPLE_S
+    tiles = samples / pixels * math.ceil(pixels / TILE_PIXELS)
+    return primitives * (samples * _NUMPY_SAMPLE_S + tiles * _NUMPY_START_S) / max(workers, 1)
+
+
+def bytes_of(primitives: int, pixels: int) -> int:
+    """Return about how much memory a process of rendering takes."""
+    return primitives * _PRIMITIVE_BYTES + pixels * _PIXEL_BYTES
+
+
+def said_of_rendering(
+    scene: Scene, samples: int, pixels: int, executor: str, workers: int | None
+) -> list[str]:
+    """Return the sentence about large work, if it is large; `pixels` are those of one picture."""
+    count = primitives_of(scene)
+    if count < MANY_PRIMITIVES and samples < MANY_SAMPLES:
+        return []
+    seconds = seconds_of(count, samples, pixels, executor, workers or len(os.sched_getaffinity(0)))
+    work = f"{count:,} primitives and {samples:,} samples"
+    return [f"{work}: {_about(seconds, bytes_of(count, pixels))}; Ctrl-C ends it"]
+
+
+def said_of_compiling(scene: Scene) -> list[str]:
+    """Return the sentence about a large scene that is to be compiled, if it is large."""
+    count = primitives_of(scene)
+    if count < MANY_PRIMITIVES:
+        return []
+    return [f"{count:,} primitives: {_about(count * _COMPILE_S, bytes_of(count, 0))}; Ctrl-C ends it"]
+
+
+def said_of_measuring(contenders: int, sizes: Sequence[int], budget_s: float) -> list[str]:
+    """Return the sentence about a large benchmark of pictures of these sides, if it is large."""
+    seconds, pixels = contenders * len(sizes) * budget_s, max(sizes) ** 2
+    if seconds < LONG_S and pixels < MANY_PIXELS:
+        return []
+    work = f"{contenders} contender{'s' if contenders > 1 else ''} and pictures of up to {pixels:,} pixels"
+    return [
+        f"{work}: {_about(seconds, pixels * _PICTURE_BYTES)} at most, compilation left out; Ctrl-C ends it"
+    ]
+
+
+def said_of_learning(frames: int, pixels: int) -> list[str]:
+    """Return the sentence about the memory of many pixels to learn from, if they are many."""
+    if frames * pixels < MANY_PIXELS:
+        return []
+    size = f"{frames * pixels * _PAIR_BYTES // 2**20:,} MiB of memory"
+    return [f"{frames} frames of {pixels:,} pixels to learn from: by a rule of thumb {size}; Ctrl-C ends it"]
+
+
+def _about(seconds: float, size: int) -> str:
+    """Return an estimate in units that people think in."""
+    return f"by a rule of thumb about {duration(seconds)} and {max(1, size // 2**20):,} MiB of memory"
+
+
+def duration(seconds: float) -> str:
+    """Return a time in the largest unit of which there are two at least."""
+    for name, unit in (("years", 31_557_600.0), ("days", 86_400.0), ("hours", 3_600.0), ("minutes", 60.0)):
+        if seconds >= 2 * unit:
+            return f"{seconds / unit:,.0f} {name}"
+    return f"{max(seconds, 1.0):.0f} s"

@@ -1,0 +1,143 @@
+"""Reading what commands are given, with errors that name the file and fit the command."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...refimpl.errors import InputError
+from . import options
+from .terminal import tell
+
+if TYPE_CHECKING:
+    from ...refimpl.frame import Frame
+    from ...refimpl.light.scene import Scene
+    from ...refimpl.network.denoise import Model
+
+MODELS = Path(__file__).parents[1] / "models"
+"""Folder of the models that come with the package, each with its recipe and its scores."""
+
+MODEL_PREFIX = "model:"
+"""May be before the name of a model that ships with the package, and must where scenes have names too."""
+
+CHECKPOINT_MARK = ".checkpoint"
+"""Before the suffix of a model's name in the name of its checkpoint."""
+
+
+def check_input(path: Path) -> None:
+    """Refuse an input that is no file."""
+    if path.is_dir():
+        raise InputError("input file", str(path), "it is a folder", "give the name of a file in it")
+    if not path.exists():
+        raise InputError("input file", str(path), "it does not exist", "check the name")
+    if not path.is_file():
+        rule = "it is no regular file (a pipe or a device)"
+        raise InputError("input file", str(path), rule, "give a file on a disk")
+
+
+def shipped_models() -> list[str]:
+    """Return the names of the models that come with the package."""
+    return sorted(path.stem for path in MODELS.glob("*.safetensors"))
+
+
+def model_path(path: Path) -> Path:
+    """Return the file of a model: the file that is named, else the shipped one of this name."""
+    known, name = shipped_models(), str(path).removeprefix(MODEL_PREFIX)
+    # No model is a folder: one of that name, perhaps of results, does not hide the model.
+    if path.suffix or (path.exists() and not (name in known and path.is_dir())):
+        return path
+    if path.is_dir():
+        tell(f"{path}/ is a folder, and no model: the model of this name that ships with wamnet is taken")
+    if name not in known:
+        rule = "there is no such file, and wamnet ships no model of this name"
+        raise InputError("model", str(path), rule, f"give a .safetensors file, or one of {', '.join(known)}")
+    return MODELS / f"{name}.safetensors"
+
+
+def load_model(path: Path) -> Model:
+    """Read a model; a checkpoint is refused with the name of the model that belongs to it."""
+    from ...compiler import model_file
+
+    path = model_path(path)
+    try:
+        return model_file.load_model(path)
+    except InputError as error:
+        if error.value != model_file.CHECKPOINT_FORMAT:
+            raise
+    name = path.name.replace(CHECKPOINT_MARK + path.suffix, path.suffix)
+    way_out = f"give the model beside it: {path.with_name(name)}" if name != path.name else "give the model"
+    raise InputError("model file", str(path), "it is a checkpoint of training, not a model", way_out)
+
+
+def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
+    """Return what about a frame of this info a model has not learned, as sentences; not known is nothing."""
+    from ...refimpl.light.render import FEATURE_SPP
+
+    told = []
+    scenes, scene = model.info.get("trained_on_scene", ""), info.get("scene", "")
+    if scenes and scene and scene not in scenes.split(", "):
+        told.append(f"it shows {scene}, and the model has learned only {scenes}: expect a poor picture")
+    elif beyond := outside_ranges(model, info):
+        told.append(f"outside of what the model has learned: {', '.join(beyond)}; expect errors")
+    if scenes and "spp" in info:
+        rays, wanted = info.get(FEATURE_SPP, "1"), model.info.get(f"trained_on_{FEATURE_SPP}", "1")
+        if rays not in wanted.split(", "):
+            rule = f"its features are of --feature-spp {rays}, those that the model learned from of {wanted}"
+            told.append(f"{rule}: expect worse edges")
+    return told
+
+
+def outside_ranges(model: Model, info: Mapping[str, str]) -> list[str]:
+    """Return what of a frame lies outside of the ranges that a model says it has learned."""
+    from ...refimpl.light.scenes import CANONICAL, canonical
+    from ...refimpl.light.variation import RANGES, outside, ranges_from_json
+
+    text, scene = model.info.get(f"trained_on_{RANGES}"), info.get("scene", "")
+    if text is None:
+        return []
+    own = canonical(scene).lights if scene in CANONICAL else ()
+    return outside(ranges_from_json(text), info, [light.color for light in own])
+
+
+def need_layers(path: Path, frame: Frame, features: Sequence[str], because: str, way_out: str) -> None:
+    """Refuse the frame in `path` if it lacks a layer that one of the features needs."""
+    from ...refimpl.network.dataset import FEATURES
+
+    # Unknown features are refused where they come from.
+    for layer in (FEATURES[name].layer for name in features if name in FEATURES):
+        if layer not in frame.layers:
+            rule = f"{layer} must be among them, because {because}"
+            raise InputError(f"{path}: list of layers", ", ".join(frame.layers), rule, way_out)
+
+
+def load_scene(
+    name: str, time: float | None, assignments: Sequence[str], view: options.View | None = None
+) -> Scene:
+    """Return a canonical scene by name, as a view has it, or the scene in a JSON file."""
+    from ...refimpl.light.scene import from_json
+    from ...refimpl.light.scenes import CANONICAL, canonical
+    from ...refimpl.reading import read_file
+
+    parameters = options.parse_parameters(assignments)
+    if time is not None:
+        parameters["time"] = time
+    path = Path(name)
+    if path.suffix.lower() != ".json":
+        if name in CANONICAL:
+            found = canonical(name, **parameters)
+            return view.of(found) if view else found
+        if path.suffix or path.exists():
+            rule = "neither a canonical scene nor a scene file, whose name ends in .json"
+            raise InputError("scene", name, rule, f"use a .json file or one of {', '.join(CANONICAL)}")
+        return canonical(name, **parameters)
+    if parameters:
+        rule = "a scene file has no parameters"
+        raise InputError("option for the scene", ", ".join(parameters), rule, "change the file")
+    if view not in (None, options.View()):
+        rule = "a scene file has its own camera and lamps"
+        raise InputError("camera and lamps", "given", rule, "change the file, or write it with wamnet scene")
+    try:
+        return from_json(read_file(path, "scene file", "check the name"))
+    except InputError as error:
+        raise InputError(f"{path}: {error.what}", error.value, error.rule, error.way_out) from None

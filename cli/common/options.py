@@ -1,0 +1,406 @@
+"""The options that several commands share, each defined once, and the parsing of their values.
+
+Ranges are not repeated here: what a number may be is said by the function of the reference that takes it.
+"""
+
+from __future__ import annotations
+
+import colorsys
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ...refimpl.errors import InputError
+
+if TYPE_CHECKING:
+    from ...refimpl.light.scene import Scene, Vector
+
+SCENES = "minicubes, glossy, daylight, cornell, furnace, lone_light, empty"
+"""Canonical scenes by name, for help texts; equal to the registry in refimpl, which they do not import."""
+
+MODELS = "minicubes, cornell, glossy"
+"""Names of the models that ship with the package, for help texts; equal to the files in cli/models."""
+
+LARGEST_EXPOSURE_STOPS = 64.0
+"""Brightest and darkest exposure: a factor of 2**64; far past it float32 ends."""
+
+
+def _finite(value: float | None) -> float | None:
+    """Refuse a time that is no number."""
+    if value is not None and not math.isfinite(value):
+        raise InputError("--time", value, "it must be finite", "give seconds, for example --time 2.5")
+    return value
+
+
+def _context(command: typer.Context, value: ContextName | None) -> ContextName | None:
+    """Let this command, and the processes that it starts, open OpenGL in this way."""
+    from ...kernels.devices.registry import CONTEXT_VARIABLE
+
+    if value is None:
+        return None
+    before = os.environ.get(CONTEXT_VARIABLE)
+    os.environ[CONTEXT_VARIABLE] = value.value
+
+    def restore() -> None:
+        """Leave the environment as it was."""
+        if before is None:
+            os.environ.pop(CONTEXT_VARIABLE, None)
+        else:
+            os.environ[CONTEXT_VARIABLE] = before
+
+    command.call_on_close(restore)
+    return value
+
+
+def _stops(value: float) -> float:
+    """Refuse an exposure that is no number or that leaves no picture."""
+    if not abs(value) <= LARGEST_EXPOSURE_STOPS:
+        rule = f"it must be from {-LARGEST_EXPOSURE_STOPS:g} to {LARGEST_EXPOSURE_STOPS:g} stops"
+        raise InputError("--exposure", value, rule, "for example --exposure 1")
+    return value
+
+
+class ExecutorName(str, Enum):
+    """What runs a kernel; equal to the registry in kernels, which is not imported for a help text."""
+
+    numpy = "numpy"
+    opencl = "opencl"
+    opengl = "opengl"
+    c = "c"
+
+
+class ContextName(str, Enum):
+    """How OpenGL [kernels/devices/opengl_executor.py] gets a context: with no display, or in main memory."""
+
+    egl = "egl"
+    osmesa = "osmesa"
+
+
+class Renderer(str, Enum):
+    """What traces paths: the reference, or a kernel."""
+
+    numpy = "numpy"
+    opencl = "opencl"
+    opengl = "opengl"
+    c = "c"
+
+
+class TrainerName(str, Enum):
+    """What trains: the reference, or its steps compiled."""
+
+    numpy = "numpy"
+    opencl = "opencl"
+
+
+class Target(str, Enum):
+    """Languages that a model is compiled to."""
+
+    opencl = "opencl"
+    glsl = "glsl"
+    c = "c"
+
+
+class FloatType(str, Enum):
+    """Element types of the reference's arithmetic."""
+
+    float32 = "float32"
+    float64 = "float64"
+
+
+class Sampler(str, Enum):
+    """Sources of random numbers by name; equal to the registry in refimpl."""
+
+    pcg4d = "pcg4d"
+    sobol = "sobol"
+
+
+class Preset(str, Enum):
+    """Training protocols by name; equal to the registry in refimpl."""
+
+    best = "best"
+    paper = "paper"
+    short = "short"
+
+
+Executor = Annotated[
+    ExecutorName,
+    typer.Option(
+        "--executor", help="What runs the kernel; see which are there with [bold]wamnet executors[/]."
+    ),
+]
+OpenGLContext = Annotated[
+    ContextName | None,
+    typer.Option(
+        "--context",
+        callback=_context,
+        help="How OpenGL gets a context: [bold]egl[/], without a display; [bold]osmesa[/], in main memory.",
+        show_default="the first of them that is here; WAMNET_OPENGL_CONTEXT names another",
+    ),
+]
+Exposure = Annotated[
+    float,
+    typer.Option(
+        "--exposure", callback=_stops, help="Stops by which pictures are brightened; +1 doubles the light."
+    ),
+]
+ModelFile = Annotated[
+    Path,
+    typer.Argument(
+        metavar="MODEL",
+        help=f"Trained model (.safetensors), or the name of one that ships with wamnet ({MODELS}).",
+        show_default=False,
+    ),
+]
+Profile = Annotated[
+    str,
+    typer.Option(
+        "--profile",
+        help="What the arithmetic promises: [bold]ieee[/] brings its own sine and a bound on the error, "
+        "[bold]ieee-sine7[/] one of degree 7 (3 to 13), [bold]exact[/] gives the same bits everywhere, "
+        "[bold]native[/] uses the target's sine.",
+    ),
+]
+Trainer = Annotated[
+    TrainerName,
+    typer.Option(
+        "--executor", help="What trains: the reference, or its step compiled, which is much faster."
+    ),
+]
+ActivationName = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="What hidden layers do with their sums: sine or relu.",
+        show_default="the preset's: sine",
+    ),
+]
+CutRank = Annotated[
+    int,
+    typer.Option(
+        "--rank",
+        metavar="R",
+        help="Short for --variant rankR: cut the first layer to this rank, and run it along rows, then "
+        "columns. Trained on with it, a model loses little.",
+        show_default="no cut",
+    ),
+]
+Variant = Annotated[
+    str | None,
+    typer.Option(
+        "--variant",
+        metavar="NAME",
+        help="Fewer operations: [bold]full[/], or some of without-FEATURE, windowN, hiddenN, rankN, sineN "
+        "with + between them, as in window8+rank16.",
+        show_default="full",
+    ),
+]
+MaxError = Annotated[
+    float | None,
+    typer.Option(
+        "--max-error",
+        metavar="E",
+        help="Choose the fastest variant whose measured error is at most E: the largest difference of "
+        "display-encoded colour (0 to 1) from the full network in float64, on the frames.",
+        show_default="no limit",
+    ),
+]
+MaxMs = Annotated[
+    float | None,
+    typer.Option(
+        "--max-ms",
+        metavar="T",
+        help="Choose the most accurate variant that takes at most T milliseconds here.",
+        show_default="no limit",
+    ),
+]
+MaxLoss = Annotated[
+    float | None,
+    typer.Option(
+        "--max-loss-db",
+        metavar="D",
+        help="Choose the fastest variant that loses at most D dB of the full network's PSNR on the frames.",
+        show_default="no limit",
+    ),
+]
+CurveFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--curve",
+        metavar="FILE",
+        help="Choose among the points of this file (.json).",
+        show_default="measured, and kept in the cache folder",
+    ),
+]
+CurveFrames = Annotated[
+    Path | None,
+    typer.Option(
+        "--frames",
+        metavar="FOLDER",
+        help="Data set whose test frames errors are measured on.",
+        show_default=False,
+    ),
+]
+CurveSize = Annotated[
+    int | None,
+    typer.Option("--size", metavar="N", help="Times are those of N x N pixels.", show_default="1024"),
+]
+Here = Annotated[
+    bool,
+    typer.Option("--here", help="Take the schedule that suits this machine: as tuned, or built in."),
+]
+Schedule = Annotated[
+    str | None,
+    typer.Option(
+        "--schedule",
+        metavar="NAME",
+        help="Order of the kernel's work: [bold]plain[/] is made to be read, others to be fast.",
+        show_default=False,
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", help="Any other number gives other random numbers.")]
+Time = Annotated[
+    float | None,
+    typer.Option("--time", callback=_finite, help="Time in the animation, in seconds.", show_default="0"),
+]
+Parameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Parameter of a canonical scene: a number or three with commas; repeat for more.",
+        show_default=False,
+    ),
+]
+SamplerName = Annotated[
+    Sampler,
+    typer.Option(
+        "--sampler", help="Random numbers: independent, or evenly spread (less noise at many samples)."
+    ),
+]
+FeatureSpp = Annotated[
+    int,
+    typer.Option(
+        "--feature-spp",
+        metavar="N",
+        help="Camera rays per pixel whose first hits the features are means over: 16 show edges without "
+        "jags, and cost a fraction of a path each.",
+        show_default="the colour's",
+    ),
+]
+Yaw = Annotated[
+    float,
+    typer.Option("--yaw", metavar="DEG", help="Turn the camera around what it looks at, in degrees."),
+]
+Pitch = Annotated[
+    float, typer.Option("--pitch", metavar="DEG", help="Move the camera up (or down), in degrees.")
+]
+Distance = Annotated[
+    float, typer.Option("--distance", metavar="X", help="Factor of the camera's distance; 2 is farther away.")
+]
+Lights = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--light",
+        metavar="N=R,G,B",
+        help="Hue and saturation of lamp N, from 1, in linear RGB; it keeps its brightness. Repeat for more.",
+        show_default="the lamps' own",
+    ),
+]
+SceneName = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENE",
+        help=f"Canonical scene ({SCENES}) or scene file (.json).",
+        show_default=False,
+    ),
+]
+
+
+def parse_parameters(texts: Sequence[str]) -> dict[str, float | tuple[float, ...]]:
+    """Return parameters of a scene from texts like `albedo=0.8` and `warm=1,0.5,0.2`."""
+    parameters: dict[str, float | tuple[float, ...]] = {}
+    for text in texts:
+        name, sign, value = text.partition("=")
+        try:
+            numbers = tuple(float(part) for part in value.split(","))
+        except ValueError:
+            numbers = ()
+        if not sign or len(numbers) not in (1, 3):
+            rule = "it must be NAME=NUMBER or NAME=NUMBER,NUMBER,NUMBER"
+            raise InputError("--set", text, rule, "for example --set albedo=0.8")
+        if not all(map(math.isfinite, numbers)):
+            raise InputError("--set", text, "all numbers must be finite", "for example --set albedo=0.8")
+        parameters[name.strip()] = numbers if len(numbers) > 1 else numbers[0]
+    return parameters
+
+
+def parse_limits(option: str, text: str) -> tuple[float, float]:
+    """Return the two numbers of a text like `-24:24`, or refuse it."""
+    try:
+        low, high = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise InputError(option, text, "it must be LOW:HIGH", f"for example {option}=-24:24") from None
+    return low, high
+
+
+@dataclass(frozen=True)
+class View:
+    """What is asked of camera and lamps: degrees, a factor of the distance, texts like `1=1,0.5,0.2`."""
+
+    yaw_deg: float = 0.0
+    pitch_deg: float = 0.0
+    distance: float = 1.0
+    lights: tuple[str, ...] = ()
+
+    def of(self, scene: Scene) -> Scene:
+        """Return the scene from there and under these lamps; its info says so."""
+        from ...refimpl.light.variation import Variation, varied
+
+        colors = parse_lights(self.lights, [light.color for light in scene.lights])
+        return varied(scene, Variation(self.yaw_deg, self.pitch_deg, self.distance, colors))
+
+
+def parse_lights(texts: Sequence[str], own: Sequence[Vector]) -> tuple[Vector, ...]:
+    """Return the lamps' colours from texts like `1=1,0.5,0.2`, as bright as their own; none without texts."""
+    from ...refimpl.light.variation import lamp_color
+
+    colors = dict(enumerate(own, start=1))
+    chosen: set[int] = set()
+    for text in texts:
+        number, color = _parse_light(text)
+        if number not in colors:
+            rule = f"the scene's lamps are 1 to {len(own)}" if own else "the scene has no lamps"
+            raise InputError("--light", text, rule, "choose another" if own else "leave it out")
+        if number in chosen:
+            raise InputError("--light", text, f"lamp {number} has a colour already", "give one for each lamp")
+        chosen.add(number)
+        hue, saturation, _ = colorsys.rgb_to_hsv(*color)
+        colors[number] = lamp_color(own[number - 1], hue, saturation)
+    return tuple(colors.values()) if texts else ()
+
+
+def _parse_light(text: str) -> tuple[int, Vector]:
+    """Return a lamp's number and its colour."""
+    number, _, value = text.partition("=")
+    try:
+        red, green, blue = (float(part) for part in value.split(","))
+        found = int(number)
+    except ValueError:
+        rule = "it must be N=R,G,B: a lamp's number and three numbers"
+        raise InputError("--light", text, rule, "for example --light 1=1,0.4,0.2") from None
+    color = (red, green, blue)
+    if not (all(map(math.isfinite, color)) and min(color) >= 0.0 and max(color) > 0.0):
+        rule = "its channels must be finite, 0 or more, and not all 0"
+        raise InputError("--light", text, rule, "for example --light 1=1,0.4,0.2")
+    return found, color
+
+
+def parse_names(text: str) -> tuple[str, ...]:
+    """Return names that are separated by commas."""
+    return tuple(part.strip() for part in text.split(",") if part.strip())

@@ -1,0 +1,21 @@
+"""Optional packages: imported when they are needed, and a plain sentence when they are not there."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from ...compiler.core.writing import signals_wait
+from ...refimpl.errors import InputError
+
+
+def need(module: str, purpose: str, extra: str) -> Any:
+    """Import an optional module, or say what needs it and which extra of this package installs it."""
+    try:
+        with signals_wait():
+            return importlib.import_module(module)
+    except ImportError:
+        rule = f"it is needed {purpose}"
+        raise InputError(
+            f"Python package {module!r}", "missing", rule, f"install it: pip install 'wamnet[{extra}]'"
+        ) from None

@@ -1,0 +1,1 @@
+"""Files: pictures, frames, data sets, films, and how they are written."""

@@ -1,0 +1,140 @@
+"""Pictures on disk: PNG for looking, EXR for computing, and one way to open either.
+
+1. PNG holds display-encoded colour in 8 bits a channel [`write_png`], [`read_png`].
+2. Pictures side by side have labels, and a text that names their origin [`write_panels`], [`read_origin`].
+3. A picture to be compared is a PNG or the colour of an EXR; either knows its display-encoded and its linear
+   form [`read_image`], [`Image`].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+
+from ...refimpl import encoding
+from ...refimpl.errors import InputError
+from ...refimpl.frame import Floats
+from ...refimpl.reading import check_room, read_file
+from ..common.inputs import check_input, need_layers
+from ..common.packages import need
+from . import exr
+from .outputs import replacing
+
+EIGHT_BIT_MODES = ("1", "L", "LA", "P", "RGB", "RGBA")
+"""Pillow's modes that fit 8 bits a channel; others would lose precision silently."""
+
+
+PNG_BYTES = 64
+"""Memory that a pixel takes until it is linear: levels, and a few pictures of three float32 on the way."""
+
+LABEL_PX = 18
+"""Height of the line of labels above pictures: Pillow's own font has letters of 11 pixels."""
+
+ORIGIN = "wamnet.origin"
+"""Name of the text in a PNG that says what it was made from."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """Colour (H, W, 3) display-encoded in [0, 1], and as linear radiance."""
+
+    display: Floats
+    linear: Floats
+
+
+def write_png(path: Path, encoded: Floats) -> None:
+    """Write display-encoded colour (H, W, 3) in [0, 1] as an 8-bit PNG, all of it or nothing."""
+    pillow = need("PIL.Image", "to write PNG files", "files")
+    picture = pillow.fromarray(encoding.to_8bit(encoded))
+    with replacing(path) as new:
+        picture.save(new, format="PNG")
+
+
+def write_panels(path: Path, panels: Sequence[tuple[str, Floats]], origin: str) -> None:
+    """Write pictures (H, W, 3) side by side under their labels; the file keeps a text that names its origin.
+
+    Both sides of the whole are even, as films want it.
+    """
+    pillow = need("PIL.Image", "to write PNG files", "files")
+    drawing, info = (
+        need("PIL.ImageDraw", "to label", "files"),
+        need("PIL.PngImagePlugin", "to label", "files"),
+    )
+    font = need("PIL.ImageFont", "to label", "files").load_default()
+    height, width, _ = panels[0][1].shape
+    whole = pillow.new("RGB", (_even(width * len(panels)), _even(height + LABEL_PX)))
+    for index, (label, encoded) in enumerate(panels):
+        bar = pillow.new("RGB", (width, LABEL_PX))
+        drawing.Draw(bar).text((3, 3), label, fill="white", font=font)
+        whole.paste(bar, (width * index, 0))
+        whole.paste(pillow.fromarray(encoding.to_8bit(encoded)), (width * index, LABEL_PX))
+    text = info.PngInfo()
+    text.add_text(ORIGIN, origin)
+    with replacing(path) as new:
+        whole.save(new, format="PNG", pnginfo=text)
+
+
+def _even(length: int) -> int:
+    """Return the length, or one more."""
+    return length + length % 2
+
+
+def read_origin(path: Path) -> str | None:
+    """Return the text that names the origin of a PNG; None if the file is damaged, "" if it has no text.
+
+    What is no regular file is refused: a pipe of this name would make us wait.
+    """
+    pillow = need("PIL.Image", "to read PNG files", "files")
+    content = BytesIO(read_file(path, "picture", "move it elsewhere, or choose another output with -o"))
+    try:
+        with pillow.open(content, formats=["PNG"]) as picture:
+            origin = str(picture.text.get(ORIGIN, ""))
+            # A picture of another origin is refused anyway, whatever its header says of its size.
+            if origin:
+                picture.load()
+            return origin
+    except (OSError, SyntaxError, ValueError, pillow.DecompressionBombError):
+        return None
+
+
+def read_png(path: Path) -> Floats:
+    """Read a PNG of 8 bits a channel as display-encoded colour (H, W, 3); transparency is ignored."""
+    check_input(path)
+    pillow = need("PIL.Image", "to read PNG files", "files")
+    # Not from the file itself: of a chunk that says it is huge, a file would give room for all of it.
+    content = BytesIO(read_file(path))
+    try:
+        with pillow.open(content, formats=["PNG"]) as picture:
+            mode, (width, height) = picture.mode, picture.size
+            # A file of a few bytes may stand for a picture of any size.
+            check_room(PNG_BYTES * width * height, f"size of {path}", f"{width} x {height}", "cut it")
+            levels = np.asarray(picture.convert("RGB"))
+    except InputError:
+        raise
+    except (OSError, SyntaxError, ValueError, pillow.DecompressionBombError):
+        raise InputError("input file", str(path), "it is not a readable PNG", "export it again") from None
+    if mode not in EIGHT_BIT_MODES:
+        raise InputError(
+            f"{path}: pixel format", mode, "a PNG must have 8 bits a channel", "use .exr for more"
+        )
+    return encoding.from_8bit(levels)
+
+
+def read_image(path: Path, exposure_stops: float = 0.0) -> Image:
+    """Read a PNG, or the colour of an EXR, in both forms at the given exposure."""
+    suffix = path.suffix.lower()
+    if suffix == ".png":
+        display = read_png(path)
+        return Image(display, encoding.from_display(display, exposure_stops))
+    if suffix == ".exr":
+        frame = exr.read_frame(path)
+        need_layers(path, frame, ("color",), "pictures are compared by their colour", "export it too")
+        linear = frame["color"]
+        return Image(encoding.to_display(linear, exposure_stops), linear)
+    if path.is_dir():
+        check_input(path)
+    raise InputError("input file", str(path), "its name must end in .exr or .png", "convert it")

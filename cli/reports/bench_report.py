@@ -1,0 +1,422 @@
+"""What a benchmark has found, for readers: a Markdown text, a table, and a section of the demo's report.
+
+The data are those of spec/bench.md; here they are only written down and drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ...refimpl.errors import InputError
+from ..files.outputs import replacing
+from . import plots
+from .plots import Point
+
+Data = Mapping[str, Any]
+
+PRINTED = plots.PAPER
+"""Theme of the plots that are files."""
+
+WIDE = ("range", "frames/s", "compile, s")
+"""Columns that a terminal has no room for."""
+
+NO_CACHE = "nothing is kept"
+"""What a contender's `caches` says that leaves no compiled code on disk; equal to that of kernels."""
+
+NONE = "–"
+"""What is printed where there is no number."""
+
+LEGEND = """\
+Sorted by time. A star is on the Pareto front of time and error: nothing here is faster and nearer. Times are
+medians of interleaved frames, copies included. Errors are the largest difference from the full network
+in float64: what a form leaves out counts. Predictions come from operations, sines and bytes
+(spec/bench.md)."""
+"""What a reader of the first table should know."""
+
+OF_SGEMM_TOO_FAST = 1.05
+"""A share of sgemm above this does not come from noise: the measured library is slower than it could be."""
+
+
+def number(value: float | None, form: str = ".3g") -> str:
+    """Return a number as it is printed, a dash where there is none."""
+    if value is None:
+        return NONE
+    return f"{value:,.0f}" if form == ".3g" and abs(value) >= 1000 else format(value, form)
+
+
+def percent(value: float | None) -> str:
+    """Return a share in percent."""
+    return number(value, ".0%")
+
+
+def part(row: Data, name: str, key: str) -> float | None:
+    """Return a number of a part of a row, if it has both."""
+    found: float | None = (row.get(name) or {}).get(key)
+    return found
+
+
+def _ranges(row: Data) -> str:
+    """Return the shortest and the longest time."""
+    ms = row["ms"]
+    return f"{number(ms['min'])} - {number(ms['max'])}" if ms else NONE
+
+
+def measured(data: Data) -> list[Data]:
+    """Return the contenders that have a time, fastest first."""
+    return sorted((row for row in data["contenders"] if row["ms"]), key=lambda row: row["ms"]["median"])
+
+
+def speed_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return heads and rows of what each contender takes and how far off it is."""
+    first = ("contender", "ms", "range", "predicted, ms", "frames/s", "GFLOP/s", "of sgemm")
+    heads = (*first, "compile, s", "error", *(("PSNR loss, dB",) if data["unseen_frames"] else ()))
+    rows = []
+    for row in measured(data):
+        cells: tuple[str, ...] = (
+            row["name"] + (" *" if row["name"] in data["front"]["error"] else ""),
+            number(part(row, "ms", "median")),
+            _ranges(row),
+            number(row.get("predicted_ms")),
+            number(row.get("frames_per_s")),
+            number(row.get("gflops")),
+            percent(row.get("of_sgemm")),
+            number(row.get("compile_s")),
+            number(part(row, "error", "max"), ".1e"),
+        )
+        cells += (number(part(row, "quality", "psnr_loss_db"), ".2f"),) if data["unseen_frames"] else ()
+        rows.append(cells)
+    return heads, rows
+
+
+def short_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return the columns of the first table that a terminal has room for."""
+    heads, rows = speed_table(data)
+    kept = [k for k, head in enumerate(heads) if head not in WIDE]
+    return tuple(heads[k] for k in kept), [tuple(row[k] for k in kept) for row in rows]
+
+
+def detail_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return heads and rows of everything else that is known."""
+    heads = (
+        "contender", "spread", "kernel, ms", "of memory", "predicted / measured", "mean error", "ulp",
+        "rounding", "its bound", "PSNR, dB", "SSIM", "SSIM loss", "source, bytes", "first run ever, s",
+        "later run, s",
+    )  # fmt: skip
+    rows = [
+        (
+            row["name"],
+            percent(part(row, "ms", "spread")),
+            number(part(row, "kernel_ms", "median")),
+            percent(row.get("of_memory")),
+            number(row.get("predicted_over_measured"), ".2f"),
+            number(part(row, "error", "mean"), ".1e"),
+            number(part(row, "error", "ulp")),
+            number(part(row, "rounding", "max"), ".1e"),
+            number(part(row, "rounding", "bound"), ".1e"),
+            number(part(row, "quality", "psnr_db"), ".2f"),
+            number(part(row, "quality", "ssim"), ".4f"),
+            number(part(row, "quality", "ssim_loss"), ".4f"),
+            number(row.get("source_bytes")),
+            number(row.get("first_run_s")),
+            number(row.get("later_run_s")),
+        )
+        for row in measured(data)
+    ]
+    kept = [k for k in range(len(heads)) if k == 0 or any(row[k] != NONE for row in rows)]
+    return tuple(heads[k] for k in kept), [tuple(row[k] for k in kept) for row in rows]
+
+
+def growth_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return heads and rows of the time at each size, and beside it the predicted one; dashes: left out."""
+    columns = growth(data)
+    heads = ("contender", *(f"{size}, ms (predicted)" for size in columns))
+    rows = []
+    for name in dict.fromkeys(name for cells in columns.values() for name in cells):
+        cells = [columns[size].get(name, {}) for size in columns]
+        texts = [
+            f"{number(part(cell, 'ms', 'median'))} ({number(cell.get('predicted_ms'))})"
+            if cell.get("ms")
+            else NONE
+            for cell in cells
+        ]
+        rows.append((name, *texts))
+    return heads, rows
+
+
+def _cell(row: Data) -> str:
+    """Return a measured time with the predicted one."""
+    return f"{number(part(row, 'ms', 'median'))} ({number(row.get('predicted_ms'))})"
+
+
+def growth(data: Data) -> dict[int, dict[str, Data]]:
+    """Return the rows of each size by name, the main size among them; none where there is no other."""
+    if not data["sizes"]:
+        return {}
+    found = {entry["size_px"]: entry["contenders"] for entry in data["sizes"]}
+    found[data["size_px"]] = data["contenders"]
+    return {size: {row["name"]: row for row in found[size] if row["ms"]} for size in sorted(found)}
+
+
+def limits_text(data: Data) -> str:
+    """Return the machine's limits as a sentence."""
+    limits = data["limits"]
+    if limits is None:
+        return "The machine's limits were not measured."
+    return (
+        f"Measured in the same run: sgemm {number(1e-9 * limits['flops_per_s'])} GFLOP/s, memory (triad) "
+        f"{number(1e-9 * limits['bytes_per_s'])} GB/s, NumPy's sine {number(1e-9 * limits['sines_per_s'])} "
+        "thousand million a second."
+    )
+
+
+def machine_text(data: Data) -> str:
+    """Return the machine and the versions of what ran."""
+    facts = [f"{name} {value}" for name, value in data["machine"].items()]
+    return ", ".join([*facts, *(f"{name} {value}" for name, value in data["versions"].items())])
+
+
+def network_text(data: Data) -> str:
+    """Return the network and the picture."""
+    network = data["network"]
+    widths = "-".join(map(str, network["widths"]))
+    return f"{data['size_px']}x{data['size_px']}, {widths} on {', '.join(network['features'])}"
+
+
+def notes(data: Data) -> list[str]:
+    """Return a line for all that was left out, or that took fewer turns, and for what readers should know."""
+    lines = []
+    for row in data["contenders"]:
+        if row["state"] != "measured":
+            lines.append(f"{row['name']}: {row['state']}" + (f", {row['reason']}" if row["reason"] else ""))
+        elif row["reason"]:
+            lines.append(f"{row['name']}: {row['reason']}")
+    for entry in data["sizes"]:
+        left_out = [row for row in entry["contenders"] if not row["ms"]]
+        lines += [f"{row['name']} at {entry['size_px']}: {row['reason']}" for row in left_out]
+    if any((row.get("of_sgemm") or 0.0) > OF_SGEMM_TOO_FAST for row in data["contenders"]):
+        lines.append(
+            "a kernel is faster than sgemm: NumPy's OpenBLAS does not know this processor; "
+            "OPENBLAS_CORETYPE=SkylakeX may double it where there is AVX-512"
+        )
+    draws = (data.get("frames") or {}).get("draws", ())
+    if any(draw["time_in_training"] for draw in draws):
+        lines.append("a test frame is at a time that training had")
+    lines += dict.fromkeys(f"a test frame: {text}" for draw in draws for text in draw["unlike_training"])
+    if data["interrupted"]:
+        lines.append("interrupted: this is what was measured until then")
+    return lines
+
+
+def markdown(data: Data, pictures: Sequence[str]) -> str:
+    """Return the result as a Markdown text."""
+    return "\n".join(_lines(data, pictures)) + "\n"
+
+
+def _lines(data: Data, pictures: Sequence[str]) -> Iterator[str]:
+    """Yield the lines of the text."""
+    yield from ("# Speed against error", "", network_text(data) + f" (`{data['command']}`).", "")
+    yield from (machine_text(data) + ".", "", limits_text(data), "")
+    yield from _table(*speed_table(data))
+    yield LEGEND
+    yield ""
+    yield from ("## Speed, loss and bounds", "", frames_text(data), "")
+    yield from _table(TABLE_HEADS, [_full_row(data, row) for row in measured(data)])
+    yield from (TABLE_LEGEND, "", "## Details", "")
+    yield from _table(*detail_table(data))
+    if data["sizes"]:
+        yield from ("## How cost grows", "")
+        yield from _table(*growth_table(data))
+    if lines := notes(data):
+        yield from ("## Left out, and why", "", *(f"* {line}" for line in lines), "")
+    if caches := sorted({row["caches"] for row in measured(data) if row["caches"] != NO_CACHE}):
+        yield from ("## Code that stays compiled", "", *(f"* {text}" for text in caches), "")
+    yield from (f"![{name}]({name})" for name in pictures)
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield the lines of a table and an empty one."""
+    yield f"| {' | '.join(heads)} |"
+    yield f"|{'---|' * len(heads)}"
+    yield from (f"| {' | '.join(row)} |" for row in rows)
+    yield ""
+
+
+# ---- speed against error -----------------------------------------------------------------------------------
+
+
+PANELS = (
+    ("quality", "psnr_loss_db", "PSNR lost against the full network, dB", True),
+    ("rounding", "bound", "bound of the error, this frame", False),
+)
+"""Part and number of each panel of the picture, its label, and whether it is a loss."""
+
+
+def kind_of(row: Data, window: int) -> str:
+    """Return what sets a row apart, by the names of plots.COLOURS; `window` is the full network's."""
+    if row["kind"] != "kernel":
+        return "peer"
+    narrow = (row.get("window") or window) < window
+    if row.get("rank"):
+        return "both" if narrow else "rank"
+    if narrow:
+        return "window"
+    return "sine" if row.get("profile", "ieee") != "ieee" else "whole"
+
+
+def short_name(row: Data) -> str:
+    """Return a row's name without its executor, which the marker says, and without a variant's schedule."""
+    if row["kind"] != "kernel":
+        return str(row["name"])
+    return str(row["name"]).rpartition(":")[2]
+
+
+def panels(data: Data) -> list[plots.Panel]:
+    """Return the panels of the picture that have something to show."""
+    found = []
+    for name, key, label, is_loss in PANELS:
+        marks = [
+            plots.Mark(
+                short_name(row),
+                (row["ms"]["median"], row["ms"]["min"], row["ms"]["max"]),
+                part(row, name, key),
+                row.get("executor") or ("" if row.get("window") else "other"),
+                kind_of(row, data["network"].get("window") or 0),
+                row["name"] in data["front"].get(name, ()),
+            )
+            for row in measured(data)
+            if not (is_loss and part(row, name, key) is None)
+        ]
+        if any(mark.y is not None for mark in marks):
+            found.append(plots.Panel(label, marks, is_loss))
+    return found
+
+
+def picture(data: Data, path: Path, theme: plots.Theme = PRINTED) -> None:
+    """Draw speed against error from a benchmark's data (spec/bench.md) into a PNG file.
+
+    Raises InputError where no row has both a time and a loss or a bound.
+    """
+    shown = panels(data)
+    if not shown:
+        rule = "no row has a time and a loss or a bound"
+        raise InputError("benchmark", str(path), rule, "measure a trained model: wamnet bench")
+    with replacing(path) as new:
+        new.write_bytes(plots.trade_off(shown, theme))
+
+
+TABLE_HEADS = (
+    "form", "executor, schedule", "profile, degree of sine", "rank", "window", "parameters", "ms", "spread",
+    "PSNR, dB", "lost, dB", "largest error", "bound, this frame", "bound, all frames",
+)  # fmt: skip
+"""Columns of the table of speed against error."""
+
+
+def table(data: Data) -> str:
+    """Return the rows of a benchmark's data as a Markdown table of speed, quality, errors and bounds."""
+    return "\n".join(_table(TABLE_HEADS, [_full_row(data, row) for row in measured(data)])).rstrip() + "\n"
+
+
+def _full_row(data: Data, row: Data) -> tuple[str, ...]:
+    """Return the cells of a row; a star is on the front of time and loss, a dagger has a certificate."""
+    front = data["front"].get("quality", ())
+    kernel = row["kind"] == "kernel"
+    form = (row["name"].split(":")[2:] or ["whole"])[0] if kernel else row["name"]
+    certified = " †" if part(row, "rounding", "certified") else ""
+    degree = row.get("degree")
+    return (
+        form + (" *" if row["name"] in front else ""),
+        f"{row.get('executor')} {row.get('schedule')}" if kernel else NONE,
+        f"{row.get('profile')}, {degree or 'its own'}" if kernel else NONE,
+        number(row.get("rank")),
+        number(row.get("window")),
+        number(row.get("parameters")),
+        number(part(row, "ms", "median")),
+        percent(part(row, "ms", "spread")),
+        number(part(row, "quality", "psnr_db"), ".2f"),
+        _loss(part(row, "quality", "psnr_loss_db")),
+        number(part(row, "rounding", "max"), ".1e"),
+        number(part(row, "rounding", "bound"), ".1e"),
+        number(part(row, "rounding", "bound_all"), ".1e") + certified,
+    )
+
+
+def _loss(value: float | None) -> str:
+    """Return a loss in dB with its sign; one that rounds to nothing has none."""
+    text = number(value, "+.2f")
+    return "0.00" if text in ("+0.00", "-0.00") else text
+
+
+TABLE_LEGEND = """\
+Sorted by time: median of interleaved frames, copies included; the spread is (longest - shortest) / median.
+A star is on the Pareto front of time and loss. PSNR is against the references, the mean over the frames; lost
+is that of the full network less it. The error is the largest difference from the form's own network in
+float64; its bound is computed for this frame, and for all frames; a dagger marks a certificate. `further` is
+the whole network after as many more steps as the trained forms."""
+"""What a reader of the table should know."""
+
+
+def frames_text(data: Data) -> str:
+    """Return what was denoised as a sentence."""
+    frames = data.get("frames")
+    if not frames:
+        return "Noise was denoised: there is no quality."
+    times = ", ".join(f"{draw['time_s']:.4g} s" for draw in frames["draws"])
+    return (
+        f"{len(frames['draws'])} frames of {frames['scene']} ({times}), {frames['frame_px']} pixels wide, "
+        f"features of {frames['feature_spp']} camera rays, references of {frames['reference_spp']} paths "
+        "a pixel."
+    )
+
+
+# ---- plots -------------------------------------------------------------------------------------------------
+
+
+def points(data: Data, name: str, key: str) -> list[Point]:
+    """Return the points of a plot: time against a number of a part of the rows."""
+    on_front = data["front"][name]
+    found = []
+    for row in measured(data):
+        y = part(row, name, key)
+        if y is not None:
+            ms = float(row["ms"]["median"])
+            kind = row["kind"] == "kernel"
+            found.append(Point(row["name"], ms, y, row.get("predicted_ms"), kind, row["name"] in on_front))
+    return found
+
+
+def draw(data: Data, theme: plots.Theme) -> dict[str, bytes]:
+    """Return the plots as PNG by name: `error`, `trade-off` and `sizes`, where there is something to show."""
+    drawn = {}
+    if shown := points(data, "error", "max"):
+        drawn["error"] = plots.speed_and_error(shown, "largest error against float64", theme)
+    if data["unseen_frames"] and (found := panels(data)):
+        drawn["trade-off"] = plots.trade_off(found, theme)
+    if columns := growth(data):
+        names = dict.fromkeys(name for cells in columns.values() for name in cells)
+        lines = {
+            name: [(size, cells[name]["ms"]["median"]) for size, cells in columns.items() if name in cells]
+            for name in names
+        }
+        drawn["sizes"] = plots.growth(lines, theme)
+    return drawn
+
+
+def section(data: Data) -> dict[str, Any]:
+    """Return what the demo's report shows of a benchmark: texts, tables, and plots for both kinds of page."""
+    heads, rows = speed_table(data)
+    by_theme = {"light": draw(data, plots.LIGHT), "dark": draw(data, plots.DARK)}
+    return {
+        "data": data,
+        "network": network_text(data),
+        "limits": limits_text(data),
+        "heads": heads,
+        "rows": rows,
+        "frames": frames_text(data),
+        "trade_heads": TABLE_HEADS,
+        "trade_rows": [_full_row(data, row) for row in measured(data)],
+        "trade_legend": TABLE_LEGEND,
+        "notes": notes(data),
+        "plots": {name: {theme: by_theme[theme][name] for theme in by_theme} for name in by_theme["light"]},
+    }

@@ -1,0 +1,149 @@
+"""The demonstration's report: the same facts for programs (`report.json`) and for people (`report.html`).
+
+1. All facts are gathered as JSON's types [`facts`]; they are the whole of `report.json`.
+2. `report.html` shows them with pictures and plots [`page`]. It is one file: nothing is fetched, no script
+   runs, and it follows the reader's choice of a light or a dark page.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..files.outputs import write_text
+from . import bench_report, machine, plots, scores
+
+if TYPE_CHECKING:
+    from ...refimpl.network.denoise import Model
+    from ..commands.demo import Plan, Results, Unseen
+
+SCHEMA = "wamnet-demo-2"
+"""Name and version of the form of `report.json`."""
+
+FOLDER = "pictures"
+"""Folder of the pictures, in the folder of the results; their names begin with the test frame's number."""
+
+PICTURES = ("noisy", "denoised", "reference", "normal")
+"""Pictures of a test frame that the report shows, by the ends of their files' names."""
+
+
+def write(
+    output: Path, plan: Plan, results: Results, command: str, bench: Mapping[str, Any] | None = None
+) -> None:
+    """Write `report.json` and `report.html` into the folder that has the pictures.
+
+    `bench`: what `cli/commands/bench.py: measure` has found, which both then hold too.
+    """
+    data = facts(plan, results, command)
+    if bench is not None:
+        data["bench"] = bench
+    write_text(output / "report.json", json.dumps(data, indent=2, allow_nan=False) + "\n")
+    folder = output / FOLDER
+    pictures = [
+        {name: _embedded((folder / f"{index}-{name}.png").read_bytes()) for name in PICTURES}
+        for index in range(len(results.unseen))
+    ]
+    write_text(output / "report.html", page(data, pictures, draw(results)))
+
+
+def facts(plan: Plan, results: Results, command: str) -> dict[str, Any]:
+    """Return everything that a demonstration has found, as JSON's types."""
+    return {
+        "schema": SCHEMA,
+        "command": command,
+        "plan": asdict(plan),
+        "model": _model_facts(results.model),
+        "unseen": [
+            {"time_s": frame.time_s, **{name: scores.as_data(s) for name, s in frame.scores.items()}}
+            for frame in results.unseen
+        ],
+        "train_times_s": results.train_times_s,
+        "denoised_by": results.denoised_by,
+        "runs": [asdict(run) for run in results.runs],
+        "training": {
+            "steps": results.state.step,
+            "seconds_per_step": results.seconds_per_step,
+            "history": results.state.history,
+            "recipe": asdict(results.state.recipe),
+        },
+        "seconds": results.seconds,
+        "machine": machine.describe(),
+        "versions": machine.versions(),
+    }
+
+
+def _model_facts(model: Model) -> dict[str, Any]:
+    """Return what a reader wants to know of a model."""
+    layers = (*model.siren.weights, *model.siren.biases)
+    return {
+        "features": model.features,
+        "window": asdict(model.window),
+        "widths": model.siren.widths,
+        "parameters": sum(layer.size for layer in layers),
+    }
+
+
+def draw(results: Results) -> dict[str, Any]:
+    """Return each plot as an embedded picture for a light and for a dark page.
+
+    `errors` has the maps of each test frame by picture, both on one scale; `training` is the curve.
+    """
+    drawn: dict[str, Any] = {"errors": [], "training": {}}
+    themes = (("light", plots.LIGHT), ("dark", plots.DARK))
+    for frame in results.unseen:
+        maps = _error_maps(frame, results.model.normalization.exposure_stops)
+        by_theme = {name: plots.error_maps(list(maps.items()), theme) for name, theme in themes}
+        drawn["errors"].append(
+            {title: {name: _embedded(by_theme[name][k]) for name in by_theme} for k, title in enumerate(maps)}
+        )
+    for name, theme in themes:
+        curve = plots.training_curve(results.state.history, results.seconds_per_step, theme)
+        drawn["training"][name] = _embedded(curve)
+    return drawn
+
+
+def _error_maps(frame: Unseen, stops: float) -> dict[str, Any]:
+    """Return the absolute error (H, W) of the noisy and the denoised picture."""
+    from ...refimpl.encoding import to_display
+    from ...refimpl.metrics import error_map
+
+    noisy, target = (to_display(layers["color"], stops) for layers in (frame.noisy, frame.reference))
+    return {"input": error_map(noisy, target), "denoised": error_map(frame.denoised, target)}
+
+
+def bench_section(bench: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the page shows of a benchmark, plots as embedded pictures."""
+    found = bench_report.section(bench)
+    shown = {
+        name: {theme: _embedded(png) for theme, png in pictures.items()}
+        for name, pictures in found["plots"].items()
+    }
+    return {**found, "plots": shown}
+
+
+def page(data: dict[str, Any], pictures: list[dict[str, str]], drawn: dict[str, Any]) -> str:
+    """Return the report as one HTML page."""
+    import jinja2
+
+    text = resources.files(__package__).joinpath("report.html.jinja").read_text(encoding="utf-8")
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
+    environment.filters["number"] = _number
+    bench = bench_section(data["bench"]) if data.get("bench") else None
+    return environment.from_string(text).render(**{**data, "bench": bench}, pictures=pictures, plots=drawn)
+
+
+def _number(value: float | None, digits: int = 3) -> str:
+    """Return a number with so many significant digits, or a dash where there is none."""
+    if value is None:
+        return "–"
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.{digits}g}"
+
+
+def _embedded(png: bytes) -> str:
+    """Return a PNG as the address of itself."""
+    return "data:image/png;base64," + base64.b64encode(png).decode()

@@ -1,0 +1,92 @@
+"""One model and one frame on every executor: picture, times, error against the float64 reference, bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ...refimpl.errors import CompileError, ExecutorUnavailable
+
+if TYPE_CHECKING:
+    from ...compiler.artifact import Artifact
+    from ...compiler.plan import Plan
+    from ...refimpl.frame import Frame
+    from ...refimpl.network.denoise import Model
+
+
+@dataclass(frozen=True)
+class Run:
+    """One executor on one frame; where it cannot run, `missing` says why and the numbers are None.
+
+    `error` is the largest difference from the float64 reference. `bound_frame` bounds it for this very frame,
+    `bound_all` for all frames; they are None where the target's sine promises nothing.
+    """
+
+    executor: str
+    device: str = ""
+    seconds_compile: float | None = None
+    seconds_run: float | None = None
+    error: float | None = None
+    bound_frame: float | None = None
+    bound_all: float | None = None
+    missing: str = ""
+
+
+def run_all(
+    model: Model, frame: Frame, kernels: dict[str, Artifact], on_done: Callable[[float], None]
+) -> tuple[dict[str, Any], tuple[Run, ...]]:
+    """Run each executor that is here; return pictures (H, W, 3) by executor, and what was found about all."""
+    import numpy as np
+
+    from ...refimpl.network.denoise import denoise
+
+    truth = denoise(model, frame, np.float64)
+    images: dict[str, Any] = {}
+    runs = []
+    for name, kernel in kernels.items():
+        try:
+            images[name], run = run_one(name, kernel, model, frame, truth)
+        except (ExecutorUnavailable, CompileError) as error:
+            run = Run(name, missing=str(error))
+        runs.append(run)
+        on_done(1)
+    return images, tuple(runs)
+
+
+def run_one(name: str, kernel: Artifact, model: Model, frame: Frame, truth: Any) -> tuple[Any, Run]:
+    """Return one executor's picture, and its times, error and bounds.
+
+    The kernel runs twice and the second time counts: drivers put off work until the first run.
+    """
+    from ...compiler.core.enclosure import round_up
+    from ...compiler.variants import plan_model
+    from ...kernels import denoise_on, open_executor
+    from ...refimpl.metrics import largest_error
+
+    with open_executor(name) as executor:
+        schedule = executor.schedule_for((frame.height, frame.width))
+        plan = plan_model(model, name, kernel.profile, schedule)
+        first = denoise_on(executor, model, frame)
+        second = denoise_on(executor, model, frame)
+    everywhere = plan.bound.output
+    run = Run(
+        name,
+        second.device,
+        first.seconds_compile,
+        second.seconds_run,
+        largest_error(second.image, truth),
+        frame_bound(plan, frame),
+        round_up(max(everywhere)) if everywhere else None,
+    )
+    return second.image, run
+
+
+def frame_bound(plan: Plan, frame: Frame) -> float | None:
+    """Return the bound on the largest error of a plan's kernel in this frame, or None where it has none."""
+    import numpy as np
+
+    from ...kernels.run.denoise_on import images_of
+
+    largest = float(plan.expected(images_of(plan.model, frame)).bound.max())
+    return largest if np.isfinite(largest) else None

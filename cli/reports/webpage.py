@@ -1,0 +1,106 @@
+"""One HTML file that path-traces a scene and denoises it in the reader's browser [`build_page`].
+
+1. The scene at the times of its animation [`animation_of`]; one that time does not change is still.
+2. Kernels, weights and numbers come from kernels/run/page.py, as JSON in the page.
+3. The page is a template with one style sheet and some scripts beside it [`SCRIPTS`], which are put into it
+   as they are: nothing is built, nothing is fetched; its Content-Security-Policy forbids it to.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...refimpl.errors import InputError
+from ..common import options
+from ..common.inputs import load_model, load_scene
+from ..common.packages import need
+
+if TYPE_CHECKING:
+    from ...kernels.run.page import Animation
+    from ...refimpl.network.denoise import Model
+
+FOLDER = "templates"
+"""Folder of the template and its parts, beside this module."""
+
+SCRIPTS = ("page.scene.js", "page.device.js", "page.renderer.js", "page.main.js")
+"""The page's scripts, in the order in which they are joined to one module."""
+
+FRAMES = 240
+"""Moments of an animation that a page can show: eight seconds, 30 a second."""
+
+FPS = 30.0
+"""Moments a second. They are half a step beside integers, since some scenes are laid out otherwise at time 0,
+where their boxes are parallel to the axes."""
+
+LEAD = (
+    "One random path per pixel gives the noisy picture; a small network, compiled to a fragment shader with "
+    "a bound on its error, makes the calm one of it. All runs on your device: nothing is loaded or sent."
+)
+"""The sentence below the title."""
+
+
+def build_page(animation: Animation, model: Model, fast: Model | None = None) -> str:
+    """Return the page of an animation and a model; `fast` is a model for the variants of low rank."""
+    from ...kernels.run.page import networks_of, page_data
+
+    return render_page(page_data(animation, networks_of(model, fast)))
+
+
+def page_of(model: Path, scene: str | None, assignments: Sequence[str], fast: Path | None) -> str:
+    """Return the page of files and names as a command is given them."""
+    need("jinja2", "for web pages", "report")
+    network = load_model(model)
+    name = scene or learned_scene(network)
+    return build_page(animation_of(name, assignments), network, load_model(fast) if fast else None)
+
+
+def learned_scene(model: Model) -> str:
+    """Return the canonical scene that a model has learned, minicubes if it names none; refuse others."""
+    from ...refimpl.light.scenes import CANONICAL
+
+    found = model.info.get("trained_on_scene", "") or "minicubes"
+    if found not in CANONICAL:
+        rule = "it must be one canonical scene, or one must be chosen"
+        raise InputError("scene that the model has learned", found, rule, "name one with --scene")
+    return found
+
+
+def animation_of(name: str, assignments: Sequence[str] = ()) -> Animation:
+    """Return a canonical scene at the times of a page, or the scene in a file, which is still."""
+    from ...kernels.run.page import Animation
+    from ...refimpl.light.scenes import CANONICAL
+
+    if name not in CANONICAL:
+        return Animation((0.0,), (load_scene(name, None, assignments),))
+    if "time" in options.parse_parameters(assignments):
+        rule = "a page shows all times of a canonical scene"
+        raise InputError("parameter time", "given", rule, "leave it out, or give a scene file")
+    times = tuple((number + 0.5) / FPS for number in range(FRAMES))
+    scenes = tuple(load_scene(name, time, assignments) for time in times)
+    if len({repr(replace(scene, info={})) for scene in scenes}) == 1:
+        return Animation(times[:1], scenes[:1])
+    return Animation(times, scenes)
+
+
+def render_page(data: dict[str, Any]) -> str:
+    """Return the page that shows such data."""
+    import jinja2
+
+    def part(name: str) -> str:
+        return (resources.files(__package__) / FOLDER / name).read_text(encoding="utf-8")
+
+    # In a script element nothing but its end tag and <!-- mean anything: JSON can do without the sign.
+    text = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
+    return environment.from_string(part("page.html.jinja")).render(
+        title=f"{data['scene'].replace('_', ' ').capitalize()}, path-traced and denoised live",
+        lead=LEAD,
+        style=part("page.css"),
+        script="\n".join(part(name) for name in SCRIPTS),
+        data=text,
+    )

@@ -1,0 +1,1 @@
+"""Devices: one executor for NumPy, OpenCL, OpenGL and C each, and which there are here."""

@@ -1,0 +1,369 @@
+"""Kernels as C, built by the system's compiler and called in this process: rows of a picture in threads.
+
+1. Write the kernel's source and a function around it [`GLUE`] into a folder that goes with the executor.
+2. Compile them to a shared object, for this processor where the compiler knows how [`OPTIONS`].
+3. Call it on blocks of rows, one a thread: ctypes lets other threads run meanwhile.
+4. The schedule that suits the processor follows from the registers that the compiler uses [`SCHEDULES`].
+"""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+import os
+import shlex
+import subprocess
+import tempfile
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.artifact import Artifact
+from ...compiler.scenes.encode_kernel import EncodeArtifact
+from ...compiler.scenes.path_kernel import PathArtifact
+from ...compiler.schedules.emit import output_channels
+from ...compiler.schedules.schedules import PLAIN
+from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
+from .executor import INDEX_LIMIT, Executor, Images, Part, gather_of, images_of, keep
+
+COMPILER_VARIABLE = "CC"
+"""Environment variable that names the compiler, with options if need be; else `cc`."""
+
+OPTIONS = ("-std=c99", "-O3", "-fPIC")
+"""Options of every call, before those that keep the arithmetic."""
+
+STRICT = (
+    "-fno-fast-math",
+    "-fno-unsafe-math-optimizations",
+    "-fno-associative-math",
+    "-fno-reciprocal-math",
+    "-fno-finite-math-only",
+    "-fsigned-zeros",
+    "-ftrapping-math",
+    "-ffp-contract=off",
+)
+"""What takes back whatever the user's options allow beyond IEEE 754: compilers obey the last of several.
+Contraction is off in the source too."""
+
+NATIVE = "-march=native"
+"""Option for this very processor's instructions; not all compilers take it."""
+
+PRIVATE_BYTES = 2**20
+"""Most bytes of a pixel's arrays: half the smallest stack that glibc gives a thread."""
+
+TRIAL = """\
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#if !defined(__GNUC__)
+#define LANES 1
+#elif defined(__AVX512F__)
+#define LANES 16
+#elif defined(__AVX__)
+#define LANES 8
+#else
+#define LANES 4
+#endif
+
+static void show(float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    printf("%08lx\\n", (unsigned long)bits);
+}
+
+int main(int count, char **arguments)
+{
+    (void)arguments;
+    /* The compiler does not know that count is 1. */
+    float one = (float)count, large = 16777216.0f * one, small = 1e-30f * one, third = one / 3.0f, sum = 0.0f;
+    float terms[64];
+    for (int i = 0; i < 64; ++i) terms[i] = one / (float)(i + 1);
+    for (int i = 0; i < 64; ++i) sum += terms[i];
+    show(sum);
+    show((large + one) - large);
+    show(third * third - one / 9.0f);
+    show(small * 1e-12f);
+    show(large / 7.0f);
+    show(sqrtf(third));
+    show(-one * 0.0f + -0.0f);
+    show(large * large * large * large * large * large * 0.0f == 0.0f ? one : 0.0f);
+    printf("%d\\n", LANES);
+    return 0;
+}
+"""
+"""A program in which each freedom that a compiler may take shows: order of sums, contraction, reciprocals,
+denormal numbers, signs of zeros, comparison with NaN. Last it prints the floats in a vector register that
+kernels are compiled for, 1 where the compiler has no vectors."""
+
+SCHEDULES = {16: "tile16", 8: "tile8", 4: "tile4"}
+"""Schedule of a denoiser by the floats in a vector register: each took the least processor time of all four
+when GCC compiled them for such registers. Without vectors it is the plain one."""
+
+
+def trial_bits() -> list[str]:
+    """Return what the trial's arithmetic prints, by NumPy: the definition of all arithmetic here."""
+    f = np.float32
+    one, large, small = f(1), f(16777216), f(1e-30)
+    third, total = one / f(3), f(0)
+    for i in range(64):
+        total = total + one / f(i + 1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        no_number = large * large * large * large * large * large * f(0)
+    values = [
+        total,
+        (large + one) - large,
+        third * third - one / f(9),
+        small * f(1e-12),
+        large / f(7),
+        np.sqrt(third),
+        -one * f(0) + -f(0),
+        one if no_number == 0 else f(0),
+    ]
+    return [f"{int(f(value).view(np.uint32)):08x}" for value in values]
+
+
+WAY_OUT = f"install one (Debian: gcc and libc6-dev), or name yours in {COMPILER_VARIABLE}"
+"""What to do without a compiler."""
+
+TRIAL_S = 10.0
+"""Most seconds that the trial may take: it takes a thousandth of one."""
+
+MOST_TOLD = 300
+"""Most letters of a compiler's complaint in a message of one line."""
+
+GLUE = """\
+#include "{header}"
+
+void wamnet_rows(const float *const *images, const float *weights, float *result, int width, int height,
+                 int first, int end)
+{{
+    for (int y = first; y < end; ++y) {{
+        for (int x = 0; x < width; x += {pixels}) {{
+            {entry}({images}, weights, result, width, height, x, y);
+        }}
+    }}
+}}
+"""
+"""The function that is called: rows [first, end) of a picture."""
+
+PATH_GLUE = """\
+#include "{header}"
+
+void wamnet_rows(const uint32_t *sizes, float *sums, int first, int end)
+{{
+    const wamnet_part part = {{(int)sizes[0], (int)sizes[1], (int)sizes[2], (int)sizes[3], sizes[4],
+                              (int)sizes[5], sizes[6]}};
+    for (int row = first; row < end; ++row) {{
+        for (int column = 0; column < part.width; ++column) {{
+            {entry}(&part, sums, column, row);
+        }}
+    }}
+}}
+"""
+"""The same for the paths of a part of a picture."""
+
+ENCODE_GLUE = """\
+#include "{header}"
+
+void wamnet_rows(const float *sums, float *const *images, int width, int height, int samples)
+{{
+    {entry}(sums, {images}, width, height, samples);
+}}
+"""
+"""The same for an encoding, which takes all rows at once: a thousandth of the time of the paths."""
+
+
+class CExecutor(Executor):
+    """The system's C compiler; what it has built stays loaded as long as the process."""
+
+    name = "c"
+
+    def __init__(self) -> None:
+        given = os.environ.get(COMPILER_VARIABLE) or ""
+        try:
+            self._command = shlex.split(given) or ["cc"]
+        except ValueError as error:
+            rule = f"{COMPILER_VARIABLE} is {given!r}, which is no command ({error})"
+            raise ExecutorUnavailable(f"c: {rule}; {WAY_OUT}") from None
+        version = self._call("--version").stdout.strip().partition("\n")[0]
+        self.device = f"{' '.join(self._command)}: {version}"
+        self._built: dict[str, Any] = {}
+        self._count = itertools.count()
+        self._options = list(OPTIONS)
+        self._folder = tempfile.TemporaryDirectory(prefix="wamnet-c-")
+        try:
+            self._try()
+        except ExecutorUnavailable:
+            self._folder.cleanup()
+            raise
+        self._threads = ThreadPoolExecutor(os.cpu_count() or 1)
+
+    def _try(self) -> None:
+        """Find out what the compiler takes, and whether its programs compute as they must."""
+        program = Path(self._folder.name) / "trial"
+        # Not all compilers know all options; what the program prints decides, not which options they accept.
+        for options in ([*STRICT, NATIVE], STRICT, []):
+            self._options = [*OPTIONS, *options]
+            done = self._compile(program, TRIAL, [])
+            if done.returncode == 0:
+                break
+        told = " ".join(done.stderr.split())[:MOST_TOLD]
+        if done.returncode or not program.is_file():
+            told = told or "it writes no program"
+            raise ExecutorUnavailable(f"c: {self.device} does not compile C99 ({told}); {WAY_OUT}")
+        try:
+            ran = subprocess.run([program], capture_output=True, text=True, check=False, timeout=TRIAL_S)
+            found = ran.stdout.split()
+        except (OSError, ValueError, subprocess.TimeoutExpired) as error:
+            rule = f"what it compiles does not run here ({type(error).__name__})"
+            raise ExecutorUnavailable(f"c: {self.device}: {rule}; {WAY_OUT}") from None
+        *bits, lanes = found or [""]
+        if bits != trial_bits():
+            rule = "what it compiles does not compute as IEEE 754 says"
+            way_out = f"take options that relax arithmetic out of {COMPILER_VARIABLE}"
+            raise ExecutorUnavailable(f"c: {self.device}: {rule}; {way_out}")
+        self.schedule = SCHEDULES.get(int(lanes), PLAIN)
+        self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
+
+    def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
+        """Compile and load the kernels."""
+        for kernel in artifact.kernels:
+            built = self._built.get(kernel.digest) or self._loaded(kernel)
+            keep(self._built, kernel.digest, built)
+
+    def forget(self) -> None:
+        """Drop the built kernels."""
+        self._built.clear()
+
+    def _loaded(self, artifact: Artifact) -> Any:
+        """Return the compiled function."""
+        used = artifact.manifest["private_bytes"]
+        if used > PRIVATE_BYTES:
+            raise CompileError(
+                f"{self.device}: the kernel's arrays take {used} bytes a pixel: at most {PRIVATE_BYTES} fit "
+                "a thread's stack; use narrower layers, or executor numpy"
+            )
+        images = ", ".join(f"images[{i}]" for i in range(len(gather_of(artifact).images)))
+        header, pixels = _header(artifact), artifact.manifest["schedule"]["pixels"]
+        glue = GLUE.format(header=header, entry=artifact.entry_point, images=images, pixels=pixels)
+        function = self._library(artifact, glue)
+        function.argtypes = [*[ctypes.c_void_p] * 3, *[ctypes.c_int] * 4]
+        return function
+
+    def _library(self, kernel: Artifact | PathArtifact | EncodeArtifact, glue: str) -> Any:
+        """Return the function of a kernel's source and the glue around it, compiled and loaded."""
+        folder = Path(self._folder.name)
+        (folder / _header(kernel)).write_text(kernel.source, encoding="utf-8")
+        # A library that was built before may still be loaded: each has a name of its own.
+        library = folder / f"{kernel.digest[:32]}-{next(self._count)}.so"
+        done = self._compile(library, glue, ["-shared"])
+        if done.returncode or not library.is_file():
+            told = done.stderr.strip()[:MOST_TOLD] or "it writes no library"
+            raise CompileError(f"{self.device} does not build the kernel: {told}; {WAY_OUT}")
+        function = ctypes.CDLL(str(library)).wamnet_rows
+        function.restype = None
+        return function
+
+    def _compile(self, result: Path, text: str, options: list[str]) -> subprocess.CompletedProcess[str]:
+        """Compile a text to a program, or to a library if the options say so."""
+        source = result.with_suffix(".c")
+        source.write_text(text, encoding="utf-8")
+        return self._call(*self._options, *options, "-o", str(result), str(source), "-lm")
+
+    def _call(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run the compiler."""
+        try:
+            return subprocess.run(
+                [*self._command, *arguments], capture_output=True, text=True, check=False, errors="replace"
+            )
+        except OSError as error:
+            raise ExecutorUnavailable(
+                f"c: the compiler {self._command[0]!r} cannot be run ({error.strerror}); {WAY_OUT}"
+            ) from None
+
+    def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
+        """Refuse images whose indices `int` does not hold."""
+        written = [output_channels(kernel.program) for kernel in artifact.kernels]
+        most = max(*written, *(image.channels for image in images_of(artifact)))
+        if size[0] * size[1] * most >= INDEX_LIMIT:
+            raise InputError(
+                "size of the picture for C",
+                f"{size[1]} x {size[0]} with {most} channels",
+                f"one image must hold fewer than {INDEX_LIMIT} numbers",
+                "split the picture, or use executor numpy",
+            )
+
+    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
+        found = list(images.values())
+        # What one pass returns is the image of the next.
+        for kernel in artifact.kernels:
+            found = [self._run_kernel(kernel, found)]
+        return found[0]
+
+    def _run_kernel(self, artifact: Artifact, images: list[NDArray[np.float32]]) -> NDArray[np.float32]:
+        """Return the output (H, W, C) of one kernel."""
+        height, width, _ = images[0].shape
+        result = np.empty((height, width, output_channels(artifact.program)), np.float32)
+        pointers = (ctypes.c_void_p * len(images))(*(image.ctypes.data for image in images))
+        weights = np.ascontiguousarray(artifact.weights)
+        call = self._built[artifact.digest]
+
+        def rows(first: int, end: int) -> None:
+            call(pointers, weights.ctypes.data, result.ctypes.data, width, height, first, end)
+
+        self._in_threads(height, rows)
+        return result
+
+    def _in_threads(self, height: int, rows: Callable[[int, int], None]) -> None:
+        """Call a function for blocks of rows [first, end), shared out to threads."""
+        firsts = range(0, height, max(1, height // (8 * (os.cpu_count() or 1))))
+        list(self._threads.map(rows, firsts, [*firsts[1:], height]))
+
+    def build_path(self, kernel: PathArtifact) -> None:
+        """Compile and load the path kernel."""
+        built = self._built.get(kernel.digest) or self._loaded_path(kernel)
+        keep(self._built, kernel.digest, built)
+
+    def _loaded_path(self, kernel: PathArtifact) -> Any:
+        """Return the compiled function of a path kernel."""
+        function = self._library(kernel, PATH_GLUE.format(header=_header(kernel), entry=kernel.entry_point))
+        function.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int] * 2]
+        return function
+
+    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
+        sums = np.zeros((len(kernel.planes), part.rows, part.width), np.float32)
+        numbers = (part.width, part.height, part.first_row, part.rows, part.first_sample)
+        sizes = (ctypes.c_uint32 * 7)(*(n % 2**32 for n in (*numbers, part.samples, part.seed)))
+        call = self._built[kernel.digest]
+        self._in_threads(part.rows, lambda first, end: call(sizes, sums.ctypes.data, first, end))
+        return sums
+
+    def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+        _, height, width = sums.shape
+        images = {i.name: np.empty((height, width, i.channels), np.float32) for i in kernel.images}
+        if kernel.digest not in self._built:
+            arguments = ", ".join(f"images[{i}]" for i in range(len(images)))
+            glue = ENCODE_GLUE.format(header=_header(kernel), entry=kernel.entry_point, images=arguments)
+            function = self._library(kernel, glue)
+            function.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int] * 3]
+            keep(self._built, kernel.digest, function)
+        pointers = (ctypes.c_void_p * len(images))(*(image.ctypes.data for image in images.values()))
+        self._built[kernel.digest](sums.ctypes.data, pointers, width, height, samples)
+        return images
+
+    def close(self) -> None:
+        """End the threads and remove the folder."""
+        self._threads.shutdown()
+        self._folder.cleanup()
+
+
+def _header(kernel: Artifact | PathArtifact | EncodeArtifact) -> str:
+    """Return the name of the file that holds a kernel's source."""
+    return f"{kernel.digest[:32]}.h"

@@ -1,0 +1,138 @@
+"""The interpreter of the IR as an executor: all windows of a block of rows at once, in float32.
+
+Its path tracer is the skeleton that path kernels have (compiler/scenes/emit_path.py), with all paths of a
+part as lanes: it defines what they add up. Its passes are the plain composition of its kernels
+[`passes.HostPasses`].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.artifact import Artifact
+from ...compiler.core.interpret import interpret
+from ...compiler.scenes.encode_kernel import EncodeArtifact
+from ...compiler.scenes.lower_encode import SAMPLES, channel_name
+from ...compiler.scenes.lower_scene import PathPrograms
+from ...compiler.scenes.path_kernel import PathArtifact
+from ...compiler.schedules.emit import output_channels
+from ...refimpl.network import dataset
+from .executor import Executor, Images, Part, gather_of
+
+BLOCK_NUMBERS = 2**22
+"""Numbers in the windows of one block of rows: 16 MiB in float32, for images of any height."""
+
+
+class NumpyExecutor(Executor):
+    """Runs the program itself; there is nothing to build."""
+
+    name = "numpy"
+
+    def __init__(self) -> None:
+        self.device = f"NumPy {np.__version__}"
+
+    def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
+        """Do nothing: the program is interpreted."""
+
+    def build_path(self, kernel: PathArtifact) -> None:
+        """Do nothing: the programs are interpreted."""
+
+    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
+        shape = (part.rows, part.width)
+        y, x = (a.astype(np.uint32) for a in np.indices(shape))
+        state: dict[str, Any] = {
+            "x": x,
+            "y": y + np.uint32(part.first_row),
+            "seed": np.full(shape, part.seed, np.uint32),
+            "width": np.float32(part.width),
+            "height": np.float32(part.height),
+        }
+        sums = {plane: np.zeros(shape, np.float32) for plane in kernel.planes}
+        # Paths that have ended are computed on, and may leave the range of numbers.
+        with np.errstate(all="ignore"):
+            for n in range(part.samples):
+                state["sample_number"] = np.full(shape, (part.first_sample + n) % 2**32, np.uint32)
+                first, end = follow(kernel.programs, state)
+                _add(sums, first, end, np.float32(n))
+        return np.stack(list(sums.values()))
+
+    def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+        """Interpret the encoding, all pixels at once."""
+        given = dict(zip(kernel.planes, sums, strict=True))
+        found = interpret(kernel.program, {**given, SAMPLES: np.full(sums.shape[1:], samples, np.float32)})
+        return {
+            image.name: np.stack([found[channel_name(image.name, c)] for c in range(image.channels)], axis=-1)
+            for image in kernel.images
+        }
+
+    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
+        image = np.concatenate(list(images.values()), axis=-1)
+        # What one pass returns is the image of the next.
+        for kernel in artifact.kernels:
+            image = self._run_kernel(kernel, image)
+        return image
+
+    def _run_kernel(self, artifact: Artifact, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the output (H, W, C) of one kernel for its images, joined."""
+        gather = gather_of(artifact)
+        height, width, _ = image.shape
+        padded = dataset.pad(image, gather.window, gather.axes)
+        rows = max(1, BLOCK_NUMBERS // (width * gather.n_inputs))
+        result = np.empty((height, width, output_channels(artifact.program)), np.float32)
+        for top in range(0, height, rows):
+            bottom = min(top + rows, height)
+            # These rows and the margin around them are all that their pixels see.
+            strip = padded[top : bottom + gather.rows - 1]
+            windows = dataset.all_windows(strip, gather.window, gather.axes)
+            (value,) = interpret(artifact.program, {"window": windows}).values()
+            result[top:bottom] = np.reshape(value, (bottom - top, width, -1)) if np.ndim(value) > 1 else value
+        return result
+
+
+def follow(programs: PathPrograms, given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Follow paths; return the features of their first surfaces and their state in the end.
+
+    given holds the inputs of `start`: x, y, seed, sample_number (...), width and height.
+    """
+    state: dict[str, Any] = {**given, **interpret(programs.start, given)}
+    state["alive"] = np.ones(state["x"].shape, bool)
+    first: dict[str, Any] = {}
+    for depth in range(programs.settings.max_depth + 1):
+        state = _masked(state, interpret(programs.arrive, state))
+        if depth == 0:
+            first = interpret(programs.look, state)
+        if depth == programs.settings.max_depth:
+            break
+        state["depth"] = np.full(state["x"].shape, depth, np.uint32)
+        state = _masked(state, interpret(programs.scatter, state))
+        if not state["alive"].any():
+            break
+    return first, state
+
+
+def _masked(state: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the state with new values; the radiance of a path that has ended stays as it is."""
+    alive = state["alive"]
+    kept = {name: np.where(alive, new[name], state[name]) for name in new if name.startswith("radiance")}
+    ended = {"alive": alive & new["alive"]} if "alive" in new else {}
+    return {**state, **new, **kept, **ended}
+
+
+def _add(sums: dict[str, Any], first: Mapping[str, Any], end: Mapping[str, Any], n: np.float32) -> None:
+    """Add a path to the sums, `n` being the number of samples before it."""
+    one = np.float32(1)
+    weight = one / (n * (n + one)) if n else np.float32(0)
+    if "deviation_r" in sums:
+        for c in "rgb":
+            sums[f"deviation_{c}"] += (end[f"radiance_{c}"] * n - sums[f"color_{c}"]) ** 2 * weight
+    for plane in sums:
+        if plane in first:
+            sums[plane] += first[plane]
+        elif plane.startswith("color"):
+            sums[plane] += end[plane.replace("color", "radiance")]
+        elif not plane.startswith("deviation"):
+            sums[plane] += end[plane.removeprefix("last_")].astype(np.float32)

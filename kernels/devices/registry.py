@@ -1,0 +1,74 @@
+"""Executors by name. Their packages are imported when one is opened: the base install has none of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ...compiler.core.writing import signals_wait
+from ...refimpl.errors import ExecutorUnavailable, InputError
+from .executor import Executor
+
+CONTEXT_VARIABLE = "WAMNET_OPENGL_CONTEXT"
+"""Environment variable that names the kind of OpenGL's context, egl or osmesa, where the caller does not."""
+
+
+def _numpy(**options: Any) -> Executor:
+    """Open the interpreter."""
+    from .numpy_executor import NumpyExecutor
+
+    return NumpyExecutor(**options)
+
+
+def _opencl(**options: Any) -> Executor:
+    """Open an OpenCL device; option `device`: a part of its name."""
+    with signals_wait():
+        from .opencl_executor import OpenCLExecutor
+
+    return OpenCLExecutor(**options)
+
+
+def _opengl(**options: Any) -> Executor:
+    """Open an OpenGL context; option `context`: auto, egl or osmesa."""
+    with signals_wait():
+        from .opengl_executor import OpenGLExecutor
+
+    return OpenGLExecutor(**options)
+
+
+def _c(**options: Any) -> Executor:
+    """Open the system's C compiler."""
+    from .c_executor import CExecutor
+
+    return CExecutor(**options)
+
+
+EXECUTORS: Mapping[str, Callable[..., Executor]] = {
+    "numpy": _numpy,
+    "opencl": _opencl,
+    "opengl": _opengl,
+    "c": _c,
+}
+"""How to open each executor; the name is also the target that the compiler takes."""
+
+OPTIONS: Mapping[str, tuple[Mapping[str, str], ...]] = {"opengl": ({"context": "egl"}, {"context": "osmesa"})}
+"""Options of executors that can be opened in several ways, each perhaps another driver."""
+
+WAYS: Mapping[str, tuple[str, Mapping[str, str]]] = {
+    "-".join((name, *options.values())): (name, options)
+    for name in EXECUTORS
+    for options in OPTIONS.get(name, ({},))
+}
+"""Every way to open an executor: numpy, opencl, opengl-egl, ...; its name and its options."""
+
+
+def open_executor(name: str, **options: Any) -> Executor:
+    """Return an open executor, or raise ExecutorUnavailable that says what is missing and how to get it."""
+    if name not in EXECUTORS:
+        raise InputError("executor", name, f"must be one of {', '.join(EXECUTORS)}", "choose one of these")
+    try:
+        return EXECUTORS[name](**options)
+    except ImportError as error:
+        raise ExecutorUnavailable(
+            f"{name}: package {error.name or error} cannot be imported; pip install 'wamnet[{name}]'"
+        ) from None

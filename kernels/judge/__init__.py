@@ -1,0 +1,1 @@
+"""What judges: pictures and paths compared, and what to do when they differ."""

@@ -1,0 +1,280 @@
+"""When executors disagree: which one is off, where, since which stage, and on how small a picture.
+
+1. Compile the network for each executor and schedule [`kernels_of`], run each kernel, and hold each number
+   against the float64 reference and the bound of its schedule at this frame [`judged`], [compiler/plan.py].
+   What is no finite number deviates. Under profile `exact` the bits must also be those of the interpreter.
+2. Name the odd ones out: those that deviate while others are within their bounds. If all deviate, it is the
+   program or the bound that is suspect [`conclusion`].
+3. Cut the picture down to one that still shows it [reduce.py: `shrink`], and run the network's first stages
+   without the rest until one deviates [reduce.py: `first_stage`].
+
+Executors run in processes of their own [apart.py]: one that crashes, or never answers, has deviated. One that
+refuses a kernel in its own words has not: it has written nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.artifact import Artifact
+from ...compiler.compile import compile_plan
+from ...compiler.core import ir
+from ...compiler.core.ir import Program
+from ...compiler.plan import Expected, Plan, plan_program
+from ...compiler.schedules.schedules import PLAIN
+from ...compiler.targets import target_named
+from ...refimpl.errors import CompileError
+from ..devices.executor import Images
+from ..devices.numpy_executor import NumpyExecutor
+from .apart import Outcome, Runner
+
+Compile = Callable[[Plan], Artifact]
+"""What makes a plan's kernel."""
+
+NONE: Mapping[str, str] = {}
+"""No schedule but the picked one."""
+
+PICKED, EVERY = "picked", "all"
+"""Which schedules are run: the one that the executor picks, or all that its target has."""
+
+EXACT = "exact"
+"""The profile whose kernels have the interpreter's bits."""
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A kernel and what runs it; without an `artifact`, the `reason` why the compiler refuses it."""
+
+    runner: Runner
+    schedule: str
+    artifact: Artifact | None
+    reason: str = ""
+
+    @property
+    def name(self) -> str:
+        """Return executor and schedule."""
+        return f"{self.runner.way} {self.schedule}"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a kernel wrote: its worst number, (row, column, channel), and how far that one may be off.
+
+    `ratio`: the largest error / bound; `bits`: numbers that have not the interpreter's bits (profile exact);
+    `refusal`, `failure`: why there is no picture.
+    """
+
+    kernel: Kernel
+    error: float = 0.0
+    ratio: float = 0.0
+    pixel: tuple[int, int, int] | None = None
+    found: float = 0.0
+    expected: float = 0.0
+    bound: float = 0.0
+    bits: int = 0
+    refusal: str = ""
+    failure: str = ""
+
+    @property
+    def ran(self) -> bool:
+        """Tell whether there is something to judge."""
+        return not self.refusal
+
+    @property
+    def within(self) -> bool:
+        """Tell whether the picture is as promised; NaN is not."""
+        return self.ran and not self.failure and self.ratio <= 1.0 and not self.bits
+
+    @property
+    def deviates(self) -> bool:
+        """Tell whether the executor did not keep the promise."""
+        return self.ran and not self.within
+
+    @property
+    def promised(self) -> bool:
+        """Tell whether there is a bound to be within."""
+        return bool(np.isfinite(self.bound))
+
+    @property
+    def state(self) -> str:
+        """Return the verdict in a few words."""
+        if self.refusal:
+            return f"refused: {self.refusal}"
+        if self.failure:
+            return f"FAILED: {self.failure}"
+        if self.bits:
+            return f"DEVIATES: {self.bits} numbers have other bits"
+        if not self.within:
+            return "DEVIATES"
+        return "within" if self.promised else "no bound"
+
+
+def kernels_of(
+    runners: Sequence[Runner],
+    program: Program,
+    profile: str,
+    size: tuple[int, int],
+    which: str = PICKED,
+    compiled: Compile = compile_plan,
+    instead: Mapping[str, str] = NONE,
+) -> list[Kernel]:
+    """Return the kernels of a program for each runner, in the picked schedule or in `all` that hold it.
+
+    `instead`: schedules by target, instead of the picked ones.
+    """
+    known: dict[tuple[str, str], Artifact | str] = {}
+    kernels = []
+    for runner in runners:
+        every = [schedule.name for schedule in target_named(runner.target).schedules]
+        named = which if which != PICKED else instead.get(runner.target) or runner.picked(size)
+        for schedule in every if which == EVERY else [named]:
+            key = (runner.target, schedule)
+            if key not in known:
+                known[key] = _compiled(compiled, program, profile, *key)
+            found = known[key]
+            if isinstance(found, str):
+                kernels.append(Kernel(runner, schedule, None, found))
+                continue
+            actual = str(found.manifest["schedule"]["name"])
+            # One that is replaced by another is that other one, which has its turn.
+            if actual == schedule or which != EVERY:
+                kernels.append(Kernel(runner, actual, found))
+    return kernels
+
+
+def _compiled(
+    compiled: Compile, program: Program, profile: str, target: str, schedule: str
+) -> Artifact | str:
+    """Return a kernel, or why there is none."""
+    try:
+        return compiled(plan_program(program, target, profile, schedule))
+    except CompileError as error:
+        return str(error)
+
+
+class Judge:
+    """What kernels may write for images (H, W, C) by their plans: computed once where it is the same."""
+
+    def __init__(self, images: Images) -> None:
+        self.images = images
+        self._known: dict[Any, Expected] = {}
+        self._bits: dict[str, NDArray[np.float32]] = {}
+
+    def verdict(self, kernel: Kernel) -> Verdict:
+        """Run a kernel, and judge what it writes."""
+        if kernel.artifact is None:
+            return Verdict(kernel, refusal=kernel.reason)
+        outcome = kernel.runner.run(kernel.artifact, self.images)
+        if outcome.image is None:
+            return Verdict(kernel, refusal=outcome.refusal, failure=outcome.failure)
+        plan = kernel.artifact.plan
+        wanted = self._interpreted(plan) if plan.profile.name == EXACT else None
+        return _judged(kernel, outcome, self._expected(plan), wanted)
+
+    def _expected(self, plan: Plan) -> Expected:
+        """Return what a plan's kernel may write; most schedules share one bound."""
+        own = None if plan.shares_bound else plan.schedule.name
+        key = (ir.digest(plan.analysed), plan.sine, own)
+        if key not in self._known:
+            self._known[key] = plan.expected(self.images)
+        return self._known[key]
+
+    def _interpreted(self, plan: Plan) -> NDArray[np.float32]:
+        """Return the picture (H, W, C) whose bits profile exact promises."""
+        key = ir.digest(plan.analysed)
+        if key not in self._bits:
+            with NumpyExecutor() as executor:
+                there = replace(plan, target=target_named(executor.name), asked=PLAIN)
+                self._bits[key] = executor.run(compile_plan(there), self.images)
+        return self._bits[key]
+
+
+def judged(kernels: Sequence[Kernel], images: Images) -> list[Verdict]:
+    """Run kernels on images (H, W, C), and return the verdicts in their order."""
+    judge = Judge(images)
+    return [judge.verdict(kernel) for kernel in kernels]
+
+
+def _judged(kernel: Kernel, outcome: Outcome, held: Expected, wanted: NDArray[np.float32] | None) -> Verdict:
+    """Return the verdict about a picture (H, W, C)."""
+    assert outcome.image is not None
+    image = np.ascontiguousarray(outcome.image)
+    found = image.astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        error = np.abs(found - held.value)
+        ratio = np.where(np.isfinite(found), error / held.bound, np.inf)
+    other = np.zeros(found.shape, bool)
+    if wanted is not None:
+        other = image.view(np.uint32) != np.ascontiguousarray(wanted).view(np.uint32)
+    # The worst number is beyond its bound, or else has other bits, or else is the farthest off.
+    if other.any() and ratio.max() <= 1.0:
+        ratio_of = np.where(other, ratio, -1.0)
+    else:
+        ratio_of = ratio
+    at = tuple(int(i) for i in np.unravel_index(int(np.argmax(ratio_of)), found.shape))
+    return Verdict(
+        kernel,
+        error=float(np.nanmax(error)) if np.isfinite(found).all() else float("inf"),
+        ratio=float(ratio.max()),
+        pixel=(at[0], at[1], at[2]),
+        found=float(found[at]),
+        expected=float(held.value[at]),
+        bound=float(held.bound[at]),
+        bits=int(other.sum()),
+    )
+
+
+def odd_ones(verdicts: Sequence[Verdict]) -> list[Verdict]:
+    """Return the kernels that deviate."""
+    return [verdict for verdict in verdicts if verdict.deviates]
+
+
+def conclusion(verdicts: Sequence[Verdict]) -> str:
+    """Return in one sentence who is the odd one out."""
+    ran, odd = [v for v in verdicts if v.ran], odd_ones(verdicts)
+    if not ran:
+        return "nothing ran: every kernel was refused"
+    if not odd:
+        return _within(ran, "kernel")
+    names = " and ".join(_names(odd, ran))
+    if len(odd) < len(ran):
+        many = len(_names(odd, ran)) > 1
+        ones = "are the odd ones out" if many else "is the odd one out"
+        return f"{names} {ones}: {_within([v for v in ran if v.within], 'other')}"
+    if len(ran) == 1:
+        return f"{names} deviates, and nothing else ran: run other executors beside it"
+    return "all deviate: the program or the bound is suspect, not an executor"
+
+
+def _names(odd: Sequence[Verdict], ran: Sequence[Verdict]) -> list[str]:
+    """Return the names of the odd ones: an executor's, if all its schedules deviate, or a kernel's."""
+    names: dict[str, None] = {}
+    for verdict in odd:
+        way = verdict.kernel.runner.way
+        whole = all(v.deviates for v in ran if v.kernel.runner.way == way)
+        several = sum(v.kernel.runner.way == way for v in ran) > 1
+        names[f"{way} (all schedules)" if whole and several else verdict.kernel.name] = None
+    return list(names)
+
+
+def _within(verdicts: Sequence[Verdict], what: str) -> str:
+    """Return how many of these are within their bounds, and how many have none."""
+    with_bound = sum(verdict.promised for verdict in verdicts)
+    without = len(verdicts) - with_bound
+    texts = []
+    if with_bound:
+        whose = "its bound" if with_bound == 1 else "their bounds"
+        texts.append(f"{_count(with_bound, what)} within {whose}")
+    if without:
+        texts.append(f"{_count(without, what)} without a bound that wrote finite numbers")
+    return ", ".join(texts)
+
+
+def _count(number: int, what: str) -> str:
+    """Return a number of things."""
+    return f"{number} {what}{'' if number == 1 else 's'}"

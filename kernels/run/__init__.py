@@ -1,0 +1,1 @@
+"""What runs on an executor: denoising, rendering, pipelines, training and tuning."""

@@ -1,0 +1,97 @@
+"""What wamnet remembers of a machine between runs: one small file an entry, in the user's cache folder.
+
+1. The folder is WAMNET_CACHE, else `wamnet` in XDG_CACHE_HOME, else `~/.cache/wamnet` [`folder`].
+2. An entry is JSON around its data: the form's name and the data's SHA-256 [`write_json`]. It is written
+   under another name and then takes its own, so that no reader sees half of one; the last writer wins.
+3. What cannot be read, is not of this form, or does not have its checksum is as if it were not there, with a
+   line in the log `wamnet` [`read_json`]; the next write replaces it. A cache that cannot be written costs
+   time, never a run.
+
+Names hold all that an entry depends on [`key`]: nothing is ever brought up to date in place.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ...compiler.core.writing import write_bytes
+from ...refimpl.errors import InputError, shown
+from ...refimpl.reading import BROKEN, parse_json, read_file
+
+FOLDER_VARIABLE = "WAMNET_CACHE"
+"""Environment variable that names another folder."""
+
+SCHEMA = "wamnet-cache-1"
+"""Name and version of an entry's form."""
+
+LARGEST_BYTES = 1 << 24
+"""Largest file that is taken for an entry: 16 MiB."""
+
+_log = logging.getLogger("wamnet")
+
+
+def folder() -> Path:
+    """Return the folder of this user's entries, which need not exist yet."""
+    if given := os.environ.get(FOLDER_VARIABLE):
+        return Path(given)
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    # The specification of the variable: a path that is not absolute is to be ignored.
+    return (base if base.is_absolute() else Path("~/.cache").expanduser()) / "wamnet"
+
+
+def key(*parts: object) -> str:
+    """Return a short name for all that an entry depends on: JSON's types, in this order."""
+    text = json.dumps(parts, sort_keys=True, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def read_json(name: str) -> Any:
+    """Return the data of the entry `<name>.json`, or None where there is none that can be trusted."""
+    path = _path(name)
+    try:
+        content = read_file(path, "cache entry", "remove it", LARGEST_BYTES)
+    except InputError as error:
+        if path.exists() or path.is_symlink():
+            _log.warning("%s: it is ignored", error)
+        return None
+    with suppress(*BROKEN):
+        entry = parse_json(content, "cache entry", "remove it")
+        if entry["schema"] == SCHEMA and entry["sha256"] == _checksum(entry["data"]):
+            return entry["data"]
+    _log.warning(
+        "cache entry %s is damaged, or no entry of wamnet: it is ignored and written again", shown(str(path))
+    )
+    return None
+
+
+def write_json(name: str, data: Any) -> Path | None:
+    """Keep data of JSON's types as the entry `<name>.json`; return its path, or None if it cannot be kept."""
+    entry = {"schema": SCHEMA, "sha256": _checksum(data), "data": data}
+    path = _path(name)
+    try:
+        # What is kept may become code of this user's processes: nobody else writes here.
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        write_bytes(path, (json.dumps(entry, indent=1, sort_keys=True) + "\n").encode())
+    except OSError as error:
+        _log.warning(
+            "cache entry %s cannot be written (%s): nothing is kept", shown(str(path)), error.strerror
+        )
+        return None
+    return path
+
+
+def _path(name: str) -> Path:
+    """Return the file of an entry."""
+    assert name == Path(name).name, "names of entries are made by the program, and hold no folder"
+    return folder() / f"{name}.json"
+
+
+def _checksum(data: Any) -> str:
+    """Return the SHA-256 of data as JSON, in one form for equal data."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()

@@ -1,0 +1,232 @@
+"""Speed against error as measured points, and the choice among them.
+
+1. A point is a variant under a schedule on an executor: its median time, how far its pictures are from the
+   full network's in float64 (largest and mean difference of display-encoded colour), what it loses of the
+   full network's PSNR against references, and what is proven for all images [`Point`].
+2. A curve is a list of points of one model, device, size and profile, as JSON [`Curve`], [`from_data`]. It is
+   kept in the user's cache folder under all that it depends on [`key_of`]; what is damaged, or of something
+   else, is measured again [`cached`].
+3. The choice: points that break no rule, the cheapest of them where an error is limited, the most accurate
+   where only time is [`choose`]. A number that is missing or no number breaks every rule.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+from ...compiler import variants
+from ...refimpl.errors import InputError
+from ...refimpl.reading import parse_json, read_file, refusing
+from . import cache
+
+SCHEMA = "wamnet-curve-1"
+"""Name and version of a curve's form; described in spec/variants.md."""
+
+NUMBERS = ("milliseconds", "error_max", "error_mean", "psnr_loss_db", "error_bound")
+"""A point's numbers; null where it was not measured, or is no number."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One way to denoise; times in milliseconds, errors in display-encoded colour, NaN where unknown."""
+
+    variant: str
+    schedule: str
+    executor: str
+    milliseconds: float
+    error_max: float
+    error_mean: float
+    psnr_loss_db: float
+    error_bound: float
+
+    @property
+    def text(self) -> str:
+        """Return the point for a reader."""
+        return (
+            f"{self.variant}, schedule {self.schedule}: {self.milliseconds:.4g} ms, "
+            f"error {self.error_max:.3g}, PSNR loss {self.psnr_loss_db:.3g} dB"
+        )
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Points of one model (digest of its program) on a device at a size (height, width) under a profile."""
+
+    model: str
+    device: str
+    size: tuple[int, int]
+    profile: str
+    points: tuple[Point, ...]
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the curve as JSON's types, null for what is no finite number."""
+        points = []
+        for point in self.points:
+            data = asdict(point)
+            data.update({name: data[name] if math.isfinite(data[name]) else None for name in NUMBERS})
+            points.append(data)
+        head = {"schema": SCHEMA, "model": self.model, "device": self.device, "size": list(self.size)}
+        return {**head, "profile": self.profile, "points": points}
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Rules for a choice, None for no rule: largest error (display-encoded colour), time (ms), loss (dB)."""
+
+    max_error: float | None = None
+    max_ms: float | None = None
+    max_loss_db: float | None = None
+
+    @property
+    def rules(self) -> tuple[tuple[str, str, float], ...]:
+        """Return (option, name of a point's number, limit) of the rules that there are."""
+        found = (
+            ("--max-error", "error_max", self.max_error),
+            ("--max-ms", "milliseconds", self.max_ms),
+            ("--max-loss-db", "psnr_loss_db", self.max_loss_db),
+        )
+        return tuple((option, name, limit) for option, name, limit in found if limit is not None)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The point that was chosen, and why others were not: (point, the rules that it breaks)."""
+
+    point: Point
+    rejected: tuple[tuple[Point, str], ...]
+
+
+# ---- choosing ---------------------------------------------------------------------------------------------
+
+
+def check_limits(limits: Limits) -> None:
+    """Refuse limits that nothing can be checked against."""
+    for option, name, limit in limits.rules:
+        if not math.isfinite(limit) or (limit < 0 and name != "psnr_loss_db"):
+            least = "finite" if name == "psnr_loss_db" else "finite and >= 0"
+            raise InputError(option, limit, f"it must be {least}", f"for example {option} 0.1")
+
+
+def choose(points: Sequence[Point], limits: Limits) -> Choice:
+    """Return the best point within the limits, or refuse with the nearest one.
+
+    With a limit on errors the fastest, of equally fast ones the most accurate; else the most accurate, of
+    equals the fastest. What is left of a tie is decided by the order of names.
+    """
+    check_limits(limits)
+    broken = [(point, _broken(point, limits)) for point in points]
+    fit = [point for point, rules in broken if not rules]
+    if not fit:
+        raise _nothing(points, limits)
+    by_time = limits.max_error is not None or limits.max_loss_db is not None
+
+    def order(point: Point) -> tuple[Any, ...]:
+        error = (_known(point.error_max), _known(point.error_mean))
+        time = (_known(point.milliseconds),)
+        return (*(time + error if by_time else error + time), point.variant, point.schedule, point.executor)
+
+    return Choice(min(fit, key=order), tuple((point, rules) for point, rules in broken if rules))
+
+
+def _broken(point: Point, limits: Limits) -> str:
+    """Return which rules a point breaks; NaN breaks each."""
+    wrong = []
+    for option, name, limit in limits.rules:
+        value = getattr(point, name)
+        if not value <= limit:
+            wrong.append(f"{option} {limit:g} ({value:.4g})")
+    # A point without a time has not run.
+    if not math.isfinite(point.milliseconds) and limits.max_ms is None:
+        wrong.append("no time")
+    return ", ".join(wrong)
+
+
+def _known(value: float) -> float:
+    """Return a number that can be compared: what is unknown comes last."""
+    return math.inf if math.isnan(value) else value
+
+
+def _nothing(points: Sequence[Point], limits: Limits) -> InputError:
+    """Return the error for limits that no point keeps, with the nearest: the least excess over its limits."""
+    known = [point for point in points if math.isfinite(point.milliseconds)]
+    wanted = ", ".join(f"{option} {limit:g}" for option, _, limit in limits.rules) or "a time"
+    if not known:
+        rule = "no point of the curve has a time"
+        return InputError("curve", f"{len(points)} points", rule, "measure it again")
+
+    def excess(point: Point) -> float:
+        found = [
+            _known(getattr(point, name)) / limit if limit > 0 else _known(getattr(point, name)) - limit + 1
+            for _, name, limit in limits.rules
+        ]
+        return max(found, default=0.0)
+
+    nearest = min(known, key=lambda point: (excess(point), point.milliseconds, point.variant))
+    rule = f"no point of the curve keeps it; the nearest is {nearest.text}"
+    return InputError("limit", wanted, rule, "allow more, or train a variant (wamnet train --variant)")
+
+
+# ---- files ------------------------------------------------------------------------------------------------
+
+
+def from_data(data: Any, where: str) -> Curve:
+    """Return the curve that JSON's data hold, or say what is wrong; numbers may be null, and are NaN then."""
+    if not isinstance(data, Mapping) or data.get("schema") != SCHEMA:
+        found = data.get("schema", "missing") if isinstance(data, Mapping) else type(data).__name__
+        raise InputError(f"{where}: schema", found, f"must be {SCHEMA}", "give a curve that wamnet measured")
+    rule, way_out = "a curve has model, device, size, profile and points", "measure it again"
+    with refusing(f"{where}: content", "damaged", rule, way_out):
+        height, width = (int(n) for n in data["size"])
+        points = tuple(_point(entry) for entry in data["points"])
+        texts = [data[name] for name in ("model", "device", "profile")]
+        if not all(isinstance(text, str) for text in texts):
+            raise ValueError("model, device and profile are texts")
+        return Curve(texts[0], texts[1], (height, width), texts[2], points)
+
+
+def _point(entry: Mapping[str, Any]) -> Point:
+    """Return a point; keys that it does not know are another reader's."""
+    texts = {name: entry[name] for name in ("variant", "schedule", "executor")}
+    if not all(isinstance(text, str) for text in texts.values()):
+        raise ValueError("variant, schedule and executor are texts")
+    variants.parse(texts["variant"])
+    numbers = {name: math.nan if entry[name] is None else float(entry[name]) for name in NUMBERS}
+    assert {*texts, *numbers} == {field.name for field in fields(Point)}
+    return Point(texts["variant"], texts["schedule"], texts["executor"], *numbers.values())
+
+
+def read(path: Any) -> Curve:
+    """Read a curve from a file of JSON."""
+    text = read_file(path, "curve file")
+    return from_data(parse_json(text, f"curve file {path}", "measure it again"), str(path))
+
+
+def check_fits(curve: Curve, wanted: Curve, where: str) -> None:
+    """Refuse a curve of something else than what is to be chosen for."""
+    for name in ("model", "profile"):
+        has, wants = getattr(curve, name), getattr(wanted, name)
+        if has != wants:
+            rule = f"this one is for {wants}"
+            raise InputError(f"{where}: {name}", has, rule, "give its own curve, or leave out --curve")
+
+
+def key_of(curve: Curve, executor: str, frames: str, names: Sequence[str]) -> str:
+    """Return the name under which a curve is kept: of all that it depends on."""
+    head = (SCHEMA, curve.model, curve.device, list(curve.size), curve.profile)
+    return f"curve-{cache.key(*head, executor, frames, list(names))}"
+
+
+def cached(key: str, wanted: Curve) -> Curve | None:
+    """Return the curve that is kept, if it is there, whole, and of what is wanted."""
+    data = cache.read_json(key)
+    if data is None:
+        return None
+    try:
+        curve = from_data(data, key)
+    except InputError:
+        return None
+    same = (curve.model, curve.device, curve.size, curve.profile)
+    return curve if same == (wanted.model, wanted.device, wanted.size, wanted.profile) else None

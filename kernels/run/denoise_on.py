@@ -1,0 +1,96 @@
+"""Denoise a frame on an executor: lower, compile, encode, run, with both times."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.artifact import Artifact
+from ...compiler.compile import compile_plan
+from ...compiler.core.ir import sha256
+from ...compiler.schedules import schedules
+from ...compiler.schedules.schedules import PLAIN
+from ...compiler.variants import FULL, plan_model
+from ...refimpl.frame import Frame
+from ...refimpl.network.dataset import feature_image
+from ...refimpl.network.denoise import Model
+from ..devices.executor import Executor, Images
+from ..memory import keep_freed_memory
+from .tune import choose
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """The picture (H, W, 3), display-encoded, and where and how fast it was made.
+
+    `seconds_compile`: tracing, passes, bound, emission, the driver's compilation and one run on a few pixels.
+    `seconds_run`: images to the device, the kernel, the result back; not the encoding of the features.
+    `schedule`: what was picked, and why, where it is not the requested one; `reason`: why that was requested.
+    `kernel`: its digest. `variant`: what it may cost.
+    """
+
+    image: NDArray[np.float32]
+    seconds_compile: float
+    seconds_run: float
+    device: str
+    schedule: str
+    reason: str
+    kernel: str
+    variant: str = ""
+
+    @property
+    def digest(self) -> str:
+        """Return the SHA-256 of the picture's numbers, little-endian float32, rows from the top."""
+        return sha256(self.image.astype("<f4").tobytes())
+
+
+def images_of(model: Model, frame: Frame) -> Images:
+    """Return the encoded feature images (H, W, C) that the model's kernel reads, by name."""
+    return {name: feature_image(frame, (name,), model.normalization) for name in model.features}
+
+
+def denoise_on(
+    executor: Executor,
+    model: Model,
+    frame: Frame,
+    profile: str = "ieee",
+    schedule: str | None = None,
+    variant: str = FULL,
+    pictures: int = 1,
+) -> RunResult:
+    """Return the denoised frame and the times.
+
+    Without a `schedule`, it is the one that suits device, size and so many `pictures` to come [tune.py].
+    `variant`: with fewer operations [variants.py].
+    """
+    start = time.perf_counter()
+    size = (frame.height, frame.width)
+    plan, reason = plan_model(model, executor.name, profile, schedule or PLAIN, variant), "as asked"
+    planned = time.perf_counter() - start
+    # A frame that lacks a layer is refused before anything is compiled; encoding is no part of compilation.
+    images = images_of(plan.model, frame)
+    start = time.perf_counter() - planned
+    if not schedule:
+        found = choose(executor, plan, size, pictures)
+        plan, reason = found.plan, found.reason
+    artifact = compile_plan(plan)
+    executor.build(artifact, size)
+    keep_freed_memory()
+    built = time.perf_counter()
+    image = executor.run(artifact, images)
+    seconds = time.perf_counter() - built
+    picked = schedules.text(artifact.manifest["schedule"])
+    facts = (executor.device, picked, reason, artifact.digest, _text_of(artifact))
+    return RunResult(image, built - start, seconds, *facts)
+
+
+def _text_of(artifact: Artifact) -> str:
+    """Return what a manifest says about a variant, for a reader; nothing where it is all of the network."""
+    if (found := artifact.manifest.get("variant")) is None:
+        return ""
+    bound, share = found["bound"]["output"], found["products"] / found["products_of_full"]
+    moves = f"moves a colour by at most {max(bound):g}" if bound else "moves colours without a bound"
+    return f"variant {found['name']}: {share:.0%} of the multiplications; {moves}, whatever the picture"

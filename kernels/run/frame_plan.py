@@ -1,0 +1,300 @@
+"""What a data set consists of: draws, seeds, pictures, and the independent tasks that make them.
+
+1. Each frame draws a time, a camera and lamps' colours from the request's ranges: training frames, test
+   frames inside of the ranges, test frames outside [`frame_draws`].
+2. Each draw has a noisy picture and a target, each with random numbers of its own [`plan`].
+3. What the frames show is compared: test frames that repeat one another or a training frame are refused
+   [`compared`].
+4. A picture is cut into bands of rows, each an independent task [`tasks_of`]; how is a function of the
+   request only, so that an interrupted run finds its bands again whatever the number of workers is.
+5. A task is carried out anywhere [`carry_out`], and the bands of a picture are joined [`join`].
+
+The pictures are a function of the request and of the version of this package.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from ...refimpl.errors import InputError
+from ...refimpl.frame import Frame
+from ...refimpl.light.render import TILE_PIXELS, Job
+from ...refimpl.light.scene import Scene, scene_digest
+from ...refimpl.light.scenes import TURN_SECONDS, canonical
+from ...refimpl.light.transport import Settings
+from ...refimpl.light.variation import RANGES, Ranges, check_ranges, varied
+from .draws import Draw, drawn, drawn_outside
+from .geometry import Comparison, Shown, compare
+from .render_frame import Progress, Rows, render_frame, renderer
+
+NOISY_SPP = 1
+"""Paths per pixel of a noisy picture: what the network is made for."""
+
+TASK_SAMPLES = 1 << 23
+"""Samples in a task at most, where one tile of pixels allows it: half a minute of the reference on one core,
+which is what the loss of a worker costs; a picture of 1024x1024 at 1024 spp is 128 tasks."""
+
+LARGEST_FRAMES = 100_000
+"""Largest number of training or of test frames: their names count them in five digits, and so sort."""
+
+KINDS = ("noisy", "target")
+"""The two pictures of each frame, in the order of their seeds."""
+
+TRAIN, TEST, OUTSIDE = "train", "test", "outside"
+"""The splits: frames to train on, frames at other draws inside the same ranges, frames outside of them."""
+
+SPLITS = (TRAIN, TEST, OUTSIDE)
+"""The splits in the order of their frames."""
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Request:
+    """All that determines a data set, except for the version: scene, animation, numbers, sizes, seed, ways.
+
+    The animation runs from `start_s` for `seconds`, of which training leaves out the last `arc_s`;
+    `parameters` are those of the canonical scene. Cameras are drawn from the ranges `yaw_deg`, `pitch_deg`
+    and `distance` (a factor), lamps' colours from the range `saturation` (None: the lamps' own). The features
+    of noisy pictures are means over `feature_spp` camera rays; 0: over the colour's one. Targets have `spp`
+    samples, those of test frames `test_spp`; 0: as many.
+    """
+
+    scene: str
+    parameters: Mapping[str, float | tuple[float, ...]] = field(default_factory=dict)
+    start_s: float = 0.0
+    seconds: float = TURN_SECONDS
+    frames: int = 8
+    test_frames: int = 2
+    size_px: int = 64
+    spp: int = 64
+    seed: int = 0
+    max_depth: int = 5
+    executor: str = "numpy"
+    sampler: str = "pcg4d"
+    feature_spp: int = 0
+    test_spp: int = 0
+    outside_frames: int = 0
+    arc_s: float = 0.0
+    yaw_deg: Pair = (0.0, 0.0)
+    pitch_deg: Pair = (0.0, 0.0)
+    distance: Pair = (1.0, 1.0)
+    saturation: Pair | None = None
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the request as JSON's types."""
+        data = {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(self).items()}
+        lists = {k: list(v) if isinstance(v, tuple) else v for k, v in sorted(self.parameters.items())}
+        return {**data, "parameters": lists}
+
+    @property
+    def ranges(self) -> Ranges:
+        """Return what training frames are drawn from."""
+        times = (self.start_s, self.start_s + self.seconds - self.arc_s)
+        return Ranges(times, self.yaw_deg, self.pitch_deg, self.distance, self.saturation)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Return the number of frames of each split, in their order."""
+        return dict(zip(SPLITS, (self.frames, self.test_frames, self.outside_frames), strict=True))
+
+    def scene_at(self, draw: Draw) -> Scene:
+        """Return the scene that a frame shows; its info has the ranges too."""
+        scene = canonical(self.scene, **{**self.parameters, "time": draw.time_s})
+        found = varied(scene, draw.variation)
+        return replace(found, info={**found.info, RANGES: self.ranges.to_json()})
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One file: its name within the data set (with slashes), and what it shows: a draw, a job."""
+
+    name: str
+    request: Request
+    draw: Draw
+    job: Job
+
+    @property
+    def scene(self) -> Scene:
+        """Return the scene, made again each time: thousands of pictures are kept, and few are looked at."""
+        return self.request.scene_at(self.draw)
+
+
+@dataclass(frozen=True)
+class FramePlan:
+    """One frame: its split, its draw, and its two pictures, by kind."""
+
+    split: str
+    draw: Draw
+    pictures: Mapping[str, Picture]
+
+    @property
+    def name(self) -> str:
+        """Return what its pictures have in common: split and number."""
+        return self.pictures[KINDS[0]].name.removesuffix(f"-{KINDS[0]}.exr")
+
+
+@dataclass(frozen=True)
+class Task:
+    """A band of a picture, to be rendered by a version of this package."""
+
+    picture: Picture
+    rows: Rows
+    version: str
+
+    @property
+    def samples(self) -> int:
+        """Return the number of paths to be traced."""
+        job = self.picture.job
+        return job.samples // job.height * (self.rows[1] - self.rows[0])
+
+
+def version() -> str:
+    """Return the installed version of this package."""
+    return metadata.version("wamnet")
+
+
+def frame_draws(request: Request) -> list[tuple[str, Draw]]:
+    """Return (split, draw) of all frames: training, then inside, then outside.
+
+    Test frames inside continue the sequences of the training frames, those outside the sequences of both.
+    """
+    lights = canonical(request.scene, **request.parameters).lights
+    ranges, (train, inside, beyond) = request.ranges, request.counts.values()
+    found = drawn(request.seed, ranges, lights, 0, train + inside)
+    far = drawn_outside(request.seed, ranges, request.arc_s, lights, train + inside, beyond)
+    times = [draw.time_s for draw in (*found, *far)]
+    if len(set(times)) < len(times) or not all(map(math.isfinite, times)):
+        rule = f"{len(times)} different times must fit into it"
+        raise InputError("seconds of the animation", request.seconds, rule, "make it longer")
+    splits = [split for split, count in request.counts.items() for _ in range(count)]
+    return list(zip(splits, (*found, *far), strict=True))
+
+
+def animation_times(start_s: float, seconds: float, fps: float) -> list[float]:
+    """Return the times of a film, 1 / fps apart, from the start to before the end; the first at least."""
+    if not (all(map(math.isfinite, (start_s, seconds, fps))) and seconds > 0.0 and fps > 0.0):
+        what = "animation (start, seconds, pictures per second)"
+        raise InputError(what, (start_s, seconds, fps), "it must be finite and last", "change it")
+    count = max(1, round(seconds * fps))
+    if count > LARGEST_FRAMES:
+        rule = f"a film has {LARGEST_FRAMES} at most"
+        raise InputError("number of pictures", count, rule, "make it shorter, or use fewer per second")
+    return [start_s + k / fps for k in range(count)]
+
+
+def plan(request: Request) -> list[FramePlan]:
+    """Return all frames of a data set, training first, or refuse the request.
+
+    Frame i has the seeds seed + 2 i (noisy) and seed + 2 i + 1 (target).
+    """
+    _check(request)
+    size, settings = request.size_px, Settings(max_depth=request.max_depth, sampler=request.sampler)
+    frames = []
+    numbers = dict.fromkeys(SPLITS, 0)
+    for index, (split, draw) in enumerate(frame_draws(request)):
+        pictures = {}
+        target_spp = request.spp if split == TRAIN else request.test_spp or request.spp
+        for offset, (kind, spp) in enumerate(zip(KINDS, (NOISY_SPP, target_spp), strict=True)):
+            job = Job(size, size, spp, request.seed + 2 * index + offset, settings)
+            if kind == KINDS[0]:
+                job = replace(job, feature_spp=request.feature_spp)
+            pictures[kind] = Picture(f"{split}/{numbers[split]:05d}-{kind}.exr", request, draw, job)
+        frames.append(FramePlan(split, draw, pictures))
+        numbers[split] += 1
+    return frames
+
+
+def _check(request: Request) -> None:
+    """Refuse an executor, a scene, numbers of frames, an animation or a seed that mean nothing."""
+    renderer(request.executor)
+    for name, low in (("frames", 1), ("test_frames", 0), ("outside_frames", 0)):
+        value = getattr(request, name)
+        if not low <= value <= LARGEST_FRAMES:
+            rule = f"it must be an integer from {low} to {LARGEST_FRAMES}"
+            raise InputError(name, value, rule, "choose another number")
+    if not (math.isfinite(request.seconds) and request.seconds > 0.0 and math.isfinite(request.start_s)):
+        what = "animation (start, seconds)"
+        raise InputError(what, (request.start_s, request.seconds), "it must be finite and last", "change it")
+    if not (math.isfinite(request.arc_s) and 0.0 <= request.arc_s < request.seconds):
+        rule = "training leaves it out of the animation: it must be 0 or more and shorter"
+        raise InputError("arc_s", request.arc_s, rule, "use a shorter --arc")
+    check_ranges(request.ranges)
+    if "time" in request.parameters:
+        value = request.parameters["time"]
+        raise InputError("parameter time", value, "each frame has its own", "use --start and --seconds")
+    canonical(request.scene, **request.parameters)
+    last = request.seed + 2 * sum(request.counts.values()) - 1
+    if request.seed < 0 or last >= 1 << 32:
+        rule = "seeds up to that plus twice the number of frames must fit into 32 bits"
+        raise InputError("seed", request.seed, rule, "choose a smaller one, 0 or more")
+
+
+def compared(
+    frames: Sequence[FramePlan], on_progress: Callable[[int], None] = lambda frames: None
+) -> dict[str, Comparison]:
+    """Return how far the nearest training frame is from each split of test frames, or refuse frames alike."""
+    shown: dict[str, list[Shown]] = {split: [] for split in SPLITS}
+    for frame in frames:
+        scene = frame.pictures[KINDS[0]].scene
+        shown[frame.split].append(Shown(frame.name, frame.draw.time_s, scene))
+    train = shown.pop(TRAIN)
+    return compare(train, shown, on_progress) if any(shown.values()) else {}
+
+
+def describe(frame: FramePlan) -> dict[str, Any]:
+    """Return a frame as JSON's types: split, scene, draw, and of each picture its name and its job."""
+    scene, variation = frame.pictures[KINDS[0]].scene, frame.draw.variation
+    facts: dict[str, Any] = {
+        "split": frame.split,
+        "time_s": frame.draw.time_s,
+        "yaw_deg": variation.yaw_deg,
+        "pitch_deg": variation.pitch_deg,
+        "distance": variation.distance,
+        "lights": [list(light.color) for light in scene.lights],
+        "scene": scene.name,
+        "scene_digest": scene_digest(scene),
+    }
+    if frame.draw.outside:
+        facts["outside"] = frame.draw.outside
+    for kind, picture in frame.pictures.items():
+        job = picture.job
+        facts[kind] = {"file": picture.name, "width": job.width, "height": job.height}
+        facts[kind] |= {"spp": job.spp, "seed": job.seed}
+        if job.feature_spp:
+            facts[kind]["feature_spp"] = job.feature_spp
+    return facts
+
+
+def tasks_of(picture: Picture) -> list[Task]:
+    """Return the tasks of a picture, top to bottom.
+
+    A band has about TASK_SAMPLES samples, but a tile of pixels at least: smaller ones would be slow.
+    """
+    job = picture.job
+    rows = max(TASK_SAMPLES // (job.samples // job.height), TILE_PIXELS // job.width, 1)
+    bands = [(first, min(first + rows, job.height)) for first in range(0, job.height, rows)]
+    here = version()
+    return [Task(picture, band, here) for band in bands]
+
+
+def carry_out(task: Task, on_progress: Progress | None = None) -> Frame:
+    """Render a task's rows; a worker that has another version of this package refuses."""
+    if task.version != version():
+        rule = f"the data set is made by {task.version}, and every worker must have the same"
+        raise InputError("version of wamnet on a worker", version(), rule, "install that one there")
+    picture = task.picture
+    executor = picture.request.executor
+    return render_frame(executor, picture.scene, picture.job, rows=task.rows, on_progress=on_progress).frame
+
+
+def join(bands: Sequence[Frame]) -> Frame:
+    """Return the frame whose bands, top to bottom, are given."""
+    layers = {name: np.concatenate([band[name] for band in bands]) for name in bands[0].layers}
+    return replace(bands[0], layers=layers)

@@ -1,0 +1,318 @@
+"""What a web page needs to path-trace a scene and denoise it in WebGL 2: kernels, weights, moving numbers.
+
+1. The paths are one kernel for all moments: what differs between the scenes of the animation is read from a
+   table of uniforms, a row for each moment; camera and light colours are uniforms too [`moving_numbers`].
+   Features that do not fit into its colour buffers have a kernel of their own, which ends at the first hit
+   [`drawn_together`].
+2. The encoding of the features is split where they are more than colour buffers [`encoders`].
+3. Each variant of the network is one or two passes, with its bound [`variant`].
+4. A page cannot trust its compiler (GLSL ES 3.00 has no `precise`): it carries a small picture's features,
+   and for each variant the reference's output in float64 with a bound for each number [`check`].
+
+Everything is JSON's types; arrays are base64 of little-endian numbers. spec/webpage.md describes the form.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.artifact import Artifact
+from ...compiler.compile import compile_plan
+from ...compiler.core.ir import digest
+from ...compiler.core.lower import lower
+from ...compiler.languages.glsl_es import MOST_BUFFERS
+from ...compiler.plan import plan_program
+from ...compiler.scenes.encode_kernel import compile_encode
+from ...compiler.scenes.lower_encode import layers_of, planes_of
+from ...compiler.scenes.lower_scene import lower_scene
+from ...compiler.scenes.path_kernel import PathArtifact, compile_path
+from ...compiler.scenes.scene_inputs import SceneInputs, varying
+from ...compiler.schedules.emit import kernel_gather, output_channels
+from ...compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
+from ...refimpl import rng
+from ...refimpl.errors import InputError
+from ...refimpl.light import transport
+from ...refimpl.light.render import Job, render
+from ...refimpl.light.scene import Scene
+from ...refimpl.light.scenes import TURN_SECONDS
+from ...refimpl.light.shapes.quad import quad_area_pdf
+from ...refimpl.light.transport import Settings
+from ...refimpl.light.variation import RANGES, ranges_from_json
+from ...refimpl.network import factored
+from ...refimpl.network.denoise import Model, check_model, learned_feature_spp
+from .denoise_on import images_of
+
+SCHEMA = "wamnet-page-2"
+"""Name and version of the form of a page's data."""
+
+TARGET = "glsl-es"
+"""What the kernels are written in."""
+
+SHOWN = ("color", "normal")
+"""Features that a page shows, whether or not a network reads them."""
+
+RANK = 16
+"""Rank of the fast variant's first layer, unless another is given: as many numbers as four colour buffers
+hold. Trained in this form it loses nothing (spec/factored.md)."""
+
+MANY, FEW = "packed", "inlined"
+"""Schedules: four weights a texel, however many there are; constants of the source where they are few."""
+
+CHECK_PX = 32
+"""Side of the picture that a page checks itself with: the window fits in, all four borders are seen."""
+
+CHECK_SEED = 0xC43C
+"""Seed of its noise."""
+
+SAMPLE_SCENES = 4
+"""Scenes with drawn colours and cameras that show which numbers depend on them: with three or more, numbers
+that are equal by chance are not taken for one."""
+
+COMPUTED = ("camera.", "world.lights.")
+"""Tables that a page computes itself: a number that is in another one too is known by its place here."""
+
+TOLD = ("trained_on_scene", "steps_done")
+"""What of a model's info a page repeats."""
+
+MOST_UNIFORMS = 200
+"""Vectors of four uniforms for the scene: 224 are there everywhere (MAX_FRAGMENT_UNIFORM_VECTORS)."""
+
+
+@dataclass(frozen=True)
+class Animation:
+    """A scene at times in seconds; a still one has one of them."""
+
+    times: tuple[float, ...]
+    scenes: tuple[Scene, ...]
+
+
+@dataclass(frozen=True)
+class Network:
+    """A variant of the page: the first layer is cut to the rank, unless it is 0; a schedule of the kernel."""
+
+    name: str
+    model: Model
+    rank: int = 0
+    schedule: str = MANY
+
+
+def networks_of(model: Model, fast: Model | None = None, rank: int = RANK) -> tuple[Network, ...]:
+    """Return the variants of a page: the whole network, and one of low rank with its weights in either way.
+
+    `fast`: what is cut to the rank, if it is another model, such as one that was trained on in this form.
+    """
+    cut = fast or model
+    n_out, n_in = cut.siren.weights[0].shape
+    most = min(rank, factored.largest_rank(cut.window.size, n_in, n_out), 4 * MOST_BUFFERS)
+    return (
+        Network("full", model),
+        Network("fast", cut, most, FEW),
+        Network("fast-texture", cut, most),
+    )
+
+
+def page_data(
+    animation: Animation,
+    networks: Sequence[Network],
+    settings: Settings | None = None,
+    profile: str = "ieee",
+) -> dict[str, Any]:
+    """Return a page's data; the first network is the one that the others are compared with."""
+    settings = settings or Settings()
+    shown = _features([network.model for network in networks])
+    scene, first = animation.scenes[0], networks[0].model
+    inputs, numbers = moving_numbers(animation, settings)
+    together = drawn_together(shown)
+    paths = [
+        # Whole paths give colour; the other features are those of their first hit, which has no scattering.
+        path_kernel(scene, replace(settings, max_depth=0) if number else settings, inputs, part, profile)
+        for number, part in enumerate(together)
+    ]
+    images = check(animation, first, shown, settings)
+    variants = [variant(network, images, profile) for network in networks]
+    for one, network in zip(variants, networks, strict=True):
+        one["ranges"] = learned_ranges(network.model, scene.name)
+        one["rays"] = learned_feature_spp(network.model) or 1
+        # How far a variant's picture is from the first one's is a fact about the weights, not about a device.
+        off = one["picture"] - variants[0]["picture"]
+        one["rms_to_first"] = float(np.sqrt(np.mean(off**2)))
+    for one in variants:
+        del one["picture"]
+    return {
+        "schema": SCHEMA,
+        "scene": scene.name,
+        "times": list(animation.times),
+        "turn_s": TURN_SECONDS,
+        "camera": asdict(scene.camera),
+        "lights": _lights(scene),
+        "share": transport.SKY_SHARE if scene.environment is not None else 1.0,
+        "numbers": numbers,
+        "paths": [
+            {"source": one.source, "planes": list(one.planes), "settings": one.programs.settings.facts()}
+            for one in paths
+        ],
+        "encoders": [
+            {"path": number, **encoder}
+            for number, (part, path) in enumerate(zip(together, paths, strict=True))
+            for encoder in encoders(part, first, path.planes, profile)
+        ],
+        "check": {
+            "size": CHECK_PX,
+            "images": {n: {"channels": a.shape[-1], "values": _packed(a)} for n, a in images.items()},
+        },
+        "variants": variants,
+    }
+
+
+def _features(models: Sequence[Model]) -> tuple[str, ...]:
+    """Return the features that are encoded, or refuse models that would need two encodings."""
+    first, *others = models
+    for model in models:
+        check_model(model)
+    for model in others:
+        if model.normalization != first.normalization:
+            rule = "its scales are not those of the first model, and one page encodes once"
+            raise InputError("second model", model.normalization, rule, "train it from the first (--from)")
+    return tuple(dict.fromkeys([name for model in models for name in model.features] + [*SHOWN]))
+
+
+def drawn_together(features: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return the features in parts whose planes fit into the colour buffers; colour is in the first part."""
+    parts: list[tuple[str, ...]] = [()]
+    for name in sorted(features, key=lambda name: name != "color"):
+        if len(planes_of((*parts[-1], name))) > 4 * MOST_BUFFERS:
+            parts.append(())
+        parts[-1] = (*parts[-1], name)
+    return parts
+
+
+def path_kernel(
+    scene: Scene, settings: Settings, inputs: SceneInputs, features: Sequence[str], profile: str
+) -> PathArtifact:
+    """Return the kernel that adds up the planes of some features."""
+    programs = lower_scene(scene, settings, None, moving=inputs)
+    return compile_path(programs, TARGET, profile, 1, layers_of(features))
+
+
+def moving_numbers(animation: Animation, settings: Settings) -> tuple[SceneInputs, dict[str, Any]]:
+    """Return the scene's numbers that are uniforms, and their values at each time."""
+    scene = animation.scenes[0]
+    drawn = [_drawn(scene, number) for number in range(SAMPLE_SCENES)]
+    inputs = varying([*animation.scenes, *drawn], settings)
+    if len(inputs.places) > 4 * MOST_UNIFORMS:
+        rule = f"{len(inputs.places)} of its numbers move; a shader has uniforms for {4 * MOST_UNIFORMS}"
+        raise InputError("scene", scene.name, rule, "show one time of it, or a scene of fewer moving parts")
+    rows = np.stack([inputs.values(one) for one in animation.scenes])
+    moving = np.flatnonzero(np.any(rows != rows[0], axis=0))
+    return inputs, {
+        "names": [list(_named(places)) for places in inputs.places],
+        "still": [float(value) for value in rows[0]],
+        "moving": [int(place) for place in moving],
+        "rows": _packed(rows[:, moving]),
+    }
+
+
+def _named(places: Sequence[tuple[str, int]]) -> tuple[str, int]:
+    """Return the place by which a page knows a number: one that it computes, if there is one."""
+    return next((place for place in places if place[0].startswith(COMPUTED)), places[0])
+
+
+def _drawn(scene: Scene, number: int) -> Scene:
+    """Return the scene with drawn light colours and a camera moved in a drawn direction."""
+    words = rng.counter(np.arange(1 + len(scene.lights)))
+    x, y, z, _ = rng.uniforms(rng.counter(number), words, rng.counter(0), rng.counter(0), np.float64)
+    moved = [p + d[0] - 0.5 for p, d in zip(scene.camera.position, (x, y, z), strict=True)]
+    colors = [(0.1 + float(x[i]), 0.1 + float(y[i]), 0.1 + float(z[i])) for i in range(1, len(x))]
+    lights = tuple(replace(light, color=c) for light, c in zip(scene.lights, colors, strict=True))
+    camera = replace(scene.camera, position=(float(moved[0]), float(moved[1]), float(moved[2])))
+    return replace(scene, camera=camera, lights=lights)
+
+
+def _lights(scene: Scene) -> list[dict[str, Any]]:
+    """Return what a page computes the tables of the lights from."""
+    return [
+        {"color": list(light.color), "power": light.power, "area": 1.0 / quad_area_pdf(light)}
+        for light in scene.lights
+    ]
+
+
+def encoders(
+    features: Sequence[str], model: Model, planes: Sequence[str], profile: str
+) -> list[dict[str, Any]]:
+    """Return the encoding as passes of at most as many features as there are colour buffers."""
+    parts = [features[first : first + MOST_BUFFERS] for first in range(0, len(features), MOST_BUFFERS)]
+    found = [compile_encode(part, model.normalization, TARGET, profile, planes) for part in parts]
+    return [{"source": one.source, "images": [asdict(image) for image in one.images]} for one in found]
+
+
+def variant(network: Network, images: Mapping[str, NDArray[np.float32]], profile: str) -> dict[str, Any]:
+    """Return a network as passes, with its bound, and what it makes of the check's images."""
+    model, rank = network.model, network.rank
+    program = lower(model)
+    plan = plan_program(program, TARGET, profile, network.schedule, rank)
+    artifact = compile_plan(plan)
+    held = plan.expected({feature: images[feature] for feature in model.features})
+    whole = artifact.manifest["factored"]["rounding"] if rank else artifact.manifest["bound"]
+    return {
+        "name": network.name,
+        "rank": rank,
+        "schedule": artifact.manifest["schedule"]["name"],
+        "features": list(model.features),
+        "program": digest(program),
+        "trained": {key: model.info[key] for key in TOLD if key in model.info},
+        "weights": sum(kernel.weights.size for kernel in artifact.kernels),
+        "products": sum(_products(kernel) for kernel in artifact.kernels),
+        "bound": None if whole["output"] is None else max(whole["output"]),
+        "passes": [_pass(kernel) for kernel in artifact.kernels],
+        "check": {"expected": _packed(held.value, "<f8"), "bound": _packed(_raised(held.bound))},
+        "picture": held.value,
+    }
+
+
+def learned_ranges(model: Model, scene: str) -> dict[str, Any] | None:
+    """Return the ranges of what a model has learned of a scene; None where it does not say."""
+    text = model.info.get(f"trained_on_{RANGES}")
+    scenes = model.info.get("trained_on_scene", scene).split(", ")
+    return None if text is None or scene not in scenes else asdict(ranges_from_json(text))
+
+
+def _products(kernel: Artifact) -> int:
+    """Return the products of weights that one pixel takes."""
+    names = [str(node["weight"]) for node in kernel.program.nodes if node.op == "affine"]
+    return sum(kernel.program.parameters[name].size for name in names)
+
+
+def _pass(kernel: Artifact) -> dict[str, Any]:
+    """Return one fragment pass."""
+    return {
+        "source": kernel.source,
+        "weights": _packed(kernel.weights),
+        "reads": [image.name for image in kernel_gather(kernel.program).images],
+        "texel": kernel.manifest["schedule"].get(WEIGHTS_A_TEXEL, 1),
+        "buffers": -(-output_channels(kernel.program) // 4),
+    }
+
+
+def check(
+    animation: Animation, model: Model, features: Sequence[str], settings: Settings
+) -> dict[str, NDArray[np.float32]]:
+    """Return the encoded features (H, W, C) of a small noisy picture, by name."""
+    job = Job(CHECK_PX, CHECK_PX, 1, CHECK_SEED, settings)
+    frame = render(animation.scenes[0], job).frame
+    return dict(images_of(replace(model, features=tuple(features)), frame))
+
+
+def _raised(bound: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return a bound in float32, rounded up."""
+    return np.nextafter(bound.astype(np.float32), np.float32(np.inf))
+
+
+def _packed(array: NDArray[Any], kind: str = "<f4") -> str:
+    """Return the numbers as base64."""
+    return base64.b64encode(np.ascontiguousarray(array, kind).tobytes()).decode()

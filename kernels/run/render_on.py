@@ -1,0 +1,139 @@
+"""Render a scene on an executor: trace, compile, follow the paths part by part, and add up.
+
+1. The scene's programs become a kernel for the executor's schedule [`compile_scene`].
+2. A kernel adds up at most [`SAMPLES_AT_ONCE`] samples in float32; parts hold about [`PATHS_AT_ONCE`] paths,
+   so that progress is seen and no driver takes a kernel for hanging.
+3. Sums of parts are added in float64, squared deviations by the formula of Chan, Golub and LeVeque,
+   "Algorithms for Computing the Sample Variance", The American Statistician 37(3), 1983 [`merge`].
+
+The random numbers are those of the reference, to the bit, so that the same job gives the same picture up to
+rounding, and to paths whose decision fell differently by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.scenes.emit_path import GROUPS
+from ...compiler.scenes.lower_scene import lower_scene
+from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
+from ...refimpl.errors import InputError
+from ...refimpl.frame import LAYERS, Frame
+from ...refimpl.light.render import Job, Render, checked_rows, feature_job, render_info, with_own_features
+from ...refimpl.light.scene import Scene
+from ...refimpl.light.transport import Settings
+from ..devices.executor import Executor, Part
+from ..memory import keep_freed_memory
+
+SAMPLES_AT_ONCE = 16
+"""Most samples that are added up in float32: 15 roundings, a relative error below 1e-6."""
+
+PATHS_AT_ONCE = 1 << 20
+"""About how many paths a kernel follows before the host hears of it: a fraction of a second on a CPU."""
+
+
+KEPT_SCENES = 8
+"""Compiled scenes that a process keeps: bands of one picture, and noisy picture and target, share theirs."""
+
+
+def compile_scene(executor: Executor, scene: Scene, job: Job, profile: str = "ieee") -> PathArtifact:
+    """Return the kernel that renders a scene on an executor."""
+    return _compiled(scene, job.settings, executor.name, profile, executor.lanes)
+
+
+@lru_cache(KEPT_SCENES)
+def _compiled(scene: Scene, settings: Settings, target: str, profile: str, lanes: int) -> PathArtifact:
+    """Return the kernel; it depends on nothing else."""
+    programs = lower_scene(scene, settings, most_unrolled(target))
+    return compile_path(programs, target, profile, lanes)
+
+
+def render_on(
+    executor: Executor,
+    scene: Scene,
+    job: Job,
+    *,
+    rows: tuple[int, int] | None = None,
+    on_progress: Callable[[int], None] | None = None,
+    profile: str = "ieee",
+) -> Render:
+    """Render the rows [first, last) of a scene on an executor, all by default, in float32.
+
+    on_progress is called with the number of samples that were just finished.
+    """
+    if job.dtype != "float32":
+        raise InputError("dtype", job.dtype, "kernels compute in float32", "render with --executor numpy")
+    if feature_job(job) is not None:
+        apart = partial(render_on, executor, scene, rows=rows, on_progress=on_progress, profile=profile)
+        return with_own_features(scene, job, apart)
+    first, last = checked_rows(job, rows)
+    kernel = compile_scene(executor, scene, job, profile)
+    executor.build_path(kernel)
+    keep_freed_memory()
+    totals = Totals(0, np.zeros((len(kernel.planes), last - first, job.width)))
+    for parts in sample_ranges(job, (first, last)):
+        sums = []
+        for part in parts:
+            sums.append(executor.trace(kernel, part))
+            if on_progress is not None:
+                on_progress(part.rows * part.width * part.samples)
+        totals = merge(
+            kernel, totals, Totals(parts[0].samples, np.concatenate(sums, axis=1, dtype=np.float64))
+        )
+    return _render(kernel, totals, render_info(scene, job))
+
+
+def sample_ranges(job: Job, band: tuple[int, int]) -> Iterator[list[Part]]:
+    """Yield the parts of a band of rows: for each range of samples the ranges of rows, top to bottom."""
+    first, last = band
+    for first_sample in range(0, job.spp, SAMPLES_AT_ONCE):
+        samples = min(SAMPLES_AT_ONCE, job.spp - first_sample)
+        rows = max(1, PATHS_AT_ONCE // (job.width * samples))
+        yield [
+            Part(
+                job.width,
+                job.height,
+                first_row,
+                min(rows, last - first_row),
+                job.first_sample + first_sample,
+                samples,
+                job.seed,
+            )
+            for first_row in range(first, last, rows)
+        ]
+
+
+@dataclass(frozen=True)
+class Totals:
+    """Sums (planes, H, W) in float64 over a number of samples."""
+
+    samples: int
+    planes: NDArray[np.float64]
+
+
+def merge(kernel: PathArtifact, a: Totals, b: Totals) -> Totals:
+    """Return the totals over the samples of both; a may have none."""
+    if not a.samples:
+        return b
+    planes = a.planes + b.planes
+    for names in zip(GROUPS["color"], GROUPS["deviation"], strict=True):
+        color, deviation = map(kernel.planes.index, names)
+        difference = b.planes[color] / b.samples - a.planes[color] / a.samples
+        planes[deviation] += difference**2 * (a.samples * b.samples / (a.samples + b.samples))
+    return Totals(a.samples + b.samples, planes)
+
+
+def _render(kernel: PathArtifact, totals: Totals, info: dict[str, str]) -> Render:
+    """Return the means as a frame, and the variance of one sample."""
+    means = dict(zip(kernel.planes, totals.planes / totals.samples, strict=True))
+    layers: dict[str, Any] = {}
+    for name in LAYERS:
+        layers[name] = np.stack([means[plane] for plane in GROUPS[name]], axis=-1).astype(np.float32)
+    deviations = np.stack([means[plane] for plane in GROUPS["deviation"]], axis=-1)
+    return Render(Frame(layers, info), deviations * (totals.samples / max(totals.samples - 1, 1)))

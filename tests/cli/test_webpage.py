@@ -506,7 +506,9 @@ def test_scripts_are_javascript(name, tmp_path):
     if node is None:
         pytest.skip("node is not installed; Chromium runs the scripts in the other tests")
     script = tmp_path / "script.mjs"
-    script.write_text((resources.files(webpage.__package__) / webpage.FOLDER / name).read_text(encoding="utf-8"))
+    script.write_text(
+        (resources.files(webpage.__package__) / webpage.FOLDER / name).read_text(encoding="utf-8")
+    )
     found = subprocess.run([node, "--check", str(script)], capture_output=True, text=True, check=False)
     assert found.returncode == 0, found.stderr
 

@@ -28,7 +28,7 @@ from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.schedules.emit import output_channels
 from ...compiler.schedules.schedules import PLAIN
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
-from .executor import INDEX_LIMIT, Executor, Images, Part, gather_of, images_of, keep
+from .executor import INDEX_LIMIT, Executor, Images, Part, gather_of, images_of, in_order, keep
 
 COMPILER_VARIABLE = "CC"
 """Environment variable that names the compiler, with options if need be; else `cc`."""
@@ -154,12 +154,13 @@ void wamnet_rows(const float *const *images, const float *weights, float *result
 """The function that is called: rows [first, end) of a picture."""
 
 PATH_GLUE = """\
+#include <string.h>
 #include "{header}"
 
 void wamnet_rows(const uint32_t *sizes, float *sums, int first, int end)
 {{
-    const wamnet_part part = {{(int)sizes[0], (int)sizes[1], (int)sizes[2], (int)sizes[3], sizes[4],
-                              (int)sizes[5], sizes[6]}};
+    wamnet_part part;
+    memcpy(&part, sizes, sizeof part);
     for (int row = first; row < end; ++row) {{
         for (int column = 0; column < part.width; ++column) {{
             {entry}(&part, sums, column, row);
@@ -167,7 +168,7 @@ void wamnet_rows(const uint32_t *sizes, float *sums, int first, int end)
     }}
 }}
 """
-"""The same for the paths of a part of a picture."""
+"""The same for the paths of a part of a picture; its members are 32-bit integers in the interface's order."""
 
 ENCODE_GLUE = """\
 #include "{header}"
@@ -339,8 +340,8 @@ class CExecutor(Executor):
 
     def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
         sums = np.zeros((len(kernel.planes), part.rows, part.width), np.float32)
-        numbers = (part.width, part.height, part.first_row, part.rows, part.first_sample)
-        sizes = (ctypes.c_uint32 * 7)(*(n % 2**32 for n in (*numbers, part.samples, part.seed)))
+        numbers = in_order(kernel.interface, part.integers)
+        sizes = (ctypes.c_uint32 * len(numbers))(*(int(n) % 2**32 for n in numbers))
         call = self._built[kernel.digest]
         self._in_threads(part.rows, lambda first, end: call(sizes, sums.ctypes.data, first, end))
         return sums

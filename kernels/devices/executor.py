@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.core.ir import Gather, Image
+from ...compiler.languages.interface import UNSIGNED, Interface
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.schedules.schedules import PLAIN
@@ -48,6 +49,16 @@ class Part:
     first_sample: int
     samples: int
     seed: int
+
+    @property
+    def integers(self) -> dict[str, int]:
+        """Return what a path kernel is given, by the names of its interface."""
+        return {"seed_number" if name == "seed" else name: value for name, value in vars(self).items()}
+
+
+def in_order(kernel: Interface, given: Mapping[str, int]) -> list[np.integer[Any]]:
+    """Return a kernel's integers in the order and of the types in which it takes them."""
+    return [(np.uint32 if name in UNSIGNED else np.int32)(given[name]) for name in kernel.integers]
 
 
 class Executor(ABC):

@@ -19,14 +19,14 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.languages.interface import BLOCK
+from ...compiler.languages.interface import BLOCK, Interface
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.schedules.emit import output_channels
 from ...compiler.training.step_kernel import StepKernel
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import INDEX_LIMIT, Executor, Images, Part, black, images_of, keep
+from .executor import INDEX_LIMIT, Executor, Images, Part, black, images_of, in_order, keep
 from .opencl_trainer import OpenCLTrainer
 from .passes import PICTURE, Passes
 
@@ -63,9 +63,10 @@ BUILD_OPTIONS = ("-cl-std=CL1.2",)
 
 @dataclass(frozen=True)
 class _Built:
-    """A kernel on the device, its weights, work items (x, y) in a group, columns and rows of an item."""
+    """A kernel on the device, what it takes, its weights, work items (x, y) in a group, an item's pixels."""
 
     kernel: Any
+    interface: Interface
     weights: Any
     local: tuple[int, int]
     extent: tuple[int, int]
@@ -131,7 +132,7 @@ class OpenCLExecutor(Executor):
         weights = artifact.weights if artifact.weights.size else np.zeros(1, np.float32)
         kernel, schedule = getattr(program, artifact.entry_point), artifact.manifest["schedule"]
         extent = (schedule["pixels"], schedule.get("rows", 1))
-        built = _Built(kernel, self._copied(weights), local_size, extent)
+        built = _Built(kernel, artifact.interface, self._copied(weights), local_size, extent)
         keep(self._built, artifact.digest, built)
 
     def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
@@ -244,7 +245,7 @@ class OpenCLExecutor(Executor):
         """Start a built kernel on images of `size` (height, width) that are on the device."""
         columns, rows = built.extent
         items = (-(-size[1] // columns), -(-size[0] // rows))
-        numbers = (np.int32(size[1]), np.int32(size[0]))
+        numbers = in_order(built.interface, {"width": size[1], "height": size[0]})
         places = _whole(items, built.local)
         built.kernel(self._queue, places, built.local, *inputs, built.weights, output, *numbers)
 
@@ -286,12 +287,7 @@ class OpenCLExecutor(Executor):
     def _follow(self, kernel: PathArtifact, part: Part, output: Any) -> None:
         """Start a built path kernel, whose sums go to a buffer of [`sums_shape`]."""
         _, rows, stride = sums_shape(kernel, part)
-        numbers = (
-            *map(np.int32, (part.width, part.height, part.first_row)),
-            np.uint32(part.first_sample),
-            np.int32(part.samples),
-            np.uint32(part.seed),
-        )
+        numbers = in_order(kernel.interface, part.integers)
         local, columns = PATH_LOCAL_SIZE[min(kernel.lanes, 2)], stride // kernel.lanes
         self._paths[kernel.digest](self._queue, (columns, rows), local, output, *numbers)
 
@@ -382,7 +378,8 @@ class OpenCLPasses(Passes):
         executor, (height, width) = self._executor, self.size
         _, rows, stride = self._shape
         images = [self._images[image.name] for image in self.encoder.images]
-        numbers = map(np.int32, (width, height, stride, rows * stride, samples))
+        given = {"width": width, "height": height, "row_stride": stride, "plane_stride": rows * stride}
+        numbers = in_order(self.encoder.interface, {**given, "sample_count": samples})
         kernel, places = executor._encoder(self.encoder), _whole((width, height), LOCAL_SIZE)
         with executor._told(self.size):
             kernel(executor._queue, places, LOCAL_SIZE, self._sums, *images, *numbers)

@@ -287,7 +287,7 @@ class OpenGLExecutor(Executor):
             frame, targets = self._targets(
                 "the sums", (part.rows, part.width), -(-len(kernel.planes) // 4), made
             )
-            self._draw(self._paths[kernel.digest], frame, {}, _numbers(part))
+            self._draw(self._paths[kernel.digest], frame, {}, part.integers)
             read = [np.frombuffer(target.read(), np.float32) for target in targets]
         pixels = np.concatenate([buffer.reshape(part.rows, part.width, 4) for buffer in read], axis=-1)
         return np.moveaxis(pixels, -1, 0)[: len(kernel.planes)]
@@ -367,7 +367,7 @@ class OpenGLPasses(Passes):
         executor = self._executor
         executor.build_path(kernel)
         with executor._context:
-            executor._draw(executor._paths[kernel.digest], self._sums[0], {}, _numbers(part))
+            executor._draw(executor._paths[kernel.digest], self._sums[0], {}, part.integers)
 
     def encode(self, samples: int) -> None:
         """Draw the feature images."""
@@ -399,18 +399,6 @@ class OpenGLPasses(Passes):
         """Release the textures."""
         with self._executor._context:
             self._made.close()
-
-
-def _numbers(part: Part) -> dict[str, int]:
-    """Return the uniforms of a path kernel."""
-    return {
-        "width": part.width,
-        "height": part.height,
-        "first_row": part.first_row,
-        "first_sample": part.first_sample,
-        "samples": part.samples,
-        "seed_number": part.seed,
-    }
 
 
 def _open(kind: str) -> tuple[str, Any]:

@@ -19,14 +19,10 @@ from ...compiler.languages.interface import BLOCK, IMAGE, RESULT, SUMS, WEIGHTS,
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.schedules.emit import output_channels
-from ..devices.executor import Executor, Images, Part
+from ..devices.executor import Executor, Images, Part, in_order
 
 Kernel = Artifact | PathArtifact | EncodeArtifact
 """A kernel of any role."""
-
-
-PART_OF = {"seed_number": "seed"}
-"""Integers of a path kernel that a part calls otherwise."""
 
 
 @dataclass(frozen=True)
@@ -100,9 +96,9 @@ class BufferRunner(Executor):
 
     def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
         shape = (len(kernel.planes), part.rows, part.width)
-        given = {name: getattr(part, PART_OF.get(name, name)) for name in kernel.interface.integers}
+        sizes = [int(n) for n in in_order(kernel.interface, part.integers)]
         places, buffers = _numbered(kernel.interface, {SUMS: np.zeros(shape, np.float32)})
-        launch = Launch(tuple(given.values()), buffers, (places[SUMS],), (part.width, part.rows))
+        launch = Launch(sizes, buffers, (places[SUMS],), (part.width, part.rows))
         return self._launch(self._kernel(kernel), launch)[0].reshape(shape)
 
     def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
@@ -112,7 +108,7 @@ class BufferRunner(Executor):
         numbers, buffers = _numbered(kernel.interface, {SUMS: sums, **written})
         places = [numbers[name] for name in written]
         given = {"width": width, "height": height, "sample_count": samples}
-        sizes = [given[name] for name in kernel.interface.integers]
+        sizes = [int(n) for n in in_order(kernel.interface, given)]
         launch = Launch(sizes, buffers, places, (width, height))
         found = self._launch(self._kernel(kernel), launch)
         return {

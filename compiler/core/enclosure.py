@@ -1,7 +1,7 @@
 """What is known of a value: the range of the reference's, and the largest distance of the kernel's from it.
 
-float64, in which all of it is computed, rounds too: results are widened by more than that [`OUTWARD`,
-`RANGE_OUTWARD`].
+float64, in which all of it is computed, rounds too: errors are widened by more than that [`OUTWARD`], and
+ranges too [`intervals.RANGE_OUTWARD`].
 """
 
 from __future__ import annotations
@@ -21,14 +21,8 @@ Array = NDArray[np.float64]
 OUTWARD = 2.0**-20
 """Relative widening of every error bound: covers float64's rounding in rules and reference (step 5)."""
 
-RANGE_OUTWARD = 2.0**-40
-"""Relative widening of every range: float64's rounding of one operation, or sin; of a sum: `_affine`."""
-
 OVERFLOW = float(np.finfo(np.float32).max) * (1 - OUTWARD)
 """What a number on the way must stay below: the largest float32, less float64's rounding in the rules."""
-
-SURE_TURNS = 2.0**30
-"""Largest argument, in radians, for which float64 finds a sine's crests: they are off by less than 2**-20."""
 
 
 @dataclass(frozen=True)
@@ -64,20 +58,6 @@ class Enclosure:
     def read(self) -> Array:
         """Return the error of the kernel's value when it is read, and perhaps flushed to zero."""
         return self.error + FLUSH
-
-
-def sine_range(low: Array, high: Array) -> tuple[Array, Array]:
-    """Return the least and largest sine on [low, high] (...): at the ends, or 1 and -1 at crests between."""
-    sure = np.maximum(np.abs(low), np.abs(high)) <= SURE_TURNS
-    low, high = np.where(sure, low, -np.pi), np.where(sure, high, np.pi)
-    turn = 2 * np.pi
-    at_low, at_high = np.sin(low), np.sin(high)
-    # A crest that rounding hides here is so near an end that the sine there is 1 up to RANGE_OUTWARD.
-    crest = np.floor((high - np.pi / 2) / turn) >= np.ceil((low - np.pi / 2) / turn)
-    trough = np.floor((high + np.pi / 2) / turn) >= np.ceil((low + np.pi / 2) / turn)
-    least = np.where(trough, -1.0, np.minimum(at_low, at_high))
-    most = np.where(crest, 1.0, np.maximum(at_low, at_high))
-    return np.maximum(least - RANGE_OUTWARD, -1.0), np.minimum(most + RANGE_OUTWARD, 1.0)
 
 
 def round_up(value: float, digits: int = 3) -> float:

@@ -1,8 +1,9 @@
 """The operations of the IR, one row each: what the rest of the compiler knows about them in general.
 
 A row says how many operands an operation takes, which attributes, what type comes out, what it computes (a
-NumPy function: the definition, used by the interpreter), and how the target may round it. A new operation is
-a row here, a rule in bounds.py and an entry in each dialect's table; tests demand all three.
+NumPy function: the definition, used by the interpreter), how the target may round it, and what it makes of
+intervals [intervals.py]. A new operation is a row here, a rule in bounds.py and an entry in each dialect's
+table; tests demand all three.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from .ir import DTYPES, Attribute, Parameters, Type
+from . import intervals
+from .intervals import Ends, Image, monotone
+from .ir import DTYPES, Attribute, Node, Parameters, Type
 
 Rounding = Literal["exact", "nearest", "divide", "sqrt", "power", "sine", "cosine", "dot"]
 """How a target computes it: exactly, correctly rounded, or with its class's error (profiles.py)."""
@@ -38,6 +41,7 @@ class Op:
     optional: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()  # the attributes that name parameters
     elementwise: bool = False
+    image: Image | None = None  # None: what it computes is not a matter of the operands' ends
 
 
 FLOATS = ("float32",)
@@ -223,14 +227,24 @@ def _row(
     arity: int,
     rounding: Rounding = "exact",
     kinds: Sequence[str] = FLOATS,
+    image: Image | None = None,
 ) -> Op:
-    """Return the row of an elementwise operation whose definition is a NumPy function."""
-    return Op(name, arity, _elementwise(kinds), function, rounding, elementwise=True)
+    """Return the row of an elementwise operation whose definition is a NumPy function.
+
+    Without an image of its own it is monotone: its ends are those of its operands.
+    """
+    ends = image or monotone(function)
+    return Op(name, arity, _elementwise(kinds), function, rounding, elementwise=True, image=ends)
 
 
-def _compare(name: str, function: Callable[..., Any]) -> Op:
+def _compare(name: str, function: Callable[..., Any], image: Image) -> Op:
     """Return the row of a comparison."""
-    return Op(name, 2, _comparison, function, "exact", elementwise=True)
+    return Op(name, 2, _comparison, function, "exact", elementwise=True, image=image)
+
+
+def _bits(name: str, function: Callable[..., Any]) -> Op:
+    """Return the row of an operation on the bits of an integer."""
+    return Op(name, 2, _elementwise(("uint32",)), function, "exact", elementwise=True)
 
 
 OPS: Mapping[str, Op] = {
@@ -250,32 +264,32 @@ OPS: Mapping[str, Op] = {
             parameters=("weight", "bias"),
         ),
         _row("add", np.add, 2, "nearest", NUMBERS),
-        _row("subtract", np.subtract, 2, "nearest", NUMBERS),
-        _row("multiply", np.multiply, 2, "nearest", NUMBERS),
-        _row("divide", np.divide, 2, "divide"),
-        _row("reciprocal", np.reciprocal, 1, "divide"),
-        _row("negative", np.negative, 1),
-        _row("absolute", np.absolute, 1),
+        _row("subtract", np.subtract, 2, "nearest", NUMBERS, intervals.subtract),
+        _row("multiply", np.multiply, 2, "nearest", NUMBERS, intervals.multiply),
+        _row("divide", np.divide, 2, "divide", image=intervals.divide),
+        _row("reciprocal", np.reciprocal, 1, "divide", image=intervals.reciprocal),
+        _row("negative", np.negative, 1, image=intervals.negative),
+        _row("absolute", np.absolute, 1, image=intervals.absolute),
         _row("minimum", np.minimum, 2, kinds=NUMBERS),
         _row("maximum", np.maximum, 2, kinds=NUMBERS),
         _row("floor", np.floor, 1),
-        _row("sqrt", np.sqrt, 1, "sqrt"),
-        _row("power", np.power, 2, "power"),
-        _row("sin", np.sin, 1, "sine"),
-        _row("cos", np.cos, 1, "cosine"),
-        _compare("less", np.less),
-        _compare("less_equal", np.less_equal),
-        _compare("greater", np.greater),
-        _compare("greater_equal", np.greater_equal),
-        _compare("equal", np.equal),
-        _compare("not_equal", np.not_equal),
+        _row("sqrt", np.sqrt, 1, "sqrt", image=intervals.sqrt),
+        _row("power", np.power, 2, "power", image=intervals.power),
+        _row("sin", np.sin, 1, "sine", image=intervals.sine),
+        _row("cos", np.cos, 1, "cosine", image=intervals.cosine),
+        _compare("less", np.less, intervals.less),
+        _compare("less_equal", np.less_equal, intervals.less_equal),
+        _compare("greater", np.greater, lambda a, b: intervals.less(b, a)),
+        _compare("greater_equal", np.greater_equal, lambda a, b: intervals.less_equal(b, a)),
+        _compare("equal", np.equal, intervals.equal),
+        _compare("not_equal", np.not_equal, intervals.not_equal),
         _row("logical_and", np.logical_and, 2, kinds=("bool",)),
         _row("logical_or", np.logical_or, 2, kinds=("bool",)),
-        _row("logical_not", np.logical_not, 1, kinds=("bool",)),
-        _row("bitwise_and", np.bitwise_and, 2, kinds=("uint32",)),
-        _row("bitwise_xor", np.bitwise_xor, 2, kinds=("uint32",)),
-        _row("right_shift", np.right_shift, 2, kinds=("uint32",)),
-        Op("select", 3, _select, np.where, "exact", elementwise=True),
+        _row("logical_not", np.logical_not, 1, kinds=("bool",), image=intervals.logical_not),
+        _bits("bitwise_and", np.bitwise_and),
+        _bits("bitwise_xor", np.bitwise_xor),
+        _bits("right_shift", np.right_shift),
+        Op("select", 3, _select, np.where, "exact", elementwise=True, image=intervals.select),
         Op("convert", 1, _convert, _convert_value, "nearest", required=("dtype",), elementwise=True),
         Op("take", 1, _take, _take_value, "exact", required=("table",), parameters=("table",)),
         Op("carried", 1, _carried, _no_definition, "exact", required=("index", "loop")),
@@ -292,3 +306,13 @@ LOOPS = ("carried", "row", "loop")
 
 ELEMENTWISE = tuple(op for op in OPS.values() if op.elementwise)
 """The operations that work on each component by itself."""
+
+
+def image(node: Node, operands: Sequence[Ends]) -> Ends:
+    """Return the ends of what an operation computes, exactly, of its operands between theirs."""
+    if node.op == "multiply" and node.args[0] == node.args[1]:
+        return intervals.square(operands[0])
+    rule = OPS[node.op].image
+    if rule is None:
+        raise TypeRuleError(f"what {node.op} computes is not a matter of its operands' ends")
+    return rule(*operands)

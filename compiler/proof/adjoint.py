@@ -24,7 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.enclosure import OUTWARD, RANGE_OUTWARD, Enclosure, sine_range
+from ..core.enclosure import OUTWARD, Enclosure
+from ..core.intervals import RANGE_OUTWARD, sine_range
 from ..core.ir import Program
 from ..core.ops import OPS
 

@@ -29,11 +29,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.enclosure import OUTWARD as OUTWARD
-from ..core.enclosure import OVERFLOW, RANGE_OUTWARD
+from ..core.enclosure import OVERFLOW
 from ..core.enclosure import Enclosure as Enclosure
-from ..core.enclosure import sine_range as sine_range
+from ..core.intervals import RANGE_OUTWARD, Ends
+from ..core.intervals import sine_range as sine_range
 from ..core.ir import LEAST, Gather, Node, Program
-from ..core.ops import LOOPS, OPS
+from ..core.ops import LOOPS, OPS, image
 from ..core.profiles import (
     EXP2_ULPS,
     FLUSH,
@@ -116,85 +117,68 @@ def _affine(context: Context, operands: list[Enclosure]) -> Enclosure:
     return held(middle - reach, middle + reach, x.read @ size + own + underflow, whole)
 
 
-def _add(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """Errors add up."""
-    a, b = operands
-    return _rounded(context, a.low + b.low, a.high + b.high, a.read + b.read)
+def _image(context: Context, operands: Sequence[Enclosure]) -> Ends:
+    """Return the range of the reference's value."""
+    return image(context.node, [(operand.low, operand.high) for operand in operands])
 
 
-def _subtract(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """a - b is a + (-b)."""
+def _sum(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """Errors add up, of a sum and of a difference."""
     a, b = operands
-    return _rounded(context, a.low - b.high, a.high - b.low, a.read + b.read)
+    return _rounded(context, *_image(context, operands), a.read + b.read)
 
 
 def _multiply(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """(a + da)(b + db) - a b = a db + b da + da db; a square is not negative."""
+    """(a + da)(b + db) - a b = a db + b da + da db."""
     a, b = operands
-    corners = [a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high]
-    low, high = (
-        np.minimum.reduce(np.broadcast_arrays(*corners)),
-        np.maximum.reduce(np.broadcast_arrays(*corners)),
-    )
-    if context.node.args[0] == context.node.args[1]:
-        low = np.where((a.low <= 0) & (a.high >= 0), 0.0, low)
-    return _rounded(context, low, high, a.largest * b.read + b.largest * a.read + a.read * b.read)
+    passed_on = a.largest * b.read + b.largest * a.read + a.read * b.read
+    return _rounded(context, *_image(context, operands), passed_on)
 
 
 def _divide(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """(a + da) / (b + db) - a / b = (da - (a / b) db) / (b + db); no bound for b near 0, or huge."""
-    a, b = operands
+    """(a + da) / (b + db) - a / b = (da - (a / b) db) / (b + db); no bound for b near 0, or huge.
+
+    Of a reciprocal a is 1, and da, even flushed, no more than a number that is read.
+    """
+    b, low_high = operands[-1], _image(context, operands)
+    moved = operands[0].read if len(operands) == 2 else FLUSH
     nearest = np.where((b.low > 0) | (b.high < 0), np.minimum(np.abs(b.low), np.abs(b.high)), 0.0)
     safe = (nearest > b.read) & (b.seen <= LARGEST_DIVISOR)
     with np.errstate(divide="ignore", invalid="ignore"):
-        corners = np.broadcast_arrays(a.low / b.low, a.low / b.high, a.high / b.low, a.high / b.high)
-        low = np.where(safe, np.minimum.reduce(corners), -np.inf)
-        high = np.where(safe, np.maximum.reduce(corners), np.inf)
-        quotient = np.where(safe, np.maximum(np.abs(low), np.abs(high)), np.inf)
-        passed_on = np.where(safe, (a.read + quotient * b.read) / (nearest - b.read), np.inf)
+        low, high = np.where(safe, low_high[0], -np.inf), np.where(safe, low_high[1], np.inf)
+        quotient = np.maximum(np.abs(low), np.abs(high))
+        passed_on = np.where(safe, (moved + quotient * b.read) / (nearest - b.read), np.inf)
     return _rounded(context, low, high, passed_on)
 
 
-def _negative(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """Exact."""
-    (a,) = operands
-    return Enclosure(-a.high, -a.low, a.error)
+def _kept(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """Exact; -a is as far from -a' as a from a', and |a| no farther from |a'|."""
+    return Enclosure(*_image(context, operands), operands[0].error)
 
 
-def _absolute(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """Exact; ||a'| - |a|| <= |a' - a|."""
-    (a,) = operands
-    low = np.where((a.low <= 0) & (a.high >= 0), 0.0, np.minimum(np.abs(a.low), np.abs(a.high)))
-    return Enclosure(low, a.largest, a.error)
-
-
-def _minimum(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """Exact; the error of the operand that is chosen, and of both where either may be."""
+def _chosen(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """Exact; the error of the operand that is least or largest, and of both where either may be."""
     a, b = operands
-    # An operand above the other by more than both errors is never chosen.
+    if context.node.op == "maximum":
+        a, b = (Enclosure(-o.high, -o.low, o.error) for o in operands)
+    # An operand above the other by more than both errors is never the least.
     a_error = np.where(a.low - a.read > b.high + b.read, 0.0, a.error)
     b_error = np.where(b.low - b.read > a.high + a.read, 0.0, b.error)
-    return Enclosure(np.minimum(a.low, b.low), np.minimum(a.high, b.high), np.maximum(a_error, b_error))
-
-
-def _maximum(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """max(a, b) = -min(-a, -b)."""
-    negated = [_negative(context, [operand]) for operand in operands]
-    return _negative(context, [_minimum(context, negated)])
+    return Enclosure(*_image(context, operands), np.maximum(a_error, b_error))
 
 
 def _floor(context: Context, operands: list[Enclosure]) -> Enclosure:
     """Exact; the error counts the integers between the reference's operand and the kernel's."""
     (a,) = operands
     steps = np.floor(a.high + a.read) - np.floor(a.low - a.read)
-    return Enclosure(np.floor(a.low), np.floor(a.high), np.minimum(steps, np.ceil(a.read)))
+    return Enclosure(*_image(context, operands), np.minimum(steps, np.ceil(a.read)))
 
 
 def _sqrt(context: Context, operands: list[Enclosure]) -> Enclosure:
     """|sqrt(a') - sqrt(a)| = |a' - a| / (sqrt(a') + sqrt(a)); no bound when the kernel's a may be below 0."""
     (a,) = operands
     safe = a.low >= a.error
-    low, high = np.sqrt(np.maximum(a.low, 0.0)), np.sqrt(np.maximum(a.high, 0.0))
+    low, high = _image(context, operands)
     least = low + np.sqrt(np.maximum(a.low - a.error, 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         moved = np.where(a.error > 0, a.error / least, 0.0)
@@ -211,9 +195,8 @@ def _power(context: Context, operands: list[Enclosure]) -> Enclosure:
     x, y = operands
     least = x.low - x.read
     safe = least > 0
+    low, high = _image(context, operands)
     with np.errstate(all="ignore"):
-        corners = np.broadcast_arrays(x.low**y.low, x.low**y.high, x.high**y.low, x.high**y.high)
-        low, high = np.minimum.reduce(corners), np.maximum.reduce(corners)
         exponent = y.largest + y.read
         logarithm = np.maximum(np.abs(np.log(least)), np.abs(np.log(x.high + x.read)))
         moved = np.expm1(exponent * x.read / least + y.read * logarithm)
@@ -282,44 +265,15 @@ def _component(context: Context, operands: list[Enclosure]) -> Enclosure:
     return Enclosure(a.low[..., i], a.high[..., i], a.error[..., i])
 
 
-def _reciprocal(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """1 / a."""
-    one = np.ones_like(operands[0].low)
-    return _divide(context, [Enclosure(one, one, np.zeros_like(one)), operands[0]])
-
-
-def _decided(below: tuple[Any, Any], above: tuple[Any, Any]) -> Enclosure:
-    """Return a boolean from (sure for the reference, sure for the kernel) of True, and of False.
-
-    It is 1 or 0; the error is 0 where both are sure to decide alike, else 1.
-    """
-    low, high = np.where(below[0], 1.0, 0.0), np.where(above[0], 0.0, 1.0)
-    return Enclosure(low, high, np.where(below[1] | above[1], 0.0, 1.0))
-
-
-def _less(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """a < b is sure where the ranges, widened by both errors for the kernel, do not meet."""
+def _compare(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """A boolean is 1 or 0; its error is 0 where ranges are farther apart than both errors, else 1."""
     a, b = operands
     both = a.read + b.read
     with np.errstate(invalid="ignore"):
-        return _decided((a.high < b.low, a.high + both < b.low), (a.low >= b.high, a.low - both >= b.high))
-
-
-def _less_equal(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """a <= b is not b < a."""
-    a, b = operands
-    found = _less(context, [b, a])
-    return Enclosure(1.0 - found.high, 1.0 - found.low, found.error)
-
-
-def _greater(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """a > b is b < a."""
-    return _less(context, operands[::-1])
-
-
-def _greater_equal(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """a >= b is b <= a."""
-    return _less_equal(context, operands[::-1])
+        low, high = _image(context, operands)
+        sure, maybe = image(context.node, [(a.low - both, a.high + both), (b.low, b.high)])
+    ends = np.where(low, 1.0, 0.0), np.where(high, 1.0, 0.0)
+    return Enclosure(*ends, np.where(sure | ~maybe, 0.0, 1.0))
 
 
 def _select(context: Context, operands: list[Enclosure]) -> Enclosure:
@@ -327,8 +281,7 @@ def _select(context: Context, operands: list[Enclosure]) -> Enclosure:
     condition, a, b = operands
     sure = condition.error == 0.0
     first, second = sure & (condition.low > 0.5), sure & (condition.high < 0.5)
-    low = np.where(first, a.low, np.where(second, b.low, np.minimum(a.low, b.low)))
-    high = np.where(first, a.high, np.where(second, b.high, np.maximum(a.high, b.high)))
+    low, high = image(context.node, [(first, ~second), (a.low, a.high), (b.low, b.high)])
     apart = np.where(sure, 0.0, np.maximum(np.abs(a.high - b.low), np.abs(b.high - a.low)))
     error = np.where(first, a.error, np.where(second, b.error, np.maximum(a.error, b.error) + apart))
     return Enclosure(low, high, error)
@@ -353,25 +306,22 @@ RULES: Mapping[str, Rule] = {
     "constant": _constant,
     "parameter": _parameter,
     "affine": _affine,
-    "add": _add,
-    "subtract": _subtract,
+    "add": _sum,
+    "subtract": _sum,
     "multiply": _multiply,
     "divide": _divide,
-    "negative": _negative,
-    "absolute": _absolute,
-    "minimum": _minimum,
-    "maximum": _maximum,
+    "negative": _kept,
+    "absolute": _kept,
+    "minimum": _chosen,
+    "maximum": _chosen,
     "floor": _floor,
     "sqrt": _sqrt,
     "power": _power,
     "sin": _sin,
     "stack": _stack,
     "component": _component,
-    "reciprocal": _reciprocal,
-    "less": _less,
-    "less_equal": _less_equal,
-    "greater": _greater,
-    "greater_equal": _greater_equal,
+    "reciprocal": _divide,
+    **dict.fromkeys(("less", "less_equal", "greater", "greater_equal"), _compare),
     "select": _select,
     **dict.fromkeys((*NO_BOUND, *LOOPS), _no_rule),
     "cos": _cos,

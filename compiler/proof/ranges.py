@@ -33,9 +33,10 @@ import numpy as np
 
 from ...refimpl.errors import CompileError
 from ..core.interpret import apply, element
+from ..core.intervals import Ends
 from ..core.ir import Node, Program
 from ..core.loops import Loop, loops
-from ..core.ops import LOOPS
+from ..core.ops import LOOPS, image
 from ..core.profiles import (
     EMITTED_COSINE,
     EMITTED_SINE,
@@ -44,7 +45,7 @@ from ..core.profiles import (
     RELATIVE_ERROR,
     SineContract,
 )
-from .bounds import OUTWARD, power_error, sine_range
+from .bounds import OUTWARD, power_error
 
 SLACK = 2.0**-51
 """Relative widening of an end: float64's rounding of an operation, and of the widening, twice."""
@@ -296,16 +297,15 @@ def _integers(context: Context, operands: list[Range]) -> Range:
     return _decided(context, low, high, _all_sure(operands))
 
 
-def _add(context: Context, operands: list[Range]) -> Range:
-    """[a + c, b + d], rounded; products may come unrounded."""
-    a, b = (_read(context, operand) for operand in operands)
-    return _made(context, *_nearest(a[0] + b[0], a[1] + b[1]), _all_sure(operands))
+def _image(context: Context, operands: list[Range]) -> Ends:
+    """Return the ends of what the operation makes of its operands, before any rounding."""
+    return image(context.node, [(operand.low, operand.high) for operand in operands])
 
 
-def _subtract(context: Context, operands: list[Range]) -> Range:
-    """[a - d, b - c], rounded; products may come unrounded."""
-    a, b = (_read(context, operand) for operand in operands)
-    return _made(context, *_nearest(a[0] - b[1], a[1] - b[0]), _all_sure(operands))
+def _sum(context: Context, operands: list[Range]) -> Range:
+    """Sums and differences, rounded; products may come unrounded."""
+    ends = image(context.node, [_read(context, operand) for operand in operands])
+    return _made(context, *_nearest(*ends), _all_sure(operands))
 
 
 def _read(context: Context, operand: Range) -> tuple[Any, Any]:
@@ -316,11 +316,8 @@ def _read(context: Context, operand: Range) -> tuple[Any, Any]:
 
 
 def _multiply(context: Context, operands: list[Range]) -> Range:
-    """The least and the largest product of ends; a square is not negative."""
-    a, b = operands
-    low, high = _corners(a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high)
-    if context.node.args[0] == context.node.args[1]:
-        low = np.where((a.low <= 0) & (a.high >= 0), 0.0, low)
+    """The image, rounded; and before that, for a sum that reads it."""
+    (a, b), (low, high) = operands, _image(context, operands)
     # Products of two float32 numbers are exact in float64: 2 u - 1 stays a point.
     slack = np.where(_is_float32(a.low, a.high, b.low, b.high), -SLACK, 0.0)
     product = _whole(*_wider(low, high, slack))
@@ -332,20 +329,13 @@ def _is_float32(*values: Any) -> Any:
     return np.logical_and.reduce(np.broadcast_arrays(*(v.astype(np.float32) == v for v in values)))
 
 
-def _corners(*values: Any) -> tuple[Any, Any]:
-    """Return the least and the largest of four; NaN if one is."""
-    a, b, c, d = values
-    return np.minimum(np.minimum(a, b), np.minimum(c, d)), np.maximum(np.maximum(a, b), np.maximum(c, d))
-
-
 def _divide(context: Context, operands: list[Range]) -> Range:
-    """The least and the largest quotient of ends, and the promise; none where b may be 0, or huge."""
-    a, b = operands
+    """The image and the promise, of a reciprocal too; none where the divisor may be 0, or huge."""
+    b = operands[-1]
     allowed = (b.low > 0) | (b.high < 0)
     if context.arithmetic.division is not None:
         allowed = allowed & (np.maximum(np.abs(b.low), np.abs(b.high)) <= LARGEST_DIVISOR)
-    low, high = _corners(a.low / b.low, a.low / b.high, a.high / b.low, a.high / b.high)
-    low, high = _approximate(low, high, context.arithmetic.division)
+    low, high = _approximate(*_image(context, operands), context.arithmetic.division)
     low, high = np.where(allowed, low, -np.inf), np.where(allowed, high, np.inf)
     return _made(context, low, high, _all_sure(operands) & allowed)
 
@@ -355,17 +345,10 @@ def _approximate(low: Any, high: Any, relative: float | None) -> tuple[Any, Any]
     return _nearest(low, high) if relative is None else _wider(low, high, relative)
 
 
-def _reciprocal(context: Context, operands: list[Range]) -> Range:
-    """1 / a."""
-    one = np.float64(1.0)
-    return _divide(context, [Range(one, one, one), operands[0]])
-
-
 def _sqrt(context: Context, operands: list[Range]) -> Range:
     """Monotone, and the promise; none where the operand may be negative."""
     (a,) = operands
-    low, high = np.sqrt(np.maximum(a.low, 0.0)), np.sqrt(np.maximum(a.high, 0.0))
-    low, high = _approximate(low, high, context.arithmetic.root)
+    low, high = _approximate(*_image(context, operands), context.arithmetic.root)
     low, high = np.where(a.low >= 0, low, -np.inf), np.where(a.low >= 0, high, np.inf)
     return _made(context, low, high, _all_sure(operands) & (a.low >= 0))
 
@@ -373,7 +356,7 @@ def _sqrt(context: Context, operands: list[Range]) -> Range:
 def _power(context: Context, operands: list[Range]) -> Range:
     """Monotone in both, so of the powers of ends, and the promise; none where x may be 0 or below."""
     x, y = operands
-    low, high = _corners(x.low**y.low, x.low**y.high, x.high**y.low, x.high**y.high)
+    low, high = _image(context, operands)
     exponent = np.maximum(np.abs(y.low), np.abs(y.high))
     logarithm = np.maximum(np.abs(np.log2(x.low)), np.abs(np.log2(x.high)))
     # Float64's own logarithms and powers are right to a few of its units: far below 2**-20 of the promise.
@@ -384,22 +367,23 @@ def _power(context: Context, operands: list[Range]) -> Range:
 
 def _sin(context: Context, operands: list[Range]) -> Range:
     """The sine's range between both arguments, and the contract's error on its domain."""
-    return _wave(context, operands[0], 0.0, context.arithmetic.sine)
+    return _wave(context, operands, context.arithmetic.sine)
 
 
 def _cos(context: Context, operands: list[Range]) -> Range:
-    """cos(x) = sin(x + pi / 2)."""
-    return _wave(context, operands[0], np.pi / 2, context.arithmetic.cosine)
+    """The cosine's."""
+    return _wave(context, operands, context.arithmetic.cosine)
 
 
-def _wave(context: Context, a: Range, shift: float, contract: SineContract) -> Range:
-    """Return the range of sin(a + shift), computed as a contract promises."""
+def _wave(context: Context, operands: list[Range], contract: SineContract) -> Range:
+    """Return the range of a sine or cosine, computed as a contract promises."""
+    (a,) = operands
     own = np.inf if contract.error is None else contract.error + SINE_SLACK
     domain = min(contract.domain, SLACK_DOMAIN)
     inside = (np.maximum(np.abs(a.low), np.abs(a.high)) <= domain) & np.isfinite(own)
-    low, high = sine_range(np.asarray(a.low) + shift, np.asarray(a.high) + shift)
+    low, high = _image(context, operands)
     low, high = np.where(inside, low - own, -np.inf), np.where(inside, high + own, np.inf)
-    return _made(context, low, high, _all_sure([a]) & inside)
+    return _made(context, low, high, _all_sure(operands) & inside)
 
 
 # ---- exact operations -------------------------------------------------------------------------------------
@@ -409,34 +393,31 @@ def _negative(context: Context, operands: list[Range]) -> Range:
     """Exact; a product that is negated may be fused still."""
     (a,) = operands
     product = None if a.product is None else (-a.product[1], -a.product[0])
-    return Range(-a.high, -a.low, context.plain, a.sure, product)
+    return Range(*_image(context, operands), context.plain, a.sure, product)
 
 
 def _absolute(context: Context, operands: list[Range]) -> Range:
     """Exact."""
-    (a,) = operands
-    ends = np.abs(a.low), np.abs(a.high)
-    low = np.where((a.low <= 0) & (a.high >= 0), 0.0, np.minimum(*ends))
-    return Range(*_whole(low, np.maximum(*ends)), context.plain, a.sure)
+    return Range(*_whole(*_image(context, operands)), context.plain, operands[0].sure)
 
 
 def _minimum(context: Context, operands: list[Range]) -> Range:
     """Exact; only an operand that may be the least affects the result."""
     a, b = operands
     sure = (a.sure & (b.sure | (a.high <= b.low))) | (b.sure & (b.high <= a.low))
-    return _chosen(context, operands, np.minimum(a.low, b.low), np.minimum(a.high, b.high), sure)
+    return _chosen(context, operands, sure)
 
 
 def _maximum(context: Context, operands: list[Range]) -> Range:
     """Exact; only an operand that may be the largest affects the result."""
     a, b = operands
     sure = (a.sure & (b.sure | (a.low >= b.high))) | (b.sure & (b.low >= a.high))
-    return _chosen(context, operands, np.maximum(a.low, b.low), np.maximum(a.high, b.high), sure)
+    return _chosen(context, operands, sure)
 
 
-def _chosen(context: Context, operands: list[Range], low: Any, high: Any, sure: Any) -> Range:
+def _chosen(context: Context, operands: list[Range], sure: Any) -> Range:
     """Return the range of the least or largest; beside NaN either operand may come out."""
-    known = operands[0].known & operands[1].known
+    (low, high), known = _image(context, operands), operands[0].known & operands[1].known
     if context.node.type.dtype == "float32":
         low, high = np.where(known, low, -np.inf), np.where(known, high, np.inf)
     return Range(low, high, context.plain, (sure & known) | (low == high))
@@ -445,7 +426,7 @@ def _chosen(context: Context, operands: list[Range], low: Any, high: Any, sure: 
 def _floor(context: Context, operands: list[Range]) -> Range:
     """Monotone; two integers in the range are a decision."""
     (a,) = operands
-    low, high = np.floor(a.low), np.floor(a.high)
+    low, high = _image(context, operands)
     return _decided(context, low, high, a.sure & (low == high))
 
 
@@ -479,52 +460,31 @@ def _take(context: Context, operands: list[Range]) -> Range:
 # ---- decisions --------------------------------------------------------------------------------------------
 
 
-def _compare(certain: Callable[[Range, Range], tuple[Any, Any]]) -> Rule:
-    """Return the rule of a comparison from where it is certainly true, and certainly false."""
+def _compare(context: Context, operands: list[Range]) -> Range:
+    """False and true are the ends of what is not certain; on what may be NaN nothing is."""
+    (low, high), known = _image(context, operands), operands[0].known & operands[1].known
+    return _decided(context, low & known, high | ~known, False)
 
-    def rule(context: Context, operands: list[Range]) -> Range:
-        a, b = operands
-        true, false = certain(a, b)
-        known = a.known & b.known
-        # False and true are the ends of what is not certain.
-        return _decided(context, true & known, ~(false & known), False)
 
-    return rule
+def _logic(context: Context, operands: list[Range]) -> Range:
+    """Kleene's: false if one is false, or true if one is true; not turns both round."""
+    return _decided(context, *_image(context, operands), False)
 
 
 def _select(context: Context, operands: list[Range]) -> Range:
     """The branch that is chosen, or the hull of both."""
     condition, a, b = operands
-    low = np.where(condition.low, a.low, np.where(condition.high, np.minimum(a.low, b.low), b.low))
-    high = np.where(condition.low, a.high, np.where(condition.high, np.maximum(a.high, b.high), b.high))
+    low, high = _image(context, operands)
     sure = np.where(condition.low, a.sure, ~condition.high & b.sure)
     return Range(low, high, context.plain, sure | (low == high))
 
 
-def _and(context: Context, operands: list[Range]) -> Range:
-    """Kleene's: false if one is false."""
-    a, b = operands
-    return _decided(context, a.low & b.low, a.high & b.high, False)
-
-
-def _or(context: Context, operands: list[Range]) -> Range:
-    """Kleene's: true if one is true."""
-    a, b = operands
-    return _decided(context, a.low | b.low, a.high | b.high, False)
-
-
-def _not(context: Context, operands: list[Range]) -> Range:
-    """Kleene's."""
-    (a,) = operands
-    return _decided(context, ~a.high, ~a.low, False)
-
-
 RULES: Mapping[str, Rule] = {
-    "add": _numbers(_add),
-    "subtract": _numbers(_subtract),
+    "add": _numbers(_sum),
+    "subtract": _numbers(_sum),
     "multiply": _numbers(_multiply),
     "divide": _divide,
-    "reciprocal": _reciprocal,
+    "reciprocal": _divide,
     "negative": _negative,
     "absolute": _absolute,
     "minimum": _minimum,
@@ -534,15 +494,8 @@ RULES: Mapping[str, Rule] = {
     "power": _power,
     "sin": _sin,
     "cos": _cos,
-    "less": _compare(lambda a, b: (a.high < b.low, a.low >= b.high)),
-    "less_equal": _compare(lambda a, b: (a.high <= b.low, a.low > b.high)),
-    "greater": _compare(lambda a, b: (a.low > b.high, a.high <= b.low)),
-    "greater_equal": _compare(lambda a, b: (a.low >= b.high, a.high < b.low)),
-    "equal": _compare(lambda a, b: (_one_point(a, b), (a.high < b.low) | (a.low > b.high))),
-    "not_equal": _compare(lambda a, b: ((a.high < b.low) | (a.low > b.high), _one_point(a, b))),
-    "logical_and": _and,
-    "logical_or": _or,
-    "logical_not": _not,
+    **dict.fromkeys(("less", "less_equal", "greater", "greater_equal", "equal", "not_equal"), _compare),
+    **dict.fromkeys(("logical_and", "logical_or", "logical_not"), _logic),
     "bitwise_xor": _integers,
     "bitwise_and": _integers,
     "right_shift": _integers,
@@ -552,11 +505,6 @@ RULES: Mapping[str, Rule] = {
 }
 """One rule an operation; inputs, constants and what makes up a loop are the walk's own [`_Run`]. Vectors are
 taken apart before, by `scalarize`."""
-
-
-def _one_point(a: Range, b: Range) -> Any:
-    """Return where (...) both are the same single number."""
-    return a.point & b.point & (a.low == b.low)
 
 
 def where(condition: Any, a: Range, b: Range) -> Range:

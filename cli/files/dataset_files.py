@@ -94,7 +94,7 @@ def sum_of(path: Path, stated: int | None = None) -> Sum:
     with os.fdopen(handle, "rb") as file:
         found = os.fstat(handle)
         if not stat.S_ISREG(found.st_mode):
-            raise InputError("file", str(path), "it is no regular file", "remove it")
+            raise InputError("file", str(path), "it is not a regular file", "remove it")
         if stated not in (None, found.st_size):
             return Sum(found.st_size, "")
         # It may grow while it is read.
@@ -189,7 +189,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 def _damaged(path: Path) -> InputError:
     """Return the refusal of a manifest that cannot be read."""
-    rule = "it is no manifest of a data set, or damaged"
+    rule = "it is not a manifest of a data set, or damaged"
     return InputError("manifest", str(path), rule, "restore it, or make the data set in another folder")
 
 
@@ -309,6 +309,12 @@ class Store:
 
     def _begin(self, on_look: Look | None) -> None:
         """Find what is there; write down what is not, before any of it is made."""
+        for name in self.pictures:
+            path = self.folder / name
+            if path.is_dir() and not path.is_symlink():
+                raise InputError(
+                    "picture", str(path), "it is a folder", "remove it: nothing of ours is in it"
+                )
         remove_temporaries(self.folder)
         names = list(self.pictures)
         self.sums = dict(self.before) | _read_journal(self.unfinished / JOURNAL)

@@ -277,8 +277,23 @@ def test_a_pipe_is_no_picture(tmp_path) -> None:
     os.mkfifo(path)
     found = files.verify(tmp_path / "a", files.read_manifest(tmp_path / "a"))
     assert found == {"train/00000-noisy.exr": "missing"}
-    with pytest.raises(InputError, match="it is no regular file"):
+    with pytest.raises(InputError, match="it is not a regular file"):
         files.sum_of(path)
+
+
+def test_a_folder_with_a_picture_s_name_is_refused_before_anything_is_made(tmp_path) -> None:
+    """The last step of a picture is a renaming, which a folder of that name would stop in the middle."""
+    make(tmp_path / "a")
+    path = tmp_path / "a/train/00000-noisy.exr"
+    path.unlink()
+    path.mkdir()
+    (path / "mine").write_text("kept")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(
+        InputError, match="picture is .*00000-noisy.exr: it is a folder; remove it: nothing of"
+    ):
+        make(tmp_path / "a")
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_folders_that_are_something_else(tmp_path) -> None:
@@ -315,7 +330,7 @@ def test_a_journal_that_is_damaged(tmp_path, whole, line) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ("{", "[", "manifest is .*: it is no manifest of a data set, or damaged; restore it, or make"),
+        ("{", "[", "manifest is .*: it is not a manifest of a data set, or damaged; restore it, or make"),
         ("wamnet-dataset-2", "wamnet-dataset-9", "schema is wamnet-dataset-9: it must be wamnet-dataset-2"),
         ('"schema"', '"schemes"', "or damaged"),
         ('"frames": [', '"pictures": [', "or damaged"),

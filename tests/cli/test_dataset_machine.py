@@ -90,7 +90,9 @@ class DataSet(RuleBasedStateMachine):
     @rule()
     def run_to_the_end(self) -> None:
         if self._run(None):
-            own = {name: data for name, data in content(self.folder).items() if "stray" not in name}
+            found = content(self.folder).items()
+            # A half-written picture is the project's in its work folder only; elsewhere it is left alone.
+            own = {name: data for name, data in found if "stray" not in name and Path(name).name != files.NEW}
             assert own == self.whole
 
     def _run(self, bands: int | None) -> bool:
@@ -143,7 +145,7 @@ class DataSet(RuleBasedStateMachine):
 
     @rule()
     def links_and_folders_are_mended(self) -> None:
-        """As a user would after a refusal: what is no file of a data set goes."""
+        """As a user would after a refusal: what is not a file of a data set goes."""
         for path in sorted(self.folder.rglob("*"), reverse=True):
             if path.is_symlink():
                 path.unlink()

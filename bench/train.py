@@ -10,7 +10,7 @@
    steps of the preset would take at the median. Only products of matrices are counted as operations: twice
    N D_in D_out for forward pass, weights' and inputs' derivatives, the last not in the first layer.
 
-How good the result is: `experiments/presets.py --executor opencl`. PyTorch is no dependency of the project.
+How good the result is: `experiments/presets.py --executor opencl`. The project does not need PyTorch.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ def _run() -> int:
         return _interrupted()
     finally:
         if ours:
-            # What Python does at its end is no work that could be lost; an interrupt then needs no words.
+            # What Python does at its end is not work that could be lost; an interrupt then needs no words.
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 

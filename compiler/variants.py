@@ -268,7 +268,7 @@ def parse(text: str) -> Variant:
     for part in text.split(PLUS):
         match = re.fullmatch(r"(without-)([a-z]+)|(window|hidden|rank|sine)([1-9][0-9]{0,3})", part)
         if match is None:
-            rule = f"{part!r} is no approximation; there are: {KNOWN}"
+            rule = f"{part!r} is not an approximation; there are: {KNOWN}"
             raise InputError("variant", text, rule, f"use {FULL}, or some of them, as in {EXAMPLE}")
         name, feature, kind, number = match.groups()
         steps.append((name, feature) if name else (kind, int(number)))
@@ -334,7 +334,7 @@ def enclose(varied: Varied, plan: Plan) -> list[Enclosure]:
         names = str(node["weight"]), str(node["bias"])
         inside = dict(zip(names, (arrays[layer] for arrays in varied.inside), strict=True))
         outside = {name: whole.parameters[name].astype(np.float64) for name in names}
-        # Where sines promise nothing, an infinite error may meet a weight of 0: NaN is no bound either.
+        # Where sines promise nothing, an infinite error may meet a weight of 0: NaN is not a bound.
         with np.errstate(invalid="ignore"):
             wanted, kernel = (
                 bounds.RULES["affine"](bounds.Context(node, parameters, contract), [x])

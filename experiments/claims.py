@@ -7,7 +7,7 @@
    orientations and other lights is read from `generalisation.py` and `lights.py`, where they have run
    [`Evidence`].
 2. Two times are measured here, on this machine's cores: a step of the paper's training, and a frame of
-   1024x1024 [`timed`]. They are no verdict about the paper's GPU.
+   1024x1024 [`timed`]. They are not a verdict about the paper's GPU.
 3. A claim asks questions; each is decided on the bootstrap interval of its own number [`lab/verdicts.py`]:
    improvements pose by pose [`gain`], ratios of means [`change`]. Of a network whose training was broken off
    before its validation error was flat, nothing is tested [`Evidence.table`].
@@ -65,7 +65,7 @@ EQUAL_DB = 0.5
 """Decision: a picture is equally good if it gains at most so many decibels less."""
 
 NO_BLOCKS = 1.1
-"""Decision: errors that jump less than this, against elsewhere, are no blocks."""
+"""Decision: errors that jump less than this, against elsewhere, are not blocks."""
 
 LOST = 2.0
 """Decision: colours are not reproduced where they are farther off than this, against those trained on."""

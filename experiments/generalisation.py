@@ -2,7 +2,7 @@
 
 1. Networks are trained on frames of one orientation of the camera, or of a range of them, where each frame
    draws its orientation and its time independently [`RANGE`]; frames are as many in both cases [`learned`].
-2. The cubes repeat their pose each quarter of the turn, so an arc of the turn is no new geometry. A third
+2. The cubes repeat their pose each quarter of the turn, so an arc of the turn is not new geometry. A third
    kind of network learns from times of all quarters whose pose is in the first part of the quarter only, and
    is tested on poses of its rest, beside a network that has learned from all poses [`posed`].
 3. All are scored at several orientations, from that of the networks of one to beyond the range, and on the

@@ -90,11 +90,13 @@ def read_file(
 
 
 def _check_regular(found: os.stat_result, what: str, shown: str) -> None:
-    """Refuse what is no regular file."""
+    """Refuse what is not a regular file."""
     if stat.S_ISDIR(found.st_mode):
         raise InputError(what, shown, "it is a folder", "give the name of a file in it")
     if not stat.S_ISREG(found.st_mode):
-        raise InputError(what, shown, "it is no regular file (a pipe or a device)", "give a file on a disk")
+        raise InputError(
+            what, shown, "it is not a regular file (a pipe or a device)", "give a file on a disk"
+        )
 
 
 def check_room(needed: int, what: str, shown: object, way_out: str) -> None:

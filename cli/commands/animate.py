@@ -179,7 +179,7 @@ def _said_of(shots: Sequence[Shot], renderer: Renderer) -> list[str]:
 
 
 def _check_names(output: Path, model: Path, fps: float) -> None:
-    """Refuse an output that is no film and no folder, and a film that cannot be written."""
+    """Refuse an output that is not a film and no folder, and a film that cannot be written."""
     if output.suffix.lower() in movie.WRITERS:
         check_output(output, tuple(movie.WRITERS), [model])
         movie.check(output, fps)

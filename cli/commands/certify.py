@@ -34,7 +34,7 @@ def certify(
     """Check the proof of a kernel's error bound, step by step, and show what each layer adds.
 
     The checker derives every number again, from the weights and the program's text. It ends with status 0 if
-    all steps hold, 1 if one does not, which it names, and 2 if the file is no certificate.
+    all steps hold, 1 if one does not, which it names, and 2 if the file is not a certificate.
     """
     from ...compiler.artifact import CERTIFICATE_NAME
     from ...compiler.proof.checker import Refused, check

@@ -184,7 +184,7 @@ def is_scene(name: str) -> bool:
 
 def _check_name(name: str, of_scenes: Mapping[str, Any]) -> None:
     """Refuse options of scenes, and what looks like a scene's name but is not one: a model's file exists."""
-    _only_for("a scene", of_scenes, f"{name} is no scene: neither a canonical one nor a .json file")
+    _only_for("a scene", of_scenes, f"{name} is not a scene: neither a canonical one nor a .json file")
     comes_along = name.startswith(MODEL_PREFIX)
     if not comes_along and not Path(name).suffix and not Path(name).exists():
         rule = "neither a canonical scene nor a file"

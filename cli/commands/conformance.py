@@ -165,10 +165,10 @@ def _command(program: str | None, executor: str | None) -> list[str]:
             command = shlex.split(program)
         except ValueError as error:
             raise InputError(
-                "--program", program, f"it is no command ({error})", "close quotation marks"
+                "--program", program, f"it is not a command ({error})", "close quotation marks"
             ) from None
         if not command:
-            raise InputError("--program", repr(program), "it is no command", "name a program")
+            raise InputError("--program", repr(program), "it is not a command", "name a program")
         return command
     from ...kernels.devices.registry import EXECUTORS
     from ...kernels.export.runners import RUNNERS

@@ -26,13 +26,13 @@ CHECKPOINT_MARK = ".checkpoint"
 
 
 def check_input(path: Path) -> None:
-    """Refuse an input that is no file."""
+    """Refuse an input that is not a file."""
     if path.is_dir():
         raise InputError("input file", str(path), "it is a folder", "give the name of a file in it")
     if not path.exists():
         raise InputError("input file", str(path), "it does not exist", "check the name")
     if not path.is_file():
-        rule = "it is no regular file (a pipe or a device)"
+        rule = "it is not a regular file (a pipe or a device)"
         raise InputError("input file", str(path), rule, "give a file on a disk")
 
 

@@ -32,7 +32,7 @@ LARGEST_EXPOSURE_STOPS = 64.0
 
 
 def _finite(value: float | None) -> float | None:
-    """Refuse a time that is no number."""
+    """Refuse a time that is not a number."""
     if value is not None and not math.isfinite(value):
         raise InputError("--time", value, "it must be finite", "give seconds, for example --time 2.5")
     return value
@@ -59,7 +59,7 @@ def _context(command: typer.Context, value: ContextName | None) -> ContextName |
 
 
 def _stops(value: float) -> float:
-    """Refuse an exposure that is no number or that leaves no picture."""
+    """Refuse an exposure that is not a number or that leaves no picture."""
     if not abs(value) <= LARGEST_EXPOSURE_STOPS:
         rule = f"it must be from {-LARGEST_EXPOSURE_STOPS:g} to {LARGEST_EXPOSURE_STOPS:g} stops"
         raise InputError("--exposure", value, rule, "for example --exposure 1")

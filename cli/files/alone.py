@@ -125,7 +125,7 @@ def _open(path: Path) -> int:
 
 
 def _strange(path: Path) -> InputError:
-    """Return the refusal of what is no lock."""
+    """Return the refusal of what is not a lock."""
     rule = "a lock of wamnet is an empty file, and this is something else"
     return InputError("lock file", str(path), rule, "move it elsewhere, or choose another output with -o")
 

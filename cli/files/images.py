@@ -86,7 +86,7 @@ def _even(length: int) -> int:
 def read_origin(path: Path) -> str | None:
     """Return the text that names the origin of a PNG; None if the file is damaged, "" if it has no text.
 
-    What is no regular file is refused: a pipe of this name would make us wait.
+    What is not a regular file is refused: a pipe of this name would make us wait.
     """
     pillow = need("PIL.Image", "to read PNG files", "files")
     content = BytesIO(read_file(path, "picture", "move it elsewhere, or choose another output with -o"))

@@ -5,8 +5,8 @@
 2. A kernel of the plain schedule names the nodes in its text: `t12 = ` and `v12` belong to node 12, and so
    does what follows the comment `%12: ...` [emit.py]; a path kernel has a block for each of its programs,
    with the comment `arrive: ...` at its head [emit_path.py].
-3. [`lines_of`] reads that, and gives each line of the kernel its node's places. What is no node's (the loops
-   over pixels, windows and samples) has none: that is the skeleton.
+3. [`lines_of`] reads that, and gives each line of the kernel its node's places. What no node made (the
+   loops over pixels, windows and samples) has none: that is the skeleton.
 4. [`as_text`] prints the kernel in the order of its text, under each line of the reference what it became.
 """
 

@@ -187,7 +187,7 @@ def _component(args: Sequence[Type], attributes: Mapping[str, Attribute], parame
     return Type(args[0].dtype)
 
 
-# ---- definitions that are no NumPy function by themselves --------------------------------------------
+# ---- definitions that are not a NumPy function by themselves --------------------------------------------
 
 
 def _affine_value(x: Any, weight: Any, bias: Any = None) -> Any:

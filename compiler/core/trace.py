@@ -404,7 +404,7 @@ _FUNCTIONS: Mapping[Any, Callable[..., Any]] = {
     np.asarray: _asarray,
     np.take: _take,
 }
-"""NumPy's functions that are no ufuncs and can be traced."""
+"""NumPy's functions that are not ufuncs and can be traced."""
 
 
 def _call(builder: Builder, function: Any, args: Any, options: Any) -> Any:

@@ -382,7 +382,7 @@ def _spread(found: Enclosure, operand: Node, node: Node) -> Enclosure:
 
 
 def _outward(e: Enclosure) -> Enclosure:
-    """Widen an enclosure by more than float64 can have rounded it; what is no number becomes no bound."""
+    """Widen an enclosure by more than float64 can have rounded it; what is not a number becomes no bound."""
     low = e.low - RANGE_OUTWARD * np.abs(e.low)
     high = e.high + RANGE_OUTWARD * np.abs(e.high)
     error = e.error * (1 + OUTWARD)

@@ -68,7 +68,7 @@ class Layer:
 
 
 def network(program: Program, found: Sequence[Enclosure], output: int) -> list[Layer]:
-    """Return the layers whose last one makes this value, first to last; none if it is no such network."""
+    """Return the layers whose last one makes this value, first to last; none if it is another network."""
     index = unclamped(program, found, output)
     layers: list[Layer] = []
     if program.nodes[index].op != "affine":

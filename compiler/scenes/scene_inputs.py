@@ -123,7 +123,7 @@ def _kept(table: NDArray[Any]) -> tuple[Any, ...]:
 
 
 def _tables(value: Any, path: str = "") -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield the tables of a world by path; what is no table is one whose bytes are its text."""
+    """Yield the tables of a world by path; what is not a table is one whose bytes are its text."""
     for name, part in _parts(value):
         yield from _tables(part, f"{path}.{name}" if path else name)
     if isinstance(value, np.ndarray | np.number):

@@ -46,7 +46,7 @@ def main() -> int:
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "out/site"
     if folder.exists() and any(folder.iterdir()) and not (folder / "search").exists():
-        print(f"docs: {folder} holds something that is no site; name another folder", file=sys.stderr)
+        print(f"docs: {folder} holds something that is not a site; name another folder", file=sys.stderr)
         return 2
     try:
         print(build_site(folder))

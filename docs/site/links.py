@@ -16,7 +16,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 HOST = re.compile(r"""["'(]\s*(?:https?:)?//(?!www\.w3\.org/)[\w.-]+\.[a-z]{2,}[^"')\s]*""")
-"""The address of a host in a script or a style; names of XML's vocabularies are no addresses."""
+"""The address of a host in a script or a style; names of XML's vocabularies are not addresses."""
 
 ADDRESSES = {"href", "src", "srcset", "action", "poster", "data"}
 """Attributes that hold an address."""

@@ -93,7 +93,7 @@ def guides_of(frame: Frame) -> Guides:
 
 
 def slope(depth: Array, axis: int) -> Array:
-    """Return the smaller difference (H, W) to the pixels before and after: an edge is no slope."""
+    """Return the smaller difference (H, W) to the pixels before and after: an edge is not a slope."""
     steps = np.diff(depth, axis=axis)
     first, last = np.take(steps, [0], axis), np.take(steps, [-1], axis)
     before, after = np.concatenate([first, steps], axis), np.concatenate([steps, last], axis)

@@ -178,7 +178,7 @@ class Pix2pix:
     def picture(self, frame: Frame) -> Floats:
         """Return the denoised, display-encoded picture (H, W, 3) of a frame, patch by patch.
 
-        A picture whose side is no multiple of the patch's is continued by its last pixels.
+        A picture whose side is not a multiple of the patch's is continued by its last pixels.
         """
         height, width, size = frame.height, frame.width, self.recipe.crop
         margins = (0, -width % size, 0, -height % size)

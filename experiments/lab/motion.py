@@ -64,7 +64,7 @@ def slice_over_time(pictures: Floats, row: int, repeat: int = 1) -> Floats:
 
 
 def _check(pictures: Floats) -> None:
-    """Refuse what is no sequence of pictures."""
+    """Refuse what is not a sequence of pictures."""
     shape = np.shape(pictures)
     if len(shape) != 4 or shape[0] < LEAST_FRAMES:
         rule = f"(T, H, W, 3) with T of {LEAST_FRAMES} or more"

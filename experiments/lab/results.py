@@ -76,7 +76,7 @@ def _data(path: Path) -> dict[str, Any]:
             raise KeyError("schema")
         _ = data["experiment"], data["settings"]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        rule = f"it is no file of results ({type(error).__name__})"
+        rule = f"it is not a file of results ({type(error).__name__})"
         raise InputError("file of results", str(path), rule, WAY_OUT) from None
     return data
 

@@ -87,7 +87,7 @@ def from_json(value: Any, what: str) -> NDArray[Any]:
 
 
 def _leaves(value: Any) -> Any:
-    """Return all that is no list, in order."""
+    """Return all that is not a list, in order."""
     if isinstance(value, list):
         for item in value:
             yield from _leaves(item)

@@ -47,7 +47,7 @@ from .kinds.paths import VERTEX
 from .numbers import from_json
 
 Own = Callable[[Mapping[str, Any], str], Mapping[str, Any]]
-"""(inputs, profile) -> outputs, of a kind that is no function of numbers."""
+"""(inputs, profile) -> outputs, of a kind that is not a function of numbers."""
 
 
 class OnExecutor:

@@ -31,7 +31,7 @@ PROTOCOL = 1
 """Version of the protocol."""
 
 LONGEST_LINE = 2**24
-"""Most bytes of an answer: what is longer is no answer."""
+"""Most bytes of an answer: what is longer is not an answer."""
 
 LINES_AHEAD = 4
 """Most lines that are kept before they are read: an endless output must not fill the memory."""
@@ -110,7 +110,7 @@ class Session:
             answer = parse_json(line, "answer", "see spec/conformance.md")
         if not isinstance(answer, dict):
             self._end(at_once=True)
-            raise NoAnswerError("garbage", f"the line is no JSON object: {line[:80]!r}")
+            raise NoAnswerError("garbage", f"the line is not a JSON object: {line[:80]!r}")
         return answer
 
     def _start(self) -> _Child:

@@ -3,7 +3,7 @@
 1. Cases are chosen by kind, clause, flag or part of their id [`chosen`].
 2. A verdict is one word [`Verdict`], with the first output that deviates, what was expected, what was found,
    and the error beside its bound [`judge`].
-3. `unsupported` is no failure; the report counts it. A NaN is never within a bound.
+3. `unsupported` is not a failure; the report counts it. A NaN is never within a bound.
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ def _nearness(
     if found.shape != wanted.shape:
         return (f"shape {found.shape}, not {wanted.shape}", name, "", ""), np.inf
     bound = np.broadcast_to(from_json(expected["bound"], name).astype(np.float64), wanted.shape)
-    # What is no number, or no number away, is wrong.
+    # What is not a number, or no number away, is wrong.
     with np.errstate(all="ignore"):
         error = np.where(found == wanted, 0.0, np.abs(found - wanted))
         error = np.where(np.isnan(error), np.inf, error)

@@ -191,7 +191,7 @@ class CExecutor(Executor):
         try:
             self._command = shlex.split(given) or ["cc"]
         except ValueError as error:
-            rule = f"{COMPILER_VARIABLE} is {given!r}, which is no command ({error})"
+            rule = f"{COMPILER_VARIABLE} is {given!r}, which is not a command ({error})"
             raise ExecutorUnavailable(f"c: {rule}; {WAY_OUT}") from None
         version = self._call("--version").stdout.strip().partition("\n")[0]
         self.device = f"{' '.join(self._command)}: {version}"

@@ -219,7 +219,7 @@ def checked(artifact: Artifact, inputs: Images) -> Images:
 
 
 def _check_range(image: Image, array: NDArray[np.float32]) -> None:
-    """Refuse numbers outside the range on which the kernel's bound rests, and what is no number."""
+    """Refuse numbers outside the range on which the kernel's bound rests, and what is not a number."""
     # NaN among the numbers makes both NaN, and fails.
     if image.low <= float(array.min()) and float(array.max()) <= image.high:
         return

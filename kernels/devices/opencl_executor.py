@@ -128,7 +128,7 @@ class OpenCLExecutor(Executor):
             return
         local_size = self._local_size(artifact)
         program = self._compiled(artifact.source)
-        # An empty buffer is no buffer.
+        # An empty buffer is not a buffer.
         weights = artifact.weights if artifact.weights.size else np.zeros(1, np.float32)
         kernel, schedule = getattr(program, artifact.entry_point), artifact.manifest["schedule"]
         extent = (schedule["pixels"], schedule.get("rows", 1))
@@ -136,7 +136,7 @@ class OpenCLExecutor(Executor):
         keep(self._built, artifact.digest, built)
 
     def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
-        """Refuse images that are no single buffer of the device, or whose indices `int` does not hold."""
+        """Refuse images that do not fit one buffer of the device, or whose indices `int` does not hold."""
         height, width = size
         written = [output_channels(kernel.program) for kernel in artifact.kernels]
         most = max(*written, *(i.channels for i in images_of(artifact)))

@@ -321,7 +321,7 @@ ROWS: tuple[Row, ...] = (
         single=True,
     ),
 )
-"""All rows but that of ONNX, which is no kernel's text."""
+"""All rows but that of ONNX, which is not a kernel's text."""
 
 TARGETS: Mapping[str, Row] = {row.name: row for row in ROWS}
 """All targets whose kernels are text or SPIR-V, by name."""

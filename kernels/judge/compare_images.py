@@ -82,7 +82,7 @@ def compare_images(
     p = welch.welch_p(
         means[0][noisy], variances[0][noisy], counts[0], means[1][noisy], variances[1][noisy], counts[1]
     )
-    # A picture that is not finite is no picture.
+    # A picture that is not finite is not a picture.
     finite = all(np.isfinite(a).all() for a in (*means, *variances))
     least = float(np.min(p, initial=1.0)) if finite else 0.0
     comparisons = int(noisy.sum())

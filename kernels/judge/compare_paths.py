@@ -44,7 +44,7 @@ QUANTITIES: Mapping[str, list[str]] = {
 """The floats of a path's state with the names of their components."""
 
 DECISIONS = ("alive", "surface")
-"""The components of a path's state that are no floats."""
+"""The components of a path's state that are not floats."""
 
 SHOWN = 10
 """Unexplained components that a report tells one by one."""

@@ -2,7 +2,7 @@
 
 1. Compile the network for each executor and schedule [`kernels_of`], run each kernel, and hold each number
    against the float64 reference and the bound of its schedule at this frame [`judged`], [compiler/plan.py].
-   What is no finite number deviates. Under profile `exact` the bits must also be those of the interpreter.
+   What is not a finite number deviates. Under profile `exact` the bits must also be those of the interpreter.
 2. Name the odd ones out: those that deviate while others are within their bounds. If all deviate, it is the
    program or the bound that is suspect [`conclusion`].
 3. Cut the picture down to one that still shows it [reduce.py: `shrink`], and run the network's first stages

@@ -26,7 +26,7 @@ SCHEMA = "wamnet-curve-1"
 """Name and version of a curve's form; described in spec/variants.md."""
 
 NUMBERS = ("milliseconds", "error_max", "error_mean", "psnr_loss_db", "error_bound")
-"""A point's numbers; null where it was not measured, or is no number."""
+"""A point's numbers; null where it was not measured, or is not a number."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Curve:
     points: tuple[Point, ...]
 
     def as_data(self) -> dict[str, Any]:
-        """Return the curve as JSON's types, null for what is no finite number."""
+        """Return the curve as JSON's types, null for what is not a finite number."""
         points = []
         for point in self.points:
             data = asdict(point)

@@ -70,7 +70,7 @@ def denoise_on(
     size = (frame.height, frame.width)
     plan, reason = plan_model(model, executor.name, profile, schedule or PLAIN, variant), "as asked"
     planned = time.perf_counter() - start
-    # A frame that lacks a layer is refused before anything is compiled; encoding is no part of compilation.
+    # A frame that lacks a layer is refused before anything is compiled; encoding is not part of compilation.
     images = images_of(plan.model, frame)
     start = time.perf_counter() - planned
     if not schedule:

@@ -142,7 +142,7 @@ def quality(
 ) -> tuple[float, float, float]:
     """Return the largest and the mean error of pictures (H, W, 3), and the mean PSNR that they lose in dB.
 
-    All are NaN if a picture holds what is no number.
+    All are NaN if a picture holds what is not a number.
     """
     if not all(np.isfinite(picture).all() for picture in pictures):
         return math.nan, math.nan, math.nan

@@ -89,7 +89,7 @@ class Render:
 
 
 def _check_range(name: str, value: Any, low: int, high: int) -> None:
-    """Refuse an argument that is no integer from low to high."""
+    """Refuse an argument that is not an integer from low to high."""
     if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or not low <= value <= high:
         raise InputError(name, value, f"it must be an integer from {low} to {high}", "choose another value")
 

@@ -70,8 +70,8 @@ SKY_SHARE = 0.5
 radiance cannot be compared without knowing the size of what they light. A half: its halving is exact."""
 
 CAMERA_PDF = SINGLE_PDF
-"""Density of a camera ray's direction, in 1/sr: it is no sample, light sampling is no alternative to it, and
-the weight of what it meets is 1."""
+"""Density of a camera ray's direction, in 1/sr: it is not a sample, so light sampling is not an alternative
+to it, and the weight of what it meets is 1."""
 
 LEAST_SQUARE = 1e-30
 """Floor of squared distances that divide, in scene units squared; it acts only on coincident points."""

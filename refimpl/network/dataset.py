@@ -3,7 +3,7 @@
 1. A feature turns a layer of a frame into numbers near [-1, 1] [`FEATURES`], with scales that belong to the
    model, not to the frame [`Normalization`], [`normalization_of`].
 2. The chosen features, one after another on the channel axis, are the feature image [`feature_image`].
-   What is no number counts as 0 there, once and for all executors [`known`].
+   What is not a number counts as 0 there, once and for all executors [`known`].
 3. The image is padded by the border rule [`pad`], so that every pixel has a full window; the window of a
    pixel is the network's input vector [`windows_at`].
 4. Training draws pixels uniformly from all frames with the counter generator [`sample_pixels`] and gathers
@@ -274,7 +274,7 @@ def normalization_of(frames: Sequence[Frame], exposure_stops: float = 0.0) -> No
 
 
 def _farthest(depth: Array) -> float:
-    """Return the largest depth of (H, W, 1) that is no miss, or 0."""
+    """Return the largest depth of (H, W, 1) that is not a miss, or 0."""
     return float(np.max(depth, initial=0.0, where=depth < FARTHEST_DEPTH))
 
 
@@ -324,7 +324,7 @@ def known(values: Array) -> Array:
 def target_image(reference: Frame, normalization: Normalization) -> NDArray[np.float32]:
     """Return the colours (H, W, 3) to learn: the reference's, encoded as the color feature is.
 
-    What is no number is refused here: it would be learned.
+    What is not a number is refused here: it would be learned.
     """
     check_finite("layer 'color' of the reference", reference["color"])
     return feature_image(reference, ("color",), normalization)
@@ -419,7 +419,7 @@ def build(
 
 
 def _check_pairs(pairs: Sequence[tuple[Frame, Frame]]) -> None:
-    """Refuse no pairs, pairs whose pictures differ in size, and noisy frames with what is no number."""
+    """Refuse no pairs, pairs whose pictures differ in size, and noisy frames with what is not a number."""
     if not pairs:
         raise InputError("training pairs", "none", "at least one", "give a noisy frame and its reference")
     for index, (noisy, reference) in enumerate(pairs):

@@ -190,7 +190,7 @@ def test_a_pipe_or_a_bomb_in_the_place_of_a_picture(wamnet, refused, tmp_path) -
     """A pipe was waited for; a header of 60,000 x 60,000 pixels was a traceback of Pillow's."""
     (tmp_path / "a").mkdir()
     os.mkfifo(tmp_path / "a/00000.png")
-    assert "it is no regular file (a pipe or a device)" in refused(
+    assert "it is not a regular file (a pipe or a device)" in refused(
         "animate", "m.safetensors", *SHORT, "-o", "a"
     )
     (tmp_path / "a/00000.png").unlink()

@@ -63,7 +63,7 @@ def test_a_pipe_beside_a_kernel_is_refused_at_once(refused, kernel):
     os.mkfifo(kernel / "pipe")
     named = {"files": {**manifest["files"], "pipe": "0"}, "file_bytes": {**manifest["file_bytes"], "pipe": 0}}
     path.write_text(json.dumps({**manifest, **named}))
-    assert "it is no regular file" in refused("certify", kernel)
+    assert "it is not a regular file" in refused("certify", kernel)
 
 
 def test_a_file_of_another_length_is_refused(refused, kernel):

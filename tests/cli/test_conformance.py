@@ -134,8 +134,8 @@ def test_vectors_are_written(wamnet, tmp_path, monkeypatch):
     [
         ((), "--program, --executor is neither given: exactly one says who is asked"),
         (("--program", "a", "--executor", "numpy"), "--program, --executor is both given"),
-        (("--program", "'"), "it is no command (No closing quotation)"),
-        (("--program", " "), "it is no command"),
+        (("--program", "'"), "it is not a command (No closing quotation)"),
+        (("--program", " "), "it is not a command"),
         (
             ("--program", "/no/such/program"),
             "it must answer to hello (crash: /no/such/program cannot be started",

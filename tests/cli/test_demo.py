@@ -53,7 +53,7 @@ def test_all_files_are_there(finished) -> None:
 
 
 def test_the_frames_are_held_out(finished, report) -> None:
-    """Two times that are no training times, in the report and in the files."""
+    """Two times that are not training times, in the report and in the files."""
     times = {exr.read_frame(path).info["time"] for path in (finished / "frames/train").glob("*.exr")}
     held_out = [exr.read_frame(finished / f"frames/test/0000{k}-noisy.exr").info["time"] for k in (0, 1)]
     assert [float(time) for time in held_out] == [frame["time_s"] for frame in report["unseen"]]

@@ -156,11 +156,9 @@ def test_compile_writes_a_scene_s_kernel(wamnet, here, target, source) -> None:
 def test_refusals_of_compiling_a_scene(wamnet, refused, here) -> None:
     """Options of scenes with a model; a folder with the other kind; what no schedule does; no such scene."""
     glsl = ["--target", "glsl"]
-    text = (
-        "--time is 2.0: model.safetensors is no scene: neither a canonical one nor a .json file; leave it out"
-    )
+    text = "--time is 2.0: model.safetensors is not a scene: neither a canonical one nor a .json file; leave"
     assert text in refused("compile", "model.safetensors", *glsl, "--time", 2)
-    assert "--lanes is 4: model.safetensors is no scene" in refused(
+    assert "--lanes is 4: model.safetensors is not a scene" in refused(
         "compile", "model.safetensors", *glsl, "--lanes", 4
     )
     assert "target opengl does not follow 4 paths at once; it can do 1" in refused(

@@ -52,7 +52,7 @@ def test_the_status_is_the_command_s(tmp_path) -> None:
     )
     (tmp_path / "ended.py").write_text(code)
     command = [sys.executable, "-m", "ended"]
-    # The working folder is no place of modules where PYTHONSAFEPATH is set, as in .ci/run.
+    # The working folder is not a place of modules where PYTHONSAFEPATH is set, as in .ci/run.
     found = {**os.environ, "PYTHONPATH": str(tmp_path)}
     done = subprocess.run(command, env=found, cwd=tmp_path, capture_output=True, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (143, b"")

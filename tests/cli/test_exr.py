@@ -211,7 +211,7 @@ def test_a_file_cut_short(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> 
 
 
 def test_no_known_layer(tmp_path: Path) -> None:
-    """The message lists the channels; an incomplete colour is no layer."""
+    """The message lists the channels; an incomplete colour is not a layer."""
     path = write(tmp_path / "a.exr", {"G": plane(1), "R": plane(1), "mask.A": plane(1)})
     with pytest.raises(InputError, match=r"list of channels is G, R, mask\.A: no known layer is among them"):
         exr.read_frame(path)
@@ -227,7 +227,7 @@ def test_two_layers_of_one_meaning(tmp_path: Path) -> None:
 
 
 def test_integer_pixels(tmp_path: Path) -> None:
-    """Object identifiers are no colour."""
+    """Object identifiers are not colour."""
     path = write(tmp_path / "a.exr", {name: plane(1, np.uint32) for name in "RGB"})
     with pytest.raises(InputError, match="pixels of color is uint32: they must be half or float"):
         exr.read_frame(path)

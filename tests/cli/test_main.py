@@ -91,7 +91,7 @@ def test_wrong_options_are_one_line(refused, arguments, text) -> None:
 
 
 def test_errors_of_the_system_are_one_line(refused, monkeypatch) -> None:
-    """A full disk is no bug."""
+    """A full disk is not a bug."""
 
     def fail(*_args: object, **_options: object) -> None:
         raise OSError(28, "No space left on device", "a.exr")

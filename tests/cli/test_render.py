@@ -239,4 +239,6 @@ def test_times_beyond_all_turns_are_refused(refused, command):
 def test_a_pipe_is_no_scene_file(refused, tmp_path):
     """Reading it would wait for ever."""
     os.mkfifo(tmp_path / "s.json")
-    assert "scene file is s.json: it is no regular file (a pipe or a device)" in refused("render", "s.json")
+    assert "scene file is s.json: it is not a regular file (a pipe or a device)" in refused(
+        "render", "s.json"
+    )

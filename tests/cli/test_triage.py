@@ -131,7 +131,7 @@ def test_a_kernel_that_is_given_runs_though_another_schedule_would_be_picked(wam
     assert outcome.status == 0
     assert [line.split()[:2] for line in outcome.out.splitlines() if " row " in line] == [["opencl", "plain"]]
     source = here / "kept/denoise.cl"
-    source.write_text(source.read_text() + "this is no OpenCL;")
+    source.write_text(source.read_text() + "this is not OpenCL;")
     outcome = wamnet(*given, "-o", "odd")
     assert outcome.status in (1, 2)
     assert "within its bound" not in outcome.out

@@ -122,7 +122,7 @@ def test_a_curve_is_measured_once_and_kept(wamnet, here, monkeypatch) -> None:
 
 
 REFUSED = {
-    "variant is rank: 'rank' is no approximation": (*COMPILE, "--variant", "rank"),
+    "variant is rank: 'rank' is not an approximation": (*COMPILE, "--variant", "rank"),
     "variant is window9: the window has 4 x 4 taps": (*COMPILE, "--variant", "window9"),
     "--variant is full: --max-ms chooses a variant itself": (*COMPILE, "--variant", "full", "--max-ms", 3),
     "list of options is --size: a choice needs --max-error": (*COMPILE, "--size", 64),

@@ -29,7 +29,7 @@ class Int32:
     """A number of 32 bits whose arithmetic must not overflow."""
 
     def __init__(self, value):
-        assert -LIMIT <= value < LIMIT, f"{value} is no int"
+        assert -LIMIT <= value < LIMIT, f"{value} is not an int"
         self.value = value
 
     def __add__(self, other):
@@ -107,9 +107,9 @@ def test_the_test_reads_what_is_emitted():
 
 @pytest.mark.parametrize("text", ["(y * width + x) * 3 + c"])
 def test_an_index_that_overflows_is_seen(text):
-    """A picture of 2^31 numbers: the last index is no int."""
+    """A picture of 2^31 numbers: the last index is not an int."""
     assert SUBSCRIPT.findall(f"a[{text}]") == [text]
-    with pytest.raises(AssertionError, match="is no int"):
+    with pytest.raises(AssertionError, match="is not an int"):
         (Int32(2**14 - 1) * 2**16 + (2**16 - 1)) * 3 + 2
 
 

@@ -59,7 +59,7 @@ def test_members_give_members(name, data):
 @pytest.mark.parametrize("name", WITH_IMAGE)
 @given(data=st.data())
 def test_points_give_points(name, data):
-    """Of single numbers the image is what the operation computes, but for a sine's own rounding."""
+    """Of single numbers the image is what the operation computes, except for a sine's own rounding."""
     members = [np.asarray(pair[1]) for pair in operands(data, name)]
     assume(name != "sqrt" or members[0] >= 0)
     assume(name != "power" or members[0] > 0)

@@ -183,7 +183,7 @@ def test_a_rotation_that_boxes_share_is_outside_of_their_loop(most_unrolled):
 
 
 def test_the_number_of_primitives_decides_on_loops():
-    """The room is no row; a table of one row is no loop."""
+    """The room is not a row; a table of one row is not a loop."""
     scene = room_with(boxes=boxes(20, TURNED), lights=(LIGHT,))
     assert primitives(scene) == 21
     assert ops(lower_scene(scene, Settings(), 21).arrive, "loop") == 0

@@ -79,7 +79,7 @@ def test_what_promises_nothing_has_no_bound(kit, images):
 
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 def test_of_two_passes_rounding_is_bounded(kit, images, border):
-    """The reference has the factors' product for weights: a cut is no error of the kernel."""
+    """The reference has the factors' product for weights: a cut is not an error of the kernel."""
     program = kit.denoiser(kit.network([27, 5, 3], (3.0, 3.0)), CHANNELS, 3, border)
     plan = plan_program(program, "numpy", rank=2)
     found = plan.expected(images)

@@ -43,7 +43,7 @@ def program_of(op, kinds, result, **named):
 
 
 def between(low, high, plain=None, dtype=np.float64):
-    """Return a range, unsure where it is no point."""
+    """Return a range, unsure where it is not a point."""
     low, high = np.asarray(low, dtype), np.asarray(high, dtype)
     plain = low if plain is None else np.asarray(plain)
     return Range(low, high, plain.astype(np.float32) if dtype == np.float64 else plain, low == high)

@@ -42,7 +42,7 @@ def test_layout_round_trip() -> None:
 
 
 def test_errors_hold_for_float32_in_any_order() -> None:
-    """NumPy's float32 sums, forwards and backwards, are executors like others; the bound is no wild guess."""
+    """NumPy's float32 sums, forwards and backwards, are executors like others; the bound fits."""
     random = np.random.default_rng(2)
     found = lower_step(WIDTHS, 2.0, 10.0, 50)
     found = step.with_parameters(found, weights(3, found.trained, found.program))

@@ -1,4 +1,4 @@
-"""Numbers as text: nothing is lost, and what is no number is refused in one line."""
+"""Numbers as text: nothing is lost, and what is not a number is refused in one line."""
 
 from __future__ import annotations
 

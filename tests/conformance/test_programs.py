@@ -154,7 +154,7 @@ def test_what_a_program_has_started_ends_with_it(verdicts, tmp_path):
     ("command", "text"),
     [
         (["/no/such/program"], r"crash: /no/such/program cannot be started: No such file"),
-        ([sys.executable, "-c", "print(1)"], "garbage: the line is no JSON object"),
+        ([sys.executable, "-c", "print(1)"], "garbage: the line is not a JSON object"),
         ([sys.executable, "-c", "print({})"], "garbage: the answer to hello has no list of kinds"),
         ([sys.executable, "-c", "raise SystemExit(3)"], "crash: it ended with status 3"),
         (["sleep", "60"], "timeout: no answer within"),

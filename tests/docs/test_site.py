@@ -228,5 +228,5 @@ def test_a_folder_that_holds_something_else_is_left_alone(tmp_path, monkeypatch,
     (tmp_path / "letter.txt").write_text("mine")
     monkeypatch.setattr("sys.argv", ["build.py", str(tmp_path)])
     assert main() == 2
-    assert "holds something that is no site; name another folder" in capsys.readouterr().err
+    assert "holds something that is not a site; name another folder" in capsys.readouterr().err
     assert (tmp_path / "letter.txt").read_text() == "mine"

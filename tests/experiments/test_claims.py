@@ -275,7 +275,9 @@ def test_speed_is_not_tested_and_shows_what_cores_take(table):
 def test_other_orientations_are_judged_by_what_is_gained(table, tmp_path, loss, expected):
     kept = Results.open(tmp_path / "g.json", "generalisation", {"size": 256})
     noisy = [10.0, 11.0, 12.0, 11.0]
-    harder = [value - 5.0 for value in noisy]  # other frames, on which the input is worse: that is no fault
+    harder = [
+        value - 5.0 for value in noisy
+    ]  # other frames, on which the input is worse: that is not a fault
     record(kept, "input", **{"psnr at 0": noisy, "psnr at 4": harder, "psnr at poses held out": noisy})
     net = {"psnr at 0": [v + 20.0 for v in noisy], "psnr at poses held out": noisy}
     net["psnr at 4"] = [v + 20.0 - loss + d for v, d in zip(harder, (0.1, -0.1, 0.1, -0.1), strict=True)]

@@ -63,7 +63,7 @@ def test_another_experiment_s_file_is_refused(results):
     with pytest.raises(InputError, match="it belongs to test"):
         Results.open(results.path, "other", {"size": 8})
     results.path.write_text("{")
-    with pytest.raises(InputError, match="it is no file of results"):
+    with pytest.raises(InputError, match="it is not a file of results"):
         Results.open(results.path, "test", {"size": 8})
 
 
@@ -97,7 +97,7 @@ def test_a_file_of_the_older_form_goes_on(results):
     results.put("a", 0, {"psnr": 30.0})
     assert results.data()["schema"] == "wamnet-experiment-2"
     results.path.write_text(json.dumps({**data, "schema": "wamnet-experiment-3"}))
-    with pytest.raises(InputError, match="it is no file of results"):
+    with pytest.raises(InputError, match="it is not a file of results"):
         results.records()
 
 

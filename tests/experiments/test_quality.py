@@ -112,7 +112,7 @@ def test_the_whole_way(tmp_path, capsys):
 
 
 def test_gaps_are_to_the_best_peer_with_the_same_features(tmp_path):
-    """By hand, with frames that are all alike: no interval; features of 16 rays are no peer of 1."""
+    """By hand, with frames that are all alike: no interval; features of 16 rays are not a peer of 1."""
     kept = Results.open(tmp_path / "r.json", "quality", {})
     values = {"best-1": 34.0, "best-16": 37.0, "oidn-1": 32.5, "oidn-clean16": 33.5}
     for row, number in values.items():

@@ -69,7 +69,7 @@ TEXTS = (
     ),
     *("c", "exact", "window2", "rank1", "minicubes", "--help", "-h", "-o", "--seed", "--size", "--time"),
 )
-"""Words of a command line that programs have stumbled over; a byte that is no UTF-8 comes as a surrogate."""
+"""Words of a command line that programs have stumbled over; a byte that is not UTF-8 comes as a surrogate."""
 
 VALUES: tuple[Any, ...] = (
     *(None, True, False, 0, -1, 1, 2, 3, 0.5, -0.0, 1e-320, 1e-30, 1e30, 1e308, -1e308),

@@ -152,7 +152,9 @@ DAMAGES = {
     "x: content is .*'points' is missing": damaged(lambda d: d.pop("points")),
     "x: content is .*'milliseconds' is missing": damaged(lambda d: d["points"][0].pop("milliseconds")),
     "x: content is .*could not convert": damaged(lambda d: d["points"][0].update(error_max="much")),
-    "variant is rank: 'rank' is no approximation": damaged(lambda d: d["points"][0].update(variant="rank")),
+    "variant is rank: 'rank' is not an approximation": damaged(
+        lambda d: d["points"][0].update(variant="rank")
+    ),
     "x: content is .*variant, schedule and executor": damaged(lambda d: d["points"][0].update(schedule=3)),
     "x: content is .*model, device and profile": damaged(lambda d: d.update(model=3)),
     "x: content is .*not enough values": damaged(lambda d: d.update(size=[3])),

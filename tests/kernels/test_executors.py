@@ -238,7 +238,7 @@ def test_wide_layers_run_on_opencl(executor_named, kit, width):
 def test_too_wide_a_layer_is_refused_on_a_processor(executor_named, kit):
     executor = executor_named("opencl")
     if "pthread" not in executor.device and "cpu" not in executor.device.lower():
-        pytest.skip(f"{executor.device} is no processor: its arrays lie on no stack")
+        pytest.skip(f"{executor.device} is not a processor: its arrays lie on no stack")
     with pytest.raises(
         CompileError,
         match=r"arrays take 1200004 bytes a pixel \(the longest vector has 150000 numbers\): at most 1048576",

@@ -499,7 +499,7 @@ def test_frames_that_are_not_finite_leave_no_good_state(opencl: Any) -> None:
 
 
 def test_parameters_that_are_not_finite_are_never_handed_out(opencl: Any) -> None:
-    """1e39 is no float32: the one step makes the parameters infinite, and no later loss would tell."""
+    """1e39 is not a float32: the one step makes the parameters infinite, and no later loss would tell."""
     kept: list[TrainState] = []
     with (
         np.errstate(over="ignore"),

@@ -91,7 +91,7 @@ def excesses(opencl: Any, recipe: Recipe, kernel: StepKernel | None = None) -> t
     moved = run.state(1)
     after = doubled(moved.factors)
     assert not np.array_equal(after.vertical, given_factors.vertical)
-    # Memory that a planted fault leaves unwritten may hold anything: what is no number is beyond every bound.
+    # Memory that a planted fault leaves unwritten may hold anything: NaN is beyond every bound.
     with np.errstate(invalid="ignore"):
         distance = np.abs(moved.siren.weights[0] - factored.expand(after))
         excess = distance / step.expansion_error(after)

@@ -190,7 +190,7 @@ def test_if_all_deviate_the_bound_is_suspect(executor_named, model, images):
 
 
 def test_names_of_odd_ones():
-    """An executor is named whole where all its schedules deviate; refusals are no deviations."""
+    """An executor is named whole where all its schedules deviate; refusals are not deviations."""
 
     def verdict(way, schedule, ratio, refusal=""):
         kernel = triage.Kernel(SimpleNamespace(way=way), schedule, None)

@@ -91,7 +91,7 @@ MOST_FILES = 20
 
 
 def test_rooms_are_small_and_import_one_way(house):
-    """Imports for type checkers only may go the other way: they are no part of what runs.
+    """Imports for type checkers only may go the other way: they are not part of what runs.
 
     A part's own `__init__` hands out what its rooms have.
     """

@@ -21,7 +21,7 @@ SHELF = "kernels/shelf/"
 """Kernels to be read and pasted: no program needs them, `wamnet export` writes them again."""
 
 NOT_DATA = {".pyc"}
-"""Suffixes of files in these folders that are no part of the package."""
+"""Suffixes of files in these folders that are not part of the package."""
 
 
 @pytest.fixture(scope="module")

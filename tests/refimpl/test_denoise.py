@@ -104,7 +104,7 @@ BROKEN = {
         changed(biases=(np.zeros(5), np.zeros(2))),
         r"layer 1 is weights \(3, 5\), biases \(2,\)",
     ),
-    "weights that are no matrix": (
+    "weights that are not a matrix": (
         changed(weights=(np.zeros(5), np.zeros((3, 5)))),
         r"layer 0 is weights \(5,\)",
     ),

@@ -90,7 +90,7 @@ def test_8bit_levels_come_back() -> None:
 
 
 def test_negative_values_follow_the_line() -> None:
-    """A negative value is no NaN."""
+    """A negative value is not a NaN."""
     x = np.array([-0.5, -1e-3])
     assert (encoding.srgb_encode(x) == 12.92 * x).all()
     assert (encoding.srgb_decode(x) == x / 12.92).all()

@@ -89,7 +89,7 @@ def test_glossy_has_every_material_and_its_parameters():
 @pytest.mark.parametrize("name", scenes.CANONICAL)
 @pytest.mark.parametrize("time", [1e308, -1e308, 1.1e9, float("inf"), float("nan")])
 def test_times_that_no_turn_has_are_refused(name, time):
-    """2 pi times the largest of them is no number."""
+    """2 pi times the largest of them is not a number."""
     with pytest.raises(InputError, match=r"time is .*: it must be a number from -1e\+09 to 1e\+09 seconds"):
         scenes.canonical(name, time=time)
 

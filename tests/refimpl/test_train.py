@@ -206,7 +206,7 @@ def test_a_loss_that_is_not_finite_stops_and_keeps_the_last_good_state() -> None
 
 
 def test_parameters_that_are_not_finite_are_never_handed_out() -> None:
-    """1e39 is no float32: the one step makes the parameters infinite, and no later loss would tell."""
+    """1e39 is not a float32: the one step makes the parameters infinite, and no later loss would tell."""
     kept: list[TrainState] = []
     with pytest.raises(
         TrainingError, match="parameters after step 1 are not finite: they must be; lower the"

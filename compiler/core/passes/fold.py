@@ -67,7 +67,7 @@ def _folded(program: Program, kind: np.dtype[Any]) -> Program:
 
 
 Known = list[bool | int | float | None]
-"""The values of a node's operands, None for those that are no constants."""
+"""The values of a node's operands, None for those that are not constants."""
 
 Simplification = Callable[[Builder, Node, tuple[int, ...], Known], int | None]
 

@@ -191,7 +191,7 @@ SINE = Function(
 """The sine of the network; its contract is the emitted sine's."""
 
 KINDS = (BLOCK, SOBOL)
-"""Kinds of this module that are no functions of floats."""
+"""Kinds of this module that are not functions of floats."""
 
 FUNCTIONS = (SRGB, SINE, ADAM)
 """Those that are."""

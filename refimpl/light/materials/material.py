@@ -22,8 +22,8 @@ from ... import vectors
 from ...vectors import Colors, Directions, Floats, Normals, Truths
 
 SINGLE_PDF = 1e30
-"""Density of a direction that is no random one, in 1/sr: a mirror's, and a camera ray's. Light sampling is no
-alternative to it, so that the weight of what it meets is 1."""
+"""Density of a direction that is not random, in 1/sr: a mirror's, and a camera ray's. Light sampling is not
+an alternative to it, so that the weight of what it meets is 1."""
 
 LEAST_SQUARE = 1e-30
 """Floor of squared lengths and of denominators; it acts on directions that cancel out, and on lanes that hit

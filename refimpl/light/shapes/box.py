@@ -74,7 +74,7 @@ class Box(Shape):
     material: Material | None = field(default=None, metadata=OMITTED)
 
     def check(self, path: str) -> None:
-        """Refuse a flat box, and a matrix that is no rotation."""
+        """Refuse a flat box, and a matrix that is not a rotation."""
         half, rows = self.half_extent, self.rotation
         require(min(half) > 0.0, half, f"{path}.half_extent", "half extents must be positive", "use a quad")
         rule, way_out = "its rows must be orthonormal", "normalise the rows"

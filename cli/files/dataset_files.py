@@ -312,9 +312,7 @@ class Store:
         for name in self.pictures:
             path = self.folder / name
             if path.is_dir() and not path.is_symlink():
-                raise InputError(
-                    "picture", str(path), "it is a folder", "remove it: nothing of ours is in it"
-                )
+                raise InputError("picture", str(path), "it is a folder", "move it, or use another -o")
         remove_temporaries(self.folder)
         names = list(self.pictures)
         self.sums = dict(self.before) | _read_journal(self.unfinished / JOURNAL)

@@ -7,6 +7,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 
+import budget
 import pytest
 
 PEERS = {
@@ -110,6 +111,21 @@ def test_rooms_are_small_and_import_one_way(house):
                 wrong.append(source.at(node, f"room {room or part} imports {target or part}"))
     wrong += [f"{folder} has {count} modules" for folder, count in files.items() if count > MOST_FILES]
     house.refuse(wrong, "A room has at most 20 modules and imports those before it: move the code.")
+
+
+def test_rooms_keep_to_their_budget():
+    """Not more lines than a room may have, and a budget that says how many it has."""
+    rooms = {f"{part}/{room}".rstrip("/") for part, found in ROOMS.items() for room in found}
+    assert rooms == set(budget.BUDGET)
+    found = {room: budget.lines(room) for room in budget.BUDGET}
+    wrong = {
+        room: (n, budget.BUDGET[room])
+        for room, n in found.items()
+        if not 0 <= budget.BUDGET[room] - n <= budget.SLACK
+    }
+    assert not wrong, (
+        f"lines and budget of {wrong}: change BUDGET of tests/support/budget.py, and say why in the commit"
+    )
 
 
 def checked_only(tree):

@@ -1,0 +1,57 @@
+"""Lines and modules of each room, against what it may have: `python tests/support/budget.py`.
+
+A change that needs more lines raises its room's budget here, in the open; one that makes a room smaller by
+more than a hundred lowers it, so that what was gained stays [`tests/meta/test_layering.py`].
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+BUDGET = {
+    "refimpl": 1150,
+    "refimpl/light": 3550,
+    "refimpl/network": 1600,
+    "compiler": 1550,
+    "compiler/core": 3200,
+    "compiler/languages": 2100,
+    "compiler/proof": 1900,
+    "compiler/schedules": 3550,
+    "compiler/scenes": 1350,
+    "compiler/training": 1200,
+    "kernels": 150,
+    "kernels/devices": 2200,
+    "kernels/run": 2600,
+    "kernels/judge": 1450,
+    "kernels/bench": 2000,
+    "kernels/export": 2600,
+    "kernels/conformance": 4500,
+    "cli": 300,
+    "cli/commands": 4500,
+    "cli/common": 1000,
+    "cli/files": 1250,
+    "cli/reports": 1350,
+}
+"""Most lines of each room, comments counted; a part by itself is the files above its rooms."""
+
+SLACK = 100
+"""A budget is at most so far above what a room has."""
+
+
+def modules(room: str) -> list[Path]:
+    """Return the Python files of a room, and of the folders in it; of a part only its own."""
+    folder = ROOT / room
+    return sorted(folder.rglob("*.py") if "/" in room else folder.glob("*.py"))
+
+
+def lines(room: str) -> int:
+    """Return the number of lines of a room."""
+    return sum(len(path.read_text(encoding="utf-8").splitlines()) for path in modules(room))
+
+
+if __name__ == "__main__":
+    print(f"{'room':24}{'modules':>8}{'lines':>8}{'budget':>8}")
+    for name, most in BUDGET.items():
+        print(f"{name:24}{len(modules(name)):8}{lines(name):8}{most:8}")

@@ -210,7 +210,7 @@ def test_a_forgotten_kernel_is_built_again(executor_named, case):
         ("no-such-compiler -O2", r"c: the compiler 'no-such-compiler' cannot be run .*Debian: gcc"),
         ("false", r"does not compile C99 \(.*\); install one"),
         ("true", r"\(it writes no program\); install one"),
-        ("gcc '", r"c: CC is .* no command \(No closing quotation\); install"),
+        ("gcc '", r"c: CC is .* not a command \(No closing quotation\); install"),
     ],
 )
 @pytest.mark.needs("programs")

@@ -114,9 +114,9 @@ def test_what_is_no_regular_file_is_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "link").symlink_to("pipe")
     for path, rule in [
-        (tmp_path / "pipe", "no regular file"),
-        (tmp_path / "link", "no regular file"),
-        ("/dev/zero", "no regular file"),
+        (tmp_path / "pipe", "not a regular file"),
+        (tmp_path / "link", "not a regular file"),
+        ("/dev/zero", "not a regular file"),
         (tmp_path, "folder"),
         (tmp_path / "none", "No such file"),
         (str(tmp_path) + "\0", "null"),

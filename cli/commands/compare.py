@@ -94,7 +94,7 @@ def compare(
     _refuse_given(context, OF_PICTURES, "with --paths")
     from ...refimpl.light.render import Job
     from ...refimpl.light.transport import Settings
-    from .compare_paths import compare_paths
+    from ..reports.compare_paths import compare_paths
 
     job = Job(width, height, spp, seed, Settings(max_depth=max_depth), first_sample=sample)
     compare_paths(paths, executor.value, job, time, parameters or [], as_json)

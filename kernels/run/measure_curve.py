@@ -85,7 +85,7 @@ def measure(
 ) -> Curve:
     """Return the points of a model on a device at a size (height, width), errors from pairs of frames.
 
-    `schedules`: those to measure; without any, those that may pay. `on_done` gets each variant's share.
+    `schedules`: which to measure; by default those that may be fast. `on_done` gets each variant's share.
     """
     pictures = [denoise(model, noisy, np.float64) for noisy, _ in pairs]
     chosen = tuple(schedules) or promising(executor, model, profile)

@@ -29,10 +29,10 @@ BUDGET = {
     "kernels/export": 2600,
     "kernels/conformance": 4500,
     "cli": 300,
-    "cli/commands": 4500,
+    "cli/commands": 4400,
     "cli/common": 1000,
     "cli/files": 1250,
-    "cli/reports": 1350,
+    "cli/reports": 1450,
 }
 """Most lines of each room, comments counted; a part by itself is the files above its rooms."""
 

@@ -31,7 +31,7 @@ from ..reports import machine
 if TYPE_CHECKING:
     from ...compiler.artifact import Artifact
     from ...compiler.plan import Plan
-    from ...kernels.devices.executor import Images
+    from ...kernels.devices.images import Images
     from ...kernels.judge.apart import Runner
     from ...kernels.judge.reduce import Box, Reduced
     from ...kernels.judge.triage import Compile, Kernel, Verdict

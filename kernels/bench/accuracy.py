@@ -28,7 +28,7 @@ from ...refimpl import metrics
 from ...refimpl.frame import Frame
 from ...refimpl.network import dataset
 from ...refimpl.network.denoise import Model, denoise
-from ..devices.executor import Images
+from ..devices.images import Images
 from .contender import Variant
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import TARGETS, schedule_named, target_named
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.network.denoise import Model
-from ..devices.executor import Images
+from ..devices.images import Images
 from . import peer_oidn, peer_onnxruntime, peer_tinygrad, peer_torch
 from .contender import FULL, IEEE, NO_CACHE, Contender, Opened, Tools, Variant
 from .cost import fused, sines_of

@@ -30,7 +30,8 @@ from ...compiler.core.ir import Gather, Image, Program, Type
 from ...compiler.core.trace import trace
 from ...refimpl import rng
 from ...refimpl.network.dataset import Window
-from ..devices.executor import Executor, Images
+from ..devices.executor import Executor
+from ..devices.images import Images
 from ..measure import Times, in_turns
 from .cost import FLOAT_BYTES, Rates, products_of, sines_of
 

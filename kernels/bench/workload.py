@@ -17,7 +17,7 @@ from ...refimpl.errors import InputError
 from ...refimpl.frame import LAYERS, Frame
 from ...refimpl.network import dataset, siren
 from ...refimpl.network.denoise import Model
-from ..devices.executor import Images
+from ..devices.images import Images
 from ..run.denoise_on import images_of
 
 HIDDEN = (32, 32, 32, 32, 3)

@@ -28,7 +28,8 @@ from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.schedules.emit import output_channels
 from ...compiler.schedules.schedules import PLAIN
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
-from .executor import INDEX_LIMIT, Executor, Images, Part, gather_of, images_of, in_order, keep
+from .executor import INDEX_LIMIT, Executor, Part, in_order, keep
+from .images import Images, gather_of, images_of
 
 COMPILER_VARIABLE = "CC"
 """Environment variable that names the compiler, with options if need be; else `cc`."""

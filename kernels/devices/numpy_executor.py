@@ -21,7 +21,8 @@ from ...compiler.scenes.lower_scene import PathPrograms
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.schedules.emit import output_channels
 from ...refimpl.network import dataset
-from .executor import Executor, Images, Part, gather_of
+from .executor import Executor, Part
+from .images import Images, gather_of
 
 BLOCK_NUMBERS = 2**22
 """Numbers in the windows of one block of rows: 16 MiB in float32, for images of any height."""

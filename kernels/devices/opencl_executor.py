@@ -26,7 +26,8 @@ from ...compiler.schedules.emit import output_channels
 from ...compiler.training.step_kernel import StepKernel
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import INDEX_LIMIT, Executor, Images, Part, black, images_of, in_order, keep
+from .executor import INDEX_LIMIT, Executor, Part, in_order, keep
+from .images import Images, black, images_of
 from .opencl_trainer import OpenCLTrainer
 from .passes import PICTURE, Passes
 

@@ -30,7 +30,8 @@ from ...compiler.schedules.factor import HORIZONTAL
 from ...compiler.schedules.glsl_compute import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import osmesa
-from .executor import Executor, Images, Part, black, gather_of, keep
+from .executor import Executor, Part, keep
+from .images import Images, black, gather_of
 from .passes import PICTURE, Passes
 from .registry import CONTEXT_VARIABLE
 

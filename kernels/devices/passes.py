@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
-from .executor import Executor, Part, images_of
+from .executor import Executor, Part
+from .images import images_of
 
 PICTURE = "picture"
 """Name under which the result is read."""

@@ -19,7 +19,8 @@ from ...compiler.languages.interface import BLOCK, IMAGE, RESULT, SUMS, WEIGHTS,
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.schedules.emit import output_channels
-from ..devices.executor import Executor, Images, Part, in_order
+from ..devices.executor import Executor, Part, in_order
+from ..devices.images import Images
 
 Kernel = Artifact | PathArtifact | EncodeArtifact
 """A kernel of any role."""

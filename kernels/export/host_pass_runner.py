@@ -13,7 +13,7 @@ from ...compiler.artifact import Artifact
 from ...compiler.languages.glsl_es import VERSION
 from ...compiler.languages.hosts import CHANNELS
 from ...compiler.languages.interface import TABLE
-from ..devices.executor import Images
+from ..devices.images import Images
 from .gl_runner import ESRunner
 
 TOP = f"""\

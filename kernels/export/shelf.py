@@ -32,7 +32,8 @@ from ...refimpl.network import siren
 from ...refimpl.network.dataset import Normalization, Window
 from ...refimpl.network.denoise import Model
 from ..bench.cost import products_of
-from ..devices.executor import Executor, Images, black
+from ..devices.executor import Executor
+from ..devices.images import Images, black
 from ..measure import in_turns
 from .check import runner
 from .package import Export, Request, export

@@ -25,7 +25,7 @@ from ...compiler.targets import target_named
 from ...refimpl.network.activation import SINE, activation_named
 from ...refimpl.network.denoise import Model, as_dtype
 from ...refimpl.network.siren import Siren, forward
-from ..devices.executor import Images
+from ..devices.images import Images
 from .apart import Runner
 from .triage import Compile, Judge, Kernel, Verdict, judged, kernels_of, odd_ones
 

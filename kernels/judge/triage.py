@@ -29,7 +29,7 @@ from ...compiler.plan import Expected, Plan, plan_program
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import target_named
 from ...refimpl.errors import CompileError
-from ..devices.executor import Images
+from ..devices.images import Images
 from ..devices.numpy_executor import NumpyExecutor
 from .apart import Outcome, Runner
 

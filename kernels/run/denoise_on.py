@@ -17,7 +17,8 @@ from ...compiler.variants import FULL, plan_model
 from ...refimpl.frame import Frame
 from ...refimpl.network.dataset import feature_image
 from ...refimpl.network.denoise import Model
-from ..devices.executor import Executor, Images
+from ..devices.executor import Executor
+from ..devices.images import Images
 from ..memory import keep_freed_memory
 from .tune import choose
 

@@ -28,7 +28,8 @@ from ...refimpl.frame import Frame
 from ...refimpl.network import dataset
 from ...refimpl.network.denoise import Model, denoise
 from ...refimpl.rng import counter, random_block, uniform_floats
-from ..devices.executor import Executor, Images
+from ..devices.executor import Executor
+from ..devices.images import Images
 from ..measure import in_turns
 from .curve import Curve, Point
 from .denoise_on import images_of

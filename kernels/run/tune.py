@@ -36,7 +36,8 @@ from ...refimpl import rng
 from ...refimpl.errors import CompileError
 from ...refimpl.network.denoise import Model
 from .. import measure
-from ..devices.executor import Executor, Images
+from ..devices.executor import Executor
+from ..devices.images import Images
 from . import cache
 
 CROP = (19, 45)

@@ -22,7 +22,7 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import plan_program
 from wamnet.kernels import denoise_on, open_executor
-from wamnet.kernels.devices.executor import black
+from wamnet.kernels.devices.images import black
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.network import dataset, denoise

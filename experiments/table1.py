@@ -94,7 +94,7 @@ SCALES: Mapping[str, Scale] = {
         few=(0,),
         dncnn={"steps": 30_000, "batch": 16, "crop": 40, "half": True},
         shrunk={"steps": 5000, "batch": 8, "crop": 40, "half": True, "shrink": 4},
-        pix2pix={"steps": 40_000, "batch": 1, "crop": 128, "width": 32, "every": 200},
+        pix2pix={"steps": 80_000, "batch": 1, "crop": 128, "width": 32, "every": 200},
     ),
 }
 """Sizes by name. `paper` has the paper's pictures, references and training of WAMnet, and fewer frames: the

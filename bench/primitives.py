@@ -107,7 +107,7 @@ def _built(executor: Executor, scene: Scene, form: str, part: Part) -> Kernel:
     programs = lower_scene(scene, Settings(), FORMS[form])
     artifact = compile_path(programs, executor.name, lanes=executor.lanes)
     traced = time.perf_counter()
-    executor.build_path(artifact)
+    executor.build(artifact)
     executor.trace(artifact, replace(part, rows=1, samples=1))
     built = time.perf_counter()
     chosen = (primitives(scene) <= most_unrolled(executor.name)) == (form == "unrolled")

@@ -27,7 +27,7 @@ from ...compiler.scenes.emit_path import END
 from ...compiler.scenes.lower_scene import PATH, SURFACE, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from ...compiler.schedules.schedules import PLAIN
-from ...compiler.targets import DENOISERS, TARGETS
+from ...compiler.targets import DENOISERS, target_named
 from ...refimpl.errors import CompileError
 from ...refimpl.frame import LAYERS
 from ...refimpl.light import scene as scene_module
@@ -35,7 +35,6 @@ from ...refimpl.light.render import Job
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.dataset import Window
 from ..devices.executor import Executor, Part
-from ..export.buffer_runner import BufferRunner
 from ..run.denoise_on import denoise_on
 from ..run.render_on import render_on
 from .case import given
@@ -56,7 +55,7 @@ class OnExecutor:
     def __init__(self, executor: Executor) -> None:
         self.executor = executor
         own: dict[str, Own] = {"picture.denoised": self._denoised}
-        if executor.name in TARGETS or isinstance(executor, BufferRunner):
+        if target_named(executor.name).paths:
             own |= {"path.whole": self._vertices, "picture.rendered": self._rendered}
         self._own: Mapping[str, Own] = own
         self.kinds = [*FUNCTIONS, *self._own]

@@ -14,8 +14,10 @@ import os
 import shlex
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.scenes.encode_kernel import EncodeArtifact
-from ...compiler.scenes.path_kernel import PathArtifact
-from ...compiler.schedules.emit import output_channels
+from ...compiler.languages.interface import DENOISE, ENCODE, PATH, WEIGHTS, Interface
 from ...compiler.schedules.schedules import PLAIN
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
-from .executor import INDEX_LIMIT, Executor, Part, in_order, keep
-from .images import Images, gather_of, images_of
+from .executor import INDEX_LIMIT, Executor, Kernel, Memory, in_order
+from .images import widest
 
 COMPILER_VARIABLE = "CC"
 """Environment variable that names the compiler, with options if need be; else `cc`."""
@@ -140,46 +140,48 @@ MOST_TOLD = 300
 """Most letters of a compiler's complaint in a message of one line."""
 
 GLUE = """\
-#include "{header}"
-
-void wamnet_rows(const float *const *images, const float *weights, float *result, int width, int height,
-                 int first, int end)
-{{
-    for (int y = first; y < end; ++y) {{
-        for (int x = 0; x < width; x += {pixels}) {{
-            {entry}({images}, weights, result, width, height, x, y);
-        }}
-    }}
-}}
-"""
-"""The function that is called: rows [first, end) of a picture."""
-
-PATH_GLUE = """\
+#include <stdint.h>
 #include <string.h>
 #include "{header}"
 
-void wamnet_rows(const uint32_t *sizes, float *sums, int first, int end)
+void wamnet_rows(float *const *arrays, const uint32_t *integers, int first, int end)
 {{
+{body}
+}}
+"""
+"""The function that is called: rows [first, end), arrays and integers in the interface's order."""
+
+BODIES = {
+    DENOISE: """\
+    int width = (int)integers[0], height = (int)integers[1];
+    for (int y = first; y < end; ++y) {{
+        for (int x = 0; x < width; x += {pixels}) {{
+            {entry}({arrays}, width, height, x, y);
+        }}
+    }}""",
+    PATH: """\
     wamnet_part part;
-    memcpy(&part, sizes, sizeof part);
+    memcpy(&part, integers, sizeof part);
     for (int row = first; row < end; ++row) {{
         for (int column = 0; column < part.width; ++column) {{
-            {entry}(&part, sums, column, row);
+            {entry}(&part, {arrays}, column, row);
         }}
-    }}
-}}
-"""
-"""The same for the paths of a part of a picture; its members are 32-bit integers in the interface's order."""
+    }}""",
+    ENCODE: """\
+    (void)first;
+    (void)end;
+    {entry}({arrays}, (int)integers[0], (int)integers[1], (int)integers[2]);""",
+}
+"""What it does, by role; an encoding takes all rows at once: a thousandth of the time of the paths."""
 
-ENCODE_GLUE = """\
-#include "{header}"
 
-void wamnet_rows(const float *sums, float *const *images, int width, int height, int samples)
-{{
-    {entry}(sums, {images}, width, height, samples);
-}}
-"""
-"""The same for an encoding, which takes all rows at once: a thousandth of the time of the paths."""
+@dataclass(frozen=True)
+class _Prepared:
+    """The function of a loaded kernel, what the kernel takes, and its weights."""
+
+    function: Any
+    interface: Interface
+    weights: NDArray[np.float32] | None
 
 
 class CExecutor(Executor):
@@ -188,6 +190,7 @@ class CExecutor(Executor):
     name = "c"
 
     def __init__(self) -> None:
+        super().__init__()
         given = os.environ.get(COMPILER_VARIABLE) or ""
         try:
             self._command = shlex.split(given) or ["cc"]
@@ -196,7 +199,6 @@ class CExecutor(Executor):
             raise ExecutorUnavailable(f"c: {rule}; {WAY_OUT}") from None
         version = self._call("--version").stdout.strip().partition("\n")[0]
         self.device = f"{' '.join(self._command)}: {version}"
-        self._built: dict[str, Any] = {}
         self._count = itertools.count()
         self._options = list(OPTIONS)
         self._folder = tempfile.TemporaryDirectory(prefix="wamnet-c-")
@@ -234,32 +236,27 @@ class CExecutor(Executor):
         self.schedule = SCHEDULES.get(int(lanes), PLAIN)
         self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
 
-    def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
-        """Compile and load the kernels."""
-        for kernel in artifact.kernels:
-            built = self._built.get(kernel.digest) or self._loaded(kernel)
-            keep(self._built, kernel.digest, built)
+    def _prepare(self, kernel: Kernel) -> _Prepared:
+        pixels, weights = 1, None
+        if isinstance(kernel, Artifact):
+            self._check_stack(kernel.manifest["private_bytes"])
+            pixels, weights = kernel.manifest["schedule"]["pixels"], np.ascontiguousarray(kernel.weights)
+        taken = kernel.interface
+        arrays = ", ".join(f"arrays[{place}]" for place in range(len(taken.arrays)))
+        body = BODIES[taken.role].format(entry=kernel.entry_point, arrays=arrays, pixels=pixels)
+        function = self._library(kernel, GLUE.format(header=_header(kernel), body=body))
+        function.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int] * 2]
+        return _Prepared(function, taken, weights)
 
-    def forget(self) -> None:
-        """Drop the built kernels."""
-        self._built.clear()
-
-    def _loaded(self, artifact: Artifact) -> Any:
-        """Return the compiled function."""
-        used = artifact.manifest["private_bytes"]
+    def _check_stack(self, used: int) -> None:
+        """Refuse a kernel whose arrays take so many bytes a pixel."""
         if used > PRIVATE_BYTES:
             raise CompileError(
                 f"{self.device}: the kernel's arrays take {used} bytes a pixel: at most {PRIVATE_BYTES} fit "
                 "a thread's stack; use narrower layers, or executor numpy"
             )
-        images = ", ".join(f"images[{i}]" for i in range(len(gather_of(artifact).images)))
-        header, pixels = _header(artifact), artifact.manifest["schedule"]["pixels"]
-        glue = GLUE.format(header=header, entry=artifact.entry_point, images=images, pixels=pixels)
-        function = self._library(artifact, glue)
-        function.argtypes = [*[ctypes.c_void_p] * 3, *[ctypes.c_int] * 4]
-        return function
 
-    def _library(self, kernel: Artifact | PathArtifact | EncodeArtifact, glue: str) -> Any:
+    def _library(self, kernel: Kernel, glue: str) -> Any:
         """Return the function of a kernel's source and the glue around it, compiled and loaded."""
         folder = Path(self._folder.name)
         (folder / _header(kernel)).write_text(kernel.source, encoding="utf-8")
@@ -292,8 +289,7 @@ class CExecutor(Executor):
 
     def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
         """Refuse images whose indices `int` does not hold."""
-        written = [output_channels(kernel.program) for kernel in artifact.kernels]
-        most = max(*written, *(image.channels for image in images_of(artifact)))
+        most = widest(artifact)
         if size[0] * size[1] * most >= INDEX_LIMIT:
             raise InputError(
                 "size of the picture for C",
@@ -302,63 +298,34 @@ class CExecutor(Executor):
                 "split the picture, or use executor numpy",
             )
 
-    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
-        found = list(images.values())
-        # What one pass returns is the image of the next.
-        for kernel in artifact.kernels:
-            found = [self._run_kernel(kernel, found)]
-        return found[0]
+    def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
+        return Memory(array.shape, np.ascontiguousarray(array))
 
-    def _run_kernel(self, artifact: Artifact, images: list[NDArray[np.float32]]) -> NDArray[np.float32]:
-        """Return the output (H, W, C) of one kernel."""
-        height, width, _ = images[0].shape
-        result = np.empty((height, width, output_channels(artifact.program)), np.float32)
-        pointers = (ctypes.c_void_p * len(images))(*(image.ctypes.data for image in images))
-        weights = np.ascontiguousarray(artifact.weights)
-        call = self._built[artifact.digest]
+    def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
+        return Memory(shape, np.empty(shape, np.float32))
 
-        def rows(first: int, end: int) -> None:
-            call(pointers, weights.ctypes.data, result.ctypes.data, width, height, first, end)
+    def _start(
+        self, kernel: Kernel, prepared: _Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+    ) -> None:
+        taken = prepared.interface
+        held = {WEIGHTS: prepared.weights, **{name: memory.held for name, memory in arrays.items()}}
+        pointers = (ctypes.c_void_p * len(taken.arrays))(*(held[a.name].ctypes.data for a in taken.arrays))
+        numbers = in_order(taken, integers)
+        given = (ctypes.c_uint32 * len(numbers))(*(int(n) % 2**32 for n in numbers))
+        if taken.role == ENCODE:
+            prepared.function(pointers, given, 0, integers["height"])
+        else:
+            call = partial(prepared.function, pointers, given)
+            self._in_threads(integers[taken.rows], call)
 
-        self._in_threads(height, rows)
-        return result
+    def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
+        held: NDArray[np.float32] = memory.held
+        return held.copy()
 
     def _in_threads(self, height: int, rows: Callable[[int, int], None]) -> None:
         """Call a function for blocks of rows [first, end), shared out to threads."""
         firsts = range(0, height, max(1, height // (8 * (os.cpu_count() or 1))))
         list(self._threads.map(rows, firsts, [*firsts[1:], height]))
-
-    def build_path(self, kernel: PathArtifact) -> None:
-        """Compile and load the path kernel."""
-        built = self._built.get(kernel.digest) or self._loaded_path(kernel)
-        keep(self._built, kernel.digest, built)
-
-    def _loaded_path(self, kernel: PathArtifact) -> Any:
-        """Return the compiled function of a path kernel."""
-        function = self._library(kernel, PATH_GLUE.format(header=_header(kernel), entry=kernel.entry_point))
-        function.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int] * 2]
-        return function
-
-    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
-        sums = np.zeros((len(kernel.planes), part.rows, part.width), np.float32)
-        numbers = in_order(kernel.interface, part.integers)
-        sizes = (ctypes.c_uint32 * len(numbers))(*(int(n) % 2**32 for n in numbers))
-        call = self._built[kernel.digest]
-        self._in_threads(part.rows, lambda first, end: call(sizes, sums.ctypes.data, first, end))
-        return sums
-
-    def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
-        _, height, width = sums.shape
-        images = {i.name: np.empty((height, width, i.channels), np.float32) for i in kernel.images}
-        if kernel.digest not in self._built:
-            arguments = ", ".join(f"images[{i}]" for i in range(len(images)))
-            glue = ENCODE_GLUE.format(header=_header(kernel), entry=kernel.entry_point, images=arguments)
-            function = self._library(kernel, glue)
-            function.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int] * 3]
-            keep(self._built, kernel.digest, function)
-        pointers = (ctypes.c_void_p * len(images))(*(image.ctypes.data for image in images.values()))
-        self._built[kernel.digest](sums.ctypes.data, pointers, width, height, samples)
-        return images
 
     def close(self) -> None:
         """End the threads and remove the folder."""
@@ -366,6 +333,6 @@ class CExecutor(Executor):
         self._folder.cleanup()
 
 
-def _header(kernel: Artifact | PathArtifact | EncodeArtifact) -> str:
+def _header(kernel: Kernel) -> str:
     """Return the name of the file that holds a kernel's source."""
     return f"{kernel.digest[:32]}.h"

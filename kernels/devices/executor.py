@@ -1,34 +1,49 @@
-"""What every executor is: something that builds an artifact and runs it on images.
+"""What every executor is: a device with memory, on which kernels of all roles are built and started.
+
+    run      images -> denoising kernel, or both of its passes -> picture
+    trace    path kernel -> sums
+    encode   sums -> encoding kernel -> images
+    passes   all three, without leaving the device [passes.py]
+
+These are written once, here. A device provides six things: it makes a kernel ready [`Executor._prepare`],
+makes memory with a content or without one [`_store`, `_memory`], starts a kernel on it [`_start`],
+copies from it [`_fetch`], and gives it back [`_release`].
 
 `build` is idempotent and does all that can be done before the pixels are known, the driver's own delayed
-compilation included (it runs the kernel once on a few pixels). `run` copies the images to the device, runs,
+compilation included: it runs the kernel once on a few pixels. `run` copies the images to the device, runs,
 and copies the result back; the times that wamnet reports mean these two [`denoise_on.RunResult`].
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.languages.interface import UNSIGNED, Interface
+from ...compiler.languages.interface import IMAGE, RESULT, SUMS, UNSIGNED, Interface
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
+from ...compiler.schedules.emit import output_channels
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.training.step_kernel import StepKernel
 from ...refimpl.errors import InputError
-from .images import Images, checked
+from .images import Images, black, checked, gather_of
 
 if TYPE_CHECKING:
     from .passes import Passes
 
-T = TypeVar("T")
+Kernel = Artifact | PathArtifact | EncodeArtifact
+"""A kernel of any role."""
+
+Size = tuple[int, int]
+"""Height and width."""
 
 KEPT_KERNELS = 64
 """Kernels that an executor keeps built: programs use a few; a process that makes thousands stays small."""
@@ -53,6 +68,22 @@ class Part:
     def integers(self) -> dict[str, int]:
         """Return what a path kernel is given, by the names of its interface."""
         return {"seed_number" if name == "seed" else name: value for name, value in vars(self).items()}
+
+
+@dataclass(frozen=True)
+class Memory:
+    """An array on a device: an image (H, W, C), or sums (planes, rows, columns); `held` is what holds it."""
+
+    shape: tuple[int, ...]
+    held: Any
+
+
+@dataclass(frozen=True)
+class Built:
+    """A kernel that is ready: what the device made of it, and the sizes at which it has run."""
+
+    prepared: Any
+    run_at: set[Size] = field(default_factory=set)
 
 
 def in_order(kernel: Interface, given: Mapping[str, int]) -> list[np.integer[Any]]:
@@ -81,46 +112,65 @@ class Executor(ABC):
     trains: bool = False
     homes: tuple[str, ...] = ()
 
-    @abstractmethod
-    def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
-        """Make the artifact ready to run on images of `size` (height, width); again costs nothing."""
+    def __init__(self) -> None:
+        self._built: dict[str, Built] = {}
+
+    # ---- what a device provides --------------------------------------------------------------------------
 
     @abstractmethod
-    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
-        """Run on checked images (H, W, C)."""
+    def _prepare(self, kernel: Kernel) -> Any:
+        """Return a kernel, compiled, with its weights on the device."""
+
+    def _discard(self, prepared: Any) -> None:
+        """Give a compiled kernel back."""
 
     @abstractmethod
-    def build_path(self, kernel: PathArtifact) -> None:
-        """Make a path kernel ready to run; again costs nothing."""
+    def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
+        """Return memory with an array's content; `name` is the kernel's name for it."""
 
     @abstractmethod
-    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
-        """Return the sums (planes, rows, width) of a part."""
+    def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
+        """Return memory that a kernel will write."""
 
-    def schedule_for(self, size: tuple[int, int]) -> str:
-        """Return the name of the schedule that suits one picture of `size` (height, width)."""
-        return self.schedule if size[0] * size[1] >= self.schedule_pixels else PLAIN
+    def _result(self, shape: tuple[int, ...]) -> Memory:
+        """Return memory for an image that will be fetched once."""
+        return self._memory(RESULT, shape)
 
-    def _passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
-        """Return the passes of checked kernels over a picture: by default their plain composition."""
-        from .passes import HostPasses
+    def _between(self, shape: tuple[int, ...]) -> Memory:
+        """Return memory for what the first pass hands on, perhaps that of the last call."""
+        return self._memory(RESULT, shape)
 
-        return HostPasses(self, encode, denoise, size)
+    @abstractmethod
+    def _start(
+        self, kernel: Kernel, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+    ) -> None:
+        """Start a kernel: arrays by the names of its interface, and at least its integers, by name."""
 
-    def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
-        """Return the encoded images of checked sums."""
-        rule = "its encodings run in pipelines only, where nothing leaves the device"
-        raise InputError("executor of an encoding by itself", self.name, rule, "use kernels.Pipeline")
+    @abstractmethod
+    def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
+        """Wait for what was started, and return the memory's content."""
 
-    def passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
-        """Return passes over a picture of `size` (height, width), whose images stay on the device."""
-        for artifact in (encode, denoise):
-            self._check_target(artifact)
-        self.check_size(denoise, size)
-        return self._passes(encode, denoise, size)
+    def _release(self, memory: Memory) -> None:
+        """Give memory back."""
 
-    def forget(self) -> None:
-        """Drop the kernels that were built: the next build is the driver's."""
+    def _finish(self) -> None:
+        """Wait for what was started."""
+
+    @contextmanager
+    def _session(self, size: Size | None = None) -> Iterator[None]:
+        """Surround all that is done on the device, for a picture of `size` if it is for one; never nested."""
+        yield
+
+    def _first_run(self, size: Size) -> Size | None:
+        """Return the size of the run with which a driver finishes compiling for pictures of `size`."""
+        return None
+
+    def sums_shape(self, kernel: PathArtifact, part: Part) -> tuple[int, int, int]:
+        """Return (planes, rows, columns) of the sums that a kernel writes: the part's, or more than it."""
+        return len(kernel.planes), part.rows, part.width
+
+    def check_size(self, artifact: Artifact, size: Size) -> None:
+        """Refuse images of a size (height, width) that the device cannot hold."""
 
     def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
         """Return a trainer (opencl_trainer.py) for pictures laid out end to end, or refuse."""
@@ -132,16 +182,58 @@ class Executor(ABC):
     def close(self) -> None:
         """Give the device back."""
 
-    def trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
-        """Return the sums (planes, rows, width) over the samples of a part of an image."""
-        self._check_target(kernel)
-        self.build_path(kernel)
-        return self._trace(kernel, part)
+    # ---- what follows from it ----------------------------------------------------------------------------
 
-    def encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
-        """Return the encoded images (H, W, C) of sums (planes, H, W) over so many samples, by name."""
-        self._check_target(kernel)
-        return self._encode(kernel, np.ascontiguousarray(sums), samples)
+    def schedule_for(self, size: Size) -> str:
+        """Return the name of the schedule that suits one picture of `size` (height, width)."""
+        return self.schedule if size[0] * size[1] >= self.schedule_pixels else PLAIN
+
+    def build(self, kernel: Kernel, size: Size = (1, 1)) -> None:
+        """Make a kernel, or both of its passes, ready to run on images of `size`; again costs nothing."""
+        passes = kernel.kernels if isinstance(kernel, Artifact) else (kernel,)
+        new = [each.digest for each in passes if each.digest not in self._built]
+        try:
+            for each in passes:
+                self._keep(each)
+            small, last = self._first_run(size), self._built[passes[-1].digest]
+            if small is not None and small not in last.run_at:
+                self._run_once(kernel, small)
+                last.run_at.add(small)
+        except BaseException:
+            # A kernel counts as built after its first run.
+            self._drop([self._built.pop(digest) for digest in new if digest in self._built])
+            raise
+
+    def _keep(self, kernel: Kernel) -> None:
+        """Put a kernel among those that are built as the newest; the oldest fall out."""
+        built = self._built.pop(kernel.digest, None)
+        if built is None:
+            with self._session():
+                built = Built(self._prepare(kernel))
+        self._built[kernel.digest] = built
+        self._drop([self._built.pop(next(iter(self._built))) for _ in range(len(self._built) - KEPT_KERNELS)])
+
+    def _run_once(self, kernel: Kernel, size: Size) -> None:
+        """Run a kernel once on black images."""
+        if isinstance(kernel, PathArtifact):
+            self._trace(kernel, Part(size[1], size[0], 0, size[0], 0, 1, 0))
+        elif isinstance(kernel, EncodeArtifact):
+            self._encode(kernel, np.zeros((len(kernel.planes), *size), np.float32), 1)
+        else:
+            self._run(kernel, black(kernel, size))
+
+    def forget(self) -> None:
+        """Drop the kernels that were built: the next build is the driver's."""
+        dropped = list(self._built.values())
+        self._built.clear()
+        self._drop(dropped)
+
+    def _drop(self, dropped: Sequence[Built]) -> None:
+        """Give kernels back."""
+        if dropped:
+            with self._session():
+                for built in dropped:
+                    self._discard(built.prepared)
 
     def run(self, artifact: Artifact, inputs: Images) -> NDArray[np.float32]:
         """Return the output (H, W, C) for encoded feature images (H, W, C), float32, by name."""
@@ -152,10 +244,91 @@ class Executor(ABC):
         self.build(artifact, (height, width))
         return self._run(artifact, images)
 
-    def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
-        """Refuse images of a size (height, width) that the device cannot hold."""
+    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
+        """Run a built artifact on checked images."""
+        height, width = next(iter(images.values())).shape[:2]
+        with self._session((height, width)), ExitStack() as made:
+            held = {name: self._stored(name, image, made) for name, image in images.items()}
+            *first, last = shapes(artifact, (height, width))
+            written = [self._between(shape) for shape in first]
+            for memory in written:
+                made.callback(self._release, memory)
+            written.append(self._result(last))
+            made.callback(self._release, written[-1])
+            self._chain(artifact, held, written)
+            return self._fetch(RESULT, written[-1])
 
-    def _check_target(self, artifact: Artifact | PathArtifact | EncodeArtifact) -> None:
+    def _stored(self, name: str, image: NDArray[np.float32], made: ExitStack) -> Memory:
+        """Return an image on the device, which `made` gives back."""
+        memory = self._store(name, image)
+        made.callback(self._release, memory)
+        return memory
+
+    def _chain(self, artifact: Artifact, images: Mapping[str, Memory], written: Sequence[Memory]) -> None:
+        """Start an artifact's kernels one after another: what one has written is the image of the next."""
+        for kernel, result in zip(artifact.kernels, written, strict=True):
+            arrays = {f"{IMAGE}{name}": memory for name, memory in images.items()}
+            integers = {"width": result.shape[1], "height": result.shape[0]}
+            prepared = self._built[kernel.digest].prepared
+            self._start(kernel, prepared, {**arrays, RESULT: result}, integers)
+            images = {image.name: result for image in gather_of(artifact).images}
+
+    def trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
+        """Return the sums (planes, rows, width) over the samples of a part of an image."""
+        self._check_target(kernel)
+        self.build(kernel)
+        return self._trace(kernel, part)
+
+    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
+        """Run a built kernel."""
+        with self._session((part.rows, part.width)), ExitStack() as made:
+            sums = self._memory(SUMS, self.sums_shape(kernel, part))
+            made.callback(self._release, sums)
+            self._follow(kernel, part, sums)
+            return self._fetch(SUMS, sums)[:, : part.rows, : part.width]
+
+    def _follow(self, kernel: PathArtifact, part: Part, sums: Memory) -> None:
+        """Start a built kernel, whose sums go to memory of [`sums_shape`]."""
+        self._start(kernel, self._built[kernel.digest].prepared, {SUMS: sums}, part.integers)
+
+    def encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+        """Return the encoded images (H, W, C) of sums (planes, H, W) over so many samples, by name."""
+        self._check_target(kernel)
+        self.build(kernel)
+        return self._encode(kernel, np.ascontiguousarray(sums), samples)
+
+    def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+        """Run a built kernel."""
+        size = sums.shape[1:]
+        with self._session((size[0], size[1])), ExitStack() as made:
+            given, written = self._stored(SUMS, sums, made), dict[str, Memory]()
+            for image in kernel.images:
+                written[image.name] = self._memory(f"{IMAGE}{image.name}", (*size, image.channels))
+                made.callback(self._release, written[image.name])
+            self._turn(kernel, given, written, samples)
+            return {name: self._fetch(f"{IMAGE}{name}", memory) for name, memory in written.items()}
+
+    def _turn(
+        self, kernel: EncodeArtifact, sums: Memory, written: Mapping[str, Memory], samples: int
+    ) -> None:
+        """Start a built encoding of sums that may be larger than the images."""
+        height, width = next(iter(written.values())).shape[:2]
+        _, rows, stride = sums.shape
+        arrays = {SUMS: sums, **{f"{IMAGE}{name}": memory for name, memory in written.items()}}
+        integers = {"width": width, "height": height, "row_stride": stride, "plane_stride": rows * stride}
+        built = self._built[kernel.digest]
+        self._start(kernel, built.prepared, arrays, {**integers, "sample_count": samples})
+
+    def passes(self, encode: EncodeArtifact, denoise: Artifact, size: Size) -> Passes:
+        """Return passes over a picture of `size` (height, width), whose images stay on the device."""
+        from .passes import Passes
+
+        for artifact in (encode, denoise):
+            self._check_target(artifact)
+        self.check_size(denoise, size)
+        return Passes(self, encode, denoise, size)
+
+    def _check_target(self, artifact: Kernel) -> None:
         """Refuse a kernel in another language."""
         if artifact.target not in (self.name, *(f"{self.name}:{home}" for home in self.homes)):
             raise InputError(
@@ -174,8 +347,6 @@ class Executor(ABC):
         self.close()
 
 
-def keep(built: dict[str, T], digest: str, thing: T) -> list[T]:
-    """Put a built kernel into `built` as the newest, and return those that fall out: the oldest."""
-    built.pop(digest, None)
-    built[digest] = thing
-    return [built.pop(next(iter(built))) for _ in range(len(built) - KEPT_KERNELS)]
+def shapes(artifact: Artifact, size: Size) -> list[tuple[int, ...]]:
+    """Return the shapes (H, W, C) of what an artifact's kernels write."""
+    return [(*size, output_channels(kernel.program)) for kernel in artifact.kernels]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.core.ir import Gather, Image
+from ...compiler.schedules.emit import output_channels
 from ...refimpl.errors import InputError
 
 Images = Mapping[str, NDArray[np.float32]]
@@ -49,6 +50,12 @@ def checked(artifact: Artifact, inputs: Images) -> Images:
             )
         _check_range(image, array)
     return {image.name: np.ascontiguousarray(inputs[image.name]) for image in wanted}
+
+
+def widest(artifact: Artifact) -> int:
+    """Return the most channels of an image that one of the artifact's kernels reads or writes."""
+    written = [output_channels(kernel.program) for kernel in artifact.kernels]
+    return max(*written, *(image.channels for image in images_of(artifact)))
 
 
 def _check_range(image: Image, array: NDArray[np.float32]) -> None:

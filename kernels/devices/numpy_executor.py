@@ -1,8 +1,7 @@
 """The interpreter of the IR as an executor: all windows of a block of rows at once, in float32.
 
 Its path tracer is the skeleton that path kernels have (compiler/scenes/emit_path.py), with all paths of a
-part as lanes: it defines what they add up. Its passes are the plain composition of its kernels
-[`passes.HostPasses`].
+part as lanes: it defines what they add up.
 """
 
 from __future__ import annotations
@@ -15,13 +14,13 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.core.interpret import interpret
+from ...compiler.languages.interface import IMAGE, RESULT, SUMS
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.lower_encode import SAMPLES, channel_name
 from ...compiler.scenes.lower_scene import PathPrograms
 from ...compiler.scenes.path_kernel import PathArtifact
-from ...compiler.schedules.emit import output_channels
 from ...refimpl.network import dataset
-from .executor import Executor, Part
+from .executor import Executor, Kernel, Memory
 from .images import Images, gather_of
 
 BLOCK_NUMBERS = 2**22
@@ -34,64 +33,80 @@ class NumpyExecutor(Executor):
     name = "numpy"
 
     def __init__(self) -> None:
+        super().__init__()
         self.device = f"NumPy {np.__version__}"
 
-    def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
-        """Do nothing: the program is interpreted."""
+    def _prepare(self, kernel: Kernel) -> Any:
+        """Do nothing: programs are interpreted."""
 
-    def build_path(self, kernel: PathArtifact) -> None:
-        """Do nothing: the programs are interpreted."""
+    def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
+        return Memory(array.shape, array)
 
-    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
-        shape = (part.rows, part.width)
-        y, x = (a.astype(np.uint32) for a in np.indices(shape))
-        state: dict[str, Any] = {
-            "x": x,
-            "y": y + np.uint32(part.first_row),
-            "seed": np.full(shape, part.seed, np.uint32),
-            "width": np.float32(part.width),
-            "height": np.float32(part.height),
-        }
-        sums = {plane: np.zeros(shape, np.float32) for plane in kernel.planes}
-        # Paths that have ended are computed on, and may leave the range of numbers.
-        with np.errstate(all="ignore"):
-            for n in range(part.samples):
-                state["sample_number"] = np.full(shape, (part.first_sample + n) % 2**32, np.uint32)
-                first, end = follow(kernel.programs, state)
-                _add(sums, first, end, np.float32(n))
-        return np.stack(list(sums.values()))
+    def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
+        return Memory(shape, np.empty(shape, np.float32))
 
-    def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
-        """Interpret the encoding, all pixels at once."""
-        given = dict(zip(kernel.planes, sums, strict=True))
-        found = interpret(kernel.program, {**given, SAMPLES: np.full(sums.shape[1:], samples, np.float32)})
-        return {
-            image.name: np.stack([found[channel_name(image.name, c)] for c in range(image.channels)], axis=-1)
-            for image in kernel.images
-        }
+    def _start(
+        self, kernel: Kernel, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+    ) -> None:
+        held = {name: memory.held for name, memory in arrays.items()}
+        if isinstance(kernel, PathArtifact):
+            held[SUMS][:] = _traced(kernel, integers)
+        elif isinstance(kernel, EncodeArtifact):
+            for name, image in _encoded(kernel, held[SUMS], integers["sample_count"]).items():
+                held[f"{IMAGE}{name}"][:] = image
+        else:
+            images = [held[f"{IMAGE}{image.name}"] for image in gather_of(kernel).images]
+            _denoised(kernel, np.concatenate(images, axis=-1), held[RESULT])
 
-    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
-        image = np.concatenate(list(images.values()), axis=-1)
-        # What one pass returns is the image of the next.
-        for kernel in artifact.kernels:
-            image = self._run_kernel(kernel, image)
-        return image
+    def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
+        held: NDArray[np.float32] = memory.held
+        return held.copy()
 
-    def _run_kernel(self, artifact: Artifact, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the output (H, W, C) of one kernel for its images, joined."""
-        gather = gather_of(artifact)
-        height, width, _ = image.shape
-        padded = dataset.pad(image, gather.window, gather.axes)
-        rows = max(1, BLOCK_NUMBERS // (width * gather.n_inputs))
-        result = np.empty((height, width, output_channels(artifact.program)), np.float32)
-        for top in range(0, height, rows):
-            bottom = min(top + rows, height)
-            # These rows and the margin around them are all that their pixels see.
-            strip = padded[top : bottom + gather.rows - 1]
-            windows = dataset.all_windows(strip, gather.window, gather.axes)
-            (value,) = interpret(artifact.program, {"window": windows}).values()
-            result[top:bottom] = np.reshape(value, (bottom - top, width, -1)) if np.ndim(value) > 1 else value
-        return result
+
+def _traced(kernel: PathArtifact, integers: Mapping[str, int]) -> NDArray[np.float32]:
+    """Return the sums (planes, rows, width) of a part."""
+    shape = (integers["rows"], integers["width"])
+    y, x = (a.astype(np.uint32) for a in np.indices(shape))
+    state: dict[str, Any] = {
+        "x": x,
+        "y": y + np.uint32(integers["first_row"]),
+        "seed": np.full(shape, integers["seed_number"], np.uint32),
+        "width": np.float32(integers["width"]),
+        "height": np.float32(integers["height"]),
+    }
+    sums = {plane: np.zeros(shape, np.float32) for plane in kernel.planes}
+    # Paths that have ended are computed on, and may leave the range of numbers.
+    with np.errstate(all="ignore"):
+        for n in range(integers["samples"]):
+            state["sample_number"] = np.full(shape, (integers["first_sample"] + n) % 2**32, np.uint32)
+            first, end = follow(kernel.programs, state)
+            _add(sums, first, end, np.float32(n))
+    return np.stack(list(sums.values()))
+
+
+def _encoded(kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+    """Interpret the encoding, all pixels at once."""
+    given = dict(zip(kernel.planes, sums, strict=True))
+    found = interpret(kernel.program, {**given, SAMPLES: np.full(sums.shape[1:], samples, np.float32)})
+    return {
+        image.name: np.stack([found[channel_name(image.name, c)] for c in range(image.channels)], axis=-1)
+        for image in kernel.images
+    }
+
+
+def _denoised(artifact: Artifact, image: NDArray[np.float32], result: NDArray[np.float32]) -> None:
+    """Fill the output (H, W, C) of one kernel for its images, joined."""
+    gather = gather_of(artifact)
+    height, width, _ = image.shape
+    padded = dataset.pad(image, gather.window, gather.axes)
+    rows = max(1, BLOCK_NUMBERS // (width * gather.n_inputs))
+    for top in range(0, height, rows):
+        bottom = min(top + rows, height)
+        # These rows and the margin around them are all that their pixels see.
+        strip = padded[top : bottom + gather.rows - 1]
+        windows = dataset.all_windows(strip, gather.window, gather.axes)
+        (value,) = interpret(artifact.program, {"window": windows}).values()
+        result[top:bottom] = np.reshape(value, (bottom - top, width, -1)) if np.ndim(value) > 1 else value
 
 
 def follow(programs: PathPrograms, given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -4,16 +4,15 @@
 2. Upload images and weights as float textures; texel row 0 is the frame's top row.
 3. Draw one triangle that covers a float colour buffer of the image's size [`CORNERS`], and read it
    back: fragment (x, y) computed the pixel in column x of row y, so rows need no turning.
-4. Of two passes the first one draws into as many buffers as its channels fill, which the second one reads
-   [`OpenGLExecutor._draw_all`].
+4. What a kernel writes is as many textures as its channels, or planes, fill; the next one reads them.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import moderngl
@@ -22,17 +21,12 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.languages.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
-from ...compiler.scenes.encode_kernel import EncodeArtifact
-from ...compiler.scenes.path_kernel import PathArtifact
-from ...compiler.schedules.emit import output_channels
+from ...compiler.languages.interface import SUMS, WEIGHTS, WRITE, Interface
 from ...compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
-from ...compiler.schedules.factor import HORIZONTAL
 from ...compiler.schedules.glsl_compute import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import osmesa
-from .executor import Executor, Part, keep
-from .images import Images, black, gather_of
-from .passes import PICTURE, Passes
+from .executor import Executor, Kernel, Memory, Size
 from .registry import CONTEXT_VARIABLE
 
 CORNERS = """\
@@ -83,8 +77,8 @@ thousand pixels pay for the time."""
 
 
 @dataclass(frozen=True)
-class _Built:
-    """A kernel on the device, with weights or None, and the sizes of which it has drawn a few pixels.
+class _Prepared:
+    """A kernel on the device, what it takes, and its weights or None.
 
     A compute shader has no triangle, and the pixels (x, y) of a group's `tile`.
     """
@@ -92,14 +86,8 @@ class _Built:
     program: Any
     triangle: Any
     weights: Any
+    interface: Interface
     tile: tuple[int, int] | None = None
-    drawn: set[tuple[int, int]] = field(default_factory=set)
-
-    def release(self) -> None:
-        """Give it back."""
-        for thing in (self.triangle, self.program, self.weights):
-            if thing is not None:
-                thing.release()
 
 
 class OpenGLExecutor(Executor):
@@ -109,6 +97,7 @@ class OpenGLExecutor(Executor):
     version = "#version 330 core"
 
     def __init__(self, context: str | None = None) -> None:
+        super().__init__()
         kind, self._context = _open(context or os.environ.get(CONTEXT_VARIABLE) or "auto")
         # Enter it and leave it: EGL would take it for the current one also after OSMesa has made its own
         # current, and do nothing when it is asked to change.
@@ -124,41 +113,45 @@ class OpenGLExecutor(Executor):
         else:
             self.schedule_reason = f"built-in choice before OpenGL {SHADER_VERSION / 100:.1f}"
         self.driver = self._context.info["GL_VERSION"]
-        self._built: dict[str, _Built] = {}
-        self._paths: dict[str, _Built] = {}
-        self._encoders: dict[str, _Built] = {}
 
-    def build(self, artifact: Artifact, size: tuple[int, int] = (1, 1)) -> None:
-        """Compile the shaders, upload the weights, and draw a few pixels."""
-        for kernel in artifact.kernels:
-            built = self._built.get(kernel.digest) or self._compile(kernel)
-            with self._context:
-                for old in keep(self._built, kernel.digest, built):
-                    old.release()
-        # llvmpipe compiles again for textures whose width or height is, or is not, a power of two.
-        small = (3 if size[0] & (size[0] - 1) else 2, 3 if size[1] & (size[1] - 1) else 2)
-        built = self._built[artifact.kernels[-1].digest]
-        if small not in built.drawn:
-            self._run(artifact, black(artifact, small))
-            built.drawn.add(small)
+    @contextmanager
+    def _session(self, size: Size | None = None) -> Iterator[None]:
+        """Make the context current."""
+        with self._context:
+            yield
 
-    def _compile(self, artifact: Artifact) -> _Built:
-        """Compile the shaders and upload the weights."""
+    def _first_run(self, size: Size) -> Size:
+        """llvmpipe compiles again for textures whose width or height is, or is not, a power of two."""
+        height, width = size
+        return 3 if height & (height - 1) else 2, 3 if width & (width - 1) else 2
+
+    def _prepare(self, kernel: Kernel) -> _Prepared:
+        with ExitStack() as made:
+            weights = None
+            if isinstance(kernel, Artifact):
+                self._check_promise(kernel)
+                if "group" in kernel.manifest["schedule"]:
+                    return self._compile_compute(kernel)
+                weights = self._weights(kernel)
+                made.callback(weights.release)
+            program, triangle = self._program(kernel.source, made)
+            made.pop_all()
+            return _Prepared(program, triangle, weights, kernel.interface)
+
+    def _check_promise(self, artifact: Artifact) -> None:
+        """Refuse a bound that the device cannot keep."""
         if artifact.manifest["bound"]["output"] and ORDER_EXTENSION not in self._context.extensions:
             raise CompileError(
                 f"{self.device} lacks {ORDER_EXTENSION}, whose `precise` the error bound needs: use profile "
                 "native, which then promises nothing, or executor opencl or numpy"
             )
-        if "group" in artifact.manifest["schedule"]:
-            return self._compile_compute(artifact)
-        with self._context, ExitStack() as made:
-            weights = self._weights(artifact)
-            made.callback(weights.release)
-            program, triangle = self._program(artifact.source, made)
-            made.pop_all()
-            return _Built(program, triangle, weights)
 
-    def _compile_compute(self, artifact: Artifact) -> _Built:
+    def _discard(self, prepared: _Prepared) -> None:
+        for thing in (prepared.triangle, prepared.program, prepared.weights):
+            if thing is not None:
+                thing.release()
+
+    def _compile_compute(self, artifact: Artifact) -> _Prepared:
         """Compile a compute shader, and put the weights into a storage buffer."""
         schedule = artifact.manifest["schedule"]
         if self._context.version_code < SHADER_VERSION:
@@ -167,7 +160,7 @@ class OpenGLExecutor(Executor):
                 f"{schedule['name']} is a compute shader, which OpenGL "
                 f"{SHADER_VERSION / 100:.1f} has; use schedule plain"
             )
-        with self._context, ExitStack() as made:
+        with ExitStack() as made:
             data = artifact.weights.astype("<f4").tobytes() or bytes(16)
             weights = self._context.buffer(data)
             made.callback(weights.release)
@@ -177,7 +170,8 @@ class OpenGLExecutor(Executor):
                 raise CompileError(f"{self.device} does not build the kernel: {error}") from None
             made.pop_all()
             width, height = schedule["group"]
-            return _Built(program, None, weights, (width * schedule["pixels"], height))
+            tile = (width * schedule["pixels"], height)
+            return _Prepared(program, None, weights, artifact.interface, tile)
 
     def _program(self, source: str, made: ExitStack) -> tuple[Any, Any]:
         """Return the shaders and the triangle that they draw; `made` gives them back if something fails."""
@@ -203,122 +197,115 @@ class OpenGLExecutor(Executor):
         padded.reshape(-1)[: artifact.weights.size] = artifact.weights
         return self._texture("weights", padded)
 
-    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
-        size, textures = next(iter(images.values())).shape[:2], {}
-        with self._context, ExitStack() as made:
-            for name, image in images.items():
-                textures[name] = self._texture(name, image)
-                made.callback(textures[name].release)
-            drawn = [self._drawn_into(kernel, size, made) for kernel in artifact.kernels]
-            self._draw_all(artifact, textures, drawn)
-            read = [np.frombuffer(target.read(), np.float32).reshape(*size, 4) for target in drawn[-1][1]]
-        return np.concatenate(read, axis=-1)[..., : output_channels(artifact.program)].copy()
+    def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
+        """Return an image as one texture, sums as textures of four planes each."""
+        if name != SUMS:
+            return Memory(array.shape, [self._texture(name, array)])
+        planes, made = np.pad(array, ((0, -len(array) % 4), (0, 0), (0, 0))), ExitStack()
+        with made:
+            textures = []
+            for first in range(0, len(planes), 4):
+                four = np.ascontiguousarray(np.moveaxis(planes[first : first + 4], 0, -1))
+                textures.append(self._texture(name, four))
+                made.callback(textures[-1].release)
+            made.pop_all()
+        return Memory(array.shape, textures)
 
-    def _drawn_into(self, kernel: Artifact, size: tuple[int, ...], made: ExitStack) -> tuple[Any, list[Any]]:
-        """Return the framebuffer and the textures that a kernel draws into."""
-        count = -(-output_channels(kernel.program) // 4)
-        return self._targets("the pictures", (size[0], size[1]), count, made)
+    def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
+        """Return textures of four channels, or planes, each."""
+        numbers, size = (shape[0], shape[1:]) if name == SUMS else (shape[2], shape[:2])
+        with ExitStack() as made:
+            textures = []
+            for _ in range(-(-numbers // 4)):
+                self._check_texture(repr(name), (size[1], size[0]), 4)
+                textures.append(self._context.texture((size[1], size[0]), 4, dtype="f4"))
+                made.callback(textures[-1].release)
+                textures[-1].filter = (moderngl.NEAREST, moderngl.NEAREST)
+            made.pop_all()
+        return Memory(shape, textures)
 
-    def _draw_all(
-        self, artifact: Artifact, textures: Mapping[str, Any], drawn: Sequence[tuple[Any, list[Any]]]
+    def _release(self, memory: Memory) -> None:
+        for texture in memory.held:
+            texture.release()
+
+    def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
+        size = memory.shape[1:] if name == SUMS else memory.shape[:2]
+        read = [np.frombuffer(texture.read(), np.float32).reshape(*size, 4) for texture in memory.held]
+        pixels = np.concatenate(read, axis=-1)
+        if name == SUMS:
+            return np.moveaxis(pixels, -1, 0)[: memory.shape[0]]
+        return pixels[..., : memory.shape[2]].copy()
+
+    def _finish(self) -> None:
+        self._context.finish()
+
+    def _start(
+        self, kernel: Kernel, prepared: _Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
-        """Draw an artifact's kernels one after another: images (by name), then what each pass has drawn."""
-        for kernel, into in zip(artifact.kernels, drawn, strict=True):
-            built = self._built[kernel.digest]
-            named = {f"image_{image.name}": textures[image.name] for image in gather_of(kernel).images}
-            self._denoise(built, into, named)
-            textures = {f"{HORIZONTAL}_{number}": target for number, target in enumerate(into[1])}
-
-    def _denoise(self, built: _Built, drawn: tuple[Any, list[Any]], textures: Mapping[str, Any]) -> None:
-        """Run a kernel into the textures of a framebuffer: a compute shader has one."""
-        frame, targets = drawn
-        if built.tile is None:
-            self._draw(built, frame, {"weight_texture": built.weights, **textures})
+        written = [arrays[array.name] for array in prepared.interface.arrays if array.access == WRITE]
+        targets = [texture for memory in written for texture in memory.held]
+        textures = self._named(prepared.interface, arrays)
+        if prepared.tile is not None:
+            self._dispatch(prepared, textures, targets[0])
             return
-        self._bind(built, textures, {})
-        built.weights.bind_to_storage_buffer(0)
-        targets[0].bind_to_image(0, read=False, write=True)
-        groups = (-(-n // size) for n, size in zip(targets[0].size, built.tile, strict=True))
-        built.program.run(*groups, 1)
-        self._context.memory_barrier()
+        if prepared.weights is not None:
+            textures["weight_texture"] = prepared.weights
+        self._draw(prepared.program, prepared.triangle, targets, textures, self._values(integers))
 
     def _draw(
         self,
-        built: _Built,
-        frame: Any,
+        program: Any,
+        triangle: Any,
+        targets: Sequence[Any],
         textures: Mapping[str, Any],
-        values: Mapping[str, int] | None = None,
+        values: Mapping[str, Any],
     ) -> None:
-        """Draw a built shader into a framebuffer, with textures and numbers under their uniforms' names."""
-        self._bind(built, textures, values or {})
-        frame.use()
-        built.triangle.render(mode=moderngl.TRIANGLES, vertices=3)
+        """Draw into textures, reading others, and numbers, under their uniforms' names."""
+        frame = self._context.framebuffer(list(targets))
+        try:
+            self._bind(program, textures, values)
+            frame.use()
+            triangle.render(mode=moderngl.TRIANGLES, vertices=3)
+        finally:
+            frame.release()
 
-    def _bind(self, built: _Built, textures: Mapping[str, Any], values: Mapping[str, int]) -> None:
-        """Give a built shader its textures and numbers."""
+    def _named(self, taken: Interface, arrays: Mapping[str, Memory]) -> dict[str, Any]:
+        """Return what a kernel reads, by uniforms: images of one memory take its textures in turn."""
+        left = {id(memory): list(memory.held) for memory in arrays.values()}
+        named: dict[str, Any] = {}
+        for array in taken.arrays:
+            if array.access == WRITE or array.name == WEIGHTS:
+                continue
+            textures = left[id(arrays[array.name])]
+            if array.name == SUMS:
+                named |= {f"{SUMS}_{number}": texture for number, texture in enumerate(textures)}
+            else:
+                named[array.name] = textures.pop(0)
+        return named
+
+    def _values(self, integers: Mapping[str, int]) -> Mapping[str, Any]:
+        """Return a kernel's numbers under its uniforms' names."""
+        return integers
+
+    def _dispatch(self, prepared: _Prepared, textures: Mapping[str, Any], target: Any) -> None:
+        """Run a compute shader, which writes a texture."""
+        self._bind(prepared.program, textures, {})
+        prepared.weights.bind_to_storage_buffer(0)
+        target.bind_to_image(0, read=False, write=True)
+        tile = prepared.tile or (1, 1)
+        groups = (-(-n // size) for n, size in zip(target.size, tile, strict=True))
+        prepared.program.run(*groups, 1)
+        self._context.memory_barrier()
+
+    def _bind(self, program: Any, textures: Mapping[str, Any], values: Mapping[str, Any]) -> None:
+        """Give a program its textures and numbers."""
         units = {name: unit for unit, name in enumerate(textures)}
         for name, texture in textures.items():
             texture.use(units[name])
         for name, value in {**units, **values}.items():
             # A driver removes what the shader does not read, and its name with it.
-            if name in built.program:
-                built.program[name].value = value
-
-    def forget(self) -> None:
-        """Drop the kernels that were built."""
-        for kernels in (self._built, self._paths, self._encoders):
-            with self._context:
-                for built in kernels.values():
-                    built.release()
-            kernels.clear()
-
-    def build_path(self, kernel: PathArtifact) -> None:
-        """Compile the shaders and draw one pixel: drivers finish compiling when they draw."""
-        known = self._paths.get(kernel.digest)
-        with self._context, ExitStack() as made:
-            built = known or _Built(*self._program(kernel.source, made), None)
-            made.pop_all()
-            for old in keep(self._paths, kernel.digest, built):
-                old.release()
-        if known is None:
-            self._trace(kernel, Part(1, 1, 0, 1, 0, 1, 0))
-
-    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
-        with self._context, ExitStack() as made:
-            frame, targets = self._targets(
-                "the sums", (part.rows, part.width), -(-len(kernel.planes) // 4), made
-            )
-            self._draw(self._paths[kernel.digest], frame, {}, part.integers)
-            read = [np.frombuffer(target.read(), np.float32) for target in targets]
-        pixels = np.concatenate([buffer.reshape(part.rows, part.width, 4) for buffer in read], axis=-1)
-        return np.moveaxis(pixels, -1, 0)[: len(kernel.planes)]
-
-    def _targets(
-        self, name: str, size: tuple[int, int], count: int, made: ExitStack
-    ) -> tuple[Any, list[Any]]:
-        """Return a framebuffer of `size` (height, width) and its RGBA textures, which `made` gives back."""
-        self._check_texture(name, size[::-1], 4)
-        targets = []
-        for _ in range(count):
-            targets.append(self._context.texture(size[::-1], 4, dtype="f4"))
-            made.callback(targets[-1].release)
-            targets[-1].filter = (moderngl.NEAREST, moderngl.NEAREST)
-        frame = self._context.framebuffer(targets)
-        made.callback(frame.release)
-        return frame, targets
-
-    def _passes(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> Passes:
-        return OpenGLPasses(self, encode, denoise, size)
-
-    def _encoder(self, artifact: EncodeArtifact) -> _Built:
-        """Return the built encoding shader."""
-        with self._context, ExitStack() as made:
-            known = self._encoders.get(artifact.digest)
-            built = known or _Built(*self._program(artifact.source, made), None)
-            made.pop_all()
-            for old in keep(self._encoders, artifact.digest, built):
-                old.release()
-        return built
+            if name in program:
+                program[name].value = value
 
     def _texture(self, name: str, array: NDArray[np.float32]) -> Any:
         """Return (H, W, C) as a float texture that is read texel by texel."""
@@ -342,64 +329,7 @@ class OpenGLExecutor(Executor):
     def close(self) -> None:
         """Release the context and all that lives in it."""
         self._built.clear()
-        self._paths.clear()
-        self._encoders.clear()
         self._context.release()
-
-
-class OpenGLPasses(Passes):
-    """Float textures between fragment passes: what one draws into, the next one reads."""
-
-    def __init__(
-        self, executor: OpenGLExecutor, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]
-    ) -> None:
-        super().__init__(encode, denoise, size)
-        self._executor = executor
-        with executor._context, ExitStack() as made:
-            self._sums = executor._targets("the pictures", size, -(-len(encode.planes) // 4), made)
-            self._encoded = executor._targets("the pictures", size, len(encode.images), made)
-            self._drawn = [executor._drawn_into(kernel, size, made) for kernel in denoise.kernels]
-            self._made = made.pop_all()
-        names = [image.name for image in encode.images]
-        self._images = dict(zip((*names, PICTURE), self._encoded[1] + self._drawn[-1][1], strict=True))
-
-    def trace(self, kernel: PathArtifact, part: Part) -> None:
-        """Draw the sums."""
-        executor = self._executor
-        executor.build_path(kernel)
-        with executor._context:
-            executor._draw(executor._paths[kernel.digest], self._sums[0], {}, part.integers)
-
-    def encode(self, samples: int) -> None:
-        """Draw the feature images."""
-        executor = self._executor
-        built = executor._encoder(self.encoder)
-        textures = {f"sums_{number}": texture for number, texture in enumerate(self._sums[1])}
-        with executor._context:
-            executor._draw(built, self._encoded[0], textures, {"sample_count": samples})
-
-    def denoise(self) -> None:
-        """Draw the picture."""
-        executor = self._executor
-        executor.build(self.denoiser, self.size)
-        with executor._context:
-            executor._draw_all(self.denoiser, self._images, self._drawn)
-
-    def read(self, name: str) -> NDArray[np.float32]:
-        """Copy a texture to the host."""
-        with self._executor._context:
-            pixels = np.frombuffer(self._images[name].read(), np.float32).reshape(*self.size, 4)
-        return pixels[..., : self.channels(name)].copy()
-
-    def finish(self) -> None:
-        """Wait for the context."""
-        with self._executor._context:
-            self._executor._context.finish()
-
-    def close(self) -> None:
-        """Release the textures."""
-        with self._executor._context:
-            self._made.close()
 
 
 def _open(kind: str) -> tuple[str, Any]:

@@ -1,96 +1,104 @@
-"""The three passes of a pipeline on one device: what each executor provides for kernels/run/pipeline.py.
+"""The three passes of a pipeline on one device, for kernels/run/pipeline.py.
 
     path kernel -> sums -> encoding kernel -> feature images -> denoising kernel -> picture
 
 Sums, images and picture are made once for a size and stay on the device; only [`Passes.read`] copies
 anything to the host. Passes are ordered: each sees what the one before it has written.
-
-On devices whose memory is the host's the passes are the plain composition of the three kernels, which is the
-definition of all others [`HostPasses`].
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
+from ...compiler.languages.interface import IMAGE, RESULT, SUMS
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
-from .executor import Executor, Part
+from .executor import Executor, Memory, Part, Size, shapes
 from .images import images_of
 
 PICTURE = "picture"
 """Name under which the result is read."""
 
 
-class Passes(ABC):
+class Passes:
     """Kernels with their images on a device; a context manager that gives the images back."""
 
-    def __init__(self, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]) -> None:
+    def __init__(self, executor: Executor, encode: EncodeArtifact, denoise: Artifact, size: Size) -> None:
         self.encoder, self.denoiser, self.size = encode, denoise, size
+        self._executor, self._sums = executor, Memory((), None)
+        with executor._session(size), ExitStack() as made:
+            self._images = {
+                image.name: self._made(f"{IMAGE}{image.name}", (*size, image.channels), made)
+                for image in encode.images
+            }
+            self._written = [self._made(RESULT, shape, made) for shape in shapes(denoise, size)]
+            self._giving_back = made.pop_all()
 
-    @abstractmethod
+    def _made(self, name: str, shape: tuple[int, ...], made: ExitStack) -> Memory:
+        """Return memory that `made` gives back."""
+        memory = self._executor._memory(name, shape)
+        made.callback(self._executor._release, memory)
+        return memory
+
     def trace(self, kernel: PathArtifact, part: Part) -> None:
-        """Leave the sums of a part that is the whole picture, by a kernel with the encoder's planes."""
+        """Start the paths of a part that is the whole picture, by a kernel with the encoder's planes."""
+        executor = self._executor
+        executor.build(kernel)
+        shape = executor.sums_shape(kernel, part)
+        with executor._session(self.size):
+            if shape != self._sums.shape:
+                self._drop_sums()
+                self._sums = executor._memory(SUMS, shape)
+            executor._follow(kernel, part, self._sums)
 
-    @abstractmethod
     def encode(self, samples: int) -> None:
-        """Turn sums over so many samples into feature images."""
+        """Start the encoding of sums over so many samples."""
+        executor = self._executor
+        executor.build(self.encoder)
+        with executor._session(self.size):
+            executor._turn(self.encoder, self._sums, self._images, samples)
 
-    @abstractmethod
     def denoise(self) -> None:
-        """Turn feature images into the picture."""
+        """Start the denoiser on the images that it reads."""
+        executor = self._executor
+        executor.build(self.denoiser, self.size)
+        images = {image.name: self._images[image.name] for image in images_of(self.denoiser)}
+        with executor._session(self.size):
+            executor._chain(self.denoiser, images, self._written)
 
-    @abstractmethod
     def read(self, name: str) -> NDArray[np.float32]:
         """Copy an image to the host, (H, W, C): a feature by name, or the result, [`PICTURE`]."""
+        executor = self._executor
+        with executor._session(self.size):
+            if name == PICTURE:
+                return executor._fetch(RESULT, self._written[-1])
+            return executor._fetch(f"{IMAGE}{name}", self._images[name])
 
     def finish(self) -> None:
         """Wait until all passes that were started have ended; reading waits by itself."""
+        with self._executor._session(self.size):
+            self._executor._finish()
 
     def close(self) -> None:
         """Give the images back."""
+        with self._executor._session():
+            self._drop_sums()
+            self._giving_back.close()
+        self._images, self._written = {}, []
 
-    def channels(self, name: str) -> int:
-        """Return the number of channels of a feature's image, or of the picture."""
-        counts = {image.name: image.channels for image in self.encoder.images}
-        return 3 if name == PICTURE else counts[name]
+    def _drop_sums(self) -> None:
+        """Give the sums back, if there are any."""
+        old, self._sums = self._sums, Memory((), None)
+        if old.shape:
+            self._executor._release(old)
 
     def __enter__(self) -> Any:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-class HostPasses(Passes):
-    """What one kernel returns is what the next one is given."""
-
-    def __init__(
-        self, executor: Executor, encode: EncodeArtifact, denoise: Artifact, size: tuple[int, int]
-    ) -> None:
-        super().__init__(encode, denoise, size)
-        self._executor = executor
-        self._sums = np.zeros((0, 0, 0), np.float32)
-        self._images: dict[str, NDArray[np.float32]] = {}
-
-    def trace(self, kernel: PathArtifact, part: Part) -> None:
-        """Keep the sums (planes, H, W)."""
-        self._sums = self._executor.trace(kernel, part)
-
-    def encode(self, samples: int) -> None:
-        """Keep the feature images."""
-        self._images = dict(self._executor.encode(self.encoder, self._sums, samples))
-
-    def denoise(self) -> None:
-        """Run the denoiser on the images that it reads."""
-        wanted = {image.name: self._images[image.name] for image in images_of(self.denoiser)}
-        self._images[PICTURE] = self._executor.run(self.denoiser, wanted)
-
-    def read(self, name: str) -> NDArray[np.float32]:
-        """Return an image."""
-        return self._images[name]

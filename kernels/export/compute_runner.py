@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import moderngl
@@ -12,8 +14,9 @@ from numpy.typing import NDArray
 from ...compiler.languages.interface import BLOCK
 from ...compiler.schedules.glsl_compute import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable
+from ..devices.executor import Kernel, Memory, Size
 from ..devices.opengl_executor import OpenGLExecutor
-from .buffer_runner import BufferRunner, Kernel, Launch
+from .buffer_runner import BufferRunner, Launch, Prepared
 
 
 class ComputeRunner(BufferRunner):
@@ -23,6 +26,7 @@ class ComputeRunner(BufferRunner):
     homes = (BLOCK,)
 
     def __init__(self, context: str | None = None) -> None:
+        super().__init__()
         self._opened = OpenGLExecutor(context)
         self._context = self._opened._context
         self.device = self._opened.device
@@ -32,30 +36,46 @@ class ComputeRunner(BufferRunner):
                 f"{SHADER_VERSION / 100:.1f}"
             )
 
-    def _prepare(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+    @contextmanager
+    def _session(self, size: Size | None = None) -> Iterator[None]:
         with self._context:
-            try:
-                return self._context.compute_shader(kernel.source)
-            except moderngl.Error as error:
-                raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+            yield
 
-    def _launch(self, prepared: Any, launch: Launch) -> list[NDArray[np.float32]]:
-        with self._context, ExitStack() as made:
-            sizes = np.array([n % 2**32 for n in launch.sizes], np.uint32)
-            block = self._context.buffer(np.pad(sizes, (0, -len(sizes) % 4)).tobytes())
-            block.bind_to_uniform_block(0)
-            made.callback(block.release)
-            held = {}
-            for place, data in launch.buffers.items():
-                held[place] = self._context.buffer(np.ascontiguousarray(data).tobytes())
-                made.callback(held[place].release)
-                if place in launch.blocks:
-                    held[place].bind_to_uniform_block(place)
-                else:
-                    held[place].bind_to_storage_buffer(place)
-            prepared.run(*launch.groups, 1)
-            self._context.memory_barrier()
-            return [np.frombuffer(held[place].read(), np.float32).copy() for place in launch.back]
+    def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+        try:
+            return self._context.compute_shader(kernel.source)
+        except moderngl.Error as error:
+            raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+
+    def _discard(self, prepared: Prepared) -> None:
+        prepared.built.release()
+        if prepared.weights is not None:
+            self._release(prepared.weights)
+
+    def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
+        return Memory(array.shape, self._context.buffer(np.ascontiguousarray(array).tobytes()))
+
+    def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
+        return Memory(shape, self._context.buffer(reserve=4 * math.prod(shape)))
+
+    def _release(self, memory: Memory) -> None:
+        memory.held.release()
+
+    def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
+        return np.frombuffer(memory.held.read(), np.float32).reshape(memory.shape).copy()
+
+    def _launch(self, built: Any, launch: Launch) -> None:
+        whole = np.pad(launch.integers, (0, -len(launch.integers) % 4))
+        block = self._context.buffer(whole.tobytes())
+        block.bind_to_uniform_block(0)
+        for number, buffer in launch.buffers.items():
+            if number in launch.blocks:
+                buffer.bind_to_uniform_block(number)
+            else:
+                buffer.bind_to_storage_buffer(number)
+        built.run(*launch.groups, 1)
+        self._context.memory_barrier()
+        block.release()
 
     def close(self) -> None:
         """Release the context."""

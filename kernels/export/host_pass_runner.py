@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
 from ...compiler.languages.glsl_es import VERSION
 from ...compiler.languages.hosts import CHANNELS
-from ...compiler.languages.interface import TABLE
-from ..devices.images import Images
+from ...compiler.languages.interface import TABLE, Interface
+from ..devices.executor import Memory
 from .gl_runner import ESRunner
 
 TOP = f"""\
@@ -74,48 +74,28 @@ class ShadertoyRunner(ESRunner):
     def _program(self, source: str, made: ExitStack) -> tuple[Any, Any]:
         return super()._program(self._wrapped(source), made)
 
-    def _values(self, size: tuple[int, int]) -> dict[str, Any]:
-        """Return the host's numbers for a picture of a size (height, width)."""
-        return {"iResolution": (float(size[1]), float(size[0]), 1.0)}
+    def _values(self, integers: Mapping[str, int]) -> Mapping[str, Any]:
+        """Return the host's numbers for a picture."""
+        return {"iResolution": (float(integers["width"]), float(integers["height"]), 1.0)}
 
-    def _named(self, textures: dict[str, Any]) -> dict[str, Any]:
+    def _named(self, taken: Interface, arrays: Mapping[str, Memory]) -> dict[str, Any]:
         """Return the textures under the host's names."""
-        return {f"iChannel{i}": texture for i, texture in enumerate(textures.values())}
+        return {f"iChannel{i}": texture for i, texture in enumerate(super()._named(taken, arrays).values())}
 
-    def _shown(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return what is read back with the picture's top row first: Shadertoy shows row 0 at the bottom."""
-        return picture[::-1].copy()
-
-    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
-        height, width = next(iter(images.values())).shape[:2]
-        built = self._built[artifact.digest]
-        with self._context, ExitStack() as made:
-            textures = {}
-            for name, image in images.items():
-                textures[name] = self._texture(name, image)
-                made.callback(textures[name].release)
-            frame, (target,) = self._targets("the picture", (height, width), 1, made)
-            named: dict[str, Any] = self._named(textures)
-            if built.weights is not None:
-                named["weight_texture"] = built.weights
-            self._draw(built, frame, named, self._values((height, width)))
-            found = np.frombuffer(target.read(), np.float32).reshape(height, width, 4)
-        channels = artifact.manifest["output"]["channels"]
-        return self._shown(found)[..., :channels].copy()
+    def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
+        """Return what was drawn with the picture's top row first: Shadertoy shows row 0 at the bottom."""
+        return super()._fetch(name, memory)[::-1].copy()
 
     def draw(self, source: str, size: tuple[int, int], values: dict[str, Any]) -> NDArray[np.float32]:
         """Return what a pass without images writes (H, W, 4), texel row 0 first, with numbers by name."""
-        with self._context, ExitStack() as made:
+        numbers = {**self._values({"width": size[1], "height": size[0]}), **values}
+        with self._session(size), ExitStack() as made:
             program, triangle = self._program(source, made)
-            frame, (target,) = self._targets("the pass", size, 1, made)
-            for name, value in {**self._values(size), **values}.items():
-                if name in program:
-                    program[name].value = value
-            frame.use()
-            triangle.render(vertices=3)
-            found = np.frombuffer(target.read(), np.float32).reshape(*size, 4).copy()
-            triangle.release()
-        return found
+            made.callback(triangle.release)
+            written = self._memory("what the pass draws", (*size, 4))
+            made.callback(self._release, written)
+            self._draw(program, triangle, written.held, {}, numbers)
+            return super()._fetch("what the pass draws", written)
 
 
 class GodotRunner(ShadertoyRunner):
@@ -127,11 +107,11 @@ class GodotRunner(ShadertoyRunner):
     def _wrapped(self, source: str) -> str:
         return GODOT.format(source=GODOT_WORDS.sub(_plain, source))
 
-    def _values(self, size: tuple[int, int]) -> dict[str, Any]:
-        return {"wamnet_size": (float(size[1]), float(size[0]))}
+    def _values(self, integers: Mapping[str, int]) -> Mapping[str, Any]:
+        return {"wamnet_size": (float(integers["width"]), float(integers["height"]))}
 
-    def _named(self, textures: dict[str, Any]) -> dict[str, Any]:
-        return {f"image_{name}": texture for name, texture in textures.items()}
+    def _named(self, taken: Interface, arrays: Mapping[str, Memory]) -> dict[str, Any]:
+        return ESRunner._named(self, taken, arrays)
 
-    def _shown(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
-        return picture
+    def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
+        return ESRunner._fetch(self, name, memory)

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from ...compiler.languages.interface import BLOCK, PATH, TABLE, UNSIGNED, Interface
 from ...refimpl.errors import ExecutorUnavailable
+from ..devices.executor import Kernel, Memory
 from . import tools
-from .buffer_runner import BufferRunner, Kernel, Launch
+from .buffer_runner import BufferRunner, Launch
 
 OPTIONS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")
 """Nothing here may allow what the standards do not."""
@@ -129,6 +130,7 @@ class HostRunner(BufferRunner):
     homes = (TABLE, BLOCK)
 
     def __init__(self) -> None:
+        super().__init__()
         self._folder = tempfile.TemporaryDirectory(prefix="wamnet-host-")
         self._count = 0
         try:
@@ -142,7 +144,7 @@ class HostRunner(BufferRunner):
         """Return the text that is compiled, with a function `wamnet_call`."""
         raise NotImplementedError
 
-    def _prepare(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+    def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
         self._count += 1
         folder = Path(self._folder.name) / str(self._count)
         folder.mkdir()
@@ -158,16 +160,23 @@ class HostRunner(BufferRunner):
         function.restype = None
         return function, group is not None
 
-    def _launch(self, prepared: Any, launch: Launch) -> list[NDArray[np.float32]]:
-        held = {place: np.array(data, np.float32, order="C") for place, data in launch.buffers.items()}
-        empty = np.zeros(4, np.float32)
-        pointers = (ctypes.c_void_p * (max(held) + 1))(
-            *(held.get(place, empty).ctypes.data for place in range(max(held) + 1))
-        )
-        sizes = (ctypes.c_uint32 * len(launch.sizes))(*(n % 2**32 for n in launch.sizes))
-        function, grouped = prepared
-        function(sizes, pointers, *(launch.groups if grouped else launch.threads))
-        return [held[place].reshape(-1) for place in launch.back]
+    def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
+        return Memory(array.shape, np.ascontiguousarray(array, np.float32))
+
+    def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
+        return Memory(shape, np.empty(shape, np.float32))
+
+    def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
+        held: NDArray[np.float32] = memory.held
+        return held.copy()
+
+    def _launch(self, built: Any, launch: Launch) -> None:
+        empty, count = np.zeros(4, np.float32), max(launch.buffers) + 1
+        arrays = [launch.buffers.get(number, empty) for number in range(count)]
+        pointers = (ctypes.c_void_p * count)(*(array.ctypes.data for array in arrays))
+        integers = (ctypes.c_uint32 * len(launch.integers))(*launch.integers.tolist())
+        function, grouped = built
+        function(integers, pointers, *(launch.groups if grouped else launch.threads))
 
     def close(self) -> None:
         """Remove the folder."""

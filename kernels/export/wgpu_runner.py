@@ -7,18 +7,19 @@ will do. SPIR-V reaches naga with decorations that it does not know (NoContracti
 from __future__ import annotations
 
 import logging
+import math
 import re
-import struct
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import BLOCK
+from ...compiler.languages.interface import BLOCK, WEIGHTS
 from ...refimpl.errors import CompileError, ExecutorUnavailable
+from ..devices.executor import Kernel, Memory
 from . import tools
-from .buffer_runner import BufferRunner, Kernel, Launch
+from .buffer_runner import BufferRunner, Launch
 
 WAY_OUT = "pip install 'wamnet[targets]', and a Vulkan driver: apt-get install mesa-vulkan-drivers"
 """How to get a device."""
@@ -55,6 +56,7 @@ class WgpuRunner(BufferRunner):
     def __init__(
         self, name: str = "wgsl", translate: Callable[[str], str | bytes] = lambda source: source
     ) -> None:
+        super().__init__()
         try:
             import wgpu
         except ImportError:
@@ -71,7 +73,7 @@ class WgpuRunner(BufferRunner):
         self.device = f"{adapter.info['device']}, {adapter.info['backend_type']}"
         self._translate = translate
 
-    def _prepare(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+    def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
         source = kernel.source
         code = self._translate(source)
         try:
@@ -90,22 +92,32 @@ class WgpuRunner(BufferRunner):
             raise CompileError(f"{self.device} does not build the kernel: {error}") from None
         return pipeline, bound, set(_declared(source))
 
-    def _launch(self, prepared: Any, launch: Launch) -> list[NDArray[np.float32]]:
-        usage, device = self._wgpu.BufferUsage, self._device
-        pipeline, layout, declared = prepared
-        sizes = struct.pack(f"<{len(launch.sizes)}I", *(n % 2**32 for n in launch.sizes))
+    def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
+        kind = self._wgpu.BufferUsage.UNIFORM if name == WEIGHTS else 0
+        data = np.ascontiguousarray(array).tobytes()
+        usage = kind | self._wgpu.BufferUsage.STORAGE
+        return Memory(array.shape, self._device.create_buffer_with_data(data=data, usage=usage))
+
+    def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
+        usage = self._wgpu.BufferUsage.STORAGE | self._wgpu.BufferUsage.COPY_SRC
+        return Memory(shape, self._device.create_buffer(size=4 * math.prod(shape), usage=usage))
+
+    def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
+        found = np.frombuffer(self._device.queue.read_buffer(memory.held), np.float32)
+        return found.reshape(memory.shape).copy()
+
+    def _release(self, memory: Memory) -> None:
+        memory.held.destroy()
+
+    def _launch(self, built: Any, launch: Launch) -> None:
+        device, (pipeline, layout, declared) = self._device, built
+        sizes = launch.integers.tobytes()
         sizes += bytes(-len(sizes) % UNIFORM_BYTES)
-        held = {0: device.create_buffer_with_data(data=sizes, usage=usage.UNIFORM)}
-        for place, data in launch.buffers.items():
-            written = usage.COPY_SRC if place in launch.back else 0
-            kind = usage.UNIFORM if place in launch.blocks else usage.STORAGE
-            held[place] = device.create_buffer_with_data(
-                data=np.ascontiguousarray(data).tobytes(), usage=kind | written
-            )
+        integers = device.create_buffer_with_data(data=sizes, usage=self._wgpu.BufferUsage.UNIFORM)
         entries = [
-            {"binding": place, "resource": {"buffer": buffer, "offset": 0, "size": buffer.size}}
-            for place, buffer in held.items()
-            if place in declared
+            {"binding": number, "resource": {"buffer": buffer, "offset": 0, "size": buffer.size}}
+            for number, buffer in {0: integers, **launch.buffers}.items()
+            if number in declared
         ]
         group = device.create_bind_group(layout=layout, entries=entries)
         encoder = device.create_command_encoder()
@@ -115,9 +127,6 @@ class WgpuRunner(BufferRunner):
         compute.dispatch_workgroups(*launch.groups, 1)
         compute.end()
         device.queue.submit([encoder.finish()])
-        return [
-            np.frombuffer(device.queue.read_buffer(held[place]), np.float32).copy() for place in launch.back
-        ]
 
 
 def vulkan_runner() -> WgpuRunner:

@@ -89,7 +89,7 @@ class Pipeline:
             programs = lower_scene(scene, self._settings, most_unrolled(executor.name))
             groups = layers_of(self._features)
             kernel = compile_path(programs, executor.name, profile, executor.lanes, groups)
-        executor.build_path(kernel)
+        executor.build(kernel)
         return kernel
 
     def set_scene(self, scene: Scene) -> None:

@@ -74,7 +74,7 @@ def render_on(
         return with_own_features(scene, job, apart)
     first, last = checked_rows(job, rows)
     kernel = compile_scene(executor, scene, job, profile)
-    executor.build_path(kernel)
+    executor.build(kernel)
     keep_freed_memory()
     totals = Totals(0, np.zeros((len(kernel.planes), last - first, job.width)))
     for parts in sample_ranges(job, (first, last)):

@@ -271,10 +271,10 @@ def test_device_that_runs_out_of_memory_is_told_on_one_line(executor_named, kit,
     artifact = compile_program(kit.program(lambda x: x * 1.5, {"a": 1}), "opencl")
     executor.build(artifact)
 
-    def full(array):
+    def full(name, array):
         raise MemoryError("no\nmemory")
 
-    monkeypatch.setattr(executor, "_upload", full)
+    monkeypatch.setattr(executor, "_store", full)
     with pytest.raises(
         InputError, match=r"is 3 x 2: the device does not run it \(no memory\); split the picture"
     ):
@@ -285,7 +285,7 @@ def test_a_kernel_counts_as_built_after_its_first_run(executor_named, kit, monke
     executor = executor_named("opencl")
     artifact = compile_program(kit.program(lambda x: x * 1.75, {"a": 1}), "opencl")
     with monkeypatch.context() as patch:
-        patch.setattr(executor, "_launch", lambda *_: 1 / 0)
+        patch.setattr(executor, "_start", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError, match="division"):
             executor.build(artifact)
     assert artifact.digest not in executor._built

@@ -17,8 +17,8 @@ from ..common.terminal import progress, say, table
 from ..files.outputs import check_output, write_text
 
 if TYPE_CHECKING:
-    from ...kernels.conformance.case import Case
-    from ...kernels.conformance.run import Verdict
+    from ...spec.conformance.case import Case
+    from ...spec.conformance.run import Verdict
 
 EXAMPLES = """Examples:
 
@@ -112,8 +112,8 @@ def conformance(
     has a program of forty lines. Ends with status 1 if a case fails.
     """
     from ...compiler.core.profiles import profile_named
-    from ...kernels.conformance import report, run
-    from ...kernels.conformance import vectors as all_vectors
+    from ...spec.conformance import report, run
+    from ...spec.conformance import vectors as all_vectors
 
     if write is not None:
         _refuse_others(write, program, executor)
@@ -176,7 +176,7 @@ def _command(program: str | None, executor: str | None) -> list[str]:
     if executor not in (REFERENCE, *EXECUTORS, *RUNNERS):
         known = ", ".join(dict.fromkeys((REFERENCE, *EXECUTORS, *RUNNERS)))
         raise InputError("--executor", executor, "it is unknown", f"known are {known}")
-    return [sys.executable, "-m", "wamnet.kernels.conformance.program", "--executor", str(executor)]
+    return [sys.executable, "-m", "wamnet.spec.conformance.program", "--executor", str(executor)]
 
 
 def _check_options(timeout: float, outputs: Sequence[Path]) -> None:
@@ -198,8 +198,8 @@ def _asked(
     command: Sequence[str], cases: Mapping[str, Sequence[Case]], profile: str, timeout: float
 ) -> list[Verdict]:
     """Ask all cases and return the verdicts."""
-    from ...kernels.conformance import run
-    from ...kernels.conformance.protocol import Session
+    from ...spec.conformance import run
+    from ...spec.conformance.protocol import Session
 
     total = sum(map(len, cases.values()))
     with Session(command, timeout) as session, progress("asking", total) as advance:
@@ -219,8 +219,8 @@ def _again(
 
 def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:
     """Print a table with a line a kind."""
-    from ...kernels.conformance.report import counts
-    from ...kernels.conformance.run import PASS, UNSUPPORTED
+    from ...spec.conformance.report import counts
+    from ...spec.conformance.run import PASS, UNSUPPORTED
 
     rows = []
     for known in counts(verdicts):
@@ -238,7 +238,7 @@ def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:
 
 def _print_failures(failed: Sequence[Verdict], cases: Mapping[str, Sequence[Case]], again: str) -> None:
     """Print the first failures in full."""
-    from ...kernels.conformance.report import about, first_blamed
+    from ...spec.conformance.report import about, first_blamed
 
     first = first_blamed(failed)
     if first is not None and len(failed) > 1:

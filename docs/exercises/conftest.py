@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wamnet.kernels.conformance.case import given, load
-from wamnet.kernels.conformance.numbers import to_json
-from wamnet.kernels.conformance.run import judge
+from wamnet.spec.conformance.case import given, load
+from wamnet.spec.conformance.numbers import to_json
+from wamnet.spec.conformance.run import judge
 
 VECTORS = Path(__file__).resolve().parents[2] / "spec/vectors"
 """The spec's vectors."""

@@ -20,10 +20,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from wamnet.kernels.conformance import run, vectors
-from wamnet.kernels.conformance.case import Case
-from wamnet.kernels.conformance.protocol import Session
-from wamnet.kernels.conformance.report import first_blamed
+from wamnet.spec.conformance import run, vectors
+from wamnet.spec.conformance.case import Case
+from wamnet.spec.conformance.protocol import Session
+from wamnet.spec.conformance.report import first_blamed
 
 SOURCE = Path(__file__).with_name("wamnet.c")
 """What is mutated."""

@@ -11,8 +11,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from wamnet.kernels.conformance import report
-from wamnet.kernels.conformance.run import Verdict
+from wamnet.spec.conformance import report
+from wamnet.spec.conformance.run import Verdict
 
 CHAPTER = Path(__file__).parents[2] / "spec" / "conformance.md"
 
@@ -121,7 +121,7 @@ def test_a_known_failure_is_no_failure(wamnet, program, tmp_path):
 
 
 def test_vectors_are_written(wamnet, tmp_path, monkeypatch):
-    from wamnet.kernels.conformance import vectors
+    from wamnet.spec.conformance import vectors
 
     monkeypatch.setattr(vectors, "contents", lambda: {"a.json": b"{}\n", "scenes/b.json": b"{}\n"})
     done = wamnet("conformance", "--write", str(tmp_path / "new"))

@@ -45,8 +45,8 @@ def program(tmp_path: Path, example: Callable[[str], str]) -> Callable[..., list
 def verdicts(needs: Callable[[str], None]) -> Callable[..., list[Any]]:
     """Give a function from a command, words that choose cases and a time-out to the verdicts."""
     needs("programs")
-    from wamnet.kernels.conformance import run, vectors
-    from wamnet.kernels.conformance.protocol import Session
+    from wamnet.spec.conformance import run, vectors
+    from wamnet.spec.conformance.protocol import Session
 
     def ask(command: list[str], words: list[str], timeout_s: float = 60.0, folder: Path | None = None) -> Any:
         cases = run.chosen(run.read_vectors(folder or vectors.FOLDER), words)

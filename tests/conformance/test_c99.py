@@ -18,8 +18,8 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.kernels.conformance import run, vectors
-from wamnet.kernels.conformance.report import ELEMENTARY
+from wamnet.spec.conformance import run, vectors
+from wamnet.spec.conformance.report import ELEMENTARY
 
 SOURCE = Path(__file__).parents[2] / "examples" / "c99" / "wamnet.c"
 """The program: one file."""

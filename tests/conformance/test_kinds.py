@@ -9,15 +9,15 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from wamnet.kernels.conformance import blocks, case, program, run, vectors
-from wamnet.kernels.conformance.functions import Field, Function
-from wamnet.kernels.conformance.kinds import FUNCTIONS, KINDS
-from wamnet.kernels.conformance.numbers import to_json
-from wamnet.kernels.conformance.on_executor import OnExecutor
 from wamnet.refimpl import encoding, metrics, rng
 from wamnet.refimpl.light import camera, environment, intersection, sampling, transport
 from wamnet.refimpl.light.materials import conductor, dielectric
 from wamnet.refimpl.network import adam, dataset, siren
+from wamnet.spec.conformance import blocks, case, program, run, vectors
+from wamnet.spec.conformance.functions import Field, Function
+from wamnet.spec.conformance.kinds import FUNCTIONS, KINDS
+from wamnet.spec.conformance.numbers import to_json
+from wamnet.spec.conformance.on_executor import OnExecutor
 
 
 def judged(kind: str, answer) -> list[run.Verdict]:

@@ -10,15 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.kernels.conformance.numbers import (
-    from_file,
-    from_json,
-    is_number,
-    number_text,
-    rounded_up,
-    to_json,
-)
 from wamnet.refimpl.errors import InputError
+from wamnet.spec.conformance.numbers import from_file, from_json, is_number, number_text, rounded_up, to_json
 
 
 @given(st.floats(allow_nan=False))

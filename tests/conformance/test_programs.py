@@ -7,12 +7,12 @@ from collections import Counter
 
 import pytest
 
-from wamnet.kernels.conformance import run
-from wamnet.kernels.conformance.case import Case, Output
-from wamnet.kernels.conformance.protocol import NoAnswerError, Session
-from wamnet.kernels.conformance.report import first_blamed
-from wamnet.kernels.conformance.run import Verdict, judge
 from wamnet.refimpl.errors import InputError
+from wamnet.spec.conformance import run
+from wamnet.spec.conformance.case import Case, Output
+from wamnet.spec.conformance.protocol import NoAnswerError, Session
+from wamnet.spec.conformance.report import first_blamed
+from wamnet.spec.conformance.run import Verdict, judge
 
 ANSWER = '{"id": request["id"], "output": KINDS[request["kind"]](request["input"])}'
 """The example's answer, which wrong programs change."""

@@ -11,11 +11,11 @@ import jsonschema
 import numpy as np
 import pytest
 
-from wamnet.kernels.conformance import case, vectors
-from wamnet.kernels.conformance.case import Case, Kind, Output
-from wamnet.kernels.conformance.kinds import FUNCTIONS, KINDS
-from wamnet.kernels.conformance.numbers import from_json, is_number
 from wamnet.refimpl.errors import InputError
+from wamnet.spec.conformance import case, vectors
+from wamnet.spec.conformance.case import Case, Kind, Output
+from wamnet.spec.conformance.kinds import FUNCTIONS, KINDS
+from wamnet.spec.conformance.numbers import from_json, is_number
 
 FILES = sorted(path for path in vectors.FOLDER.glob("*.json") if path.name != "schema.json")
 

@@ -16,7 +16,7 @@ from build import main
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 
-from wamnet.kernels.conformance.kinds import KINDS
+from wamnet.spec.conformance.kinds import KINDS
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -16,13 +16,13 @@ from xml.etree import ElementTree
 from targets import VECTORS, Target
 
 from wamnet.cli.commands.view import HOST, handler_of
-from wamnet.kernels.conformance import report
-from wamnet.kernels.conformance.case import Case, load
-from wamnet.kernels.conformance.numbers import to_json
-from wamnet.kernels.conformance.protocol import NoAnswerError, Session
-from wamnet.kernels.conformance.run import SCHEMA, judge
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.reading import parse_json
+from wamnet.spec.conformance import report
+from wamnet.spec.conformance.case import Case, load
+from wamnet.spec.conformance.numbers import to_json
+from wamnet.spec.conformance.protocol import NoAnswerError, Session
+from wamnet.spec.conformance.run import SCHEMA, judge
 
 PAGE = b"<!doctype html><title>the page</title>"
 """What only somebody who names this machine may read."""

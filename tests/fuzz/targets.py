@@ -28,7 +28,6 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.model_file import load_checkpoint, save_checkpoint, save_model
 from wamnet.compiler.proof import checker
-from wamnet.kernels.conformance import case, report
 from wamnet.kernels.run import cache, curve
 from wamnet.refimpl.errors import WamnetError
 from wamnet.refimpl.light import scene, variation
@@ -37,8 +36,9 @@ from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.network import denoise, siren, train
 from wamnet.refimpl.network.dataset import Normalization, Window, normalization_from_json
 from wamnet.refimpl.reading import parse_json
+from wamnet.spec.conformance import case, report
 
-VECTORS = Path(case.__file__).parents[2] / "spec/vectors"
+VECTORS = Path(case.__file__).parents[1] / "vectors"
 """Where the vectors lie in a source tree; an installed package has them elsewhere."""
 
 

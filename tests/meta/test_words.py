@@ -50,7 +50,7 @@ KEPT = {
     "compiler/languages/weight_homes.py": ("whatever stands above",),  # heads of kernels
     "compiler/languages/wgsl.py": ("on [-pi, pi] alone",),  # a sine in manifests and heads of kernels
     "refimpl/network/dataset.py": ("were it matt and nothing in between",),  # manifests and heads of kernels
-    "kernels/conformance/kinds/files.py": (  # notes of vectors
+    "spec/conformance/kinds/files.py": (  # notes of vectors
         "whole numbers are numbers",
         "a version that is a truth value",
         "a truth value as number",
@@ -60,7 +60,7 @@ KEPT = {
         "a matrix that is no rotation",
         "glass that is no body",
     ),
-    "kernels/conformance/kinds/materials.py": (  # titles of vectors
+    "spec/conformance/kinds/materials.py": (  # titles of vectors
         "A matt surface sends a path on",
         "as if nothing stood in between",
     ),

@@ -27,7 +27,7 @@ BUDGET = {
     "kernels/judge": 1450,
     "kernels/bench": 2000,
     "kernels/export": 2600,
-    "kernels/conformance": 4500,
+    "spec/conformance": 4500,
     "cli": 300,
     "cli/commands": 4400,
     "cli/common": 1000,

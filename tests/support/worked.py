@@ -25,7 +25,6 @@ from wamnet.compiler.scenes.encode_kernel import compile_encode
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.training.step_kernel import compile_step
-from wamnet.kernels.conformance.numbers import number_text
 from wamnet.refimpl import encoding, metrics, rng
 from wamnet.refimpl.light import (
     camera,
@@ -40,6 +39,7 @@ from wamnet.refimpl.light import (
 )
 from wamnet.refimpl.network import adam, dataset, factored, siren, train
 from wamnet.refimpl.network.denoise import Model
+from wamnet.spec.conformance.numbers import number_text
 
 SEED, SAMPLE, X, Y, SIZE_PX = 7, 5, 6, 10, 16
 """The path that several chapters follow: sample 5 of pixel (6, 10) of a picture of 16 x 16, seed 7."""

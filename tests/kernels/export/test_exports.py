@@ -12,11 +12,6 @@ import jsonschema
 import numpy as np
 import pytest
 
-from wamnet.kernels.conformance.numbers import to_json
-from wamnet.kernels.conformance.on_executor import OnExecutor
-from wamnet.kernels.conformance.program import serve
-from wamnet.kernels.conformance.run import judge, read_vectors
-from wamnet.kernels.conformance.vectors import FOLDER
 from wamnet.kernels.export import check, runners, targets, tools
 from wamnet.kernels.export.package import Request, export
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
@@ -25,6 +20,11 @@ from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
+from wamnet.spec.conformance.numbers import to_json
+from wamnet.spec.conformance.on_executor import OnExecutor
+from wamnet.spec.conformance.program import serve
+from wamnet.spec.conformance.run import judge, read_vectors
+from wamnet.spec.conformance.vectors import FOLDER
 
 ROOT = Path(__file__).resolve().parents[3]
 """The repository's root folder."""

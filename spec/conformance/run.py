@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kernels.judge.welch import sidak, welch_p
 from ...refimpl.errors import InputError
-from ..judge.welch import sidak, welch_p
 from . import blocks
 from . import case as cases_module
 from .case import Case, Output

@@ -17,7 +17,7 @@ from ...refimpl.errors import InputError
 from .case import FORMAT, VERSION, Kind, text_of
 from .kinds import KINDS
 
-FOLDER = Path(__file__).resolve().parents[2] / "spec" / "vectors"
+FOLDER = Path(__file__).resolve().parents[1] / "vectors"
 """Where the vectors are, in the repository and where the package is installed."""
 
 NUMBER = {

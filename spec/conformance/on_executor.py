@@ -28,15 +28,15 @@ from ...compiler.scenes.lower_scene import PATH, SURFACE, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import DENOISERS, target_named
+from ...kernels.devices.executor import Executor, Part
+from ...kernels.run.denoise_on import denoise_on
+from ...kernels.run.render_on import render_on
 from ...refimpl.errors import CompileError
 from ...refimpl.frame import LAYERS
 from ...refimpl.light import scene as scene_module
 from ...refimpl.light.render import Job
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.dataset import Window
-from ..devices.executor import Executor, Part
-from ..run.denoise_on import denoise_on
-from ..run.render_on import render_on
 from .case import given
 from .functions import Function, components, names
 from .kinds import FUNCTIONS

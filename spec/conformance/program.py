@@ -1,4 +1,4 @@
-"""The project's own answers through the same door: `python -m wamnet.kernels.conformance.program`.
+"""The project's own answers through the same door: `python -m wamnet.spec.conformance.program`.
 
 --executor reference   the reference in float64
 --executor NAME        kernels on an executor (on_executor.py), or exported ones on what runs them here
@@ -62,8 +62,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.executor == REFERENCE:
         serve(sys.stdin, sys.stdout, "wamnet, reference", list(KINDS), of_reference)
         return
-    from .. import open_executor
-    from ..export.runners import RUNNERS
+    from ...kernels import open_executor
+    from ...kernels.export.runners import RUNNERS
     from .on_executor import OnExecutor
 
     try:

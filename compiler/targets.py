@@ -28,6 +28,7 @@ from .languages.opencl import OpenCL
 from .languages.weight_homes import HOMES
 from .languages.wgsl import WGSL
 from .schedules.buffers_group import ComputeGroup, CUDAGroup, MetalGroup, VulkanGroup, WGSLGroup, groups
+from .schedules.c_fourier import C_FOURIER
 from .schedules.c_tiled import C_LADDER
 from .schedules.emit_inlined import Inlined
 from .schedules.emit_packed import Packed
@@ -116,7 +117,7 @@ TARGETS: Mapping[str, Target] = {
 }
 """The targets that the demo and the benchmark show, by the name of the executor that runs them."""
 
-DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C(), *C_LADDER)}
+DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C(), *C_LADDER, *C_FOURIER)}
 """All targets that an executor of the registry runs."""
 
 EXPORTED: Mapping[str, Target] = {

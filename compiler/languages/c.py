@@ -68,7 +68,11 @@ def includes(role: str, *names: str) -> list[str]:
 
 
 class C(Arguments):
-    """The dialect's table; `pixels` is what one call of the denoiser computes, `step` moves along a row."""
+    """The dialect's table.
+
+    `pixels` is what one call of the denoiser computes, from the pixel `first_pixel` on; `steps` move to that
+    of the next call, along a row and down.
+    """
 
     target = "c"
     language = "C99"
@@ -80,7 +84,8 @@ class C(Arguments):
         ENCODE: f"    }}\n{POPPED}",
     }
     pixels = "One pixel (x, y): its channels are written to `result`, the whole picture's array."
-    step = "++x"
+    first_pixel = ("x", "y")
+    steps = ("++x", "++y")
     heading = "static inline void {entry}"
     reads = "const float *restrict {name}"
     writes = "float *restrict {name}"
@@ -170,7 +175,10 @@ class C(Arguments):
             f"{self.heading.format(entry='wamnet_trace')}({listed})",
             "{",
             *_loops(
-                "row", "part->rows", "column", "part->width", "++column", f"{name}(part, sums, column, row);"
+                ("column", "row"),
+                ("part->width", "part->rows"),
+                ("++column", "++row"),
+                f"{name}(part, sums, column, row);",
             ),
             "}",
             "",
@@ -181,7 +189,7 @@ class C(Arguments):
     def _of_denoiser(self, kernel: Interface) -> list[str]:
         """Return the functions of a denoiser up to the statements of a pixel."""
         whole, name = super().listed(kernel), self.entries[DENOISE]
-        one = self._signature(name, [*whole, "int x", "int y"])
+        one = self._signature(name, [*whole, *(f"int {place}" for place in self.first_pixel)])
         given = ", ".join([*(array.name for array in kernel.arrays), *kernel.integers, "x", "y"])
         return [
             f"/* {self.pixels} */",
@@ -191,7 +199,7 @@ class C(Arguments):
             ALL_PIXELS,
             *self._signature("wamnet_image", whole),
             "{",
-            *_loops("y", "height", "x", "width", self.step, f"{name}({given});"),
+            *_loops(("x", "y"), ("width", "height"), self.steps, f"{name}({given});"),
             "}",
             "",
             "static inline int wamnet_clamp(int value, int low, int high)",
@@ -233,11 +241,16 @@ class C(Arguments):
         return f"(size_t){text}"
 
 
-def _loops(row: str, rows: str, column: str, columns: str, step: str, call: str) -> list[str]:
+Two = tuple[str, str]
+"""What is said of columns, and of rows."""
+
+
+def _loops(places: Two, ends: Two, steps: Two, call: str) -> list[str]:
     """Return the loops over all pixels around a call."""
+    (column, row), (columns, rows), (along, down) = places, ends, steps
     return [
-        f"    for (int {row} = 0; {row} < {rows}; ++{row}) {{",
-        f"        for (int {column} = 0; {column} < {columns}; {step}) {{",
+        f"    for (int {row} = 0; {row} < {rows}; {down}) {{",
+        f"        for (int {column} = 0; {column} < {columns}; {along}) {{",
         f"            {call}",
         "        }",
         "    }",

@@ -49,12 +49,7 @@ STRAIGHT = """\
 
 GCC would make straight code of the loops over lanes too, instead of vectors."""
 
-VECTORS = """\
-/* GCC's vectors are fast where the processor has registers of LANES floats, else very slow. */
-#if (LANES <= 4 || (LANES <= 8 && defined(__AVX__)) || defined(__AVX512F__)) && defined(__GNUC__) && \\
-    __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
-typedef float wamnet_vector __attribute__((vector_size(4 * LANES), aligned(4), may_alias));
-
+OPERATORS = """\
 static inline void wamnet_clear(wamnet_vector *to)
 {
     *to = (wamnet_vector){0};
@@ -79,7 +74,10 @@ static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *w
 {
     *sum += *weight * value;
 }
-#else
+"""
+"""What is done with vectors of GCC's type."""
+
+LOOPS = """\
 typedef struct {
     float lane[LANES];
 } wamnet_vector;
@@ -126,12 +124,27 @@ static inline void wamnet_add_product(
         sum->lane[i] += weight->lane[i] * value;
     }
 }
-#endif
+"""
+"""The type of vectors of other compilers, and what is done with it."""
+
+
+def gnu_vectors(lanes: str) -> str:
+    """Return GCC's type of vectors of so many floats, which need no alignment, and what is done with them."""
+    kind = f"__attribute__((vector_size(4 * {lanes}), aligned(4), may_alias))"
+    return f"typedef float wamnet_vector {kind};\n\n{OPERATORS}"
+
+
+VECTORS = f"""\
+/* GCC's vectors are fast where the processor has registers of LANES floats, else very slow. */
+#if (LANES <= 4 || (LANES <= 8 && defined(__AVX__)) || defined(__AVX512F__)) && defined(__GNUC__) && \\
+    __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
+{gnu_vectors("LANES")}#else
+{LOOPS}#endif
 """
 """The type of vectors and what is done with them, by GCC and clang, and by other compilers."""
 
 
-def _from(offset: int) -> str:
+def from_weights(offset: int) -> str:
     """Return the text of the address of the weights from `offset` on."""
     return f"weights + {offset}" if offset else "weights"
 
@@ -146,7 +159,7 @@ class CTiled(C, TiledDialect):
         "Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written "
         "to\n   `result`, the whole picture's array."
     )
-    step = "x += PIXELS"
+    steps = ("x += PIXELS", "++y")
     store = "result[(y * width + x + p) * {channels} + {i}] = {value};"
     said = {
         DENOISE: (
@@ -169,7 +182,7 @@ class CTiled(C, TiledDialect):
 
     def set_weights(self, total: str, offset: int, index: str) -> str:
         """Return the statement that gives a sum vector `index` of the weights from `offset` on."""
-        return f"wamnet_load(&{total}, {_from(offset)} + ({index}) * LANES);"
+        return f"wamnet_load(&{total}, {from_weights(offset)} + ({index}) * LANES);"
 
     def add(self, total: str, term: str) -> str:
         """Return the statement that adds a vector to a sum."""
@@ -181,7 +194,7 @@ class CTiled(C, TiledDialect):
 
     def walk(self, name: str, offset: int, first: str = "") -> str:
         """Return the declaration of a place in the weights: vector `first` of those from `offset` on."""
-        return f"const float *{name} = {_from(offset)}{first and f' + {first} * LANES'};"
+        return f"const float *{name} = {from_weights(offset)}{first and f' + {first} * LANES'};"
 
     def walked(self, name: str, place: str, index: int) -> list[str]:
         """Return the statements that declare the vector `index` vectors after a place."""

@@ -18,6 +18,7 @@ transformed when they are packed, in float64 [`fourier.spectrum`]. The bound is 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -26,12 +27,12 @@ from numpy.typing import NDArray
 from ..core.ir import Node, Program
 from ..core.profiles import SineContract
 from ..languages.dialect import Dialect
+from ..languages.fourier_dialect import FourierDialect
 from ..proof import bounds
 from ..proof.bounds import Enclosure
 from . import fourier
 from .emit import kernel_gather
 from .emit_tiled import LARGEST_PRIVATE, Tiled, TiledBody, readers_of_window, refused_by_vectors
-from .opencl_tiled import OpenCLTiled
 from .schedules import ALL, Images, windows
 
 COST = 3.0
@@ -62,7 +63,6 @@ class Sizes:
 class Fourier(Tiled):
     """Tiles of `points` x `points` pixels, `tiles` side by side."""
 
-    instead = "tile16"
     order = (
         "vectors filled up with zeros; the spectrum of the matrix that reads the window: columns of "
         "frequencies 0 to points / 2, pairs of vectors of neurons, rows of frequencies, pairs of channels, "
@@ -74,7 +74,7 @@ class Fourier(Tiled):
         self, name: str, idea: str, dialect: Dialect, lanes: int, pixels: int, points: int, tiles: int
     ) -> None:
         super().__init__(name, idea, dialect, lanes, pixels, vectors=2)
-        self.points, self.tiles = points, tiles
+        self.points, self.tiles, self.instead = points, tiles, f"tile{lanes}"
 
     def sizes(self, program: Program) -> Sizes:
         """Return the sizes of a program's kernel."""
@@ -184,7 +184,7 @@ class Fourier(Tiled):
 class Statements:
     """Assignments in the order in which they are made, each to a new name."""
 
-    def __init__(self, dialect: Dialect) -> None:
+    def __init__(self, dialect: FourierDialect) -> None:
         self.dialect = dialect
         self.made: list[tuple[str, tuple[str, ...]]] = []
 
@@ -209,7 +209,7 @@ class Statements:
             if "*" in template and readers[name] == 1 and name not in outputs and "[" not in template:
                 texts[name] = text
             else:
-                lines.append(f"vector {name} = {text};")
+                lines.append(self.dialect.vector(name, text))
         return lines
 
 
@@ -230,7 +230,7 @@ class Named:
         return self.statements.assign(f"{{0}} * {self.statements.dialect.literal(factor)}", self)
 
 
-def codelet(dialect: Dialect, name: str, points: int, kept: int, sign: int) -> list[str]:
+def codelet(dialect: FourierDialect, name: str, points: int, kept: int, sign: int) -> list[str]:
     """Return the function that transforms `points` numbers and keeps the first `kept`."""
     statements = Statements(dialect)
     places = [(f"from[{PARTS * k} * step]", f"from[{PARTS * k} * step + 1]") for k in range(points)]
@@ -240,8 +240,7 @@ def codelet(dialect: Dialect, name: str, points: int, kept: int, sign: int) -> l
     for k, number in enumerate(found):
         for i, part in enumerate(number):
             lines.append(f"to[{PARTS * k} * leap{' + 1' * i}] = {part.name};")
-    head = f"void {name}(const vector *from, int step, vector *to, int leap)"
-    return [head, "{", *(f"    {line}" for line in lines), "}"]
+    return [dialect.function(name), "{", *(f"    {line}" for line in lines), "}"]
 
 
 @dataclass
@@ -252,7 +251,9 @@ class FourierBody(TiledBody):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        assert isinstance(self.dialect, OpenCLTiled), "these statements are OpenCL's"
+        assert isinstance(self.dialect, FourierDialect), (
+            f"{self.dialect.language} has no words for transforms"
+        )
         self.vectors = self.dialect
         self.sizes = self.tile.sizes(self.program)
 
@@ -269,8 +270,8 @@ class FourierBody(TiledBody):
             f"#define INPUTS {s.inputs} /* vectors that hold the pairs of all tiles */",
             f"#define NEURONS {s.neurons} /* pairs of vectors of neurons */",
             "#define STRIDE (2 * (POINTS + 1)) /* vectors from row to row: not a multiple of 4096 bytes */",
-            *codelet(tile.dialect, "forward", tile.points, tile.points, -1),
-            *codelet(tile.dialect, "backward", tile.points, s.out, 1),
+            *codelet(self.vectors, "forward", tile.points, tile.points, -1),
+            *codelet(self.vectors, "backward", tile.points, s.out, 1),
         ]
 
     def _prepare(self) -> None:
@@ -278,33 +279,34 @@ class FourierBody(TiledBody):
         self._rows_forward()
         self._columns()
         self._comment("rows back, and the other layers")
-        blocks = -(-self.tile.tiles * self.sizes.out // self.tile.pixels)
-        self._line(f"vector sums[{blocks} * PIXELS * NEURONS * 2];")
-        self._open("for (int line = 0; line < OUT && tile_y + line < height; ++line) {")
-        self._open("for (int tile = 0; tile < TILES * NEURONS; ++tile) {")
-        self._line("int at = (tile / NEURONS * OUT * NEURONS + tile % NEURONS) * 2;")
-        self._line("backward(back + (tile * OUT + line) * STRIDE, 1, sums + at, NEURONS);")
+        blocks, words = -(-self.tile.tiles * self.sizes.out // self.tile.pixels), self.vectors
+        self._line(words.vectors("sums", f"{blocks} * PIXELS * NEURONS * 2"))
+        self._open(words.loop_while("line", "OUT", "tile_y + line < height"))
+        self._open(words.loop("tile", "TILES * NEURONS"))
+        self._line(words.index("at", "(tile / NEURONS * OUT * NEURONS + tile % NEURONS) * 2"))
+        self._line(words.call("backward", "back + (tile * OUT + line) * STRIDE", "1", "sums + at", "NEURONS"))
         self._close()
-        self._line("int y = tile_y + line;")
-        self._open(f"for (int block = 0; block < {blocks}; ++block) {{")
-        self._line("int x = tile_x + block * PIXELS;")
-        self._line("int last = min(tile_x + TILES * OUT, width);")
+        self._line(words.index("y", "tile_y + line"))
+        self._open(words.loop("block", blocks))
+        self._line(words.index("x", "tile_x + block * PIXELS"))
+        self._line(words.index("last", words.least("tile_x + TILES * OUT", "width")))
 
     def _rows_forward(self) -> None:
         """Write the gathering and transformation of rows."""
+        words = self.vectors
         self._comment("rows of the images around the tiles, transformed")
-        self._union("row", "INPUTS * POINTS * 2")
-        self._line("vector rows[INPUTS * POINTS * STRIDE];")
-        self._nest(["for (int i = 0; i < INPUTS * POINTS * 2; ++i) {"], ["row.all[i] = (vector)(0.0f);"])
-        self._open("for (int dy = 0; dy < POINTS; ++dy) {")
-        self._line("int top = tile_y + dy - WINDOW_CENTRE;")
-        self._line("int row_y = clamp(top, 0, height - 1);")
-        self._open("for (int tile = 0; tile < TILES; ++tile) {")
-        self._open("for (int dx = 0; dx < POINTS; ++dx) {")
-        self._line("int left = tile_x + tile * OUT + dx - WINDOW_CENTRE;")
-        self._line("int column = clamp(left, 0, width - 1);")
+        self._line(words.numbered("row", "INPUTS * POINTS * 2"))
+        self._line(words.vectors("rows", "INPUTS * POINTS * STRIDE"))
+        self._nest([words.loop("i", "INPUTS * POINTS * 2")], [f"row.all[i] = {words.zeros};"])
+        self._open(words.loop("dy", "POINTS"))
+        self._line(words.index("top", "tile_y + dy - WINDOW_CENTRE"))
+        self._line(words.index("row_y", f"{words.clamp}(top, 0, height - 1)"))
+        self._open(words.loop("tile", "TILES"))
+        self._open(words.loop("dx", "POINTS"))
+        self._line(words.index("left", "tile_x + tile * OUT + dx - WINDOW_CENTRE"))
+        self._line(words.index("column", f"{words.clamp}(left, 0, width - 1)"))
         if self.gather.window.border == "zero":
-            self._line("bool inside = row_y == top && column == left;")
+            self._line(words.flag("inside", "row_y == top && column == left"))
         first = 0
         for image in self.gather.images:
             for c in range(image.channels):
@@ -314,105 +316,126 @@ class FourierBody(TiledBody):
                 self._line(f"row.number[PLACE(tile * PAIRS + {pair}, dx * 2 + {part})] = {value};")
             first += image.channels
         self._close(2)
-        call = "forward(row.all + i * POINTS * 2, 1, rows + (i * POINTS + dy) * STRIDE, 1);"
-        self._nest(["for (int i = 0; i < INPUTS; ++i) {"], [call])
+        row, column = "row.all + i * POINTS * 2", "rows + (i * POINTS + dy) * STRIDE"
+        self._nest([words.loop("i", "INPUTS")], [words.call("forward", row, "1", column, "1")])
         self._close()
 
     def _columns(self) -> None:
         """Write the loop over columns of frequencies: forward, products with the weights, back."""
+        words = self.vectors
         self._comment("columns: transformed, multiplied with the weights' spectra, transformed back")
         slot = self.slots[str(readers_of_window(self.program)[0]["weight"])]
-        self._line("vector column[POINTS * 2];")
-        self._line("vector mirror[POINTS * 2];")
-        self._union("spectra", "INPUTS * POINTS * 4")
-        self._line("vector product[TILES * 2][POINTS * 2];")
-        self._line("vector back[TILES * NEURONS * OUT * STRIDE];")
-        self._line(self.vectors.walk("w", slot.offset))
+        self._line(words.vectors("column", "POINTS * 2"))
+        self._line(words.vectors("mirror", "POINTS * 2"))
+        self._line(words.numbered("spectra", "INPUTS * POINTS * 4"))
+        self._line(words.vectors("product", "TILES * 2", "POINTS * 2"))
+        self._line(words.vectors("back", "TILES * NEURONS * OUT * STRIDE"))
+        self._line(words.walk(words.spectrum, slot.offset))
         self._open("for (int k = 0; k <= POINTS / 2; ++k) {")
-        self._line("int opposite = (POINTS - k) % POINTS;")
-        self._open("for (int i = 0; i < INPUTS; ++i) {")
-        self._line("forward(rows + i * POINTS * STRIDE + 2 * k, POINTS + 1, column, 1);")
-        self._line("forward(rows + i * POINTS * STRIDE + 2 * opposite, POINTS + 1, mirror, 1);")
-        self._open("for (int f = 0; f < POINTS; ++f) {")
-        self._line("int g = (POINTS - f) % POINTS;")
-        self._line("vector a = column[2 * f], b = column[2 * f + 1];")
-        self._line("vector c = mirror[2 * g], d = mirror[2 * g + 1];")
-        self._line("vector *to = spectra.all + (i * POINTS + f) * 4;")
+        self._line(words.index("opposite", "(POINTS - k) % POINTS"))
+        self._open(words.loop("i", "INPUTS"))
+        for place, to in (("k", "column"), ("opposite", "mirror")):
+            row = f"rows + i * POINTS * STRIDE + 2 * {place}"
+            self._line(words.call("forward", row, "POINTS + 1", to, "1"))
+        self._open(words.loop("f", "POINTS"))
+        self._line(words.index("g", "(POINTS - f) % POINTS"))
+        self._line(f"{words.kind} a = column[2 * f], b = column[2 * f + 1];")
+        self._line(f"{words.kind} c = mirror[2 * g], d = mirror[2 * g + 1];")
+        self._line(words.pointer("to", "spectra.all + (i * POINTS + f) * 4"))
         for number, value in enumerate(("a + c", "b - d", "b + d", "c - a")):
             self._line(f"to[{number}] = {value};")
         self._close(2)
-        self._open("for (int q = 0; q < NEURONS; ++q) {")
+        self._open(words.loop("q", "NEURONS"))
         self._products()
-        self._open("for (int tile = 0; tile < TILES; ++tile) {")
-        self._line("vector *to = back + (tile * NEURONS + q) * OUT * STRIDE;")
-        self._line("backward(product[tile * 2], 1, to + 2 * k, POINTS + 1);")
-        self._open("if (opposite != k) {")
-        self._line("backward(product[tile * 2 + 1], 1, to + 2 * opposite, POINTS + 1);")
+        self._open(words.loop("tile", "TILES"))
+        self._line(words.pointer("to", "back + (tile * NEURONS + q) * OUT * STRIDE"))
+        self._line(words.call("backward", "product[tile * 2]", "1", "to + 2 * k", "POINTS + 1"))
+        self._open(words.when("opposite != k"))
+        self._line(words.call("backward", "product[tile * 2 + 1]", "1", "to + 2 * opposite", "POINTS + 1"))
         self._close(4)
-
-    def _union(self, name: str, vectors: str) -> None:
-        """Write the declaration of an array of vectors that can be read number by number."""
-        self._line(f"union {{ vector all[{vectors}]; float number[{vectors} * LANES]; }} {name};")
 
     def _products(self) -> None:
         """Write the products of a column of frequencies for all tiles."""
-        self._open("for (int f = 0; f < POINTS; ++f) {")
-        self._line("vector real[TILES][2];")
-        self._line("vector imaginary[TILES][2];")
-        self._line("#pragma unroll")
-        zeros = [f"{name}[t][{v}] = (vector)(0.0f);" for name in ("real", "imaginary") for v in range(2)]
-        self._nest(["for (int t = 0; t < TILES; ++t) {"], zeros)
-        self._line("for (int pair = 0; pair < PAIRS; ++pair) {")
-        self.depth += 1
+        words = self.vectors
+        self._open(words.loop("f", "POINTS"))
+        self._line(words.vectors("real", "TILES", "2"))
+        self._line(words.vectors("imaginary", "TILES", "2"))
+        zeros = [f"{name}[t][{v}] = {words.zeros};" for name in ("real", "imaginary") for v in range(2)]
+        self._tiles(zeros)
+        self._open(words.loop("pair", "PAIRS"))
         for j in range(8):
-            self._line(f"vector w{j} = w[{j}];")
-        self._line("w += 8;")
-        self._line("#pragma unroll")
-        self._open("for (int t = 0; t < TILES; ++t) {")
-        self._line("const float *x = spectra.number + SPECTRUM(t * PAIRS + pair, f);")
-        self._line("float a = x[0], b = x[LANES], c = x[2 * LANES], d = x[3 * LANES];")
+            for line in words.walked(f"w{j}", words.spectrum, j):
+                self._line(line)
+        self._line(words.advance(words.spectrum, 8))
+        lines = [
+            words.row("x", "spectra.number + SPECTRUM(t * PAIRS + pair, f)"),
+            "float a = x[0], b = x[LANES], c = x[2 * LANES], d = x[3 * LANES];",
+        ]
         for v in range(2):
             for part, terms in PRODUCTS.items():
                 for sign, weight, value in terms:
-                    self._line(f"{part}[t][{v}] {sign}= w{2 * weight + v} * {value};")
-        self._close(2)
-        self._line("int g = (POINTS - f) % POINTS;")
-        self._line("#pragma unroll")
-        lines = [
-            "product[t * 2][2 * f] = real[t][0] - imaginary[t][1];",
-            "product[t * 2][2 * f + 1] = imaginary[t][0] + real[t][1];",
-            "product[t * 2 + 1][2 * g] = real[t][0] + imaginary[t][1];",
-            "product[t * 2 + 1][2 * g + 1] = real[t][1] - imaginary[t][0];",
-        ]
-        self._nest(["for (int t = 0; t < TILES; ++t) {"], lines)
+                    lines.append(f"{part}[t][{v}] {sign}= w{2 * weight + v} * {value};")
+        self._tiles(lines)
         self._close()
+        self._line(words.index("g", "(POINTS - f) % POINTS"))
+        self._tiles(
+            [
+                "product[t * 2][2 * f] = real[t][0] - imaginary[t][1];",
+                "product[t * 2][2 * f + 1] = imaginary[t][0] + real[t][1];",
+                "product[t * 2 + 1][2 * g] = real[t][0] + imaginary[t][1];",
+                "product[t * 2 + 1][2 * g + 1] = real[t][1] - imaginary[t][0];",
+            ]
+        )
+        self._close()
+
+    def _tiles(self, lines: list[str]) -> None:
+        """Write a loop over tiles that keeps each tile's sums in registers of their own."""
+        self._line(self.vectors.unroll)
+        self._nest([self.vectors.loop("t", "TILES")], lines)
 
     def _affine(self, index: int, node: Node) -> None:
         """Write the copy of the sums of a block of pixels, or what the tiled schedule does."""
         if self.program.nodes[node.args[0]].op != "input":
             super()._affine(index, node)
             return
-        blocks, bias = self.tile.blocks(node.type.shape[0]), node.get("bias")
+        blocks, bias, words = self.tile.blocks(node.type.shape[0]), node.get("bias"), self.vectors
         self._declare(index, f"%{index}: the sums, and their bias")
         lines = []
         for j in range(blocks.total):
-            add = f" + {self.vectors.weights_at(self.slots[str(bias)].offset, str(j))}" if bias else ""
-            lines.append(f"v{index}.all[p * {blocks.total} + {j}] = from[p * NEURONS * 2 + {j}]{add};")
-        self._line("const vector *from = sums + block * PIXELS * NEURONS * 2;")
-        self._nest(["for (int p = 0; p < PIXELS; ++p) {"], lines)
+            add = f" + {words.weights_at(self.slots[str(bias)].offset, str(j))}" if bias else ""
+            total = f"from[p * NEURONS * 2 + {j}]{add}"
+            lines.append(words.hold(f"v{index}", f"p * {blocks.total} + {j}", total))
+        self._line(words.pointer("from", "sums + block * PIXELS * NEURONS * 2", written=False))
+        self._nest([words.loop("p", "PIXELS")], lines)
 
     def _outputs(self) -> None:
         """Write the output of each pixel of the block that lies in the tiles and in the image."""
         name, index = self.program.outputs[0]
-        channels = self.program.nodes[index].type.shape[0]
+        channels, words = self.program.nodes[index].type.shape[0], self.vectors
         held = self.tile.blocks(channels).total
         self._comment(f"output {name}")
-        line = self.dialect.store.format(
-            channels=channels, i="i", value=f"v{index}.number[p * {held} * LANES + i]"
-        )
-        loops = [
-            "for (int p = 0; p < PIXELS && x + p < last; ++p) {",
-            f"for (int i = 0; i < {channels}; ++i) {{",
-        ]
+        value = words.at(f"v{index}", f"p * {held} * LANES + i")
+        line = words.store.format(channels=channels, i="i", value=value)
+        loops = [words.loop_while("p", "PIXELS", "x + p < last"), words.loop("i", channels)]
         self._nest(loops, [line])
         self._close(2)
+
+
+IDEA = "products of spectra in place of sums over the window, in tiles of {points} x {points} pixels"
+"""What a schedule says of itself."""
+
+
+def fourier_ladder(of_lanes: Callable[[int], FourierDialect]) -> tuple[Fourier, ...]:
+    """Return a language's schedules, for processors with 16, 8 and 4 floats in a register.
+
+    Two tiles of 32 points side by side are as fast as four and take half the memory; one takes a third more
+    time: the weights pass by twice as often. The other layers have the register tiles of the tiled schedules.
+    """
+    idea = IDEA.format(points=32)
+    return (
+        Fourier("fft32", idea, of_lanes(16), 16, 14, 32, 2),
+        *(
+            Fourier(f"fft32x{lanes}", f"{idea}, by vectors of {lanes}", of_lanes(lanes), lanes, 6, 32, 2)
+            for lanes in (8, 4)
+        ),
+    )

@@ -103,9 +103,10 @@ int main(int count, char **arguments)
 denormal numbers, signs of zeros, comparison with NaN. Last it prints the floats in a vector register that
 kernels are compiled for, 1 where the compiler has no vectors."""
 
-SCHEDULES = {16: "tile16", 8: "tile8", 4: "tile4"}
-"""Schedule of a denoiser by the floats in a vector register: each took the least processor time of all four
-when GCC compiled them for such registers. Without vectors it is the plain one."""
+SCHEDULES = {16: "fft32", 8: "fft32x8", 4: "fft32x4"}
+"""Schedule of a denoiser by the floats in a vector register: each took the least time of all when GCC
+compiled them for such registers; the tiles of the same vectors take what it refuses. Without vectors it is
+the plain one."""
 
 
 def trial_bits() -> list[str]:
@@ -154,8 +155,8 @@ void wamnet_rows(float *const *arrays, const uint32_t *integers, int first, int 
 BODIES = {
     DENOISE: """\
     int width = (int)integers[0], height = (int)integers[1];
-    for (int y = first; y < end; ++y) {{
-        for (int x = 0; x < width; x += {pixels}) {{
+    for (int y = first; y < end; y += {rows}) {{
+        for (int x = 0; x < width; x += {columns}) {{
             {entry}({arrays}, width, height, x, y);
         }}
     }}""",
@@ -177,11 +178,12 @@ BODIES = {
 
 @dataclass(frozen=True)
 class _Prepared:
-    """The function of a loaded kernel, what the kernel takes, and its weights."""
+    """The function of a loaded kernel, what the kernel takes, its weights, and the rows of a call."""
 
     function: Any
     interface: Interface
     weights: NDArray[np.float32] | None
+    rows: int
 
 
 class CExecutor(Executor):
@@ -237,16 +239,18 @@ class CExecutor(Executor):
         self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
 
     def _prepare(self, kernel: Kernel) -> _Prepared:
-        pixels, weights = 1, None
+        columns, rows, weights = 1, 1, None
         if isinstance(kernel, Artifact):
             self._check_stack(kernel.manifest["private_bytes"])
-            pixels, weights = kernel.manifest["schedule"]["pixels"], np.ascontiguousarray(kernel.weights)
+            columns, rows = kernel.manifest["schedule"]["pixels"], kernel.manifest["schedule"].get("rows", 1)
+            weights = np.ascontiguousarray(kernel.weights)
         taken = kernel.interface
         arrays = ", ".join(f"arrays[{place}]" for place in range(len(taken.arrays)))
-        body = BODIES[taken.role].format(entry=kernel.entry_point, arrays=arrays, pixels=pixels)
+        names = {"entry": kernel.entry_point, "arrays": arrays, "columns": columns, "rows": rows}
+        body = BODIES[taken.role].format(**names)
         function = self._library(kernel, GLUE.format(header=_header(kernel), body=body))
         function.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int] * 2]
-        return _Prepared(function, taken, weights)
+        return _Prepared(function, taken, weights, rows)
 
     def _check_stack(self, used: int) -> None:
         """Refuse a kernel whose arrays take so many bytes a pixel."""
@@ -316,15 +320,16 @@ class CExecutor(Executor):
             prepared.function(pointers, given, 0, integers["height"])
         else:
             call = partial(prepared.function, pointers, given)
-            self._in_threads(integers[taken.rows], call)
+            self._in_threads(integers[taken.rows], prepared.rows, call)
 
     def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
         held: NDArray[np.float32] = memory.held
         return held.copy()
 
-    def _in_threads(self, height: int, rows: Callable[[int, int], None]) -> None:
-        """Call a function for blocks of rows [first, end), shared out to threads."""
-        firsts = range(0, height, max(1, height // (8 * (os.cpu_count() or 1))))
+    def _in_threads(self, height: int, whole: int, rows: Callable[[int, int], None]) -> None:
+        """Call a function for blocks of rows [first, end), multiples of `whole`, shared out to threads."""
+        count = max(1, height // (8 * (os.cpu_count() or 1)))
+        firsts = range(0, height, -(-count // whole) * whole)
         list(self._threads.map(rows, firsts, [*firsts[1:], height]))
 
     def close(self) -> None:

@@ -136,11 +136,14 @@ VULKAN_PLACES = _storage("glsl-vulkan", 16 * KILOBYTE, "maxUniformBufferRange")
 DISPATCH = "dispatch(ceil(width / {across}), ceil(height / {down}), 1)"
 """How kernels on buffers are started, in groups that compute so many pixels."""
 
-ON_PROCESSORS = ("tile16", "tile8", "tile4", "vector16")
+SPECTRA = ("fft32x8", "fft32", "fft32x4")
+"""Schedules of spectra. Most processors have AVX2's registers, or get two instructions for each vector."""
+
+ON_PROCESSORS = (*SPECTRA, "tile16", "tile8", "tile4", "vector16")
 """Schedules of OpenCL for processors."""
 
-IN_C = ("tile8", "tile16", "tile4", PLAIN)
-"""Schedules of C: most processors have AVX2's registers, or get two instructions for each of its vectors."""
+IN_C = ("tile8", "tile16", "tile4", *SPECTRA, PLAIN)
+"""Schedules of C. Those of spectra are the fastest, but only GCC and clang take them."""
 
 GL_CODE = """\
 GLuint program = link(fullscreen_triangle, compile(GL_FRAGMENT_SHADER, "denoise.frag"));
@@ -270,7 +273,8 @@ ROWS: tuple[Row, ...] = (
         '#include "denoise.h"\n'
         + _arguments_code("wamnet_image({arguments});")
         + "\n/* wamnet_pixel does {columns} pixels of a row, for your own loops. Use -O3 -march=native:\n"
-        "   tile8 wants registers of 8 floats (AVX2); for those of 4 (SSE, NEON) export --schedule tile4. */",
+        "   tile8 wants registers of 8 floats (AVX2); for those of 4 (SSE, NEON) export --schedule tile4.\n"
+        "   GCC and clang take the schedules of spectra too, which are faster where windows are large. */",
     ),
     Row(
         "cuda",

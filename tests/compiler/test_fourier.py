@@ -19,7 +19,7 @@ from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import emit_fourier, fourier
 from wamnet.compiler.schedules.emit_tiled import LARGEST_PRIVATE
-from wamnet.compiler.schedules.opencl_fourier import OPENCL_FOURIER, fourier_schedule
+from wamnet.compiler.schedules.opencl_fourier import OPENCL_FOURIER, OpenCLFourier
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.denoise import denoise_pixel
@@ -27,7 +27,7 @@ from wamnet.refimpl.network.denoise import denoise_pixel
 POWERS = (1, 2, 4, 8, 16, 32, 64)
 """Lengths of transforms."""
 
-(FFT32,) = OPENCL_FOURIER
+FFT32 = OPENCL_FOURIER[0]
 CONTRACT = sine_contract("ieee", "opencl")
 
 
@@ -297,7 +297,7 @@ def test_golden_spectra(golden) -> None:
     first, last = network.weights
     function = lambda x: np.sin(x @ first.T) @ last.T  # noqa: E731
     traced = trace(function, {"window": Type(shape=(12,))}, gather)
-    tiny = fourier_schedule("fft4", 4, 1, lanes=4, pixels=2)
+    tiny = emit_fourier.Fourier("fft4", emit_fourier.IDEA.format(points=4), OpenCLFourier(4), 4, 2, 4, 1)
     golden("fft4.denoise.cl", tiny.emit(analysed(traced), ["a tiny kernel"], True))
 
 

@@ -166,9 +166,9 @@ def test_building_again_costs_nothing(executor_named, case, monkeypatch):
 @pytest.mark.parametrize(
     ("native", "lanes", "schedule"),
     [
-        ("-mno-avx", 4, "tile4"),
-        ("-mavx2 -mno-avx512f", 8, "tile8"),
-        ("-mavx512f", 16, "tile16"),
+        ("-mno-avx", 4, "fft32x4"),
+        ("-mavx2 -mno-avx512f", 8, "fft32x8"),
+        ("-mavx512f", 16, "fft32"),
     ],
 )
 def test_the_schedule_follows_from_the_registers(

@@ -27,7 +27,10 @@ LADDER = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules[1:]]
 """All schedules except for the plain ones, with their targets."""
 
 
-LARGEST = {"inlined": (3, 10), "compute": (6, 10), "compute4": (6, 10), "fft32": (20, 32)}
+SPECTRA = ("fft32", "fft32x8", "fft32x4")
+"""The schedules of transforms."""
+
+LARGEST = {"inlined": (3, 10), "compute": (6, 10), "compute4": (6, 10), **dict.fromkeys(SPECTRA, (20, 32))}
 """Largest window and layer by schedule: Mesa compiles two thousand weights a second, and layers in straight
 code in a time that grows with the square; a tile's sums must fit the stack. The other schedules' layers may
 have more neurons than a block."""
@@ -177,30 +180,39 @@ FOURIER_FAULTS = {
     "middle": ("if (opposite != k)", "if (opposite > k + 2)"),
     "rows": ("(tile * OUT + line) * STRIDE", "(tile * OUT + (line ^ 1)) * STRIDE"),
     "block": ("int x = tile_x + block * PIXELS;", "int x = tile_x + (block ^ 1) * PIXELS;"),
+    "weights": {
+        "opencl": ("vector w3 = w[3];", "vector w3 = w[2];"),
+        "c": ("wamnet_load(&w3, spectrum + 3 * LANES);", "wamnet_load(&w3, spectrum + 2 * LANES);"),
+    },
 }
 """Pieces of a kernel of spectra, and what makes it wrong; none leaves an array."""
 
 
 @pytest.mark.parametrize("fault", FOURIER_FAULTS)
-def test_a_wrong_spectrum_is_caught(executor_named, kit, fault):
-    executor = executor_named("opencl")
+@pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft32"), ("c", "fft32x8")])
+def test_a_wrong_spectrum_is_caught(executor_named, kit, target, schedule, fault):
+    executor = executor_named(target)
     program = kit.denoiser(kit.network([150, 20, 3], (3.0, 3.0)), {"a": 6}, 5, "clamp")
     images = {"a": np.random.default_rng(8).uniform(-2, 2, (37, 75, 6)).astype(np.float32)}
-    artifact = compile_program(program, "opencl", "ieee", "fft32")
+    artifact = compile_program(program, target, "ieee", schedule)
     assert kit.excess(executor, program, images, artifact) <= 1
-    assert kit.excess(executor, program, images, kit.with_source(artifact, *FOURIER_FAULTS[fault])) > 1
+    found = FOURIER_FAULTS[fault]
+    old, new = found[target] if isinstance(found, dict) else found
+    assert kit.excess(executor, program, images, kit.with_source(artifact, old, new)) > 1
 
 
 @pytest.mark.parametrize("border", dataset.BORDERS)
 @pytest.mark.parametrize("shape", [(1, 1), (2, 64), (43, 22)])
-def test_pictures_smaller_than_a_tile_and_beyond_one(executor_named, kit, border, shape):
+@pytest.mark.parametrize("target", ["opencl", "c"])
+@pytest.mark.parametrize("schedule", SPECTRA)
+def test_pictures_smaller_than_a_tile_and_beyond_one(executor_named, kit, target, schedule, border, shape):
     """Tiles of 21 x 21 pixels, two side by side; 12 channels, of which one image has an odd number."""
     program = kit.denoiser(kit.network([1728, 32, 3], (3.0, 3.0)), {"a": 5, "b": 7}, 12, border)
     random = np.random.default_rng(2)
     images = {name: random.uniform(-2, 2, (*shape, n)).astype(np.float32) for name, n in (("a", 5), ("b", 7))}
-    artifact = compile_program(program, "opencl", "ieee", "fft32")
-    assert artifact.manifest["schedule"]["name"] == "fft32"
-    assert kit.excess(executor_named("opencl"), program, images, artifact) <= 1
+    artifact = compile_program(program, target, "ieee", schedule)
+    assert artifact.manifest["schedule"]["name"] == schedule
+    assert kit.excess(executor_named(target), program, images, artifact) <= 1
 
 
 INLINED_FAULTS = {

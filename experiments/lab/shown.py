@@ -116,6 +116,7 @@ AHEAD = (
         "camera moves all around the front, lamps of any hue: the network that ships",
     ),
     ("cornell", "best-16", "`cornell`, camera moves"),
+    ("glossy", "best-16", "`glossy`, camera moves"),
 )
 """Sets and rows that docs/results.md compares with Open Image Denoise, given the same clean features."""
 
@@ -578,6 +579,7 @@ TABLES: Mapping[str, TableOf] = {
     "presets": as_printed("presets", without=TIMES),
     "quality-ahead": differences,
     "quality-cornell": quality("cornell"),
+    "quality-glossy": quality("glossy"),
     "quality-lamps": quality("minicubes-page"),
     "quality-minicubes": quality("minicubes"),
     "quality-outside": quality("minicubes", "outside"),

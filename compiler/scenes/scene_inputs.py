@@ -8,8 +8,7 @@ traced. Here some of their numbers are inputs:
    scenes share one (a light's radiance is in two tables).
 2. [`SceneInputs.opened`] puts traced inputs into their places before a program is traced.
 3. [`SceneInputs.values`] reads the numbers of a scene: in float64 computed, rounded once, as constants are.
-4. [`bind`] makes programs of constants from programs with inputs: by definition they are those of the scene
-   that the numbers were read from.
+   By definition, programs with these numbers as constants are those of the scene.
 
 Scenes that differ in anything else (a primitive more, a box that is turned and one that is not) have
 different programs, and are refused.
@@ -19,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +28,6 @@ from ...refimpl.light import transport
 from ...refimpl.light.camera import camera_basis
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
-from ..core.ir import Builder, Node, Program, attributes
-from ..core.passes.rewrite import rewrite
-
-if TYPE_CHECKING:
-    from .lower_scene import PathPrograms
 
 PREFIX = "scene_"
 """How the inputs' names begin in programs: `scene_0`, `scene_1`, ..."""
@@ -97,24 +91,6 @@ def varying(scenes: Sequence[Scene], settings: Settings) -> SceneInputs:
             if not np.array_equal(column.view(np.uint32), np.full(len(rows), column[:1].view(np.uint32))):
                 columns.setdefault(column.tobytes(), []).append((path, index))
     return SceneInputs(settings, tuple(tuple(places) for places in columns.values()))
-
-
-def bind(programs: PathPrograms, values: Mapping[str, float]) -> PathPrograms:
-    """Return the programs with constants instead of the inputs that have values."""
-    parts: dict[str, Any] = {name: _bound(part, values) for name, part in programs.parts().items()}
-    return replace(programs, inputs=(), **parts)
-
-
-def _bound(program: Program, values: Mapping[str, float]) -> Program:
-    """Return one program with constants instead of inputs."""
-
-    def rule(builder: Builder, node: Node, args: tuple[int, ...]) -> int | None:
-        if node.op != "input" or node["name"] not in values:
-            return None
-        value = float(values[str(node["name"])])
-        return builder.add(Node("constant", (), node.type, attributes(value=value)))
-
-    return rewrite(program, rule)
 
 
 def _kept(table: NDArray[Any]) -> tuple[Any, ...]:

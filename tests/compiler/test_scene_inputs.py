@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wamnet.compiler.core.ir import Node, attributes
+from wamnet.compiler.core.passes.rewrite import rewrite
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.compiler.scenes.scene_inputs import SceneInputs, bind, lay_out, varying
+from wamnet.compiler.scenes.scene_inputs import SceneInputs, lay_out, varying
 from wamnet.kernels.devices.executor import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor
 from wamnet.refimpl.errors import CompileError
@@ -18,6 +20,19 @@ from wamnet.refimpl.light.transport import Settings
 
 SETTINGS = Settings(max_depth=1)
 PART = Part(10, 8, 0, 8, 0, 1, 7)
+
+
+def bind(programs, values):
+    """Return the programs with constants instead of the inputs that have values."""
+
+    def rule(builder, node, args):
+        if node.op != "input" or node["name"] not in values:
+            return None
+        return builder.add(Node("constant", (), node.type, attributes(value=float(values[node["name"]]))))
+
+    return replace(
+        programs, inputs=(), **{name: rewrite(part, rule) for name, part in programs.parts().items()}
+    )
 
 
 def at(name, time):

@@ -294,6 +294,14 @@ class Executor(ABC):
     def encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
         """Return the encoded images (H, W, C) of sums (planes, H, W) over so many samples, by name."""
         self._check_target(kernel)
+        wanted = len(kernel.planes)
+        if sums.dtype != np.float32 or sums.ndim != 3 or len(sums) != wanted or 0 in sums.shape:
+            raise InputError(
+                "sums for the encoding",
+                f"{sums.dtype} of shape {sums.shape}",
+                f"must be float32 of shape ({wanted}, height, width): planes {', '.join(kernel.planes)}",
+                "add up the planes that the encoding was compiled for",
+            )
         self.build(kernel)
         return self._encode(kernel, np.ascontiguousarray(sums), samples)
 

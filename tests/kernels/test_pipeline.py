@@ -12,7 +12,7 @@ from wamnet.compiler.core import ir
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
-from wamnet.compiler.scenes.encode_kernel import error_at
+from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
 from wamnet.compiler.variants import FULL, with_rank
 from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
 from wamnet.kernels.devices.executor import Part
@@ -319,6 +319,16 @@ def test_forgotten_kernels_are_built_again(executor, model_of):
 
 
 # ---- refusals ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "sums", [np.zeros((2, 4, 4), np.float32), np.zeros((3, 4, 4)), np.zeros((3, 0, 4), np.float32)]
+)
+def test_sums_that_an_encoding_does_not_read_are_refused(executor, sums):
+    """It would read beyond their end."""
+    kernel = compile_encode(("color",), SCALES, executor.name)
+    with pytest.raises(InputError, match=r"must be float32 of shape \(3, height, width\): planes color_r"):
+        executor.encode(kernel, sums, 1)
 
 
 def test_refusals(executor, model_of):

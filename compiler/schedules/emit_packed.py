@@ -108,7 +108,7 @@ class PackedBody(InlinedBody):
             self._line(f"vec4 v{index}[{count}];")
         operands = [self._at(index) for index in self._operands(group)]
         call = ", ".join([*operands, *(f"v{index}[i]" for index in results)])
-        self._nested(f"for (int i = 0; i < {count}; ++i) {{", [f"elementwise_{group[0]}({call});"])
+        self._nested(self.dialect.loop("i", count), [f"elementwise_{group[0]}({call});"])
 
     def _at(self, index: int) -> str:
         """Return the text of the vector number `i` of a value."""
@@ -132,7 +132,7 @@ class PackedBody(InlinedBody):
 
     def _neurons(self, count: int, line: str) -> None:
         """Write a statement for each vector `j` of neurons."""
-        self._nested(f"for (int j = 0; j < {count}; ++j) {{", [line])
+        self._nested(self.dialect.loop("j", count), [line])
 
     def _affine(self, index: int, node: Node) -> None:
         """Write v = W x + b."""
@@ -148,7 +148,7 @@ class PackedBody(InlinedBody):
             return
         whole, rest = divmod(matrix.shape[1], 4)
         if whole:
-            self._open(f"for (int i = 0; i < {whole}; ++i) {{")
+            self._open(self.dialect.loop("i", whole))
             self._products(f"v{index}", name, f"v{source}[i]", _letters(4), count, f"i * {4 * count}")
             self._close()
         if rest:
@@ -162,10 +162,10 @@ class PackedBody(InlinedBody):
         if split:
             self._line(f"vec4 {sums}[{count}];")
         for group in gather.groups:
-            self._open(f"for (int dy = 0; dy < {self.sides.rows}; ++dy) {{")
+            self._open(self.dialect.loop("dy", self.sides.rows))
             if split:
                 self._neurons(count, f"{sums}[j] = vec4(0.0f);")
-            self._open(f"for (int dx = 0; dx < {self.sides.columns}; ++dx) {{")
+            self._open(self.dialect.loop("dx", self.sides.columns))
             self._line(f"ivec2 at = ivec2(x + dx - {self.sides.column}, y + dy - {self.sides.row});")
             self._line(f"int tap = (dy * {self.sides.columns} + dx) * {gather.channels * count};")
             for image, first in group:

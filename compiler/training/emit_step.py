@@ -146,9 +146,9 @@ class _Step(Lines):
         """Copy the targets of the tile's examples."""
         (width,) = self.program.nodes[index].type.shape
         self._comment(f"%{index}: the targets")
-        self._open("for (int e = 0; e < filled; ++e) {")
+        self._open(self.dialect.loop("e", "filled"))
         self._line(f"__global float *out = (__global float *)(v{index} + e * {self._vectors(index)});")
-        self._open(f"for (int i = 0; i < {self._vectors(index) * LANES}; ++i) {{")
+        self._open(self.dialect.loop("i", self._vectors(index) * LANES))
         self._line(f"out[i] = i < {width} ? targets[target[e] * {width} + i] : 0.0f;")
         self._close(2)
 
@@ -174,7 +174,7 @@ class _Step(Lines):
                 self._line(f"float16 {sums};")
             self._line(f"__global const float16 *w = {array} + {slot.offset};")
             if windows:
-                self._open("for (int dy = 0; dy < WINDOW_SIZE; ++dy) {")
+                self._open(self.dialect.loop("dy", "WINDOW_SIZE"))
                 self._products(slot, block, examples, "WINDOW_RUN")
                 self._line(" ".join(f"x{n} += row[e + {n}];" for n in range(examples)))
                 self._close()
@@ -194,7 +194,7 @@ class _Step(Lines):
 
     def _products(self, slot: Slot, block: range, examples: int, count: str) -> None:
         """Write the loop over `count` inputs that follow one another, for all examples in registers."""
-        self._open(f"for (int i = 0; i < {count}; ++i) {{")
+        self._open(self.dialect.loop("i", count))
         self._line("const float16 " + ", ".join(f"w{j} = w[{j}]" for j in block) + ";")
         self._line(f"w += {slot.vectors};")
         for n in range(examples):
@@ -207,8 +207,8 @@ class _Step(Lines):
         vectors = self._vectors(group[0])
         span = f"%{group[0]}" if len(group) == 1 else f"%{group[0]} to %{group[-1]}"
         self._comment(f"{span}: elementwise on {self.program.nodes[group[0]].type.shape[0]} numbers")
-        self._open("for (int e = 0; e < filled; ++e) {")
-        self._open(f"for (int j = 0; j < {vectors}; ++j) {{")
+        self._open(self.dialect.loop("e", "filled"))
+        self._open(self.dialect.loop("j", vectors))
         for index in group:
             kind = self.dialect.variable(self.program.nodes[index].type.dtype)
             self._line(f"{kind} t{index} = {self._expression(index, number)};")
@@ -238,7 +238,7 @@ class _Step(Lines):
         windows = self.program.nodes[right].op == "input"
         run = self.form.run if windows else slot.rows
         if windows:
-            self._open("for (int dy = 0; dy < WINDOW_SIZE; ++dy) {")
+            self._open(self.dialect.loop("dy", "WINDOW_SIZE"))
             source, before = "values + corner[n] + dy * row[n] + k", "dy * WINDOW_RUN + k"
         else:
             source, before = f"(__global const float *)(v{right} + n * {vectors_for(slot.rows)}) + k", "k"
@@ -271,7 +271,7 @@ class _Step(Lines):
         names = [(i, j, f"s{i}_{j}", f"out[{i * slot.vectors + j}]") for i in range(inputs) for j in block]
         for _, _, name, place in names:
             self._line(f"float16 {name} = begins ? {zero} : {place};")
-        self._open("for (int n = 0; n < count; ++n) {")
+        self._open(self.dialect.loop("n", "count"))
         if source:
             self._line(f"__global const float *x = {source};")
         for j in block:

@@ -17,7 +17,7 @@ from ...compiler.compile import compile_program
 from ...compiler.plan import analysed
 from ...compiler.schedules.emit import kernel_gather
 from ...compiler.schedules.schedules import PLAIN
-from ...compiler.targets import TARGETS, schedule_named, target_named
+from ...compiler.targets import DENOISERS, TARGETS, schedule_named, target_named
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.network.denoise import Model
 from ..devices.images import Images
@@ -107,18 +107,18 @@ def of_machine(
 ) -> list[Contender]:
     """Return all contenders of a machine; those that cannot run here are in the list and say so later.
 
-    `forms` are trained; they run on all executors but the interpreter. `quick`: the kernels with the
+    `forms` are trained; they run on OpenCL and OpenGL, as the variants do. `quick`: the kernels with the
     schedules that suit their devices for pictures of this size, the first variant, and `QUICK`.
     """
     found = []
-    for name, target in TARGETS.items():
+    for name, target in DENOISERS.items():
         try:
             suits = tools.executor(name).schedule_for((size, size))
         except ExecutorUnavailable:
             suits = target.schedules[0].name
         schedules = [suits] if quick else [schedule.name for schedule in target.schedules]
         found += [kernel(name, schedule) for schedule in schedules]
-        if name != "numpy":
+        if name in TARGETS and name != "numpy":
             found += _varied(name, suits, [*(VARIANTS[:1] if quick else VARIANTS), *forms])
     return [*found, *(peer for peer in PEERS if not quick or peer.name in QUICK)]
 

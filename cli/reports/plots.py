@@ -229,7 +229,7 @@ def _place(
 
 # ---- speed against error -----------------------------------------------------------------------------------
 
-MARKERS = {"opencl": ("o", "OpenCL"), "opengl": ("^", "OpenGL"), "numpy": ("s", "NumPy")}
+MARKERS = {"opencl": ("o", "OpenCL"), "opengl": ("^", "OpenGL"), "c": ("v", "C"), "numpy": ("s", "NumPy")}
 """Marker and name of each executor."""
 
 PEER_MARKER, OTHER_MARKER = ("D", "library"), ("*", "Open Image Denoise")

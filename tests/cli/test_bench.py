@@ -14,6 +14,7 @@ from wamnet.cli.commands import bench, bench_forms, bench_frames, train
 from wamnet.cli.files import exr
 from wamnet.cli.reports import bench_report, plots, report
 from wamnet.compiler.model_file import load_model, save_checkpoint, save_model
+from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels.bench import contest, rates
 from wamnet.kernels.run.frame_plan import frame_draws
 from wamnet.refimpl.errors import InputError
@@ -407,6 +408,10 @@ def test_plots_of_any_data(theme) -> None:
     )
     assert set(bench_report.draw({**quality, "unseen_frames": 1}, theme)) == {"trade-off"}
     assert bench_report.draw(quality, theme) == {}
+
+
+def test_every_executor_of_the_benchmark_has_a_marker() -> None:
+    assert set(plots.MARKERS) == set(DENOISERS)
 
 
 TRADED = {"ms": {"median": 20.0, "min": 19.0, "max": 25.0, "spread": 0.3, "rounds": [20.0]}}

@@ -6,6 +6,8 @@ arrays of the work item's own.
 
 from __future__ import annotations
 
+from abc import abstractmethod
+
 from .tiled_dialect import TiledDialect
 
 PLACES = """\
@@ -55,6 +57,6 @@ class FourierDialect(TiledDialect):
         """Return the text of the smaller one of two integers."""
         return f"min({a}, {b})"
 
+    @abstractmethod
     def weights_at(self, offset: int, index: str = "") -> str:
         """Return the text of the weights from `offset` on as vectors, or of one of them."""
-        raise NotImplementedError

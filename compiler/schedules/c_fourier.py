@@ -1,7 +1,7 @@
 """C for the Fourier schedule [emit_fourier.py], with the vectors of GCC and clang.
 
-C99 has no vectors that operators add. Structures and loops in their place would take a function for each sum
-of a transform: other compilers are told to take the schedule of tiles, which has both [c_tiled.py].
+C99 has no vector type with operators, and structures would need a function call for every sum of a transform.
+Other compilers stop at an error that names the tiled schedules, which are plain C99 there [c_tiled.py].
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from ...compiler.artifact import Artifact
 from ...compiler.languages.interface import DENOISE, ENCODE, PATH, WEIGHTS, Interface
 from ...compiler.schedules.schedules import PLAIN
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
-from .executor import INDEX_LIMIT, Executor, Kernel, Memory, in_order
+from .executor import INDEX_LIMIT, Executor, Kernel, Memory, words
 from .images import widest
 
 COMPILER_VARIABLE = "CC"
@@ -302,29 +302,18 @@ class CExecutor(Executor):
                 "split the picture, or use executor numpy",
             )
 
-    def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
-        return Memory(array.shape, np.ascontiguousarray(array))
-
-    def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
-        return Memory(shape, np.empty(shape, np.float32))
-
     def _start(
         self, kernel: Kernel, prepared: _Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
         taken = prepared.interface
         held = {WEIGHTS: prepared.weights, **{name: memory.held for name, memory in arrays.items()}}
         pointers = (ctypes.c_void_p * len(taken.arrays))(*(held[a.name].ctypes.data for a in taken.arrays))
-        numbers = in_order(taken, integers)
-        given = (ctypes.c_uint32 * len(numbers))(*(int(n) % 2**32 for n in numbers))
+        numbers = words(taken, integers)
+        call = partial(prepared.function, pointers, numbers.ctypes.data)
         if taken.role == ENCODE:
-            prepared.function(pointers, given, 0, integers["height"])
+            call(0, integers["height"])
         else:
-            call = partial(prepared.function, pointers, given)
             self._in_threads(integers[taken.rows], prepared.rows, call)
-
-    def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
-        held: NDArray[np.float32] = memory.held
-        return held.copy()
 
     def _in_threads(self, height: int, whole: int, rows: Callable[[int, int], None]) -> None:
         """Call a function for blocks of rows [first, end), multiples of `whole`, shared out to threads."""

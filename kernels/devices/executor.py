@@ -5,9 +5,9 @@
     encode   sums -> encoding kernel -> images
     passes   all three, without leaving the device [passes.py]
 
-These are written once, here. A device provides six things: it makes a kernel ready [`Executor._prepare`],
-makes memory with a content or without one [`_store`, `_memory`], starts a kernel on it [`_start`],
-copies from it [`_fetch`], and gives it back [`_release`].
+These are written once, here. A device makes a kernel ready [`Executor._prepare`] and starts it [`_start`].
+One with memory of its own also makes memory, with a content or without one [`_store`, `_memory`], copies from
+it [`_fetch`], and gives it back [`_release`]; others work on the host's.
 
 `build` is idempotent and does all that can be done before the pixels are known, the driver's own delayed
 compilation included: it runs the kernel once on a few pixels. `run` copies the images to the device, runs,
@@ -91,6 +91,11 @@ def in_order(kernel: Interface, given: Mapping[str, int]) -> list[np.integer[Any
     return [(np.uint32 if name in UNSIGNED else np.int32)(given[name]) for name in kernel.integers]
 
 
+def words(kernel: Interface, given: Mapping[str, int]) -> NDArray[np.uint32]:
+    """Return a kernel's integers in its order, as words of 32 bits."""
+    return np.array([int(n) % 2**32 for n in in_order(kernel, given)], np.uint32)
+
+
 class Executor(ABC):
     """A device that is open; a context manager that closes it. `name` is its target, `device` a text.
 
@@ -124,13 +129,13 @@ class Executor(ABC):
     def _discard(self, prepared: Any) -> None:
         """Give a compiled kernel back."""
 
-    @abstractmethod
     def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
         """Return memory with an array's content; `name` is the kernel's name for it."""
+        return Memory(array.shape, np.ascontiguousarray(array))
 
-    @abstractmethod
     def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
         """Return memory that a kernel will write."""
+        return Memory(shape, np.empty(shape, np.float32))
 
     def _result(self, shape: tuple[int, ...]) -> Memory:
         """Return memory for an image that will be fetched once."""
@@ -146,9 +151,10 @@ class Executor(ABC):
     ) -> None:
         """Start a kernel: arrays by the names of its interface, and at least its integers, by name."""
 
-    @abstractmethod
     def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
         """Wait for what was started, and return the memory's content."""
+        held: NDArray[np.float32] = memory.held
+        return held.copy()
 
     def _release(self, memory: Memory) -> None:
         """Give memory back."""
@@ -205,7 +211,7 @@ class Executor(ABC):
             raise
 
     def _keep(self, kernel: Kernel) -> None:
-        """Put a kernel among those that are built as the newest; the oldest fall out."""
+        """Build a kernel unless it is built, make it the newest, and drop the oldest ones."""
         built = self._built.pop(kernel.digest, None)
         if built is None:
             with self._session():

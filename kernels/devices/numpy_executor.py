@@ -39,12 +39,6 @@ class NumpyExecutor(Executor):
     def _prepare(self, kernel: Kernel) -> Any:
         """Do nothing: programs are interpreted."""
 
-    def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
-        return Memory(array.shape, array)
-
-    def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
-        return Memory(shape, np.empty(shape, np.float32))
-
     def _start(
         self, kernel: Kernel, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
@@ -57,10 +51,6 @@ class NumpyExecutor(Executor):
         else:
             images = [held[f"{IMAGE}{image.name}"] for image in gather_of(kernel).images]
             _denoised(kernel, np.concatenate(images, axis=-1), held[RESULT])
-
-    def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
-        held: NDArray[np.float32] = memory.held
-        return held.copy()
 
 
 def _traced(kernel: PathArtifact, integers: Mapping[str, int]) -> NDArray[np.float32]:

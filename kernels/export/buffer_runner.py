@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.languages.glsl_buffers import GROUP
 from ...compiler.languages.interface import BLOCK, WEIGHTS, Interface
-from ..devices.executor import Executor, Kernel, Memory, in_order
+from ..devices.executor import Executor, Kernel, Memory, words
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,10 @@ class BufferRunner(Executor):
         waiting = None if group is None else (int(group[0]), int(group[1]))
         return Prepared(self._build(kernel, waiting), kernel.interface, weights, schedule)
 
+    def _discard(self, prepared: Prepared) -> None:
+        if prepared.weights is not None:
+            self._release(prepared.weights)
+
     def _start(
         self, kernel: Kernel, prepared: Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
@@ -79,7 +83,7 @@ class BufferRunner(Executor):
         numbers = taken.numbers()
         threads = (-(-integers["width"] // picked.get("pixels", 1)), integers[taken.rows])
         launch = Launch(
-            np.array([int(n) % 2**32 for n in in_order(taken, integers)], np.uint32),
+            words(taken, integers),
             {number: held[name].held for name, number in numbers.items()},
             threads,
             tuple(picked.get("group", GROUP)),

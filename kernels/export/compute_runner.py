@@ -49,8 +49,7 @@ class ComputeRunner(BufferRunner):
 
     def _discard(self, prepared: Prepared) -> None:
         prepared.built.release()
-        if prepared.weights is not None:
-            self._release(prepared.weights)
+        super()._discard(prepared)
 
     def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
         return Memory(array.shape, self._context.buffer(np.ascontiguousarray(array).tobytes()))

@@ -12,11 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...compiler.languages.interface import BLOCK, PATH, TABLE, UNSIGNED, Interface
 from ...refimpl.errors import ExecutorUnavailable
-from ..devices.executor import Kernel, Memory
+from ..devices.executor import Kernel
 from . import tools
 from .buffer_runner import BufferRunner, Launch
 
@@ -159,16 +158,6 @@ class HostRunner(BufferRunner):
         function = ctypes.CDLL(str(folder / "kernel.so")).wamnet_call
         function.restype = None
         return function, group is not None
-
-    def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
-        return Memory(array.shape, np.ascontiguousarray(array, np.float32))
-
-    def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
-        return Memory(shape, np.empty(shape, np.float32))
-
-    def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
-        held: NDArray[np.float32] = memory.held
-        return held.copy()
 
     def _launch(self, built: Any, launch: Launch) -> None:
         empty, count = np.zeros(4, np.float32), max(launch.buffers) + 1

@@ -18,6 +18,7 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import emit_fourier, fourier
+from wamnet.compiler.schedules.c_fourier import CFourier
 from wamnet.compiler.schedules.emit_tiled import LARGEST_PRIVATE
 from wamnet.compiler.schedules.opencl_fourier import OPENCL_FOURIER, OpenCLFourier
 from wamnet.refimpl.errors import CompileError
@@ -297,8 +298,10 @@ def test_golden_spectra(golden) -> None:
     first, last = network.weights
     function = lambda x: np.sin(x @ first.T) @ last.T  # noqa: E731
     traced = trace(function, {"window": Type(shape=(12,))}, gather)
-    tiny = emit_fourier.Fourier("fft4", emit_fourier.IDEA.format(points=4), OpenCLFourier(4), 4, 2, 4, 1)
-    golden("fft4.denoise.cl", tiny.emit(analysed(traced), ["a tiny kernel"], True))
+    idea = emit_fourier.IDEA.format(points=4)
+    for dialect in (OpenCLFourier(4), CFourier(4)):
+        tiny = emit_fourier.Fourier("fft4", idea, dialect, 4, 2, 4, 1)
+        golden(f"fft4.denoise{dialect.suffix}", tiny.emit(analysed(traced), ["a tiny kernel"], True))
 
 
 @given(channels=st.integers(1, 7), size=st.integers(1, 5), neurons=st.integers(1, 40))

@@ -1,0 +1,371 @@
+/*
+ * a tiny kernel
+ */
+#ifndef WAMNET_DENOISE_H
+#define WAMNET_DENOISE_H
+#include <float.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#if defined(__FAST_MATH__) || !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
+#error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
+#endif
+#if !defined(__GNUC__)
+#error this schedule needs the vectors of GCC or clang: export a schedule of tiles for other compilers
+#endif
+/* A product may be fused with a sum: the bound holds either way. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=fast")
+#else
+#pragma STDC FP_CONTRACT ON
+#endif
+#if defined(__clang__)
+#define WAMNET_UNROLL _Pragma("unroll")
+#elif defined(__GNUC__) && __GNUC__ >= 8
+/* GCC makes no vector instructions of floorf() while it has to raise the standard's exceptions, on which no
+   number depends. Nor may it carry inputs over from one step to the next, in the registers of the sums. */
+#pragma GCC optimize("no-trapping-math", "no-associative-math", "no-predictive-commoning")
+#define WAMNET_UNROLL _Pragma("GCC unroll 16")
+#define WAMNET_ROLLED _Pragma("GCC unroll 1")
+#endif
+#if !defined(WAMNET_UNROLL)
+#define WAMNET_UNROLL
+#endif
+#if !defined(WAMNET_ROLLED)
+#define WAMNET_ROLLED
+#endif
+typedef float wamnet_vector __attribute__((vector_size(4 * 4), aligned(4), may_alias));
+
+static inline void wamnet_clear(wamnet_vector *to)
+{
+    *to = (wamnet_vector){0};
+}
+
+static inline void wamnet_load(wamnet_vector *to, const float *from)
+{
+    *to = *(const wamnet_vector *)from;
+}
+
+static inline void wamnet_store(float *to, const wamnet_vector *from)
+{
+    *(wamnet_vector *)to = *from;
+}
+
+static inline void wamnet_add(wamnet_vector *sum, const wamnet_vector *term)
+{
+    *sum += *term;
+}
+
+static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *weight, float value)
+{
+    *sum += *weight * value;
+}
+
+#define WINDOW_SIZE 2
+#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
+#define POINTS 4 /* rows and columns of a tile with what its windows reach */
+#define OUT (POINTS - WINDOW_SIZE + 1) /* rows and columns of a tile's pixels */
+#define TILES 1 /* neighbours in a row that a work item computes */
+#define PIXELS 2 /* pixels of a row that go through the layers together */
+#define LANES 4 /* numbers in a vector */
+#define PAIRS 2 /* of channels */
+#define INPUTS 1 /* vectors that hold the pairs of all tiles */
+#define NEURONS 1 /* pairs of vectors of neurons */
+#define STRIDE (2 * (POINTS + 1)) /* vectors from row to row: not a multiple of 4096 bytes */
+static void wamnet_forward(const wamnet_vector *from, int step, wamnet_vector *to, int leap)
+{
+    wamnet_vector t0 = from[0 * step];
+    wamnet_vector t1 = from[0 * step + 1];
+    wamnet_vector t2 = from[2 * step];
+    wamnet_vector t3 = from[2 * step + 1];
+    wamnet_vector t4 = from[4 * step];
+    wamnet_vector t5 = from[4 * step + 1];
+    wamnet_vector t6 = from[6 * step];
+    wamnet_vector t7 = from[6 * step + 1];
+    wamnet_vector t8 = t0 + t4;
+    wamnet_vector t9 = t1 + t5;
+    wamnet_vector t10 = t0 - t4;
+    wamnet_vector t11 = t1 - t5;
+    wamnet_vector t12 = t2 + t6;
+    wamnet_vector t13 = t3 + t7;
+    wamnet_vector t14 = t2 - t6;
+    wamnet_vector t15 = t3 - t7;
+    wamnet_vector t16 = t8 + t12;
+    wamnet_vector t17 = t9 + t13;
+    wamnet_vector t18 = t8 - t12;
+    wamnet_vector t19 = t9 - t13;
+    wamnet_vector t20 = t10 - t15;
+    wamnet_vector t21 = t11 + t14;
+    wamnet_vector t22 = t10 + t15;
+    wamnet_vector t23 = t11 - t14;
+    to[0 * leap] = t16;
+    to[0 * leap + 1] = t17;
+    to[2 * leap] = t22;
+    to[2 * leap + 1] = t23;
+    to[4 * leap] = t18;
+    to[4 * leap + 1] = t19;
+    to[6 * leap] = t20;
+    to[6 * leap + 1] = t21;
+}
+static void wamnet_backward(const wamnet_vector *from, int step, wamnet_vector *to, int leap)
+{
+    wamnet_vector t0 = from[0 * step];
+    wamnet_vector t1 = from[0 * step + 1];
+    wamnet_vector t2 = from[2 * step];
+    wamnet_vector t3 = from[2 * step + 1];
+    wamnet_vector t4 = from[4 * step];
+    wamnet_vector t5 = from[4 * step + 1];
+    wamnet_vector t6 = from[6 * step];
+    wamnet_vector t7 = from[6 * step + 1];
+    wamnet_vector t8 = t0 + t4;
+    wamnet_vector t9 = t1 + t5;
+    wamnet_vector t10 = t0 - t4;
+    wamnet_vector t11 = t1 - t5;
+    wamnet_vector t12 = t2 + t6;
+    wamnet_vector t13 = t3 + t7;
+    wamnet_vector t14 = t2 - t6;
+    wamnet_vector t15 = t3 - t7;
+    wamnet_vector t16 = t8 + t12;
+    wamnet_vector t17 = t9 + t13;
+    wamnet_vector t18 = t8 - t12;
+    wamnet_vector t19 = t9 - t13;
+    wamnet_vector t20 = t10 - t15;
+    wamnet_vector t21 = t11 + t14;
+    to[0 * leap] = t16;
+    to[0 * leap + 1] = t17;
+    to[2 * leap] = t20;
+    to[2 * leap + 1] = t21;
+    to[4 * leap] = t18;
+    to[4 * leap + 1] = t19;
+}
+#define PLACE(lane, i) (((lane) / LANES * POINTS * 2 + (i)) * LANES + (lane) % LANES)
+#define SPECTRUM(lane, f) (((lane) / LANES * POINTS + (f)) * 4 * LANES + (lane) % LANES)
+/* TILES * OUT x OUT pixels from (tile_x, tile_y) on, or to the picture's end: their channels are written
+   to `result`, the whole picture's array. */
+static inline void wamnet_pixel(
+    const float *restrict image_i0,
+    const float *restrict image_i1,
+    const float *restrict weights,
+    float *restrict result,
+    int width,
+    int height,
+    int tile_x,
+    int tile_y);
+
+/* All pixels, one after another. */
+static inline void wamnet_image(
+    const float *restrict image_i0,
+    const float *restrict image_i1,
+    const float *restrict weights,
+    float *restrict result,
+    int width,
+    int height)
+{
+    for (int y = 0; y < height; y += OUT) {
+        for (int x = 0; x < width; x += TILES * OUT) {
+            wamnet_pixel(image_i0, image_i1, weights, result, width, height, x, y);
+        }
+    }
+}
+
+static inline int wamnet_clamp(int value, int low, int high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
+static inline void wamnet_pixel(
+    const float *restrict image_i0,
+    const float *restrict image_i1,
+    const float *restrict weights,
+    float *restrict result,
+    int width,
+    int height,
+    int tile_x,
+    int tile_y)
+{
+    (void)weights;
+
+    /* rows of the images around the tiles, transformed */
+    union { wamnet_vector all[INPUTS * POINTS * 2]; float number[INPUTS * POINTS * 2 * LANES]; } row;
+    wamnet_vector rows[INPUTS * POINTS * STRIDE];
+    for (int i = 0; i < INPUTS * POINTS * 2; ++i) {
+        row.all[i] = (wamnet_vector){0};
+    }
+    for (int dy = 0; dy < POINTS; ++dy) {
+        int top = tile_y + dy - WINDOW_CENTRE;
+        int row_y = wamnet_clamp(top, 0, height - 1);
+        for (int tile = 0; tile < TILES; ++tile) {
+            for (int dx = 0; dx < POINTS; ++dx) {
+                int left = tile_x + tile * OUT + dx - WINDOW_CENTRE;
+                int column = wamnet_clamp(left, 0, width - 1);
+                bool inside = row_y == top && column == left;
+                row.number[PLACE(tile * PAIRS + 0, dx * 2 + 0)] = inside ? image_i0[(row_y * width + column) * 2 + 0] : 0.0f;
+                row.number[PLACE(tile * PAIRS + 1, dx * 2 + 0)] = inside ? image_i0[(row_y * width + column) * 2 + 1] : 0.0f;
+                row.number[PLACE(tile * PAIRS + 0, dx * 2 + 1)] = inside ? image_i1[(row_y * width + column) * 1 + 0] : 0.0f;
+            }
+        }
+        for (int i = 0; i < INPUTS; ++i) {
+            wamnet_forward(row.all + i * POINTS * 2, 1, rows + (i * POINTS + dy) * STRIDE, 1);
+        }
+    }
+
+    /* columns: transformed, multiplied with the weights' spectra, transformed back */
+    wamnet_vector column[POINTS * 2];
+    wamnet_vector mirror[POINTS * 2];
+    union { wamnet_vector all[INPUTS * POINTS * 4]; float number[INPUTS * POINTS * 4 * LANES]; } spectra;
+    wamnet_vector product[TILES * 2][POINTS * 2];
+    wamnet_vector back[TILES * NEURONS * OUT * STRIDE];
+    const float *spectrum = weights;
+    for (int k = 0; k <= POINTS / 2; ++k) {
+        int opposite = (POINTS - k) % POINTS;
+        for (int i = 0; i < INPUTS; ++i) {
+            wamnet_forward(rows + i * POINTS * STRIDE + 2 * k, POINTS + 1, column, 1);
+            wamnet_forward(rows + i * POINTS * STRIDE + 2 * opposite, POINTS + 1, mirror, 1);
+            for (int f = 0; f < POINTS; ++f) {
+                int g = (POINTS - f) % POINTS;
+                wamnet_vector a = column[2 * f], b = column[2 * f + 1];
+                wamnet_vector c = mirror[2 * g], d = mirror[2 * g + 1];
+                wamnet_vector *to = spectra.all + (i * POINTS + f) * 4;
+                to[0] = a + c;
+                to[1] = b - d;
+                to[2] = b + d;
+                to[3] = c - a;
+            }
+        }
+        for (int q = 0; q < NEURONS; ++q) {
+            for (int f = 0; f < POINTS; ++f) {
+                wamnet_vector real[TILES][2];
+                wamnet_vector imaginary[TILES][2];
+                WAMNET_UNROLL
+                for (int t = 0; t < TILES; ++t) {
+                    real[t][0] = (wamnet_vector){0};
+                    real[t][1] = (wamnet_vector){0};
+                    imaginary[t][0] = (wamnet_vector){0};
+                    imaginary[t][1] = (wamnet_vector){0};
+                }
+                for (int pair = 0; pair < PAIRS; ++pair) {
+                    wamnet_vector w0;
+                    wamnet_load(&w0, spectrum + 0 * LANES);
+                    wamnet_vector w1;
+                    wamnet_load(&w1, spectrum + 1 * LANES);
+                    wamnet_vector w2;
+                    wamnet_load(&w2, spectrum + 2 * LANES);
+                    wamnet_vector w3;
+                    wamnet_load(&w3, spectrum + 3 * LANES);
+                    wamnet_vector w4;
+                    wamnet_load(&w4, spectrum + 4 * LANES);
+                    wamnet_vector w5;
+                    wamnet_load(&w5, spectrum + 5 * LANES);
+                    wamnet_vector w6;
+                    wamnet_load(&w6, spectrum + 6 * LANES);
+                    wamnet_vector w7;
+                    wamnet_load(&w7, spectrum + 7 * LANES);
+                    spectrum += 8 * LANES;
+                    WAMNET_UNROLL
+                    for (int t = 0; t < TILES; ++t) {
+                        const float *x = spectra.number + SPECTRUM(t * PAIRS + pair, f);
+                        float a = x[0], b = x[LANES], c = x[2 * LANES], d = x[3 * LANES];
+                        real[t][0] += w0 * a;
+                        real[t][0] -= w2 * b;
+                        real[t][0] += w4 * c;
+                        real[t][0] -= w6 * d;
+                        imaginary[t][0] += w2 * a;
+                        imaginary[t][0] += w0 * b;
+                        imaginary[t][0] += w6 * c;
+                        imaginary[t][0] += w4 * d;
+                        real[t][1] += w1 * a;
+                        real[t][1] -= w3 * b;
+                        real[t][1] += w5 * c;
+                        real[t][1] -= w7 * d;
+                        imaginary[t][1] += w3 * a;
+                        imaginary[t][1] += w1 * b;
+                        imaginary[t][1] += w7 * c;
+                        imaginary[t][1] += w5 * d;
+                    }
+                }
+                int g = (POINTS - f) % POINTS;
+                WAMNET_UNROLL
+                for (int t = 0; t < TILES; ++t) {
+                    product[t * 2][2 * f] = real[t][0] - imaginary[t][1];
+                    product[t * 2][2 * f + 1] = imaginary[t][0] + real[t][1];
+                    product[t * 2 + 1][2 * g] = real[t][0] + imaginary[t][1];
+                    product[t * 2 + 1][2 * g + 1] = real[t][1] - imaginary[t][0];
+                }
+            }
+            for (int tile = 0; tile < TILES; ++tile) {
+                wamnet_vector *to = back + (tile * NEURONS + q) * OUT * STRIDE;
+                wamnet_backward(product[tile * 2], 1, to + 2 * k, POINTS + 1);
+                if (opposite != k) {
+                    wamnet_backward(product[tile * 2 + 1], 1, to + 2 * opposite, POINTS + 1);
+                }
+            }
+        }
+    }
+
+    /* rows back, and the other layers */
+    wamnet_vector sums[2 * PIXELS * NEURONS * 2];
+    for (int line = 0; line < OUT && tile_y + line < height; ++line) {
+        for (int tile = 0; tile < TILES * NEURONS; ++tile) {
+            int at = (tile / NEURONS * OUT * NEURONS + tile % NEURONS) * 2;
+            wamnet_backward(back + (tile * OUT + line) * STRIDE, 1, sums + at, NEURONS);
+        }
+        int y = tile_y + line;
+        for (int block = 0; block < 2; ++block) {
+            int x = tile_x + block * PIXELS;
+            int last = tile_x + TILES * OUT < width ? tile_x + TILES * OUT : width;
+
+            /* %1: the sums, and their bias */
+            float v1[PIXELS * 2 * LANES];
+            const wamnet_vector *from = sums + block * PIXELS * NEURONS * 2;
+            for (int p = 0; p < PIXELS; ++p) {
+                *(wamnet_vector *)(v1 + (p * 2 + 0) * LANES) = from[p * NEURONS * 2 + 0];
+                *(wamnet_vector *)(v1 + (p * 2 + 1) * LANES) = from[p * NEURONS * 2 + 1];
+            }
+
+            /* %2: elementwise on 5 numbers */
+            float v2[PIXELS * 2 * LANES];
+            for (int i = 0; i < PIXELS * 2 * LANES; ++i) {
+                float t2 = sinf(v1[i]);
+                v2[i] = t2;
+            }
+
+            /* %3: affine map W1 from 5 to 2 */
+            float v3[PIXELS * 1 * LANES];
+            {
+                const float *w = weights + 768;
+                wamnet_vector sum[PIXELS][1];
+                WAMNET_UNROLL
+                for (int p = 0; p < PIXELS; ++p) {
+                    wamnet_clear(&sum[p][0]);
+                }
+                for (int i = 0; i < 5; ++i) {
+                    wamnet_vector w0;
+                    wamnet_load(&w0, w + 0 * LANES);
+                    w += 1 * LANES;
+                    WAMNET_UNROLL
+                    for (int p = 0; p < PIXELS; ++p) {
+                        float value = v2[p * 2 * LANES + i];
+                        wamnet_add_product(&sum[p][0], &w0, value);
+                    }
+                }
+                WAMNET_UNROLL
+                for (int p = 0; p < PIXELS; ++p) {
+                    *(wamnet_vector *)(v3 + (p * 1 + 0) * LANES) = sum[p][0];
+                }
+            }
+
+            /* output color */
+            for (int p = 0; p < PIXELS && x + p < last; ++p) {
+                for (int i = 0; i < 2; ++i) {
+                    result[(y * width + x + p) * 2 + i] = v3[p * 1 * LANES + i];
+                }
+            }
+        }
+    }
+}
+
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC pop_options
+#endif
+#endif

@@ -204,6 +204,19 @@ def test_a_forgotten_kernel_is_built_again(executor_named, case):
 # ---- refusals ----------------------------------------------------------------------------------------
 
 
+def test_spectra_say_to_other_compilers_what_they_take(executor_named, kit, tmp_path):
+    """FOU-9: without the vectors of GCC and clang the text is one error, before anything else goes wrong."""
+    executor_named("c")
+    program = kit.denoiser(kit.network([864, 8, 3], (3.0, 3.0)), {"a": 6}, 12, "clamp")
+    artifact = compile_program(program, "c", "ieee", "fft32x8")
+    assert artifact.manifest["schedule"]["name"] == "fft32x8"
+    (tmp_path / "denoise.c").write_text(artifact.source)
+    for options, status in (((), 0), (("-U__GNUC__",), 1)):
+        command = ["cc", "-E", *options, "-o", "out", "denoise.c"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert (done.returncode, "export a schedule of tiles" in done.stderr) == (status, bool(status))
+
+
 @pytest.mark.parametrize(
     ("command", "says"),
     [

@@ -6,13 +6,13 @@ import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
-import mitsuba_scene
 import numpy as np
 import pytest
 from statistical import SIGNIFICANCE, assert_all_plausible, sidak, welch_p
 
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.kernels.bench import peer_mitsuba
 from wamnet.kernels.devices.executor import Part
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light import scenes
@@ -23,6 +23,8 @@ from wamnet.refimpl.light.variation import Variation, varied
 WIDTH, HEIGHT, BLOCK = 16, 12, 4
 BATCHES = 32
 """Independent renders of each scene by each renderer: their spread is the error of their mean."""
+
+pytestmark = pytest.mark.apart
 
 SPP = 256
 """Samples per pixel of a batch."""
@@ -90,8 +92,8 @@ def theirs(mitsuba):
     def made(name):
         if name not in known:
             spp, scene = (SPP, SCENES[name]) if name in SCENES else (SPP_FROM_OUTSIDE, FROM_OUTSIDE[name])
-            loaded = mitsuba.load_dict(mitsuba_scene.export(mitsuba, scene, WIDTH, HEIGHT, Settings()))
-            images = [mitsuba_scene.render(mitsuba, loaded, spp, seed) for seed in range(BATCHES)]
+            loaded = mitsuba.load_dict(peer_mitsuba.export(mitsuba, scene, WIDTH, HEIGHT, Settings()))
+            images = [peer_mitsuba.render(mitsuba, loaded, spp, seed) for seed in range(BATCHES)]
             known[name] = numbers(np.stack(images).astype(np.float64))
         return known[name]
 
@@ -134,7 +136,7 @@ def test_small_faults_are_caught(executor_named, theirs, name, change, depth):
 
 def test_a_room_is_entered_by_cameras_outside_alone(mitsuba):
     kinds = {
-        name: mitsuba_scene.export(mitsuba, scene, 4, 4, Settings())["sensor"]["type"]
+        name: peer_mitsuba.export(mitsuba, scene, 4, 4, Settings())["sensor"]["type"]
         for name, scene in {**SCENES, **FROM_OUTSIDE}.items()
     }
     assert {name for name, kind in kinds.items() if kind == "wamnet_inside"} == set(FROM_OUTSIDE)
@@ -142,8 +144,8 @@ def test_a_room_is_entered_by_cameras_outside_alone(mitsuba):
 
 def test_background_alone(mitsuba):
     """Constant radiance: 4 u of float32 for a product and a mean."""
-    loaded = mitsuba.load_dict(mitsuba_scene.export(mitsuba, scenes.empty(), 4, 3, Settings(max_depth=1)))
-    assert np.abs(mitsuba_scene.render(mitsuba, loaded, 2, 0) - 0.25).max() <= 4 * 2.0**-24
+    loaded = mitsuba.load_dict(peer_mitsuba.export(mitsuba, scenes.empty(), 4, 3, Settings(max_depth=1)))
+    assert np.abs(peer_mitsuba.render(mitsuba, loaded, 2, 0) - 0.25).max() <= 4 * 2.0**-24
 
 
 # ---- refusals --------------------------------------------------------------------------------------------
@@ -193,13 +195,13 @@ ROOM = scenes.furnace()
 )
 def test_what_mitsuba_would_show_differently_is_refused(scene, settings, message):
     with pytest.raises(InputError, match=message):
-        mitsuba_scene.check(scene, settings)
+        peer_mitsuba.check(scene, settings)
 
 
 def test_missing_mitsuba_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "mitsuba", None)
     with pytest.raises(ExecutorUnavailable, match=r"package is not installed; pip install 'wamnet\[bench\]'"):
-        mitsuba_scene.open_mitsuba("scalar_rgb")
+        peer_mitsuba.open_mitsuba("scalar_rgb")
 
 
 @pytest.mark.parametrize(("version", "found"), [(15, "LLVM 15"), (-1, "none")])
@@ -208,4 +210,4 @@ def test_missing_or_old_llvm_is_told(monkeypatch, version, found):
     monkeypatch.setitem(sys.modules, "mitsuba", SimpleNamespace())
     monkeypatch.setitem(sys.modules, "drjit", library)
     with pytest.raises(ExecutorUnavailable, match=f"libLLVM 16 or newer and finds {found}; apt-get install"):
-        mitsuba_scene.open_mitsuba("llvm_ad_rgb")
+        peer_mitsuba.open_mitsuba("llvm_ad_rgb")

@@ -1,4 +1,4 @@
-"""A scene for Mitsuba 3, the peer of the benchmarks: the same picture from another renderer.
+"""Mitsuba 3 as a peer of the renderer: the same picture from another renderer.
 
 1. [`open_mitsuba`] imports Mitsuba in one of its variants and adds the sensor of step 4.
 2. [`export`] turns a scene into Mitsuba's dictionary, shape by shape; [`check`] refuses what has no
@@ -23,10 +23,10 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.refimpl.errors import ExecutorUnavailable, InputError
-from wamnet.refimpl.light.scene import Box, Light, Quad, Room, Scene, Sphere
-from wamnet.refimpl.light.shapes.quad import light_radiance
-from wamnet.refimpl.light.transport import Settings
+from ...refimpl.errors import ExecutorUnavailable, InputError
+from ...refimpl.light.scene import Box, Light, Quad, Room, Scene, Sphere
+from ...refimpl.light.shapes.quad import light_radiance
+from ...refimpl.light.transport import Settings
 
 LEAST_LLVM = 16
 """First version of LLVM that compiles Dr.Jit's code for AVX-512; earlier ones end the process."""

@@ -1,6 +1,7 @@
 """The command `wamnet`: its commands, and the one place where errors become a line and an exit status.
 
-1. Commands are registered with typer in the order of a first session [`app`].
+1. Commands are registered with typer in the order of a first session [`app`]; `bench`, which has commands
+   of its own [common/default_command.py], comes last.
 2. [`main`] runs one of them. Whatever a user can cause ends in one line on standard error and status 2;
    Ctrl-C ends in status 130 and SIGTERM in 143; anything else is a bug and shows its traceback.
 
@@ -38,6 +39,10 @@ from .commands import (
 )
 from .commands.compile import EXAMPLES as COMPILE_EXAMPLES
 from .commands.compile import compile_model
+from .commands.measure import exports, pipeline, primitives
+from .commands.measure import render as measure_render
+from .commands.measure import train as measure_train
+from .common.default_command import CommandWithOthers
 from .common.terminal import tell
 
 STATUS_BAD_INPUT = 2
@@ -61,11 +66,22 @@ app = typer.Typer(
 )
 
 
-def _register(command: Callable[..., None], examples: str, name: str | None = None) -> None:
-    """Add a command whose help is its docstring, each paragraph on one line, as typer wants it."""
+benches = typer.Typer(
+    cls=CommandWithOthers, invoke_without_command=True, subcommand_metavar="| COMMAND [OPTIONS]"
+)
+
+
+def _help(command: Callable[..., None]) -> str:
+    """Return a command's docstring, each paragraph on one line, as typer wants it."""
     paragraphs = (command.__doc__ or "").split("\n\n")
-    text = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
-    app.command(name, help=text, epilog=examples)(command)
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
+
+
+def _register(
+    command: Callable[..., None], examples: str, name: str | None = None, to: typer.Typer = app
+) -> None:
+    """Add a command, whose help is its docstring."""
+    to.command(name, help=_help(command), epilog=examples)(command)
 
 
 _register(render.render, render.RENDER_EXAMPLES)
@@ -82,10 +98,16 @@ _register(triage.triage, triage.EXAMPLES)
 _register(animate.animate, animate.EXAMPLES)
 _register(view.view, view.EXAMPLES)
 _register(tune.tune, tune.EXAMPLES)
-_register(bench.bench, bench.EXAMPLES)
 _register(denoise.executors, denoise.EXECUTORS_EXAMPLES)
 _register(conformance.conformance, conformance.EXAMPLES)
 _register(demo.demo, demo.EXAMPLES)
+_register(measure_render.render, measure_render.EXAMPLES, to=benches)
+_register(measure_train.train, measure_train.EXAMPLES, to=benches)
+_register(pipeline.pipeline, pipeline.EXAMPLES, to=benches)
+_register(exports.exports, exports.EXAMPLES, to=benches)
+_register(primitives.primitives, primitives.EXAMPLES, to=benches)
+benches.callback(help=_help(bench.bench), epilog=bench.EXAMPLES)(bench.bench)
+app.add_typer(benches, name="bench")
 
 
 @app.callback(invoke_without_command=True)

@@ -50,8 +50,8 @@ def planned(model: Model, names: Sequence[str], steps: int) -> dict[str, Variant
     found = {}
     for name in names_for(model, names):
         varied = variants.vary(variants.parse(name), model)
-        text = f"{'the whole network' if varied.is_whole else name}, trained for {steps} steps more"
-        shown = FURTHER if varied.is_whole else name
+        text = f"{'the whole network' if varied.is_full else name}, trained for {steps} steps more"
+        shown = FURTHER if varied.is_full else name
         found[name] = Variant(shown, text, varied.rank, model=varied.model, steps=steps)
     return found
 

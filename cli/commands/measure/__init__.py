@@ -1,0 +1,1 @@
+"""The commands below `wamnet bench`: each measures one part, and prints a Markdown table of it."""

@@ -1,0 +1,98 @@
+"""`wamnet bench exports`: all targets of `wamnet export`, compiled, run and checked against their bound."""
+
+from __future__ import annotations
+
+from inspect import signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ....refimpl.errors import ExecutorUnavailable, InputError
+from ...common.inputs import load_model
+from ...common.options import SCENES
+from .shared import head, names_of, row
+
+if TYPE_CHECKING:
+    from ....kernels.export.check import Verdict
+    from ....refimpl.light.scene import Scene
+    from ....refimpl.network.denoise import Model
+
+EXAMPLES = """Examples:
+
+wamnet bench exports
+
+wamnet bench exports --model model.safetensors --scene minicubes --targets wgsl,c --places"""
+"""Shown below the help of `wamnet bench exports`."""
+
+STATUS_WRONG = 1
+"""Exit status when something that was tried is wrong."""
+
+TIME_S = 1.0
+"""Time of a scene that moves."""
+
+
+def exports(
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MODEL",
+            help="Trained model (.safetensors), or the name of one that ships with wamnet.",
+            show_default="a small network with random weights",
+        ),
+    ] = None,
+    scene: Annotated[str, typer.Option(metavar="NAME", help=f"Canonical scene ({SCENES}).")] = "minicubes",
+    targets: Annotated[
+        str | None,
+        typer.Option(metavar="NAME,...", help="Targets of wamnet export.", show_default="all"),
+    ] = None,
+    places: Annotated[
+        bool, typer.Option("--places", help="Every place of the weights, without the scene's paths.")
+    ] = False,
+) -> None:
+    """Export for every target, compile, run, and check against the bound; print a table of the verdicts.
+
+    Each target is compiled by its own tools and run by what is nearest to it on this machine, and its picture
+    is compared with the reference's. A missing tool is a cell of the table. Status 1 says that something that
+    was tried is wrong.
+    """
+    from ....kernels.export.check import HEAD
+    from ....kernels.export.shelf import random_model
+    from ....kernels.export.targets import NAMES
+    from ....refimpl.light.scenes import CANONICAL, canonical
+
+    # Of a scene that moves, a time when its parts are turned.
+    moves = "time" in signature(CANONICAL[scene]).parameters if scene in CANONICAL else False
+    shown = canonical(scene, **({"time": TIME_S} if moves else {}))
+    chosen = tuple(NAMES) if targets is None else names_of("--targets", targets, NAMES)
+    network = load_model(model) if model else random_model()
+    head(*HEAD)
+    wrong = 0
+    for target in chosen:
+        for place in places_of(target, places):
+            verdict = judged(network, target, place, None if places else shown)
+            row(*verdict.cells(), after=f" {verdict.wrong}" if verdict.wrong else "")
+            wrong += not verdict.holds
+    if wrong:
+        raise typer.Exit(STATUS_WRONG)
+
+
+def places_of(target: str, every: bool) -> list[str]:
+    """Return the requested places of the weights; nothing is the usual one."""
+    from ....kernels.export.targets import ONNX, TARGETS
+
+    return [*TARGETS[target].places] if every and target != ONNX else [""]
+
+
+def judged(model: Model, target: str, place: str, scene: Scene | None) -> Verdict:
+    """Return the verdict of one export; a limit or a missing translator is one too."""
+    from ....kernels.export.check import Verdict, check
+    from ....kernels.export.package import Request, export
+    from ....kernels.export.targets import ONNX
+
+    try:
+        return check(export(Request(model, target, None if target == ONNX else scene, weights=place)))
+    except ExecutorUnavailable as error:
+        return Verdict(target, place, 0, f"missing: {error}", "-")
+    except InputError as error:
+        return Verdict(target, place, 0, f"beyond a limit: {error.what} is {error.value}", "-")

@@ -1,0 +1,77 @@
+"""`wamnet bench primitives`: scenes of many primitives as statements, and as tables with a loop."""
+
+from __future__ import annotations
+
+import statistics
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ...common.terminal import say
+from .shared import Repeats, Square, check_count, counts_of, extent, facts, head, names_of, numpy_version, row
+
+if TYPE_CHECKING:
+    from ....kernels.bench.measure_primitives import Kernel
+
+EXAMPLES = """Examples:
+
+wamnet bench primitives
+
+wamnet bench primitives --executors opengl --kinds turned --counts 30,100"""
+"""Shown below the help of `wamnet bench primitives`."""
+
+HEADS = ("by", "scene", "form", "lines", "kB", "trace, s", "build, s", "Msamples/s", "range")
+"""Heads of the table."""
+
+
+def primitives(
+    executors: Annotated[
+        str, typer.Option(metavar="NAME,...", help="What runs the kernels: opencl, opengl.")
+    ] = "opencl,opengl",
+    kinds: Annotated[
+        str, typer.Option(metavar="NAME,...", help="Primitives: shared, turned, spheres, quads, mixture.")
+    ] = "mixture",
+    counts: Annotated[str, typer.Option(metavar="N,...", help="How many there are.")] = "10,30,100,300",
+    size: Square = 128,
+    spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 4,
+    repeats: Repeats = 5,
+) -> None:
+    """Measure scenes of many primitives in both forms: statements for each, and tables with a loop.
+
+    The table has lines and size of the source, seconds to trace and emit it, seconds until the driver has
+    built it and followed a first row of paths (its caches on disk are not used), and million samples a
+    second: median and range of turns that both forms take. A star marks the form that a scene of so many
+    primitives has.
+    """
+    from ....kernels import open_executor
+    from ....kernels.bench import measure_primitives as measuring
+    from ....kernels.bench.workload import check_size
+    from ....kernels.devices.executor import Part
+    from ....kernels.measure import environment
+
+    given = names_of("--executors", executors, measuring.EXECUTORS)
+    scenes = names_of("--kinds", kinds, measuring.KINDS)
+    numbers = counts_of("--counts", counts, "30,100")
+    check_size(size)
+    check_count("--spp", spp, 4)
+    check_count("--repeats", repeats, 5)
+    say(", ".join(facts(numpy_version(), f"{size}x{size}, {spp} spp")))
+    say("")
+    head(*HEADS)
+    part = Part(size, size, 0, size, 0, spp, 0)
+    with environment(measuring.NO_CACHES):
+        for name in given:
+            with open_executor(name) as executor:
+                for scene in (measuring.crowd(kind, count) for kind in scenes for count in numbers):
+                    for kernel in measuring.compare(executor, scene, part, repeats):
+                        _show(name, kernel)
+
+
+def _show(by: str, kernel: Kernel) -> None:
+    """Print the row of a kernel."""
+    source = kernel.artifact.source
+    row(
+        *(by, kernel.scene, f"{kernel.form}{'*' if kernel.chosen else ''}", f"{source.count(chr(10)):,}"),
+        *(f"{len(source.encode()) / 1000:,.0f}", f"{kernel.trace_s:.2f}", f"{kernel.build_s:.2f}"),
+        *(f"{statistics.median(kernel.rates):.2f}", extent(kernel.rates, 2)),
+    )

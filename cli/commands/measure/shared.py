@@ -1,0 +1,76 @@
+"""What the measuring commands share: their lists with commas, their refusals, and the form of their tables.
+
+Rows are Markdown, which a record is made of (experiments/publish.py); progress is on standard error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from importlib import metadata
+from typing import Annotated
+
+import typer
+
+from ....refimpl.errors import InputError
+from ...common.options import parse_names
+from ...common.terminal import say
+from ...reports import machine
+
+MOST = 1 << 20
+"""Largest count that an option takes: a typing error is refused before anything is measured."""
+
+Repeats = Annotated[int, typer.Option(help="Rounds; in each, all take turns.")]
+Square = Annotated[int, typer.Option(help="Width and height in pixels.")]
+
+
+def names_of(option: str, text: str, known: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of a text like `opencl,opengl`, or refuse one that is not known."""
+    names, known = parse_names(text), tuple(known)
+    if not names or not set(names) <= set(known):
+        rule = f"it must be one or more of {', '.join(known)}, with commas"
+        raise InputError(option, text, rule, f"for example {option} {','.join(known[:2])}")
+    return names
+
+
+def counts_of(option: str, text: str, example: str) -> tuple[int, ...]:
+    """Return the integers of a text like `256,512`, or refuse it."""
+    try:
+        counts = tuple(int(part) for part in parse_names(text))
+    except ValueError:
+        counts = ()
+    if not counts or not all(1 <= count <= MOST for count in counts):
+        rule = f"it must be integers from 1 to {MOST}, with commas"
+        raise InputError(option, text, rule, f"for example {option} {example}")
+    return counts
+
+
+def check_count(option: str, value: int, example: int) -> None:
+    """Refuse a number of things that makes none."""
+    if not 1 <= value <= MOST:
+        raise InputError(option, value, f"it must be from 1 to {MOST}", f"for example {option} {example}")
+
+
+def facts(*others: str) -> list[str]:
+    """Return what is said of the machine, then what else was given."""
+    return [*(f"{name} {value}" for name, value in machine.describe().items()), *others]
+
+
+def numpy_version() -> str:
+    """Return NumPy's version, with its name."""
+    return f"NumPy {metadata.version('numpy')}"
+
+
+def head(*cells: str) -> None:
+    """Print the head of a table."""
+    row(*cells)
+    say(f"|{'---|' * len(cells)}")
+
+
+def row(*cells: str, after: str = "") -> None:
+    """Print a row of a table, and what is to be said behind it."""
+    say(f"| {' | '.join(cells)} |{after}")
+
+
+def extent(values: Sequence[float], digits: int) -> str:
+    """Return the least and the greatest value, as a table shows them."""
+    return f"{min(values):.{digits}f} - {max(values):.{digits}f}"

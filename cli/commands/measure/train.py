@@ -1,0 +1,91 @@
+"""`wamnet bench train`: milliseconds of a training step, by each trainer."""
+
+from __future__ import annotations
+
+import statistics
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ....refimpl.errors import InputError
+from ...common.terminal import progress, say
+from ...reports import machine
+from .shared import Repeats, Square, check_count, extent, facts, head, names_of, row
+
+if TYPE_CHECKING:
+    from ....refimpl.network.train import Recipe
+
+EXAMPLES = """Examples:
+
+wamnet bench train --presets paper,short --repeats 5
+
+wamnet bench train --trainers numpy,opencl,torch --presets paper"""
+"""Shown below the help of `wamnet bench train`."""
+
+LONGEST_S = 600.0
+"""More seconds of one measurement than anybody waits for."""
+
+
+def train(
+    presets: Annotated[
+        str, typer.Option(metavar="NAME,...", help="Training protocols: best, paper, short.")
+    ] = "paper,short",
+    trainers: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,...",
+            help="What trains: numpy, opencl, torch.",
+            show_default="all that are installed",
+        ),
+    ] = None,
+    size: Square = 256,
+    frames: Annotated[int, typer.Option(help="Frames of noise to learn from.")] = 4,
+    seconds: Annotated[float, typer.Option(metavar="S", help="Of one measurement, about.")] = 1.0,
+    repeats: Repeats = 5,
+) -> None:
+    r"""Measure milliseconds of a training step: the reference, the compiled trainer, PyTorch.
+
+    They take turns with a product of two large matrices, on frames of noise, drawing of minibatches included;
+    compiling does not count. The table has the median and the range, GFLOP/s of products of matrices, their
+    share of the product's, and what all steps would take. [bold]pip install 'wamnet\[peers]'[/] brings
+    PyTorch.
+    """
+    from ....kernels.bench import measure_train as measuring
+    from ....kernels.bench.workload import check_size
+    from ....refimpl.network.train import PRESETS
+
+    names = names_of("--presets", presets, PRESETS)
+    given = measuring.trainers() if trainers is None else names_of("--trainers", trainers, measuring.TRAINERS)
+    check_size(size)
+    check_count("--frames", frames, 4)
+    check_count("--repeats", repeats, 5)
+    if not 0.0 < seconds <= LONGEST_S:
+        rule = f"it must be above 0 and at most {LONGEST_S:g}"
+        raise InputError("--seconds", seconds, rule, "for example --seconds 1")
+    packages = [f"{name} {value}" for name, value in machine.versions().items()]
+    say(", ".join(facts(*packages, f"{frames} frames of {size}x{size}")))
+    pairs = measuring.noise(frames, size)
+    for preset in names:
+        recipe = PRESETS[preset]
+        with progress(f"measuring {preset}", len(given) * repeats) as advance:
+            times, sgemm = measuring.measured(recipe, pairs, given, seconds, repeats, partial(advance, 1.0))
+        _show(preset, recipe, times, sgemm)
+
+
+def _show(preset: str, recipe: Recipe, seconds: dict[str, list[float]], sgemm: float) -> None:
+    """Print one preset's table."""
+    from ....kernels.bench.measure_train import operations
+
+    work = operations(recipe)
+    say("")
+    say(f"preset `{preset}`: {work / 1e9:.3f} GFLOP a step; sgemm {sgemm / 1e9:.0f} GFLOP/s")
+    say("")
+    head("by", "ms a step", "range", "GFLOP/s", "of sgemm", f"{recipe.steps:,} steps")
+    for name, times in seconds.items():
+        median = statistics.median(times)
+        row(
+            *(name, f"{1e3 * median:.2f}", extent([1e3 * time for time in times], 2)),
+            *(f"{work / median / 1e9:.0f}", f"{work / median / sgemm:.0%}"),
+            f"{median * recipe.steps:,.0f} s",
+        )

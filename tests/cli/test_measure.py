@@ -1,0 +1,145 @@
+"""The commands below `wamnet bench`: their tables, refusals and helps. What they measure here is nothing."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from wamnet.cli.commands import measure
+from wamnet.kernels import render_on
+from wamnet.kernels.export.check import Verdict
+from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.scenes import canonical
+
+COMMANDS = ("render", "train", "pipeline", "exports", "primitives")
+
+CALLS = {
+    "render": ("--scenes", "empty", "--by", "opencl", "--size", 8, "--spp", 1, "--repeats", 1),
+    "train": ("--presets", "short", "--trainers", "opencl", "--size", 32, "--seconds", 0.01, "--repeats", 2),
+    "pipeline": ("--executors", "opencl", "--sizes", "8", "--hidden", "4", "--window", 3, "--repeats", 1),
+    "exports": ("--targets", "opencl"),
+    "primitives": ("--executors", "opencl", "--counts", "10", "--size", 8, "--spp", 1, "--repeats", 1),
+}
+"""Arguments with which each takes seconds."""
+
+
+@pytest.fixture(scope="module")
+def opencl(executor_named):
+    """Give OpenCL after a first kernel, which opens pyopencl's cache in the home folder of the tests."""
+    executor = executor_named("opencl")
+    render_on(executor, canonical("empty"), Job(2, 2))
+    return executor
+
+
+@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.usefixtures("opencl")
+def test_a_command_prints_its_table(wamnet, name) -> None:
+    outcome = wamnet("bench", name, *CALLS[name])
+    assert outcome.status == 0, outcome.err
+    rows = [line for line in outcome.out.splitlines() if line.startswith("|")]
+    assert len(rows) >= 3, "a head, its rule, and a row"
+    assert set(rows[1]) == {"|", "-"}
+    assert all(row.count("|") == rows[0].count("|") for row in rows)
+
+
+@pytest.fixture
+def printed(wamnet, opencl):
+    """Give a function that runs the benchmark of renderers on tiny frames and returns what it prints."""
+
+    def run(*arguments):
+        outcome = wamnet("bench", "render", "--size", 8, "--spp", 2, "--workers", 1, *arguments)
+        assert outcome.status == 0, outcome.err
+        return outcome.out
+
+    return run
+
+
+def test_table_has_a_row_for_each_scene_and_way(printed) -> None:
+    text = printed("--scenes", "furnace,empty", "--by", "opencl,numpy", "--repeats", 2)
+    rows = re.findall(
+        r"^\| (\w+) \| ([\w ,]+?) \|(?: [\d.,]+ \|){2} [\d.]+ - [\d.]+ \|(?: [\d.,]+ \|){2}$", text, re.M
+    )
+    ways = ["opencl", "numpy, 1 process"]
+    assert rows == [(scene, way) for scene in ("furnace", "empty") for way in ways]
+    assert text.count("numpy, 1 process: mean colour 0.250000, opencl's 0.250000: ") == 1
+    assert "8x8, 2 spp, 6 edges" in text
+
+
+def test_one_turn_has_no_error_to_compare_with(printed) -> None:
+    assert "mean colour" not in printed("--scenes", "empty", "--by", "opencl,numpy", "--repeats", 1)
+
+
+def test_depth_counts_edges(printed) -> None:
+    """A furnace of albedo a and emission 1 shows 1 + a + .. + a^(depth - 1): 1.75 for a = 1/2 and depth 3."""
+    text = printed("--scenes", "furnace", "--by", "opencl,numpy", "--repeats", 2, "--depth", 3)
+    assert "opencl's 1.750000" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            "render --by numpy,abacus",
+            "--by is numpy,abacus: it must be one or more of numpy, opencl, opengl",
+        ),
+        ("render --scenes nowhere", "--scenes is nowhere: it must be one or more of minicubes, "),
+        ("render --by ,", "--by is ,: it must be one or more of numpy"),
+        ("render --workers 1,x", "--workers is 1,x: it must be integers from 1 to"),
+        ("render --workers 0", "--workers is 0: it must be integers from 1 to"),
+        ("render --size 9000", "size of the picture is 9000: it must be from 1 to 8192 pixels"),
+        ("render --spp 0", "--spp is 0: it must be from 1 to"),
+        ("render --depth 0", "--depth is 0: it must be from 1 to"),
+        ("render --repeats 0", "--repeats is 0: it must be from 1 to"),
+        ("render minicubes", "Got unexpected extra argument"),
+        ("train --presets long", "--presets is long: it must be one or more of best, paper, short"),
+        ("train --trainers abacus", "--trainers is abacus: it must be one or more of numpy, opencl, torch"),
+        ("train --seconds nan", "--seconds is nan: it must be above 0 and at most 600"),
+        ("train --frames 0", "--frames is 0: it must be from 1 to"),
+        ("pipeline --scene nowhere", "scene is nowhere: no canonical scene has this name; known are"),
+        ("pipeline --executors abacus", "--executors is abacus: it must be one or more of numpy, opencl"),
+        ("pipeline --sizes 8,0", "--sizes is 8,0: it must be integers from 1 to"),
+        ("pipeline --features smell", "--features is smell: it must be one or more of color"),
+        ("pipeline --window 0", "--window is 0: it must be from 1 to"),
+        ("exports --targets abacus", "--targets is abacus: it must be one or more of opencl"),
+        ("exports --scene nowhere", "scene is nowhere: no canonical scene has this name; known are"),
+        ("exports --model none.safetensors", "none.safetensors"),
+        ("primitives --executors numpy", "--executors is numpy: it must be one or more of opencl, opengl"),
+        ("primitives --kinds cones", "--kinds is cones: it must be one or more of shared, turned"),
+        ("primitives --counts many", "--counts is many: it must be integers from 1 to"),
+    ],
+)
+def test_wrong_options_are_one_line(refused, arguments, message) -> None:
+    """And nothing is measured before."""
+    assert message in refused("bench", *arguments.split())
+
+
+def test_what_is_wrong_of_an_export_is_the_status(wamnet, monkeypatch) -> None:
+    verdicts = {"c": Verdict("c", "", 0, "cc", "here"), "wgsl": Verdict("wgsl", "", 0, "x", "-", wrong="off")}
+    monkeypatch.setattr(measure.exports, "judged", lambda model, target, place, scene: verdicts[target])
+    assert wamnet("bench", "exports", "--targets", "c").status == 0
+    outcome = wamnet("bench", "exports", "--targets", "wgsl,c")
+    assert outcome.status == measure.exports.STATUS_WRONG
+    assert outcome.out.splitlines()[2].endswith(" | off")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_each_help_has_examples(wamnet, name) -> None:
+    outcome = wamnet("bench", name, "--help")
+    assert outcome.status == 0
+    assert f"wamnet bench {name}" in outcome.out.split("Examples")[1]
+    assert "default:" in outcome.out
+
+
+def test_the_help_of_bench_has_its_options_and_the_commands(wamnet) -> None:
+    outcome = wamnet("bench", "--help")
+    assert outcome.status == 0
+    usage, commands = outcome.out.split("Commands", 1)
+    assert "wamnet bench [OPTIONS] [MODEL] | COMMAND [OPTIONS]" in usage
+    assert "--train-variants" in usage
+    assert [line.split()[1] for line in commands.splitlines()[1:6]] == list(COMMANDS)
+
+
+def test_other_first_arguments_are_models(refused) -> None:
+    assert "model is rendr: there is no such file" in refused("bench", "rendr")
+    assert "see wamnet bench --help" in refused("bench", "--rendr")

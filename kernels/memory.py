@@ -2,7 +2,7 @@
 
 glibc gives freed blocks above a moving threshold (128 KiB at first) back to the system, and takes page
 faults when it asks for them again. The reference renderer allocates and frees hundreds of such arrays a
-bounce, so that its speed could halve with the history of the process (`bench/render.py`). The sums that
+bounce, so that its speed could halve with the history of the process (`wamnet bench render`). The sums that
 kernels return are such arrays too: page faults took a sixth of the time of a 512x512 frame of 16 samples.
 """
 

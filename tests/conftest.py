@@ -9,8 +9,9 @@
    names it, as with `make test` and `.ci/run`; else they are skipped. Either way the summary says what was
    missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
 3. The user's cache folder is never touched: tests have one of their own, which their commands inherit.
+   Measurements do not rest between runs [`no_rests`].
 4. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
-5. Processes stay small (tests/support/workers.py).
+5. Processes stay small (tests/support/workers.py, tests/support/apart.py).
 6. Tests that take a minute are marked [`COSTLY`], and skipped unless a run wants them; the summary says so.
 7. `--quick` runs what needs NumPy only (tests/support/quick.py).
 """
@@ -27,7 +28,7 @@ import hypothesis
 import pytest
 from packages import FOUND, PACKAGES, required
 
-pytest_plugins = ["quick", "workers"]
+pytest_plugins = ["quick", "apart", "workers"]
 
 PIPELINES = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
 """Executors on which every test of paths and pipelines runs; an OpenGL executor is named with the kind of its
@@ -156,9 +157,9 @@ def chromium(executor_named: Callable[[str], Any]) -> Any:
 
 def _open_mitsuba() -> tuple[Any, str]:
     """Return the module and what it is."""
-    import mitsuba_scene
+    from wamnet.kernels.bench import peer_mitsuba
 
-    peer = mitsuba_scene.open_mitsuba("scalar_rgb")
+    peer = peer_mitsuba.open_mitsuba("scalar_rgb")
     return peer, f"version {peer.__version__}, {peer.variant()}"
 
 
@@ -217,6 +218,19 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
             text.partition(" ")[0].rstrip(":"), {}
         )
         terminalreporter.write_line(f"{name}: {text}", **colour)
+
+
+# ---- time ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_rests() -> Iterator[None]:
+    """Let measurements follow each other at once: no test asserts a time, and all would wait minutes."""
+    from wamnet.kernels import measure
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measure, "rest", lambda seconds: None)
+        yield
 
 
 # ---- cache ----------------------------------------------------------------------------------------------

@@ -7,6 +7,8 @@ float32 it is one more executor. Integers and booleans are the same in both.
 An exact program has one order of operations [`_in_order`]: affine maps add to the bias one rounded product
 after another, in the order of the operand's numbers, or image by image where the operand is the window.
 What it reads is 0 where it is below LEAST [`_kept`], and the zeros that it writes are +0.
+
+A value is dropped after its last use [`loops.last_reads`]: a picture's are large, and programs have hundreds.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from .ir import LEAST, Gather, Node, Parameters, Program
-from .loops import Loop, loops
+from .loops import Loop, last_reads, loops
 from .ops import OPS
 from .sums import parts
 
@@ -36,11 +38,14 @@ def interpret(
     }
     values: list[Any] = [None] * len(program.nodes)
     ends, in_bodies = loops(program)
+    unread = last_reads(program, ends)
     for index, node in enumerate(program.nodes):
         if index in ends:
             _run(ends[index], program, values, inputs, parameters, kind)
         if index not in in_bodies:
             values[index] = _value(node, program, values, inputs, parameters, kind)
+        for old in unread[index]:
+            values[old] = None
     found = {name: values[index] for name, index in program.outputs}
     if program.exact:
         return {name: np.where(value == 0, kind.type(0), value) for name, value in found.items()}

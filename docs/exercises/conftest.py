@@ -92,7 +92,8 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
                 name = Path(report.nodeid.partition("::")[0]).parent.name
                 outcomes.setdefault(name, []).append((state == "passed", _reason(report)))
     terminalreporter.section("verdicts")
-    for name, found in sorted(outcomes.items()):
+    for name in sorted(outcomes, key=lambda name: (len(name.partition("_")[0]), name)):
+        found = outcomes[name]
         right = sum(passed for passed, _ in found)
         reasons = [reason for passed, reason in found if not passed]
         verdict = "passed" if not reasons else f"not yet; {reasons[0]}"

@@ -11,7 +11,7 @@ for Image Denoising*, section 4.4, for the depth of 16 and for the loss, its equ
 
 Decisions: the paper does not say more. Colour is display-encoded. Weights begin as in He et al. 2015, as
 Zhang et al. have it; Adam follows the gradient, at a rate that falls to a tenth where progress ends. The
-paper's pictures were resized from 1024x1024 to 256x256; [`fitting.Recipe.shrink`] does that by means of
+paper's pictures were resized from 1024x1024 to 256x256; [`recipe.Recipe.shrink`] does that by means of
 squares of pixels.
 """
 
@@ -23,7 +23,8 @@ from torch import nn
 
 from wamnet.refimpl.frame import Floats, Frame
 
-from .fitting import Recipe, follow, planes
+from .fitting import follow, planes
+from .recipe import Recipe
 
 CHANNELS = 64
 """Channels of the layers inside (Zhang et al. 2017, section III.B)."""

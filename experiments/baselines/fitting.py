@@ -45,6 +45,8 @@ from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.rng import counter, random_block
 
+from .recipe import Recipe
+
 Tensor = torch.Tensor
 
 CROP_TAG = 0x43524F50
@@ -70,28 +72,6 @@ VALIDATION_PX = 512
 
 HALF = torch.bfloat16
 """Type of the products and sums of training where a recipe says `half`; parameters and losses are float32."""
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """All choices of a baseline's training; `steps` is the largest number, `every` those between two looks.
-
-    `crop` and `batch`: what a step sees; `shrink` averages squares of so many pixels first; `tiles` takes
-    crops from a grid, else from anywhere; `half`: see [`HALF`]. `features`: what the network is given.
-    """
-
-    method: str
-    steps: int
-    batch: int
-    crop: int
-    learning_rate: float
-    features: tuple[str, ...] = ("color",)
-    shrink: int = 1
-    tiles: bool = False
-    half: bool = False
-    width: int = 64
-    seed: int = 0
-    every: int = 100
 
 
 class Method(Protocol):

@@ -31,7 +31,8 @@ from torch import nn
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Floats, Frame
 
-from .fitting import Recipe, follow, generator_of, planes
+from .fitting import follow, generator_of, planes
+from .recipe import Recipe
 
 LEVELS = 6
 """Times that the generator halves a patch's side."""

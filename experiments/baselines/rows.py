@@ -298,7 +298,8 @@ def on_its_own_frame(base: Recipe, bench: Bench, seed: int) -> Ready:
 def fitted(recipe_of: Mapping[str, Any], bench: Bench, seed: int) -> tuple[Method, Ready]:
     """Train a network in PyTorch on all training frames until its error on the validation frames is flat."""
     from . import dncnn, pix2pix
-    from .fitting import Recipe, examples, fit, seconds_a_step
+    from .fitting import examples, fit, seconds_a_step
+    from .recipe import Recipe
 
     recipe = Recipe(seed=seed, **recipe_of)
     make = {"dncnn": dncnn.DnCNN, "pix2pix": pix2pix.Pix2pix}[recipe.method]

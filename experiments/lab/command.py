@@ -29,8 +29,8 @@ HIDDEN_SCALE = "toy"
 FOLDERS = ("-o", "--output", "--cache")
 """Options that say where files are, not what is in them."""
 
-SCRIPTS = ("experiments", "bench")
-"""The folders of the programs whose commands are kept."""
+SCRIPTS = "experiments"
+"""The folder of the programs whose commands are kept."""
 
 
 def line(arguments: Sequence[str] | None = None) -> str:
@@ -41,7 +41,7 @@ def line(arguments: Sequence[str] | None = None) -> str:
     """
     script, *rest = sys.argv if arguments is None else arguments
     path = Path(script)
-    if path.suffix != ".py" or path.parent.name not in SCRIPTS:
+    if path.suffix != ".py" or path.parent.name != SCRIPTS:
         return ""
     kept = [
         text

@@ -25,6 +25,7 @@ from ...compiler.targets import target_named
 from ...refimpl.network.activation import SINE, activation_named
 from ...refimpl.network.denoise import Model, as_dtype
 from ...refimpl.network.siren import Siren, forward
+from ...refimpl.network.whole import Whole, sine_layers
 from ..devices.images import Images
 from .apart import Runner
 from .triage import Compile, Judge, Kernel, Verdict, judged, kernels_of, odd_ones
@@ -160,11 +161,17 @@ def stage_program(model: Model, stage: Stage) -> Program:
     weights[-1] = np.ascontiguousarray(weights[-1][stage.first : stage.end])
     biases[-1] = np.ascontiguousarray(biases[-1][stage.first : stage.end])
     part = replace(siren, weights=tuple(weights), biases=tuple(biases))
+    if isinstance(part, Whole):
+        factors = [*part.factors[: stage.layer], part.factors[stage.layer][stage.first : stage.end]]
+        part = replace(part, factors=tuple(factors))
     omega_0 = siren.omega_0_first if stage.layer == 0 else siren.omega_0_hidden
     activate = activation_named(siren.activation).forward
 
     def function(window: Any) -> Any:
         """Run the network up to here."""
+        if isinstance(part, Whole):
+            *_, (whole_sums, values) = sine_layers(part, window, stage.layer + 1)
+            return values if stage.sines else whole_sums
         sums = forward(part, window)
         return activate(omega_0 * sums) if stage.sines else sums
 

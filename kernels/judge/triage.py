@@ -205,9 +205,10 @@ def _judged(kernel: Kernel, outcome: Outcome, held: Expected, wanted: NDArray[np
     assert outcome.image is not None
     image = np.ascontiguousarray(outcome.image)
     found = image.astype(np.float64)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         error = np.abs(found - held.value)
-        ratio = np.where(np.isfinite(found), error / held.bound, np.inf)
+        # A bound of 0 is kept by no error only.
+        ratio = np.where(error == 0.0, 0.0, np.where(np.isfinite(found), error / held.bound, np.inf))
     other = np.zeros(found.shape, bool)
     if wanted is not None:
         other = image.view(np.uint32) != np.ascontiguousarray(wanted).view(np.uint32)

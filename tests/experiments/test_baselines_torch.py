@@ -11,20 +11,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from packages import needed
+from baselines.recipe import Recipe
+from lab import frames
+from lab.frames import Shot
+from packages import Late
 
-torch = needed("torch")
+from wamnet.refimpl import metrics
+from wamnet.refimpl.encoding import to_display
+from wamnet.refimpl.errors import InputError, TrainingError
 
-from baselines import dncnn, fitting, pix2pix  # noqa: E402
-from baselines.dncnn import DnCNN  # noqa: E402
-from baselines.fitting import Recipe  # noqa: E402
-from baselines.pix2pix import Pix2pix  # noqa: E402
-from lab import frames  # noqa: E402
-from lab.frames import Shot  # noqa: E402
+pytestmark = [pytest.mark.apart, pytest.mark.needs("packages")]
 
-from wamnet.refimpl import metrics  # noqa: E402
-from wamnet.refimpl.encoding import to_display  # noqa: E402
-from wamnet.refimpl.errors import InputError, TrainingError  # noqa: E402
+torch = Late("torch", "torch")
+dncnn, fitting, pix2pix = (Late(f"baselines.{name}", "torch") for name in ("dncnn", "fitting", "pix2pix"))
 
 DNCNN = Recipe("dncnn", steps=4, batch=2, crop=8, learning_rate=1e-3, width=4)
 PIX2PIX = Recipe(
@@ -45,7 +44,7 @@ def _clean(shot):
 
 
 def make(recipe):
-    return {"dncnn": lambda: DnCNN(recipe, depth=4), "pix2pix": lambda: Pix2pix(recipe)}[recipe.method]()
+    return dncnn.DnCNN(recipe, depth=4) if recipe.method == "dncnn" else pix2pix.Pix2pix(recipe)
 
 
 # ---- architectures ---------------------------------------------------------------------------------------
@@ -62,7 +61,7 @@ def test_dncnn_has_sixteen_convolutions_and_their_parameters():
 
 
 def test_pix2pix_has_six_levels_and_their_parameters():
-    made = Pix2pix(replace(PIX2PIX, width=8))
+    made = pix2pix.Pix2pix(replace(PIX2PIX, width=8))
     channels = [8, 16, 32, 64, 64, 64]
     assert pix2pix.widths(8) == channels
     # Kernels of 4x4. Down: six channels of features and one of noise, then the level before.

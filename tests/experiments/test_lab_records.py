@@ -66,7 +66,7 @@ def test_a_result_becomes_a_record(tmp_path, monkeypatch, capsys):
     assert Records(tmp_path)["kept"].of("a", "psnr") == [30.1235]
     with pytest.raises(InputError, match="give a file, or --run"):
         publish.main([])
-    with pytest.raises(InputError, match="it must be python bench"):
+    with pytest.raises(InputError, match="it must be python experiments"):
         publish.main(["--run", "x", "rm", "-r", "x"])
     (tmp_path / "broken.json").write_text("{")
     with pytest.raises(InputError, match="it cannot be read"):
@@ -76,20 +76,31 @@ def test_a_result_becomes_a_record(tmp_path, monkeypatch, capsys):
 def test_what_a_program_prints_becomes_a_record(tmp_path, monkeypatch):
     monkeypatch.setattr(publish, "FOLDER", tmp_path)
     monkeypatch.setattr(publish, "ROOT", tmp_path)
-    (tmp_path / "bench").mkdir()
+    (tmp_path / "experiments").mkdir()
     text = "| by | ms | ms |\\n|---|---|---|\\n| a/b | **1,024** | 2.50 |\\n| a/b | 3 | - |"
-    (tmp_path / "bench/x.py").write_text(f'print("""{text}""")')
-    publish.main(["--run", "speed", "python", "bench/x.py"])
+    (tmp_path / "experiments/x.py").write_text(f'print("""{text}""")')
+    publish.main(["--run", "speed", "python", "experiments/x.py"])
     found = Records(tmp_path)["speed"]
     assert printed.table(found).splitlines()[0::2] == ["| by | ms | ms |", "| a/b | **1,024** | 2.50 |"]
-    assert found.data()["commands"] == ["python bench/x.py"]
+    assert found.data()["commands"] == ["python experiments/x.py"]
     assert texts.figure(Records(tmp_path), "speed/a,b/ms:.0f", {}) == "1024"
     assert texts.figure(Records(tmp_path), "speed/a,b #2/ms:.1f", {}) == "3.0"
     with pytest.raises(InputError, match="does not begin with a number"):
         texts.figure(Records(tmp_path), "speed/a,b #2/ms #2:.1f", {})
-    (tmp_path / "bench/x.py").write_text("raise SystemExit(3)")
+    (tmp_path / "experiments/x.py").write_text("raise SystemExit(3)")
     with pytest.raises(InputError, match="it must end with status 0"):
-        publish.main(["--run", "speed", "python", "bench/x.py"])
+        publish.main(["--run", "speed", "python", "experiments/x.py"])
+
+
+def test_what_a_command_of_bench_prints_becomes_a_record(tmp_path, monkeypatch):
+    monkeypatch.setattr(publish, "FOLDER", tmp_path)
+    command = "wamnet bench render --scenes empty,furnace --size 4 --workers 1 --repeats 2"
+    publish.main(["--run", "speed", *command.split()])
+    found = Records(tmp_path)["speed"]
+    assert found.data()["commands"] == [command]
+    assert [row["values"]["scene"] for row in found.records()] == ["empty", "furnace"]
+    with pytest.raises(InputError, match="it must end with status 0"):
+        publish.main(["--run", "speed", "wamnet", "bench", "render", "--by", "nobody"])
 
 
 def test_a_benchmark_becomes_a_record():

@@ -78,10 +78,14 @@ def test_a_file_says_which_commands_made_it(results, tmp_path):
         command.line(
             ["experiments/quality.py", "--seeds", "0", "-o", "somewhere", "--cache=x", "--rows", "a b"]
         ),
-        command.line(["/somewhere/bench/train.py"]),
+        command.line(["/somewhere/experiments/x.py"]),
         command.line(["pytest", "-x"]),
     ]
-    assert made == ["python experiments/quality.py --seeds 0 --rows 'a b'", "python bench/train.py", ""]
+    assert made == [
+        "python experiments/quality.py --seeds 0 --rows 'a b'",
+        "python experiments/x.py",
+        "",
+    ]
     for number, text in enumerate([*made, made[0]]):
         Results(results.path, "test", {"size": 8}, text).put("a", number, {"psnr": 30.0})
     assert results.data()["commands"] == made[:2]

@@ -26,6 +26,8 @@ from wamnet.refimpl.network.train import PAPER, SHORT
 pytest.importorskip("flip_evaluator", reason="flip-evaluator is not installed")
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 
+pytestmark = pytest.mark.apart  # plots and frames stay in memory
+
 FIGURES = {
     "ablations": {"window.png", "width.png", "omega_0.png", "omega_0-first-layer.png", "frames.png"},
     "fig_prediction": {"prediction.png", "methods.png"},

@@ -13,7 +13,6 @@ import table1
 from baselines import rows
 from lab import scores
 from lab.results import Results
-from packages import needed
 
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
@@ -28,10 +27,6 @@ PLAIN += ["svgf", "nlm", "render30", "render30-own"]
 
 TINY = replace(table1.SCALES["toy"], size=48, pix2pix={**table1.SCALES["toy"].pix2pix, "crop": 24})
 """A scale for rows that train no pix2pix: its measure of blocks wants patches."""
-
-
-SMALLEST = replace(table1.SCALES["toy"], train=1, test=1, short_frames=1)
-"""The smallest scale for pix2pix: its patches have 64 pixels at least."""
 
 
 @pytest.fixture(scope="module")
@@ -230,37 +225,12 @@ def test_renders_of_equal_time_and_of_equal_error_by_hand(tmp_path):
     assert table1.priced("input", kept, times)["pays_after"] == np.inf
 
 
-@pytest.mark.parametrize("row", ["dncnn", "dncnn-shrunk", "dncnn-shrunk-own", "pix2pix"])
-def test_rows_in_pytorch(row, tmp_path, executor_named, capsys, monkeypatch):
-    needed("torch")
-    executor_named("opencl")
-    monkeypatch.setitem(table1.SCALES, "toy", SMALLEST if row == "pix2pix" else TINY)
-    arguments = ["--scale", "toy", "-o", str(tmp_path / "out"), "--cache", str(tmp_path / "cache")]
-    table1.main([*arguments, "--seeds", "0", "--no-times", "--only", row])
-    assert rows.ROWS[row].text in capsys.readouterr().out
-
-
-OIDN = [row for row in rows.ROWS if row.startswith("oidn")]
-
-
-@pytest.mark.parametrize("row", OIDN)
-def test_rows_of_open_image_denoise(row, made):
-    needed("pyoidn")
-    folder, _ = made
-    with open_executor("opencl") as device:
-        bench = rows.Bench.of(TINY, folder / "cache", device)
-        ready = rows.ROWS[row].make(bench, 0)
-        case = next(bench.cases(0, ready.rays, ready.spp))
-        display, linear = ready.picture(case)
-    assert linear is not None
-    assert scores.metrics.psnr(display, rows.to_display(case.reference["color"])) > 15.0
-
-
 def test_what_an_input_costs_is_counted(made):
     folder, _ = made
+    oidn = [row for row in rows.ROWS if row.startswith("oidn")]
     with open_executor("opencl") as device:
         bench = rows.Bench.of(TINY, folder / "cache", device)
-        costs = {row: rows.ROWS[row].make(bench, 0).cost for row in (*PLAIN, *OIDN)}
+        costs = {row: rows.ROWS[row].make(bench, 0).cost for row in (*PLAIN, *oidn)}
     assert {row: cost for row, cost in costs.items() if cost != (1, 0)} == {
         "wamnet-best": (1, 16),
         "oidn-rays": (1, 16),
@@ -277,11 +247,6 @@ def test_small_frames_are_means_of_shown_colours():
     expected = shown.reshape(2, 2, 2, 2, 3).mean(axis=(1, 3))
     # Encoded, decoded and encoded again, in float32; the slope of the encoding is at most 12.92.
     assert np.max(np.abs(rows.to_display(found["color"]) - expected)) <= 16 * 12.92 * 2.0**-24
-    pytest.importorskip("torch", reason="PyTorch is missing: pip install 'wamnet[baselines]'")
-    flat = rows.larger(np.full((3, 2, 3), 0.25, np.float32), 4)
-    assert flat.shape == (12, 8, 3)
-    # Weights of the cubic kernel sum up to one.
-    assert np.max(np.abs(flat - 0.25)) <= 16 * 2.0**-24
 
 
 # ---- claims ----------------------------------------------------------------------------------------------

@@ -58,6 +58,12 @@ LINES: Sequence[str] = (
     "--steps 1 --frames 1 --reference-spp 1 --quick -o out",
     "bench paper --synthetic --features color,normal --size 8 --only numpy* -o out",
     "bench model.safetensors --quick --size 4 --dataset set --only numpy* --budget 1 --repeats 1 -o out",
+    "bench render --scenes furnace --by numpy --workers 1 --size 4 --spp 1 --depth 2 --repeats 1",
+    "bench train --presets short --trainers numpy --size 32 --frames 1 --seconds 0.01 --repeats 1",
+    "bench pipeline --scene furnace --executors numpy --sizes 4 --features color --hidden 4 --window 3 "
+    "--repeats 1",
+    "bench exports --model model.safetensors --scene furnace --targets onnx --places",
+    "bench primitives --executors opencl --kinds quads --counts 1 --size 4 --spp 1 --repeats 1",
     "executors",
     "conformance --executor reference --profile ieee -k random.block/1 --timeout 3 --json out.json "
     "--junit out.xml --track track.json",

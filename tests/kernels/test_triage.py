@@ -19,6 +19,7 @@ from wamnet.kernels.judge.reduce import Box, Stage, first_stage, reduced, shrink
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.whole import round_image, rounded
 
 SHAPE = (7, 9)
 """Height and width of the picture."""
@@ -405,3 +406,30 @@ def test_lines_have_no_line_ends():
     """A driver's log has many: a verdict is one line."""
     executor = SimpleNamespace(run=lambda *_: (_ for _ in ()).throw(RuntimeError("a\n  b")))
     assert apart.attempt(executor, None, {}).failure == "RuntimeError: a b"
+
+
+# ---- integers ----------------------------------------------------------------------------------------------
+
+
+def test_integers_are_within_a_bound_of_0_and_a_wrong_weight_is_named(executor_named, model, images):
+    """No error is within it, any error is not; stages are those of the network of integers."""
+    whole = replace(model, siren=rounded(model.siren, 3))
+    given = {name: round_image(image) for name, image in images.items()}
+    ways = runners(executor_named, "opencl")
+    found = verdicts_of(ways, whole, given, which=triage.EVERY)
+    assert [v.state for v in found] == ["within"] * len(found)
+
+    def compiled(plan):
+        program = plan.analysed
+        if plan.target.name != "opencl" or "W1" not in program.parameters:
+            return compile_plan(plan)
+        weight = program.parameters["W1"].copy()
+        weight[3, 0] += 9.0
+        changed = replace(program, parameters={**program.parameters, "W1": weight})
+        return replace(compile_plan(replace(plan, analysed=changed)), plan=plan)
+
+    found = verdicts_of(ways, whole, given, compiled=compiled)
+    (odd,) = triage.odd_ones(found)
+    assert odd.ratio == np.inf
+    stage, _ = first_stage(odd.kernel.runner, "plain", whole, "ieee", given, compiled)
+    assert (stage.layer, stage.sines, stage.first) == (1, False, 0)

@@ -45,7 +45,7 @@ def run(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch):
     pytester.makeconftest((Path(__file__).parents[1] / "conftest.py").read_text())
     pytester.makepyfile(STUB)
     tests = Path(__file__).parents[1]
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(map(str, (tests / "support", tests.parent / "bench"))))
+    monkeypatch.setenv("PYTHONPATH", str(tests / "support"))
 
     def run_with(require: str, *options: str) -> pytest.RunResult:
         monkeypatch.setenv("WAMNET_REQUIRE", require)
@@ -140,6 +140,109 @@ def test_tests_that_take_long_are_left_out_loudly(run, pytester, monkeypatch, pr
     }
     for text in list(said.values())[passed:]:
         result.stdout.fnmatch_lines([f"SKIPPED*{text}"])
+
+
+APART = """
+import os
+import sys
+
+import pytest
+
+pytestmark = pytest.mark.apart
+
+@pytest.fixture(scope="module")
+def started():
+    return []
+
+def test_fails():
+    assert "left" == "right"
+
+def test_skips():
+    pytest.skip("it is not there")
+
+def test_ends():
+    os._exit(7)
+
+@pytest.mark.parametrize("number", range(2))
+def test_passes(number, started, executor_named):
+    started.append(number)
+    assert started == list(range(number + 1)), "the file's tests share their fixtures"
+    assert os.getppid() == int(os.environ["WORKER"])
+    executor_named("numpy")
+
+def test_after():
+    assert True
+"""
+"""Tests in a process of their own, which one of them ends."""
+
+
+@pytest.mark.parametrize("options", [(), ("-n", "1")])
+def test_a_file_apart_has_a_process_of_its_own(run, pytester, options):
+    """Its results are those of any file, and so are what it lacks and its peak; a crash fails one test.
+
+    The worker takes 512 MB, which do not count as the other's.
+    """
+    body = (
+        "import os\nimport numpy\nos.environ['WORKER'] = str(os.getpid())\n\n"
+        "kept = numpy.ones(2**26)\n\ndef test_it():\n    assert kept.any()\n"
+    )
+    pytester.makepyfile(body, test_apart=APART)
+    result = run("", "-rs", *options)
+    result.assert_outcomes(passed=4, skipped=1, failed=2)
+    result.stdout.fnmatch_lines_random(
+        [
+            "numpy: ok (*)",
+            "E*assert 'left' == 'right'",
+            "*the process apart ended with status 7:*",
+            "SKIPPED * it is not there",
+            "test_apart.py: ?? MB",
+        ]
+    )
+
+
+def test_folders_around_a_file_apart_are_left_as_around_any(run, pytester):
+    """The test before it keeps what it shares with it; that of another folder came next, and was refused."""
+    test = "import pytest\n\npytestmark = [{}]\n\ndef test_it():\n    assert True\n"
+    for name, mark in (("a/test_1", ""), ("a/test_2", "pytest.mark.apart"), ("b/test_3", "")):
+        path = pytester.path / f"{name}.py"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(test.format(mark))
+    for folder in ("a", "b"):
+        (pytester.path / folder / "conftest.py").write_text("")
+    for path in pytester.path.glob("test_*.py"):
+        path.unlink()
+    run("").assert_outcomes(passed=3)
+
+
+GROWS = """
+import numpy as np
+
+class Executor:
+    forgotten = 0
+    def forget(self):
+        self.forgotten += 1
+
+kept = []
+
+def test_little(opened_executors):
+    opened_executors["numpy"] = Executor()
+
+def test_much(opened_executors):
+    assert opened_executors["numpy"].forgotten == 0
+    kept.append(np.ones(2**25))
+
+def test_after(opened_executors):
+    assert opened_executors["numpy"].forgotten == 1
+
+def test_after_that(opened_executors):
+    assert opened_executors["numpy"].forgotten == 1
+"""
+"""A file one of whose tests takes 256 MB, and keeps them."""
+
+
+def test_kernels_are_dropped_where_a_test_has_built_much(run, pytester):
+    pytester.makepyfile(GROWS)
+    run("").assert_outcomes(passed=4)
 
 
 DRAWN = """

@@ -33,11 +33,11 @@ def orders(compare: ast.Compare) -> bool:
 def test_no_asserted_times(house):
     wrong = [
         source.at(node, ast.unparse(compare))
-        for source in house.python("tests", "bench")
+        for source in house.python("tests")
         for node, compare in comparisons(source)
         if orders(compare) and asserts_a_time(compare)
     ]
-    house.refuse(wrong, "No test asserts a wall-clock time: measure it in bench/ and report it.")
+    house.refuse(wrong, "No test asserts a wall-clock time: measure it with wamnet bench and report it.")
 
 
 def asserts_a_time(compare: ast.Compare) -> bool:

@@ -38,3 +38,31 @@ def needed(name: str) -> Any:
         pytest.skip(f"package {name} is {FOUND[name]}", allow_module_level=True)
     FOUND[name] = f"ok (version {version(name)})"
     return module
+
+
+class Late:
+    """A module that is imported when a test first uses it: one that is large, in a file that runs apart."""
+
+    __slots__ = ("_name", "_package")
+
+    def __init__(self, name: str, package: str) -> None:
+        object.__setattr__(self, "_name", name)
+        object.__setattr__(self, "_package", package)
+
+    def _module(self) -> Any:
+        """Return the module, or skip the test where its package is missing [`needed`]."""
+        needed(self._package)
+        return importlib.import_module(self._name)
+
+    @property
+    def __dict__(self) -> Any:
+        """Return what the module has: a patch looks here for what it must put back."""
+        return vars(self._module())
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith(("__", "_mock", "_pytest", "pytest")):  # pytest asks all names of a file
+            raise AttributeError(name)
+        return getattr(self._module(), name)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        setattr(self._module(), name, value)

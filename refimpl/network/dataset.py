@@ -29,6 +29,7 @@ from ..frame import Frame, check_finite
 from ..reading import parse_json, to_dataclass
 from ..rng import counter, random_block
 from ..vectors import vector
+from .whole import steps_of
 
 Array = NDArray[Any]
 Indices = NDArray[np.int64]
@@ -293,17 +294,23 @@ def feature_image(frame: Frame, features: Sequence[str], normalization: Normaliz
 
 
 def encode_sums(
-    sums: Mapping[str, Any], samples: Any, features: Sequence[str], normalization: Normalization
+    sums: Mapping[str, Any],
+    samples: Any,
+    features: Sequence[str],
+    normalization: Normalization,
+    whole: bool = False,
 ) -> dict[str, Any]:
     """Return encoded features (..., channels) by name, from layers (..., channels) summed over the samples.
 
     That is what a renderer's kernel holds before it is read back; may be traced. The last clip changes
-    nothing but what rounding has put outside the range that a feature promises.
+    nothing but what rounding has put outside the range that a feature promises. `whole`: for a network of
+    integers [whole.py].
     """
     encoded = {}
     for feature in (FEATURES[name] for name in features):
         values = feature.encode(sums[feature.layer] / samples, normalization)
-        encoded[feature.name] = np.clip(values, feature.low, feature.high)
+        clipped = np.clip(values, feature.low, feature.high)
+        encoded[feature.name] = steps_of(clipped) if whole else clipped
     return encoded
 
 

@@ -12,7 +12,7 @@ for Image Denoising*.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -25,6 +25,7 @@ from . import dataset
 from .activation import activation_named
 from .dataset import Normalization, Window
 from .siren import LARGEST_PARAMETER, Siren, check_shape, forward
+from .whole import Whole, check_whole, forward_whole, round_image
 
 Array = NDArray[np.floating[Any]]
 
@@ -45,6 +46,11 @@ class Model:
     normalization: Normalization
     info: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def is_whole(self) -> bool:
+        """Return whether the network, and the images that it reads, are of integers."""
+        return isinstance(self.siren, Whole)
+
 
 def check_model(model: Model) -> None:
     """Refuse a model whose parts do not fit each other or whose parameters are not finite numbers."""
@@ -54,6 +60,8 @@ def check_model(model: Model) -> None:
     activation_named(model.siren.activation)
     _check_layers(model.siren)
     check_shape(model.siren.widths, model.siren.omega_0_first, model.siren.omega_0_hidden)
+    if isinstance(model.siren, Whole):
+        check_whole(model.siren)
     n_inputs = dataset.n_inputs(model.features, model.window)
     if model.siren.widths[0] != n_inputs:
         size = model.window.size
@@ -96,13 +104,21 @@ def learned_feature_spp(model: Model) -> int:
 
 def denoise_pixel(siren: Siren, window_vector: Any) -> Any:
     """Map window vectors (..., D_in) to display-encoded colours (..., 3) in [0, 1]; may be traced."""
+    if isinstance(siren, Whole):
+        return forward_whole(siren, window_vector)
     return np.minimum(np.maximum(forward(siren, window_vector), 0.0), 1.0)
+
+
+def input_image(model: Model, frame: Frame, features: Sequence[str] = ()) -> NDArray[np.float32]:
+    """Return what the network's window is taken from, (H, W, C): encoded features, all or some."""
+    image = dataset.feature_image(frame, features or model.features, model.normalization)
+    return round_image(image) if model.is_whole else image
 
 
 def denoise(model: Model, frame: Frame, dtype: DTypeLike = np.float32) -> Array:
     """Return the denoised picture (H, W, 3), display-encoded, with the network computed in `dtype`."""
     siren = as_dtype(model.siren, dtype)
-    image = dataset.feature_image(frame, model.features, model.normalization).astype(dtype)
+    image = input_image(model, frame).astype(dtype)
     height, width, _ = image.shape
     padded = dataset.pad(image, model.window)
     rows = max(1, BLOCK_NUMBERS // (width * siren.widths[0]))
@@ -111,7 +127,7 @@ def denoise(model: Model, frame: Frame, dtype: DTypeLike = np.float32) -> Array:
         # These rows and the margin around them are all that their pixels see.
         strip = padded[top : min(top + rows, height) + model.window.size - 1]
         blocks.append(denoise_pixel(siren, dataset.all_windows(strip, model.window)))
-    return np.concatenate(blocks)
+    return np.concatenate(blocks).astype(dtype, copy=False)
 
 
 def as_dtype(siren: Siren, dtype: DTypeLike) -> Siren:

@@ -6,7 +6,9 @@
 3. Compute the mean squared error of display-encoded colour and its derivative [`loss_and_gradients`].
 4. Follow it with Adam, at a learning rate given by the schedule [`SCHEDULES`]; where the recipe asks for a
    first layer of low rank, its factors are what moves [`factored`].
-5. Everything that the next step depends on is in [`TrainState`], so training can stop after any step and
+5. Where the recipe asks for a network of integers, the trained one is rounded in the end, on windows of the
+   noisy frames [`whole_of`].
+6. Everything that the next step depends on is in [`TrainState`], so training can stop after any step and
    resume later to the same bits [`state_to_arrays`], [`state_from_arrays`].
 
 Source: *WAMnet for Image Denoising* for the protocol of the preset `paper`. No generator has a state:
@@ -29,18 +31,25 @@ from numpy.typing import DTypeLike, NDArray
 from ..errors import InputError, TrainingError
 from ..frame import Frame
 from ..reading import parse_json, to_dataclass
-from . import adam, dataset, factored, siren
+from . import adam, dataset, factored, siren, whole
 from .activation import SINE, activation_named
 from .adam import AdamState
 from .dataset import Dataset, Normalization, Window
 from .denoise import OUTPUT_CHANNELS, Model
 from .factored import Factors
 from .siren import Siren
+from .whole import SINES, Whole
 
 Array = NDArray[np.floating[Any]]
 
 POOL_STREAM = 0xFFFFFFFF
 """Counter `sample` of the words that draw the pool; steps use their own number, which is smaller."""
+
+ROUNDING_STREAM = 0xFFFFFFFE
+"""Counter `sample` of the words that draw the windows on which a network is rounded."""
+
+ROUNDING_WINDOWS = 2**13
+"""Windows on which a network is rounded: some for each weight of a row of the shipped networks."""
 
 PICK_TAG = 0x5049434B
 """Counter `block` of the words that pick members of the pool ("PICK" in ASCII)."""
@@ -65,7 +74,8 @@ class Recipe:
     """All choices of a training run; `widths` are those of the hidden layers, `activation` is theirs.
 
     `n_windows` is the size of the pool that minibatches are picked from; 0 draws new pixels every step.
-    `log_every` is in steps. `rank` is that of the first layer, 0 for no restriction.
+    `log_every` is in steps. `rank` is that of the first layer, 0 for no restriction. `whole` is the largest
+    hidden value of the network of integers that the trained one becomes, 0 for floats.
     """
 
     features: tuple[str, ...]
@@ -82,6 +92,7 @@ class Recipe:
     log_every: int = 100
     rank: int = 0
     activation: str = SINE
+    whole: int = 0
 
     @property
     def layer_widths(self) -> tuple[int, ...]:
@@ -140,9 +151,24 @@ def check_recipe(recipe: Recipe) -> None:
     if recipe.rank > 0:
         factored.check_rank(recipe.rank, recipe.window.size, *recipe.layer_widths[:2])
     activation_named(recipe.activation)
+    if recipe.whole:
+        _check_whole(recipe)
     if recipe.schedule not in SCHEDULES:
         known = ", ".join(SCHEDULES)
         raise InputError("recipe: schedule", recipe.schedule, "not a known schedule", f"use one of {known}")
+
+
+def _check_whole(recipe: Recipe) -> None:
+    """Refuse what does not become a network of integers."""
+    if recipe.whole not in SINES:
+        known = ", ".join(map(str, SINES))
+        rule = f"the largest value of a known sine: {known}"
+        raise InputError("recipe: whole", recipe.whole, rule, "use one of these, or 0 for floats")
+    for name, floats in (("rank", 0), ("activation", SINE)):
+        value = getattr(recipe, name)
+        if value != floats:
+            rule = "a network of integers has sines, and no rank"
+            raise InputError(f"recipe: {name}", value, rule, f"use {floats}, or train floats")
 
 
 def with_activation(recipe: Recipe, name: str) -> Recipe:
@@ -152,10 +178,11 @@ def with_activation(recipe: Recipe, name: str) -> Recipe:
 
 
 def recipe_to_json(recipe: Recipe) -> str:
-    """Return the recipe as JSON text with sorted keys; the sine is not named, as before there were others."""
+    """Return the recipe as JSON text with sorted keys; the sine and floats are not named, as ever."""
     fields = asdict(recipe)
-    if recipe.activation == SINE:
-        del fields["activation"]
+    for name, usual in (("activation", SINE), ("whole", 0)):
+        if fields[name] == usual:
+            del fields[name]
     return json.dumps(fields, sort_keys=True)
 
 
@@ -247,7 +274,10 @@ def start(
 
 
 def _check_network(network: Siren, recipe: Recipe) -> None:
-    """Refuse to continue with a network of another shape than the recipe's."""
+    """Refuse to continue with a network of integers, or of another shape than the recipe's."""
+    if isinstance(network, Whole):
+        rule = "training moves floats"
+        raise InputError("first network", "of integers", rule, "begin with the model that was rounded")
     has = (network.widths, network.omega_0_first, network.omega_0_hidden, network.activation)
     wants = (recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden, recipe.activation)
     if has != wants:
@@ -424,6 +454,15 @@ def model_of(state: TrainState, info: Mapping[str, str] | None = None) -> Model:
         **(info or {}),
     }
     return Model(state.siren, state.recipe.features, state.recipe.window, state.normalization, facts)
+
+
+def whole_of(model: Model, pairs: Sequence[tuple[Frame, Frame]], amplitude: int, seed: int = 0) -> Model:
+    """Return a trained model in integers, rounded on windows of the noisy frames; `info` says which."""
+    data = dataset.build(pairs, model.features, model.window, model.normalization)
+    pixels = dataset.sample_pixels(seed, ROUNDING_STREAM, ROUNDING_WINDOWS, data.shapes)
+    windows, _ = dataset.examples_at(data, *pixels)
+    network = whole.rounded_on(model.siren, windows, model.window.size, amplitude)
+    return replace(model, siren=network, info={**model.info, "rounded_on_digest": data.digest})
 
 
 def state_to_arrays(state: TrainState) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import from_display, to_display
 from wamnet.refimpl.errors import InputError, TrainingError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.network import dataset, denoise, train
+from wamnet.refimpl.network import dataset, denoise, siren, train, whole
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.train import PRESETS, Recipe, TrainState
 
@@ -341,3 +342,53 @@ def test_states_are_checked(part: str, message: str) -> None:
     train.check_state(state)
     with pytest.raises(InputError, match=message):
         train.check_state(broken(state, part))
+
+
+# ---- integers --------------------------------------------------------------------------------------------
+
+
+def test_a_recipe_of_integers_trains_the_same_floats() -> None:
+    """To the bit: only what is made of them in the end differs; files of floats do not name it."""
+    wanted = train.train(replace(SMALL, steps=3), PAIRS)
+    found = train.train(replace(SMALL, steps=3, whole=127), PAIRS)
+    assert tensors(found) == tensors(wanted)
+    assert "whole" not in train.recipe_to_json(wanted.recipe)
+    assert train.recipe_from_json(train.recipe_to_json(found.recipe)).whole == 127
+
+
+@pytest.mark.parametrize("amplitude", whole.SINES)
+def test_a_trained_network_loses_little_in_integers(amplitude: int) -> None:
+    """On an unseen frame, against the floats, less than by rounding that sees no frames."""
+    model = train.model_of(train.train(replace(SMALL, whole=amplitude), PAIRS), {"scene": "planes"})
+    found = train.whole_of(model, PAIRS, amplitude)
+    denoise.check_model(found)
+    assert found.is_whole
+    assert found.info["rounded_on_digest"] == model.info["data_digest"]
+    assert found.info["scene"] == "planes"
+    again = train.whole_of(model, PAIRS, amplitude)
+    for a, b in zip(found.siren.weights, again.siren.weights, strict=True):
+        assert np.array_equal(a, b)
+    noisy, _ = pair(99)
+    picture = denoise.denoise(model, noisy, np.float64)
+    plain = replace(model, siren=whole.rounded(model.siren, 5, amplitude))
+    near, far = (metrics.mse(denoise.denoise(m, noisy, np.float64), picture) for m in (found, plain))
+    assert near < far
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"whole": 128}, "recipe: whole is 128: the largest value of a known sine: 127, 511"),
+        ({"whole": 127, "rank": 2}, "recipe: rank is 2: a network of integers has sines, and no rank; use 0"),
+        ({"whole": 127, "activation": "relu"}, "recipe: activation is relu: a network of integers has sines"),
+    ],
+)
+def test_recipes_of_integers_are_checked(changes: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        train.check_recipe(replace(SMALL, **changes))
+
+
+def test_training_does_not_begin_with_integers() -> None:
+    first = siren.init(SMALL.layer_widths, SMALL.omega_0_first, SMALL.omega_0_hidden, 1)
+    with pytest.raises(InputError, match="first network is of integers: training moves floats"):
+        train.start(SMALL, Normalization(), "", network=whole.rounded(first, 5))

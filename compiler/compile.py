@@ -29,6 +29,7 @@ from .core.profiles import SineContract
 from .core.sums import is_split
 from .plan import Bound, Plan, plan_program
 from .proof import bounds, certificate
+from .proof.whole import has_one_zero
 from .schedules import schedules
 from .schedules.emit import kernel_gather, output_channels
 from .schedules.factor import HORIZONTAL, Cut, left
@@ -47,6 +48,12 @@ AGAINST = "float64 reference, same float32 weights and images"
 
 AGAINST_PINNED = f"{AGAINST}, where weights below {LEAST!r} are 0"
 """The same for an exact kernel."""
+
+AGAINST_WHOLE = "reference in integers, the same bits"
+"""The same for a kernel in which nothing rounds."""
+
+WHOLE_SINE = "a polynomial of degree 5 in products and shifts of words"
+"""What a header says of the sine of integers."""
 
 SUMS = "sums      over the window: a partial sum for each image and row of taps, in any order; then these"
 """What a header says where the bound rests on partial sums [sums.py]."""
@@ -123,7 +130,9 @@ def _joined(before: Artifact, found: Artifact, report: Mapping[str, Any]) -> Art
 def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[str] = ()) -> Artifact:
     """Return the kernel of a plan without a cut; `notes` are further lines of its header."""
     header = [*_header(plan, bound), *notes, *_weight_lines(plan.emitted, plan.schedule)]
-    return _assemble(plan, bound, plan.schedule.emit(plan.emitted, header, bound.output is not None))
+    # Where nothing rounds, a language need not keep the order of operations.
+    is_ordered = bound.output is not None and not bound.exact
+    return _assemble(plan, bound, plan.schedule.emit(plan.emitted, header, is_ordered))
 
 
 def _header(plan: Plan, bound: Bound) -> list[str]:
@@ -148,9 +157,9 @@ def _header(plan: Plan, bound: Bound) -> list[str]:
         f"border    {gather.window.border}",
         f"output    {channels} channels" + (f", {encoding}" if encoding else ""),
         f"profile   {plan.profile.name}: {plan.profile.text}",
-        f"sine      {plan.sine.text}",
-        f"bound     {_bound_text(bound)}",
-        *(_wrapped("assumes", target.assumes) if target.assumes and bound.output else []),
+        f"sine      {WHOLE_SINE if bound.exact else plan.sine.text}",
+        f"bound     {_bound_text(bound, program)}",
+        *(_wrapped("assumes", plan.assumes) if plan.assumes and bound.output else []),
         *([SUMS] if is_split(gather) and plan.shares_bound else []),
         *([] if picked.schedule.name == PLAIN else [f"schedule  {schedules.text(picked.manifest())}"]),
         f"arguments {arguments[0]}",
@@ -178,8 +187,11 @@ def _wrapped(name: str, text: str) -> list[str]:
     return textwrap.wrap(text, 98, initial_indent=f"{name:10}", subsequent_indent=" " * 10)
 
 
-def _bound_text(bound: Bound) -> str:
+def _bound_text(bound: Bound, program: Program) -> str:
     """Return the bound as a reader wants it, rounded up."""
+    if bound.exact:
+        same = "the same bits" if has_one_zero(program) else "the same numbers; a zero may have either sign"
+        return f"0: no operation rounds, so that every device and compiler computes {same}"
     if bound.output is None:
         return "none: for some images an operation of this program promises nothing on this target"
     return f"|output - float64 reference| <= {round_up(max(bound.output)):g} for all images in these ranges"
@@ -203,7 +215,7 @@ def _assemble(plan: Plan, bound: Bound, source: str) -> Artifact:
         "sine": asdict_finite(plan.sine),
         "passes": [*pipeline.COMMON, *profile.common, *profile.passes],
         "window": _window(gather),
-        "images": [asdict(image) for image in gather.images],
+        "images": [image.facts for image in gather.images],
         "output": {
             "name": emitted.outputs[0][0],
             "channels": output_channels(emitted),
@@ -212,9 +224,9 @@ def _assemble(plan: Plan, bound: Bound, source: str) -> Artifact:
         "arguments": _arguments(plan.picked, output_channels(emitted)),
         "bound": {
             "output": bound.output and [round_up(error) for error in bound.output],
-            "against": AGAINST_PINNED if emitted.exact else AGAINST,
+            "against": AGAINST_WHOLE if bound.exact else AGAINST_PINNED if emitted.exact else AGAINST,
         },
-        "certificate": artifact.CERTIFICATE_NAME if bound.proof else None,
+        "certificate": artifact.CERTIFICATE_NAME if bound.proof or bound.exact else None,
         "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],
         "info": {name: _info_value(name, text) for name, text in emitted.info if name in KEPT_INFO},
         "files": {
@@ -232,7 +244,9 @@ def _assemble(plan: Plan, bound: Bound, source: str) -> Artifact:
     }
     manifest = json.loads(json.dumps(manifest, allow_nan=False))
     proven = None
-    if bound.proof:
+    if bound.exact:
+        proven = certificate.integers(plan.analysed, schedule, emitted, manifest)
+    elif bound.proof:
         proven = certificate.certificate(plan.analysed, bound.proof, plan.sine, schedule, emitted, manifest)
     return Artifact(plan, source, source_name, emitted, weights, manifest, certificate=proven)
 

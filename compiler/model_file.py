@@ -33,6 +33,7 @@ from ..refimpl.network.dataset import Window, normalization_from_json
 from ..refimpl.network.denoise import Model, check_model
 from ..refimpl.network.siren import Siren
 from ..refimpl.network.train import TrainState
+from ..refimpl.network.whole import Whole
 from ..refimpl.reading import BROKEN, parse_json, read_file, to_dataclass
 from .core.writing import write_bytes
 
@@ -51,10 +52,16 @@ VERSION = "1"
 ACTIVATION_VERSION = "2"
 """Version of models that name their activation, which readers of version 1 take to be the sine."""
 
+WHOLE_VERSION = "3"
+"""Version of models of integers."""
+
 INFO_PREFIX = "info."
 """Put before the names of a model's own facts in the header, so that they cannot hide a field."""
 
-_DTYPES = {"float32": "F32", "float64": "F64", "int64": "I64"}
+WHOLE_TEXTS = ("amplitude", "fraction")
+"""Fields of a network of integers that are texts of the header."""
+
+_DTYPES = {"float32": "F32", "float64": "F64", "int64": "I64", "int32": "I32", "int8": "I8"}
 """Element types that are written, by NumPy's name, as safetensors names them."""
 
 
@@ -64,6 +71,10 @@ def save_model(path: str | os.PathLike[str], model: Model) -> None:
     tensors: dict[str, NDArray[Any]] = {}
     for layer, (weight, bias) in enumerate(zip(model.siren.weights, model.siren.biases, strict=True)):
         tensors[f"layer{layer}.weight"], tensors[f"layer{layer}.bias"] = weight, bias
+    if isinstance(model.siren, Whole):
+        tensors = {n: a.astype(np.int8 if n.endswith("weight") else np.int32) for n, a in tensors.items()}
+        factors = enumerate(model.siren.factors)
+        tensors |= {f"layer{layer}.factor": factor.astype(np.int32) for layer, factor in factors}
     texts = {
         "features": json.dumps(model.features),
         "window": json.dumps(asdict(model.window), sort_keys=True),
@@ -72,6 +83,8 @@ def save_model(path: str | os.PathLike[str], model: Model) -> None:
         "normalization": json.dumps(asdict(model.normalization), sort_keys=True),
         **{INFO_PREFIX + name: text for name, text in model.info.items()},
     }
+    if isinstance(model.siren, Whole):
+        texts |= {name: repr(getattr(model.siren, name)) for name in WHOLE_TEXTS} | {"version": WHOLE_VERSION}
     if model.siren.activation != SINE:
         texts |= {"activation": model.siren.activation, "version": ACTIVATION_VERSION}
     _write(Path(path), _encode(MODEL_FORMAT, tensors, texts))
@@ -80,16 +93,9 @@ def save_model(path: str | os.PathLike[str], model: Model) -> None:
 def load_model(path: str | os.PathLike[str]) -> Model:
     """Read a model, or raise InputError that says what is wrong with the file."""
     path = Path(path)
-    tensors, texts = _read(path, MODEL_FORMAT, (VERSION, ACTIVATION_VERSION))
-    n_layers = sum(name.endswith(".weight") for name in tensors)
+    tensors, texts = _read(path, MODEL_FORMAT, (VERSION, ACTIVATION_VERSION, WHOLE_VERSION))
     model = Model(
-        siren=Siren(
-            tuple(_tensor(path, tensors, f"layer{layer}.weight") for layer in range(max(n_layers, 1))),
-            tuple(_tensor(path, tensors, f"layer{layer}.bias") for layer in range(max(n_layers, 1))),
-            _parsed(path, texts, "omega_0_first", float),
-            _parsed(path, texts, "omega_0_hidden", float),
-            _activation(path, texts),
-        ),
+        siren=_network(path, tensors, texts),
         features=_parsed(path, texts, "features", _names),
         window=_parsed(path, texts, "window", _window),
         normalization=_parsed(path, texts, "normalization", normalization_from_json),
@@ -101,6 +107,27 @@ def load_model(path: str | os.PathLike[str]) -> Model:
     )
     _check(path, check_model, model)
     return model
+
+
+def _network(path: Path, tensors: Tensors, texts: Texts) -> Siren:
+    """Return the network of a model file."""
+    layers = range(max(sum(name.endswith(".weight") for name in tensors), 1))
+    weights, biases = (
+        tuple(_tensor(path, tensors, f"layer{layer}.{name}") for layer in layers)
+        for name in ("weight", "bias")
+    )
+    omegas = (_parsed(path, texts, "omega_0_first", float), _parsed(path, texts, "omega_0_hidden", float))
+    if texts.get("version") != WHOLE_VERSION:
+        return Siren(weights, biases, *omegas, _activation(path, texts))
+    factors = tuple(_tensor(path, tensors, f"layer{layer}.factor") for layer in layers)
+    for array in (*weights, *biases, *factors):
+        if array.dtype.kind != "i":
+            rule = "a model of integers has tensors of I8 and I32"
+            raise InputError(f"{path}: type of a tensor", str(array.dtype), rule, "round the model again")
+    held = (tuple(array.astype(np.float32) for array in some) for some in (weights, biases, factors))
+    kept, shifts, scales = held
+    fields = (_parsed(path, texts, name, int) for name in WHOLE_TEXTS)
+    return Whole(kept, shifts, *omegas, SINE, scales, *fields)
 
 
 def save_checkpoint(path: str | os.PathLike[str], state: TrainState) -> None:

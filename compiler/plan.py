@@ -31,10 +31,10 @@ from .core.interpret import interpret
 from .core.ir import Program
 from .core.passes import pipeline
 from .core.profiles import Profile, SineContract
-from .proof import bounds, certificate
+from .proof import bounds, certificate, whole
 from .proof.bounds import Enclosure
 from .schedules import schedules
-from .schedules.emit import kernel_gather
+from .schedules.emit import kernel_gather, output_channels
 from .schedules.factor import Cut, at_images, factor, over_images, product
 from .schedules.schedules import ALL, PLAIN, Images, Pick, Schedule, pick
 from .targets import Target, target_named
@@ -52,11 +52,13 @@ class Bound:
     """A-priori promise: `output` bounds each channel's error, None where an operation promises nothing.
 
     `sines` holds the range of each sine's argument; `proof` the steps of a certificate, if it has one.
+    `exact`: no operation rounds, so that every device computes the same bits.
     """
 
     output: tuple[float, ...] | None
     sines: tuple[tuple[float, float], ...]
     proof: certificate.Proof | None = None
+    exact: bool = False
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,12 @@ class Expected:
 
     value: NDArray[np.float64]
     bound: NDArray[np.float64]
+
+    def most_from(self, picture: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+        """Return how far a kernel may be from a picture near the reference's, rounded up; 0 stays 0."""
+        most = self.bound + np.abs(picture - self.value)
+        raised = np.nextafter(most.astype(np.float32), np.float32(np.inf))
+        return np.where(most == 0, np.float32(0), raised)
 
 
 @dataclass(frozen=True)
@@ -144,6 +152,8 @@ class Plan:
     @cached_property
     def bound(self) -> Bound:
         """Return the bound over all that the images can hold, or refuse the program."""
+        if self.is_whole:
+            return Bound((0.0,) * output_channels(self.analysed), (), exact=True)
         program, found = self.analysed, self.enclosures()
         if self.profile.sine is not None:
             _check_sizes(program, found)
@@ -160,6 +170,16 @@ class Plan:
             return Bound(None, tuple(ranges))
         proof = None if self.cut else certificate.prove(program, found, self.sine)
         return Bound(proof.bound if proof else tuple(float(e) for e in errors), tuple(ranges), proof)
+
+    @cached_property
+    def is_whole(self) -> bool:
+        """Return whether no operation rounds, in any order of sums."""
+        return self.shares_bound and self.cut is None and whole.holds(self.emitted)
+
+    @property
+    def assumes(self) -> str:
+        """Return what the bound rests on that the language does not promise: nothing where nothing rounds."""
+        return "" if self.is_whole else self.target.assumes
 
     @property
     def shares_bound(self) -> bool:
@@ -185,8 +205,11 @@ class Plan:
             block = slice(top, min(top + rows, height))
             windows = schedules.windows(gather, images, block)
             (value,) = interpret(self.reference, {"window": windows}, np.float64).values()
-            (error,) = bounds.output_errors(self.analysed, self.enclosures(images, block, False)).values()
             values.append(_per_pixel(value, windows.shape[:2]))
+            if self.is_whole:
+                errors.append(np.zeros_like(values[-1]))
+                continue
+            (error,) = bounds.output_errors(self.analysed, self.enclosures(images, block, False)).values()
             errors.append(np.broadcast_to(_per_pixel(error, windows.shape[:2]), values[-1].shape))
         return Expected(np.concatenate(values), np.concatenate(errors))
 
@@ -209,7 +232,8 @@ def plan_program(
     With a `rank` the first layer is cut to it, and there are two kernels [factor.py].
     """
     chosen, promised = target_named(target), profiles.profile_named(profile)
-    kernel_gather(program)
+    if kernel_gather(program).whole and rank:
+        raise CompileError(f"rank {rank}: it rounds sums, and a network of integers does not; leave it out")
     common = analysed(program, profile)
     if common.exact and chosen.assumes:
         raise CompileError(

@@ -28,11 +28,13 @@ from .languages.opencl import OpenCL
 from .languages.weight_homes import HOMES
 from .languages.wgsl import WGSL
 from .schedules.buffers_group import ComputeGroup, CUDAGroup, MetalGroup, VulkanGroup, WGSLGroup, groups
+from .schedules.c_dot import C_DOT
 from .schedules.c_fourier import C_FOURIER
 from .schedules.c_tiled import C_LADDER
 from .schedules.emit_inlined import Inlined
 from .schedules.emit_packed import Packed
 from .schedules.glsl_compute import GLSL_COMPUTE
+from .schedules.opencl_dot import OPENCL_DOT
 from .schedules.opencl_fourier import OPENCL_FOURIER
 from .schedules.opencl_group import OPENCL_GROUPS
 from .schedules.opencl_tiled import OPENCL_LADDER
@@ -94,7 +96,7 @@ UNROLLED_BY_MESA = 128
 """Most primitives of a scene that become statements each in fragment shaders. llvmpipe reads a table at a
 loop's counter lane by lane, so a loop that Mesa does not unroll itself (it does up to some 30 trips) is two
 to four times slower than statements; but it compiles the statements of 100 primitives in 1 to 5 s, those of
-300 in 9 to 60 s (`python bench/primitives.py --executors opengl`)."""
+300 in 9 to 60 s (`wamnet bench primitives --executors opengl`)."""
 
 TARGETS: Mapping[str, Target] = {
     target.name: target
@@ -109,7 +111,7 @@ TARGETS: Mapping[str, Target] = {
             paths={1: None},
         ),
         replace(
-            _dialect_target(OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_GROUPS),
+            _dialect_target(OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_DOT, *OPENCL_GROUPS),
             paths={lanes: opencl_path.of_lanes(lanes) for lanes in opencl_path.LANES},
         ),
         replace(_dialect_target(GLSL(), Inlined(GLSLInlined()), *GLSL_COMPUTE), unrolled=UNROLLED_BY_MESA),
@@ -117,7 +119,7 @@ TARGETS: Mapping[str, Target] = {
 }
 """The targets that the demo and the benchmark show, by the name of the executor that runs them."""
 
-DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C(), *C_LADDER, *C_FOURIER)}
+DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C(), *C_LADDER, *C_FOURIER, *C_DOT)}
 """All targets that an executor of the registry runs."""
 
 EXPORTED: Mapping[str, Target] = {

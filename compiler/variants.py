@@ -18,6 +18,7 @@ may be made to suit them) and much for sines; on frames the error is measured [k
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,12 +29,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..refimpl.errors import InputError
-from ..refimpl.network import factored
+from ..refimpl.network import factored, whole
 from ..refimpl.network.dataset import FEATURES, Window
 from ..refimpl.network.denoise import Model
+from ..refimpl.network.siren import Siren
 from .core import ir, sine
 from .core.enclosure import round_up
+from .core.ir import Program
 from .core.lower import lower
+from .core.profiles import SineContract
 from .plan import Plan, analysed, plan_program
 from .proof import bounds
 from .proof.bounds import Enclosure
@@ -52,6 +56,9 @@ PLUS = "+"
 EXAMPLE = "window8+rank12"
 """A variant, for messages."""
 
+AMPLITUDES = {8: 127, 10: 511}
+"""Largest hidden value of networks of integers, by its bits."""
+
 LARGEST_DIFFERENCE = 1.0
 """Colours are clipped to [0, 1] by the reference and by every kernel: no two are farther apart."""
 
@@ -61,9 +68,10 @@ class Varied:
     """A network on its way: of the full one's shape in float64, with zeros for what is left out.
 
     `kept[l]` are the inputs of layer l that are left; `window` and `features` are what the first one reads.
+    `bits`: of hidden values, where the network is one of integers.
     """
 
-    whole: Model
+    full: Model
     weights: tuple[Array, ...]
     biases: tuple[Array, ...]
     kept: tuple[Indices, ...]
@@ -72,20 +80,37 @@ class Varied:
     variant: Variant
     rank: int = 0
     degree: int = sine.DEGREE
+    bits: int = 0
 
     @property
-    def model(self) -> Model:
-        """Return the model without what is left out, in the type of the full one's parameters."""
-        siren, last = self.whole.siren, np.arange(len(self.biases[-1]))
-        rows = (*self.kept[1:], last)
-        parts = zip(self.weights, self.biases, self.kept, rows, strict=True)
+    def rows(self) -> tuple[Indices, ...]:
+        """Return the outputs of each layer that are left."""
+        return (*self.kept[1:], np.arange(len(self.biases[-1])))
+
+    @property
+    def cut(self) -> Siren:
+        """Return the network without what is left out, in the type of the full one's parameters."""
+        siren = self.full.siren
+        parts = zip(self.weights, self.biases, self.kept, self.rows, strict=True)
         cut = [(w[np.ix_(row, column)], b[row]) for w, b, column, row in parts]
-        found = replace(
+        return replace(
             siren,
             weights=tuple(w.astype(siren.dtype) for w, _ in cut),
             biases=tuple(b.astype(siren.dtype) for _, b in cut),
         )
-        return replace(self.whole, siren=found, window=self.window, features=self.features)
+
+    @property
+    def model(self) -> Model:
+        """Return the model of that network, in integers where it is of integers."""
+        siren = self.cut
+        if self.bits:
+            siren = whole.rounded(siren, self.window.size, AMPLITUDES[self.bits])
+        return replace(self.full, siren=siren, window=self.window, features=self.features)
+
+    @property
+    def floats(self) -> tuple[Varied, int]:
+        """Return the network before it is rounded, and the largest hidden value of its integers, or 0."""
+        return replace(self, bits=0), AMPLITUDES[self.bits] if self.bits else 0
 
     @property
     def inside(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
@@ -97,6 +122,11 @@ class Varied:
             tuple(array.astype(np.float32).astype(np.float64) for array in arrays)
             for arrays in (self.weights, self.biases)
         )
+        if isinstance(network := self.model.siren, whole.Whole):
+            real = whole.real(network, self.cut)
+            for layer, (row, column) in enumerate(zip(self.rows, self.kept, strict=True)):
+                weights[layer][np.ix_(row, column)] = real[0][layer]
+                biases[layer][row] = real[1][layer]
         return weights, biases
 
     @property
@@ -110,11 +140,20 @@ class Varied:
         return self.rank * (first[0] // size + size * first[1]) + inner
 
     @property
-    def is_whole(self) -> bool:
+    def is_full(self) -> bool:
         """Return whether nothing is left out, and nothing changed."""
-        mine, given = (*self.weights, *self.biases), (*self.whole.siren.weights, *self.whole.siren.biases)
+        mine, given = (*self.weights, *self.biases), (*self.full.siren.weights, *self.full.siren.biases)
         same = all(np.array_equal(a, b) for a, b in zip(mine, given, strict=True))
-        return not self.rank and same and self.model.siren.widths == self.whole.siren.widths
+        return not self.rank and not self.bits and same and self.model.siren.widths == self.full.siren.widths
+
+    @property
+    def sine(self) -> SineContract | None:
+        """Return what is promised of the sine of integers: half a step, and the polynomial's error."""
+        if not self.bits:
+            return None
+        amplitude = AMPLITUDES[self.bits]
+        error = (0.5 + whole.SINES[amplitude].error) / amplitude
+        return SineContract("sine of integers", error=error, domain=math.inf)
 
     def profile(self, base: str) -> str:
         """Return the name of the profile that has the variant's sine."""
@@ -126,9 +165,9 @@ class Varied:
         return {
             "name": self.variant.name,
             "approximations": [f"{kind}{value}" for kind, value in self.variant.steps],
-            "program": digest_of(self.whole),
+            "program": digest_of(self.full),
             "products": self.products,
-            "products_of_full": vary(Variant(), self.whole).products,
+            "products_of_full": vary(Variant(), self.full).products,
             "bound": {
                 "output": None if bound is None else [round_up(float(error)) for error in bound],
                 "against": "float64 reference of the full network, for all images, in display-encoded colour",
@@ -205,6 +244,21 @@ def choose_sine(varied: Varied, degree: int) -> Varied:
     return replace(varied, degree=degree)
 
 
+def amplitude_of(bits: int) -> int:
+    """Return the largest hidden value of a network of integers, by its bits."""
+    known = ", ".join(f"whole{known}" for known in AMPLITUDES)
+    _check(f"whole{bits}", bits in AMPLITUDES, f"there are {known}", "whole8")
+    return AMPLITUDES[bits]
+
+
+def make_whole(varied: Varied, bits: int) -> Varied:
+    """Round the network to integers, hidden values of so many bits [whole.py]."""
+    amplitude_of(bits)
+    is_plain = not varied.rank and varied.degree == sine.DEGREE
+    _check(f"whole{bits}", is_plain, "a rank rounds, and integers have a sine of their own", "whole8 only")
+    return replace(varied, bits=bits)
+
+
 def _spread(varied: Varied, left: Indices, channels: int) -> Varied:
     """Leave inputs at these positions of `kept`; the weights of others go to all that are left, evenly."""
     kept, weight = varied.kept[0], varied.weights[0].copy()
@@ -216,6 +270,10 @@ def _spread(varied: Varied, left: Indices, channels: int) -> Varied:
         weight[:, ours] += weight[:, theirs].sum(axis=1, keepdims=True) / len(ours)
     weight[:, gone] = 0.0
     return replace(varied, weights=(weight, *varied.weights[1:]), kept=(chosen, *varied.kept[1:]))
+
+
+NARROWER = ("without-", "window", "hidden", "rank", "sine")
+"""Kinds that integers come after."""
 
 
 @dataclass(frozen=True)
@@ -237,6 +295,8 @@ KINDS: Mapping[str, Kind] = {
         # A first layer that is narrowed after the cut would not have its rank any more.
         Kind("rank", "a first layer of rank N: rank12", cut_rank, ("without-", "window", "hidden")),
         Kind("sine", "sines of degree N: sine7", choose_sine),
+        # What is rounded has no weights that could be spread, cut or counted.
+        Kind("whole", "integers of 8 or 10 bits, the same bits everywhere: whole8", make_whole, NARROWER),
     )
 }
 """All approximations, by what their names begin with."""
@@ -266,7 +326,7 @@ def parse(text: str) -> Variant:
         return Variant()
     steps: list[tuple[str, int | str]] = []
     for part in text.split(PLUS):
-        match = re.fullmatch(r"(without-)([a-z]+)|(window|hidden|rank|sine)([1-9][0-9]{0,3})", part)
+        match = re.fullmatch(r"(without-)([a-z]+)|(window|hidden|rank|sine|whole)([1-9][0-9]{0,3})", part)
         if match is None:
             rule = f"{part!r} is not an approximation; there are: {KNOWN}"
             raise InputError("variant", text, rule, f"use {FULL}, or some of them, as in {EXAMPLE}")
@@ -300,6 +360,8 @@ def _check_order(text: str, steps: Sequence[tuple[str, int | str]]) -> None:
 def vary(variant: Variant, model: Model) -> Varied:
     """Return the model with a variant's approximations, or say why it cannot have them."""
     siren = model.siren
+    is_made = isinstance(siren, whole.Whole) and variant.steps
+    _check(variant.name, not is_made, "the model is one of integers, which come last", FULL)
     wide = [[array.astype(np.float64) for array in arrays] for arrays in (siren.weights, siren.biases)]
     kept = tuple(np.arange(weight.shape[1]) for weight in siren.weights)
     varied = Varied(
@@ -321,19 +383,19 @@ def _check(name: str, holds: bool, rule: str, way_out: str) -> None:
 
 def enclose(varied: Varied, plan: Plan) -> list[Enclosure]:
     """Return enclosures of the full network's values for all images, errors being a variant's kernel's."""
-    whole = analysed(lower(varied.whole))
-    contract = plan.sine
-    box = bounds.window_box(kernel_gather(whole))
-    layers = [index for index, node in enumerate(whole.nodes) if node.op == "affine"]
+    program = analysed(lower(varied.full))
+    contract = varied.sine or plan.sine
+    box = bounds.window_box(kernel_gather(program))
+    layers = [index for index, node in enumerate(program.nodes) if node.op == "affine"]
     assert len(layers) == len(varied.weights), "a lowered model has one affine map a layer"
-    known: dict[int, Enclosure] = {}
+    known = _rounded_inputs(program, box) if varied.bits else {}
     for layer, index in enumerate(layers):
-        node = whole.nodes[index]
-        until = replace(whole, nodes=whole.nodes[:index], outputs=())
+        node = program.nodes[index]
+        until = replace(program, nodes=program.nodes[:index], outputs=())
         x = bounds.enclose(until, {"window": box}, contract, known=known)[node.args[0]]
         names = str(node["weight"]), str(node["bias"])
         inside = dict(zip(names, (arrays[layer] for arrays in varied.inside), strict=True))
-        outside = {name: whole.parameters[name].astype(np.float64) for name in names}
+        outside = {name: program.parameters[name].astype(np.float64) for name in names}
         # Where sines promise nothing, an infinite error may meet a weight of 0: NaN is not a bound.
         with np.errstate(invalid="ignore"):
             wanted, kernel = (
@@ -341,7 +403,7 @@ def enclose(varied: Varied, plan: Plan) -> list[Enclosure]:
                 for parameters in (outside, inside)
             )
         error = np.where(np.isnan(kernel.error), np.inf, kernel.error)
-        if layer == 0:
+        if layer == 0 and not varied.bits:
             error = _first_error(varied, plan, error)
         known[index] = replace(
             kernel,
@@ -349,7 +411,13 @@ def enclose(varied: Varied, plan: Plan) -> list[Enclosure]:
             high=wanted.high,
             error=(error + _moved(x, *(inside[n] - outside[n] for n in names))) * (1 + bounds.OUTWARD),
         )
-    return bounds.enclose(whole, {"window": box}, contract, known=known)
+    return bounds.enclose(program, {"window": box}, contract, known=known)
+
+
+def _rounded_inputs(program: Program, box: tuple[Array, Array]) -> dict[int, Enclosure]:
+    """Return the enclosure of the window whose numbers are rounded: half a step each."""
+    window = next(index for index, node in enumerate(program.nodes) if node.op == "input")
+    return {window: Enclosure(*box, np.full_like(box[0], 0.5 / whole.INPUT_LEVELS))}
 
 
 def _moved(x: Enclosure, weight: Array, bias: Array) -> Array:
@@ -381,11 +449,13 @@ def bound_of(plan: Plan) -> Array | None:
     In display-encoded colour, over all images, against float64.
     """
     assert plan.varied is not None, "plan_model makes plans of variants"
-    if not plan.varied.is_whole:
-        whole, found = analysed(lower(plan.varied.whole)), enclose(plan.varied, plan)
+    if not plan.varied.is_full:
+        program, found = analysed(lower(plan.varied.full)), enclose(plan.varied, plan)
     else:  # The kernel's own bound, which is sharper than one layer after another.
-        whole, found = plan.analysed, plan.enclosures()
-    (errors,) = bounds.output_errors(whole, found).values()
+        program, found = plan.analysed, plan.enclosures()
+    (errors,) = bounds.output_errors(program, found).values()
+    # A colour in integers is the nearest multiple of its step.
+    errors = errors + (1.0 / whole.COLOUR_STEPS if plan.varied.bits else 0.0)
     return np.minimum(errors, LARGEST_DIFFERENCE) if np.isfinite(errors).all() else None
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from itertools import accumulate
 from typing import Any
 
@@ -79,13 +79,23 @@ class Node:
 
 @dataclass(frozen=True)
 class Image:
-    """A feature image: an encoded channel lies in [low, high]; `encoding` says how it is made."""
+    """A feature image: an encoded channel lies in [low, high]; `encoding` says how it is made.
+
+    `whole`: its numbers are whole.
+    """
 
     name: str
     channels: int
     low: float
     high: float
     encoding: str = ""
+    whole: bool = False
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Return the fields for a manifest; `whole` only where it is true."""
+        found = asdict(self)
+        return found if self.whole else {name: value for name, value in found.items() if name != "whole"}
 
     @property
     def range_text(self) -> str:
@@ -125,6 +135,11 @@ class Gather:
     def n_inputs(self) -> int:
         """Return the length of the window vector."""
         return self.rows * self.columns * self.channels
+
+    @property
+    def whole(self) -> bool:
+        """Return whether all numbers of the window are whole."""
+        return all(image.whole for image in self.images)
 
     @property
     def by_image(self) -> NDArray[np.intp]:
@@ -212,7 +227,10 @@ def text(program: Program) -> str:
     if program.gather is not None:
         taps, border = f"{program.gather.rows}x{program.gather.columns}", program.gather.window.border
         lines.append(f"  window {taps}, border {border}")
-        lines += [f"  image {i.name}: {i.channels} in {i.range_text}" for i in program.gather.images]
+        lines += [
+            f"  image {i.name}: {i.channels}{' whole' * i.whole} in {i.range_text}"
+            for i in program.gather.images
+        ]
     lines += [f"  %{index} = {_line(node)}" for index, node in enumerate(program.nodes)]
     lines += [f"  output {name} = %{index}" for name, index in program.outputs]
     lines += [f"  parameter {name}: {_array(array)}" for name, array in sorted(program.parameters.items())]

@@ -15,7 +15,7 @@ loops. Those that execute or print a program walk through it and meet each loop 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from .ir import Node, Program
@@ -26,7 +26,7 @@ MOST_UNROLLED = 32
 On PoCL, at 10 statements are up to a tenth faster; at 30 they are level for boxes that share a rotation and
 for quads, and a third slower for mixtures; at 100 they are 1.3 to 1.8 times slower, their code having left
 the processor's first cache, and take 2 to 6 s to trace and build instead of 0.5. 32 keeps the 29 of
-`minicubes` statements (`python bench/primitives.py`)."""
+`minicubes` statements (`wamnet bench primitives`)."""
 
 
 def bodies(program: Program) -> Sequence[frozenset[int]]:
@@ -76,3 +76,22 @@ def loops(program: Program) -> tuple[dict[int, Loop], frozenset[int]]:
             body = tuple(i for i in kept if number in inside[i] and i < index)
             found[index] = Loop(number, int(node["trips"]), *split(node), body)  # type: ignore[arg-type]
     return found, frozenset(kept)
+
+
+def last_reads(program: Program, ends: Mapping[int, Loop]) -> list[list[int]]:
+    """Return, for each node, the values that are not read after it: their arrays can be forgotten.
+
+    `ends` is what [`loops`] returns: a loop's body reads, in all trips, where the loop is met.
+    """
+    reads = list(range(len(program.nodes)))
+    for end, loop in ends.items():
+        for index in loop.body:
+            reads[index] = end
+    last = reads.copy()
+    for index, node in enumerate(program.nodes):
+        for arg in node.args:
+            last[arg] = max(last[arg], reads[index])
+    forgotten: list[list[int]] = [[] for _ in last]
+    for index in set(range(len(last))).difference(index for _, index in program.outputs):
+        forgotten[last[index]].append(index)
+    return forgotten

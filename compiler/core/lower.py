@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 
 import numpy as np
 
-from ...refimpl.network.dataset import DISPLAY_FORMULA, FEATURES
+from ...refimpl.network.dataset import DISPLAY_FORMULA, FEATURES, Normalization
 from ...refimpl.network.denoise import Model, as_dtype, check_model, denoise_pixel
+from ...refimpl.network.whole import INPUT_LEVELS
 from .ir import OUTPUT_ENCODING, Gather, Image, Program, Type
 from .trace import trace
 from .verify import verify
@@ -20,10 +22,8 @@ def lower(model: Model, keep_places: bool = False) -> Program:
     `keep_places`: its nodes know the lines of the reference that they came from, for listings.
     """
     check_model(model)
-    features = [FEATURES[name] for name in model.features]
     scales = model.normalization
-    images = tuple(Image(f.name, f.channels, f.low, f.high, f.encoding(scales)) for f in features)
-    gather = Gather(model.window, images)
+    gather = Gather(model.window, images_of(model.features, scales, model.is_whole))
     siren = as_dtype(model.siren, np.float32)
     info = {
         **model.info,
@@ -38,3 +38,19 @@ def lower(model: Model, keep_places: bool = False) -> Program:
         keep_places=keep_places,
     )
     return verify(program, "lowered model")
+
+
+def images_of(
+    features: Sequence[str], normalization: Normalization, whole: bool = False
+) -> tuple[Image, ...]:
+    """Return the images of features; `whole`: as a network of integers reads them."""
+    known = [FEATURES[name] for name in features]
+    images = tuple(Image(f.name, f.channels, f.low, f.high, f.encoding(normalization)) for f in known)
+    return tuple(map(_whole_image, images)) if whole else images
+
+
+def _whole_image(image: Image) -> Image:
+    """Return the same image in integers, as a network of integers reads it."""
+    encoding = f"floor({INPUT_LEVELS} x + 1/2) of x = {image.encoding}"
+    low, high = INPUT_LEVELS * image.low, INPUT_LEVELS * image.high
+    return replace(image, low=low, high=high, encoding=encoding, whole=True)

@@ -228,7 +228,10 @@ def _operand(builder: Builder, value: Any, beside: str | None = None) -> int:
     if _is_mixed(value):
         return _operand(builder, emit(builder, "stack", *value) if value.ndim else value.item(), beside)
     if isinstance(value, np.ndarray) and value.ndim:
-        return _add(builder, "parameter", (), name=builder.parameter(_exact_float32(value)))
+        index = _add(builder, "parameter", (), name=builder.parameter(_exact_float32(value)))
+        # Kernels keep integers in float32 too, up to 2^24.
+        kind = str(value.dtype)
+        return _add(builder, "convert", (index,), dtype=kind) if kind in ("int32", "uint32") else index
     if not isinstance(value, int | float | np.number | np.bool_ | np.ndarray):
         _refuse(f"a {type(value).__name__} as an operand")
     return _constant(builder, value, _kind(value, beside))

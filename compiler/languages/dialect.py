@@ -55,7 +55,8 @@ class Dialect:
     channel. A path kernel follows `lanes` paths at once; where that is more than one, a value has a component
     for each, and `single` declares what is the same for all. `helpers`: functions that an operation calls, by
     operation. `scene_number` reads a number of the scene that is an input; a language without it takes no
-    moving scene. `types` are those of values; `scalars` those of single numbers, where values are vectors.
+    moving scene. `integers_top`: lines that integers in vectors need at a kernel's top. `types` are those of
+    values; `scalars` those of single numbers, where values are vectors.
     """
 
     target: str
@@ -91,6 +92,7 @@ class Dialect:
     any_lane: str = "{mask}"
     helpers: Mapping[str, str] = {}
     scene_number: str = ""
+    integers_top: tuple[str, ...] = ()
     planes_per_buffer: int = 1
     max_planes: int = 2**16
     sum_store: str = "sums[{plane} * plane + at] = {value};"

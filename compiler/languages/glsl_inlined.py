@@ -5,12 +5,13 @@ from __future__ import annotations
 from .dialect import Parts
 from .glsl import GLSL, said_of_denoiser
 from .interface import DENOISE, Interface
+from .tiled_dialect import ON_INTEGERS
 
 
 class GLSLInlined(GLSL):
     """The dialect's table: values are `vec4`, no texture holds weights."""
 
-    types = {"float32": "vec4", "bool": "bvec4"}
+    types = {"float32": "vec4", "bool": "bvec4", "int32": "ivec4", "uint32": "uvec4"}
     said = {DENOISE: said_of_denoiser()}
     operations = {
         **{
@@ -29,6 +30,9 @@ class GLSLInlined(GLSL):
                 ("greater_equal", "greaterThanEqual"),
             )
         },
+        **{name: GLSL.operations[name] for name in ON_INTEGERS},
+        **{f"{op}imum.int32": f"{op}(ivec4({{0}}), ivec4({{1}}))" for op in ("min", "max")},
+        "minimum.uint32": "min(uvec4({0}), uvec4({1}))",
         "select": "mix(vec4({2}), vec4({1}), {0})",
     }
 

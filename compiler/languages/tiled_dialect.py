@@ -19,6 +19,9 @@ OPERATIONS = (
 )
 """Operations of which a language has words for elements."""
 
+ON_INTEGERS = ("bitwise_and", "bitwise_xor", "right_shift", "convert")
+"""Those on integers, which are written alike for all kinds of element."""
+
 
 class TiledDialect(Dialect):
     """The words of one language for tiles; what most of them share with C is here."""

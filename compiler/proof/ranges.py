@@ -35,8 +35,8 @@ from ...refimpl.errors import CompileError
 from ..core.interpret import apply, element
 from ..core.intervals import Ends
 from ..core.ir import Node, Program
-from ..core.loops import Loop, loops
-from ..core.ops import LOOPS, image
+from ..core.loops import Loop, last_reads, loops
+from ..core.ops import image
 from ..core.profiles import (
     EMITTED_COSINE,
     EMITTED_SINE,
@@ -140,7 +140,7 @@ def evaluate(
     """Return the range of each output for inputs (...), exact numbers or ranges by name."""
     run = _Run(program, inputs, arithmetic, guided, [None] * len(program.nodes))
     ends, in_bodies = loops(program)
-    unread = _last_reads(program, in_bodies)
+    unread = last_reads(program, ends)
     # Numbers that are too large or no numbers are recognised by their value [`_whole`].
     with np.errstate(all="ignore"):
         for index in range(len(program.nodes)):
@@ -151,25 +151,6 @@ def evaluate(
             for done in unread[index]:
                 run.found[done] = None
     return {name: run.found[index] for name, index in program.outputs}
-
-
-def _last_reads(program: Program, in_bodies: frozenset[int]) -> list[list[int]]:
-    """Return, for each node, the nodes that it is the last to read: their arrays can be forgotten.
-
-    What a loop reads is kept: it is read again in the next trip.
-    """
-    last: dict[int, int] = {}
-    for index, node in enumerate(program.nodes):
-        last.update(dict.fromkeys(node.args, index))
-    kept = {index for _, index in program.outputs}
-    for index, node in enumerate(program.nodes):
-        if index in in_bodies or node.op in LOOPS:
-            kept |= {index, *node.args}
-    forgotten: list[list[int]] = [[] for _ in program.nodes]
-    for read, reader in last.items():
-        if read not in kept:
-            forgotten[reader].append(read)
-    return forgotten
 
 
 @dataclass(frozen=True)

@@ -12,18 +12,19 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError
-from ...refimpl.network.dataset import FEATURES, Normalization
+from ...refimpl.network.dataset import Normalization
 from ...refimpl.reading import SIZES
 from ..artifact import OneSource
 from ..core import ir, profiles
 from ..core.ir import Image, Program
+from ..core.lower import images_of
 from ..core.passes import pipeline
 from ..languages import interface
 from ..languages.dialect import Dialect, Parts
@@ -65,13 +66,15 @@ def compile_encode(
     target: str,
     profile: str = "ieee",
     planes: Sequence[str] | None = None,
+    whole: bool = False,
 ) -> EncodeArtifact:
     """Return the kernel that turns sums over samples into the encoded images of features.
 
-    `planes` name those of the sums, in order; by default they are what the features need.
+    `planes` name those of the sums, in order; by default they are what the features need. `whole`: the
+    images are those of a network of integers.
     """
     chosen, promised = target_named(target), profiles.unpinned(profile, "encodings of features")
-    program = pipeline.run(lower_encode(features, normalization), promised.passes)
+    program = pipeline.run(lower_encode(features, normalization, whole), promised.passes)
     planes = tuple(planes or planes_of(features))
     lacking = set(planes_of(features)) - set(planes)
     if lacking:
@@ -79,8 +82,7 @@ def compile_encode(
             f"the sums have no planes {', '.join(sorted(lacking))}: the features {', '.join(features)} are "
             "made of them; let the path kernel add them up"
         )
-    known = [FEATURES[name] for name in features]
-    images = tuple(Image(f.name, f.channels, f.low, f.high, f.encoding(normalization)) for f in known)
+    images = images_of(features, normalization, whole)
     if not chosen.encodes:
         raise CompileError(
             f"target {target} has no kernels that encode features: compile for one that has, as opencl"
@@ -107,7 +109,7 @@ def compile_encode(
         "profile": {"name": promised.name, "text": promised.text},
         "passes": [*PASSES, *promised.passes],
         "planes": list(planes),
-        "images": [asdict(image) for image in images],
+        "images": [image.facts for image in images],
         "arguments": arguments,
         "bound": None,
         "files": {name: ir.sha256(text.encode())},
@@ -184,12 +186,17 @@ def _body(program: Program, dialect: Dialect, planes: Sequence[str], images: Seq
 
 
 def encode_source(
-    features: Sequence[str], normalization: Normalization, dialect: Dialect, profile: str = "ieee"
+    features: Sequence[str],
+    normalization: Normalization,
+    dialect: Dialect,
+    profile: str = "ieee",
+    whole: bool = False,
 ) -> str:
     """Return only the statements, for a kernel that has the sums of these features in variables."""
-    program = pipeline.run(lower_encode(features, normalization), profiles.profile_named(profile).passes)
-    known = [FEATURES[name] for name in features]
-    images = [Image(f.name, f.channels, f.low, f.high, f.encoding(normalization)) for f in known]
+    program = pipeline.run(
+        lower_encode(features, normalization, whole), profiles.profile_named(profile).passes
+    )
+    images = images_of(features, normalization, whole)
     return "\n".join(f"    {line}" for line in _body(program, dialect, planes_of(features), images))
 
 

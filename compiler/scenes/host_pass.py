@@ -128,10 +128,15 @@ HOSTS = {"shadertoy": (_ShadertoyPath(), SHADERTOY_END), "godot": (_GodotPath(),
 
 
 def feature_pass(
-    programs: PathPrograms, feature: str, normalization: Normalization, target: str, header: Sequence[str]
+    programs: PathPrograms,
+    feature: str,
+    normalization: Normalization,
+    target: str,
+    header: Sequence[str],
+    whole: bool = False,
 ) -> str:
-    """Return the pass that traces one sample a pixel and writes one encoded feature."""
+    """Return the pass that traces one sample a pixel and writes one encoded feature; `whole`: in integers."""
     dialect, end = HOSTS[target]
     text = emit_path(programs, dialect, layers_of((feature,)), header)
-    statements = encode_source((feature,), normalization, STATEMENTS)
+    statements = encode_source((feature,), normalization, STATEMENTS, whole=whole)
     return text + end.format(statements=statements)

@@ -18,7 +18,7 @@ from safetensors import safe_open
 from wamnet.compiler import model_file
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.network import siren, train
+from wamnet.refimpl.network import siren, train, whole
 from wamnet.refimpl.network.dataset import FEATURES, Normalization, Window, n_inputs
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.train import Recipe
@@ -194,7 +194,7 @@ DAMAGE = {
     "shape": (with_tensor("layer1.weight", np.zeros((3, 5), np.float32)), r"layer 1 is weights \(3, 5\)"),
     "type": (with_tensor("layer1.bias", np.zeros(3, np.int64)), "types of the parameters is float32, int64"),
     "format": (with_text("format", "other"), "format is other: must be wamnet-model"),
-    "version": (with_text("version", "3"), "version is 3: this program reads version 1 and 2; use the"),
+    "version": (with_text("version", "4"), "version is 4: this program reads version 1 and 2 and 3; use the"),
     "activation missing": (with_text("version", "2"), "'activation' must be among them"),
     "activation in version 1": (
         with_text("activation", "relu"),
@@ -323,3 +323,59 @@ def test_a_damaged_checkpoint_is_refused_in_one_line(case: str, tmp_path: Path) 
     with pytest.raises(InputError, match=message) as refusal:
         model_file.load_checkpoint(path)
     assert "\n" not in str(refusal.value)
+
+
+# ---- models of integers ------------------------------------------------------------------------------------
+
+
+def whole_model() -> Model:
+    """Return a model in integers."""
+    model = model_of(size=2)
+    return replace(model, siren=whole.rounded(model.siren, 2))
+
+
+def test_a_model_of_integers_comes_back_to_the_bit(tmp_path: Path) -> None:
+    model = whole_model()
+    path = tmp_path / "model.safetensors"
+    model_file.save_model(path, model)
+    with safe_open(path, "numpy") as file:
+        kinds = {name: file.get_tensor(name).dtype.name for name in file.keys()}  # noqa: SIM118 - not a dict
+        assert file.metadata()["version"] == "3"
+    assert kinds["layer0.weight"] == "int8"
+    assert {kinds[f"layer{i}.{name}"] for i in (0, 1) for name in ("bias", "factor")} == {"int32"}
+    found = model_file.load_model(path)
+    assert same(found, model)
+    assert isinstance(found.siren, whole.Whole)
+    assert isinstance(model.siren, whole.Whole)
+    assert (found.siren.amplitude, found.siren.fraction) == (model.siren.amplitude, model.siren.fraction)
+    assert all(np.array_equal(a, b) for a, b in zip(found.siren.factors, model.siren.factors, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [("amplitude", 100, "amplitude"), ("fraction", 20, "fraction")],
+)
+def test_a_model_of_integers_that_breaks_a_rule_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, field: str, value: int, message: str
+) -> None:
+    model = whole_model()
+    broken = replace(model, siren=replace(model.siren, **{field: value}))  # type: ignore[arg-type]
+    monkeypatch.setattr(model_file, "check_model", lambda model: None)
+    model_file.save_model(tmp_path / "model.safetensors", broken)
+    monkeypatch.undo()
+    with pytest.raises(InputError, match=message):
+        model_file.load_model(tmp_path / "model.safetensors")
+
+
+def test_floats_in_a_model_of_integers_are_refused(tmp_path: Path) -> None:
+    model = model_of(size=2)
+    texts = {"version": "3", "amplitude": "127", "fraction": "8"}
+    tensors = {}
+    for layer, (weight, bias) in enumerate(zip(model.siren.weights, model.siren.biases, strict=True)):
+        tensors |= {f"layer{layer}.weight": weight, f"layer{layer}.bias": bias, f"layer{layer}.factor": bias}
+    plain = {"features": '["color"]', "window": '{"size": 2, "border": "zero"}', "normalization": "{}"}
+    texts |= plain | {"omega_0_first": "1.0", "omega_0_hidden": "1.0"}
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(model_file._encode(model_file.MODEL_FORMAT, tensors, texts))
+    with pytest.raises(InputError, match="type of a tensor"):
+        model_file.load_model(path)

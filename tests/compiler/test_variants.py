@@ -12,12 +12,15 @@ from hypothesis import strategies as st
 from wamnet.compiler import variants
 from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.core import sine
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.plan import plan_program
 from wamnet.compiler.targets import TARGETS
 from wamnet.compiler.variants import parse, plan_model, vary
-from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.network import dataset, factored, siren
 from wamnet.refimpl.network.dataset import Normalization, Window
-from wamnet.refimpl.network.denoise import Model, check_model, denoise_pixel
+from wamnet.refimpl.network.denoise import Model, as_dtype, check_model, denoise_pixel
+from wamnet.refimpl.network.whole import round_image
 
 FEATURES = ("color", "normal")
 """What the small model sees: 6 channels, colours in [0, 1], normals in [-1, 1]."""
@@ -280,3 +283,47 @@ def test_manifests_say_what_was_done(target) -> None:
     assert (np.array(said["bound"]["output"]) >= bound).all()
     assert (np.array(said["bound"]["output"]) <= 1.01 * bound).all()
     assert "variant" not in compile_plan(plan_model(small(), target)).manifest
+
+
+# ---- integers ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bits", [8, 10])
+def test_integers_are_within_their_bound_of_the_full_network(bits) -> None:
+    """Layers so thin and weights so small that the bound says something: it is below 1 and holds."""
+    features, window = ("color", "normal"), Window(2)
+    small = siren.init((24, 3, 3), 1.0, 1.0, seed=4)
+    model = Model(small, features, window, Normalization())
+    plan = variants.plan_model(model, "numpy", variant=f"whole{bits}")
+    bound = variants.bound_of(plan)
+    assert bound is not None
+    assert (bound < 1.0).all()
+    drawn = np.random.default_rng(7).uniform(-1, 1, (500, 24)).astype(np.float32)
+    drawn[:, [i for i in range(24) if i % 6 < 3]] = np.abs(drawn[:, [i for i in range(24) if i % 6 < 3]])
+    full = denoise_pixel(as_dtype(small, np.float64), drawn.astype(np.float64))
+    varied = denoise_pixel(plan.model.siren, round_image(drawn))
+    assert (np.abs(full - varied) <= bound).all()
+    # And it is not ten thousand times what is found: the bound is of this network, not of any.
+    assert np.abs(full - varied).max() * 1e4 >= bound.max()
+
+
+@pytest.mark.parametrize("text", ["rank2", "sine7", "window2", "without-normal", "hidden2", "whole8"])
+def test_integers_have_no_variants(text) -> None:
+    whole = vary(parse("whole8"), small()).model
+    with pytest.raises(InputError, match="the model is one of integers, which come last"):
+        vary(parse(text), whole)
+    assert vary(parse("full"), whole).model.is_whole
+
+
+def test_integers_have_no_rank() -> None:
+    whole = vary(parse("whole8"), small()).model
+    with pytest.raises(CompileError, match="rank 2: it rounds sums, and a network of integers does not"):
+        plan_program(lower(whole), "numpy", rank=2)
+
+
+@pytest.mark.parametrize("text", ["rank2+whole8", "sine7+whole8", "whole9", "whole8+window2"])
+def test_integers_of_what_rounds_are_refused(text) -> None:
+    small = siren.init((24, 3, 3), 1.0, 1.0, seed=4)
+    model = Model(small, ("color", "normal"), Window(2), Normalization())
+    with pytest.raises(InputError, match="variant"):
+        variants.vary(variants.parse(text), model)

@@ -1,0 +1,204 @@
+"""Programs in which nothing rounds: ranges hold all values, and each rule refuses what it must."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Gather, Image, Program, Type
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.plan import analysed, plan_program
+from wamnet.compiler.proof import whole
+from wamnet.compiler.schedules.c_dot import CDot
+from wamnet.compiler.schedules.emit_dot import Dot
+from wamnet.compiler.schedules.opencl_dot import OpenCLDot
+from wamnet.compiler.targets import DENOISERS, EXPORTED
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.whole import SINES, Whole, forward_whole, rounded
+
+CHANNELS = {"a": 3, "b": 1}
+"""Images of the networks here."""
+
+LARGEST = 127.0
+"""The end of their range."""
+
+
+def program(function, low: float = -LARGEST, high: float = LARGEST, is_whole: bool = True) -> Program:
+    """Trace a function of a window of one pixel."""
+    images = tuple(Image(name, n, low, high, whole=is_whole) for name, n in CHANNELS.items())
+    gather = Gather(Window(1, "clamp"), images)
+    return analysed(trace(function, {"window": Type(shape=(gather.n_inputs,))}, gather))
+
+
+def network(amplitude: int = 127, seed: int = 1):
+    return rounded(siren.init((4, 5, 6, 3), 1.0, 5.0, seed=seed), 1, amplitude)
+
+
+@given(seed=st.integers(0, 2**16), amplitude=st.sampled_from(sorted(SINES)))
+def test_ranges_hold_all_values(seed, amplitude) -> None:
+    net = network(amplitude, seed)
+    found = program(lambda window: forward_whole(net, window))
+    drawn = np.random.default_rng(seed).integers(-127, 128, (50, 4)).astype(np.float32)
+    drawn[0], drawn[1] = -127, 127
+    for index, (node, known) in enumerate(zip(found.nodes, whole.known(found), strict=True)):
+        one = replace(found, outputs=(("it", index),))
+        if node.op in ("constant", "parameter"):
+            continue
+        values = interpret(one, {"window": drawn})["it"].astype(np.float64)
+        assert (known.low <= values).all(), node
+        assert (values <= known.high).all(), node
+        assert (values / 2.0**known.grain == np.floor(values / 2.0**known.grain)).all(), node
+
+
+@pytest.mark.parametrize("target", [*DENOISERS, *EXPORTED])
+def test_every_kernel_states_the_bound_zero(target) -> None:
+    net = network()
+    found = {**DENOISERS, **EXPORTED}[target]
+    traced = program(lambda window: forward_whole(net, window))
+    for schedule in found.schedules:
+        for profile in ("ieee", "native"):
+            artifact = compile_program(traced, target, profile, schedule.name)
+            assert artifact.manifest["bound"]["output"] == [0.0, 0.0, 0.0]
+            assert "same bits" in artifact.source
+            assert all(image["whole"] for image in artifact.manifest["images"])
+
+
+MATRIX = np.full((3, 4), 100.0, np.float32)
+"""Weights whose sums are 3 * 100 * 127 + 100 * 127 at most."""
+
+REFUSED = {
+    "fractions in the images": (lambda x: np.matmul(x, MATRIX.T), "hold integers", {"is_whole": False}),
+    "sums beyond 2^24": (lambda x: np.matmul(x, 400 * MATRIX.T), "float32 is exact up to", {}),
+    "a sine": (lambda x: np.sin(np.matmul(x, MATRIX.T)), "may round", {}),
+    "a quotient": (lambda x: np.matmul(x, MATRIX.T) / 2.0, "may round", {}),
+    "weights of many digits": (lambda x: np.matmul(x, np.float32(1e-9) * MATRIX.T), "not a multiple", {}),
+    "products of fractions": (
+        lambda x: np.matmul(x, np.float32(2.0**-20) * MATRIX.T) * 1.001,
+        "multiple",
+        {},
+    ),
+    "a negative number in a word": (
+        lambda x: np.matmul(x, MATRIX.T).astype(np.uint32),
+        "uint32 does not hold",
+        {},
+    ),
+    "a fraction in an integer": (lambda x: (x * 0.5).astype(np.int32), "need not be whole", {}),
+    "an integer that overflows": (
+        lambda x: np.matmul(x, MATRIX.T).astype(np.int32) * 2**20,
+        "int32 does not hold",
+        {},
+    ),
+    "a large word in a float": (
+        lambda x: (x.astype(np.int32).astype(np.uint32) * 3).astype(np.float32),
+        "float32 is exact up to",
+        {},
+    ),
+}
+"""Functions with an operation that may round, what the refusal says, and the images."""
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_may_round_is_refused(name) -> None:
+    function, message, images = REFUSED[name]
+    found = program(function, **images)
+    with pytest.raises(whole.Rounds, match=message):
+        whole.known(found)
+    assert not whole.holds(found)
+
+
+def test_a_shift_by_an_unknown_number_is_refused() -> None:
+    """NumPy gives 0 for a shift by 32, C gives anything."""
+
+    def shifted(x):
+        words = np.maximum(x, 0.0).astype(np.uint32)
+        return (words >> words).astype(np.float32)
+
+    with pytest.raises(whole.Rounds, match="shifts by"):
+        whole.known(program(shifted))
+
+
+def test_the_sum_of_magnitudes_counts_not_the_range() -> None:
+    """Over images that hold one value only, the sum of two large products is 0, and its parts are not."""
+    large = np.float32([[2.0**18, -(2.0**18), 0, 0]])
+    found = program(lambda x: np.matmul(x, large.T), low=127.0)
+    with pytest.raises(whole.Rounds, match="float32 is exact up to"):
+        whole.known(found)
+
+
+def test_zeros_of_either_sign_are_no_promise_of_bits() -> None:
+    """A sum of products is -0 or 0 by its order; a colour has one zero."""
+    net = network()
+    sums = program(lambda window: np.matmul(window, net.weights[0].T))
+    assert whole.holds(sums)
+    assert not whole.has_one_zero(sums)
+    assert "a zero may have either sign" in compile_program(sums, "c").source
+    assert whole.has_one_zero(program(lambda window: forward_whole(net, window)))
+
+
+def test_a_cut_or_another_arithmetic_is_not_whole() -> None:
+    net = network()
+    traced = program(lambda window: forward_whole(net, window))
+    assert plan_program(traced, "opencl").is_whole
+    fractions = program(lambda window: forward_whole(net, window), is_whole=False)
+    assert not plan_program(fractions, "opencl", "native").is_whole
+
+
+# ---- products of bytes -----------------------------------------------------------------------------------
+
+
+def test_the_text_of_dots(golden) -> None:
+    """The smallest network that has all parts: two images, a hidden layer, rows that are filled up."""
+    net = rounded(siren.init((16, 3, 3), 1.0, 5.0, seed=1), 2)
+    images = tuple(Image(name, n, -LARGEST, LARGEST, whole=True) for name, n in CHANNELS.items())
+    gather = Gather(Window(2, "zero"), images)
+    found = analysed(trace(lambda x: forward_whole(net, x), {"window": Type(shape=(16,))}, gather))
+    for dialect in (CDot(), OpenCLDot(4)):
+        tiny = Dot("dot4", "a tiny tile", dialect, 4, 2)
+        golden(f"dot4.denoise{dialect.suffix}", tiny.emit(found, ["a tiny kernel"], True))
+
+
+def test_the_bytes_of_dots_are_the_weights() -> None:
+    """Each weight is once among the bytes; the others are 0, and sums begin at -128 times a row's sum."""
+    net = rounded(siren.init((2 * 2 * 4, 5, 3), 1.0, 5.0, seed=2), 2)
+    images = tuple(Image(name, n, -LARGEST, LARGEST, whole=True) for name, n in CHANNELS.items())
+    found = analysed(
+        trace(
+            lambda x: forward_whole(net, x), {"window": Type(shape=(16,))}, Gather(Window(2, "clamp"), images)
+        )
+    )
+    dot = Dot("dot4", "a tiny tile", CDot(), 4, 2)
+    packed, slots = dot.pack(found), dot.layout(found)
+    assert packed.size == sum(int(np.prod(slot.shape)) for slot in slots.values())
+    for name, matrix in found.parameters.items():
+        if matrix.ndim != 2:
+            continue
+        slot = slots[name]
+        held = packed[slot.offset : slot.offset + int(np.prod(slot.shape))].view(np.int8)
+        assert sorted(held[held != 0]) == sorted(matrix[matrix != 0].astype(np.int8).ravel())
+        start = slots[f"{name}start"]
+        begun = packed[start.offset : start.offset + start.shape[0]].view(np.int32)
+        assert begun[: len(matrix)].tolist() == (-128 * matrix.sum(axis=1)).astype(int).tolist()
+        assert not begun[len(matrix) :].any()
+
+
+@pytest.mark.parametrize(
+    ("changed", "reason"),
+    [
+        (lambda net: net, ""),
+        (lambda net: rounded(siren.init((4, 5, 6, 3), 1.0, 5.0, seed=1), 1, 511), "more than 8 bits"),
+        (lambda net: siren.init((4, 5, 6, 3), 1.0, 5.0, seed=1), "not of integers"),
+    ],
+)
+def test_what_bytes_do_not_hold_is_refused(changed, reason) -> None:
+    net = changed(network())
+    pixel = forward_whole if isinstance(net, Whole) else siren.forward
+    found = program(lambda window: pixel(net, window), is_whole=isinstance(net, Whole))
+    assert reason in Dot("dot16", "", CDot(), 16, 14).refusal(found)
+    assert bool(reason) == bool(Dot("dot16", "", CDot(), 16, 14).refusal(found))

@@ -16,7 +16,7 @@ from ..languages.c import UNFUSED, C, includes
 from ..languages.dialect import Parts
 from ..languages.interface import DENOISE, Interface
 from ..languages.openings import IMAGES, WEIGHTS_RESULT
-from ..languages.tiled_dialect import OPERATIONS, TiledDialect
+from ..languages.tiled_dialect import ON_INTEGERS, OPERATIONS, TiledDialect
 from .emit_tiled import Tiled
 
 FUSED = """\
@@ -168,8 +168,7 @@ class CTiled(C, TiledDialect):
             "call that from your own loops, for each x that is a multiple of {pixels}"
         )
     }
-    types = {"float32": "float", "bool": "bool"}
-    operations = {name: C.operations[name] for name in OPERATIONS}
+    operations = {name: C.operations[name] for name in (*OPERATIONS, *ON_INTEGERS)}
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the functions."""

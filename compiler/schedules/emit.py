@@ -189,6 +189,11 @@ class Body(Lines):
         """Return the lines below the window's."""
         return []
 
+    def integers(self) -> tuple[str, ...]:
+        """Return the lines that integers in vectors need, if there are any."""
+        kinds = {node.type.dtype for node in self.program.nodes if node.type.shape}
+        return self.dialect.integers_top if kinds & {"int32", "uint32"} else ()
+
     def text(self) -> list[str]:
         """Return the lines between the kernel's braces."""
         self._prepare()

@@ -106,6 +106,8 @@ class Fourier(Tiled):
         gather, readers = kernel_gather(program), readers_of_window(program)
         if program.exact:
             return "sums from spectra are rounded in another order than profile exact states"
+        if gather.whole:
+            return "sums from spectra are rounded, those of integers are not"
         if reason := refused_by_vectors(program, self.dialect):
             return reason
         if len(readers) != 1:

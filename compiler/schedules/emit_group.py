@@ -283,6 +283,7 @@ class GroupBody(InlinedBody):
         ]
         columns = f"(GROUP_WIDTH * PIXELS + {names.columns} - 1)"
         return [
+            *self.integers(),
             self._define("GROUP_WIDTH", grouped.group[0], "items of a group along a row"),
             self._define("GROUP_HEIGHT", grouped.group[1]),
             self._define("PIXELS", grouped.pixels, "pixels of an item, GROUP_WIDTH columns apart"),

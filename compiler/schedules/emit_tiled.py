@@ -58,8 +58,8 @@ def refused_by_vectors(program: Program, dialect: Dialect) -> str:
         if not OPS[node.op].elementwise or node.op not in dialect.operations:
             return f"%{index} is {node.op}, which has no form on vectors"
         if node.type.dtype not in dialect.types or not node.type.shape:
-            return f"%{index} is {node.type}: vectors hold float32[n] and bool[n]"
-    if reason := _truth_between_loops(program):
+            return f"%{index} is {node.type}: vectors hold {', '.join(f'{t}[n]' for t in dialect.types)}"
+    if reason := _others_between_loops(program):
         return reason
     output = program.nodes[program.outputs[0][1]]
     if (channels := output_channels(program)) > dialect.max_output_channels:
@@ -71,13 +71,17 @@ def refused_by_vectors(program: Program, dialect: Dialect) -> str:
     return ""
 
 
-def _truth_between_loops(program: Program) -> str:
-    """Return which boolean another loop would have to read from an array, or nothing."""
+def _others_between_loops(program: Program) -> str:
+    """Return which value that is not a float another loop would have to read from an array, or nothing."""
     group_of = {index: number for number, group in enumerate(schedule(program)) for index in group}
     for reader, node in enumerate(program.nodes):
         for index in node.args:
             known = program.nodes[index]
-            if known.type.dtype == "bool" and group_of.get(index) != group_of[reader]:
+            if (
+                known.op != "constant"
+                and known.type.dtype != "float32"
+                and group_of.get(index) != group_of[reader]
+            ):
                 return f"%{index} is {known.type}, which %{reader} in another loop reads"
     return ""
 
@@ -209,14 +213,14 @@ class TiledBody(Body):
             "PATCH_WIDTH": (f"({self.sides.columns} + PIXELS - 1)", "columns that all windows touch"),
         }
         sizes = [f"{define.format(name=name, value=n)} /* {what} */" for name, (n, what) in values.items()]
-        return [*self.words.contraction[self.program.exact], *sizes]
+        return [*self.words.contraction[self.program.exact], *self.integers(), *sizes]
 
     def _prepare(self) -> None:
         """Write the copies of the images around the pixels, under the border rule."""
         self._comment("the images around the pixels: what lies beyond the border is filled in here")
         names, words = self.sides, self.words
         for image in self.gather.images:
-            self._line(words.singles(f"patch_{image.name}", f"{names.rows} * PATCH_WIDTH * {image.channels}"))
+            self._line(self._patch(image.name, image.channels))
         self._line(words.index("left", f"x - {names.column}"))
         self._line(words.index("top", f"y - {names.row}"))
         columns = "left >= 0 && left + PATCH_WIDTH <= width"
@@ -231,7 +235,7 @@ class TiledBody(Body):
         """Write the copy of a row of the patch: at once inside the image, else pixel by pixel."""
         words = self.words
         pixel = words.pixel.format(image=name, channels=channels)
-        self._line(words.row(f"to_{name}", f"patch_{name} + dy * PATCH_WIDTH * {channels}", written=True))
+        self._line(self._patch_row(f"to_{name}", f"patch_{name} + dy * PATCH_WIDTH * {channels}", True))
         self._open(words.when("within"))
         source = f"image_{name}[(row * width + left) * {channels} + i]"
         self._nest([words.loop("i", f"PATCH_WIDTH * {channels}")], self._put(f"to_{name}[i]", source))
@@ -246,6 +250,14 @@ class TiledBody(Body):
         self._close()
         self._close()
 
+    def _patch(self, name: str, channels: int) -> str:
+        """Return the declaration of an image's patch."""
+        return self.words.singles(f"patch_{name}", f"{self.sides.rows} * PATCH_WIDTH * {channels}")
+
+    def _patch_row(self, name: str, place: str, written: bool = False) -> str:
+        """Return the declaration of a row of a patch."""
+        return self.words.row(name, place, written)
+
     def _put(self, place: str, value: str) -> list[str]:
         """Return the lines that copy one number of an image."""
         if not self.program.exact:
@@ -256,26 +268,40 @@ class TiledBody(Body):
         """Write v = W x + b for all pixels, block by block."""
         numbers, source, words = node.type.shape[0], self.program.nodes[node.args[0]], self.words
         blocks, weight = self.tile.blocks(numbers), self.slots[str(node["weight"])]
-        n_in, several = weight.shape[1], blocks.count > 1
+        n_in, several = source.type.shape[0], blocks.count > 1
         self._declare(index, f"%{index}: affine map {node['weight']} from {n_in} to {numbers}")
+        if source.op != "input":
+            self._ready(node.args[0], n_in)
         self._open(words.loop("block", blocks.count) if several else "{")
         each = range(blocks.vectors)
-        first = f"block * {n_in * blocks.vectors}" if several else ""
+        first = f"block * {weight.shape[1] * blocks.vectors}" if several else ""
         self._line(words.walk("w", weight.offset, first))
         self._line(words.sums("sum", blocks.vectors))
         at = f"block * {blocks.vectors} + " if several else ""
-        self._pixels([self._start(f"sum[p][{j}]", node.get("bias"), f"{at}{j}") for j in each])
+        self._pixels([self._start(f"sum[p][{j}]", node, f"{at}{j}") for j in each])
         if source.op == "input":
             self._windowed(blocks)
         else:
-            held = self.tile.blocks(source.type.shape[0]).total
-            self._multiply(blocks, str(n_in), words.at(f"v{node.args[0]}", f"p * {held} * LANES + i"))
+            held = self.tile.blocks(n_in).total
+            self._layer(blocks, node.args[0], n_in, f"p * {held} * LANES")
         places = [f"p * {blocks.total} + {at}{j}" for j in each]
-        self._pixels([words.hold(f"v{index}", places[j], f"sum[p][{j}]") for j in each])
+        self._pixels([self._hold(f"v{index}", places[j], f"sum[p][{j}]") for j in each])
         self._close()
 
-    def _start(self, total: str, bias: object, index: str) -> str:
+    def _ready(self, index: int, numbers: int) -> None:
+        """Write what a layer's values need before another reads them: nothing."""
+
+    def _layer(self, blocks: Blocks, index: int, numbers: int, first: str) -> None:
+        """Write the products of a layer's values, a pixel's from `first` on."""
+        self._multiply(blocks, str(numbers), self.words.at(f"v{index}", f"{first} + i"))
+
+    def _hold(self, name: str, index: str, total: str) -> str:
+        """Return the statement that puts a sum into an array, as vector `index`."""
+        return self.words.hold(name, index, total)
+
+    def _start(self, total: str, node: Node, index: str) -> str:
         """Return the statement that starts a sum."""
+        bias = node.get("bias")
         if not bias:
             return self.words.set_zero(total)
         return self.words.set_weights(total, self.slots[str(bias)].offset, index)
@@ -285,7 +311,7 @@ class TiledBody(Body):
         each, split, words = range(blocks.vectors), is_split(self.gather), self.words
         for image in self.gather.images:
             self._open(words.loop("dy", self.sides.rows))
-            self._line(words.row("row", f"patch_{image.name} + dy * PATCH_WIDTH * {image.channels}"))
+            self._line(self._patch_row("row", f"patch_{image.name} + dy * PATCH_WIDTH * {image.channels}"))
             if split:
                 self._line(words.sums("part", blocks.vectors))
                 self._pixels([words.set_zero(f"part[p][{j}]") for j in each])

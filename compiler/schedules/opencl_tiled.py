@@ -11,7 +11,7 @@ from ..languages.dialect import Parts
 from ..languages.interface import DENOISE, Interface
 from ..languages.opencl import OpenCL
 from ..languages.openings import IMAGES
-from ..languages.tiled_dialect import OPERATIONS, TiledDialect
+from ..languages.tiled_dialect import ON_INTEGERS, OPERATIONS, TiledDialect
 from .emit_tiled import Tiled
 
 MACROS = """\
@@ -29,6 +29,20 @@ typedef int{lanes} mask;
 #endif"""
 """The type of vectors of `lanes` numbers, and functions on them."""
 
+INTEGERS = """\
+#define LEAST(kind, a, b) ((kind)(b) < (kind)(a) ? (kind)(b) : (kind)(a))
+#define MOST(kind, a, b) ((kind)(b) > (kind)(a) ? (kind)(b) : (kind)(a))
+#ifdef __has_builtin
+#if __has_builtin(__builtin_convertvector)
+#define CONVERT(a, kind) __builtin_convertvector(a, kind)
+#endif
+#endif
+#ifndef CONVERT
+#define vector float{lanes}
+#define CONVERT(a, kind) CONVERTED(a, kind)
+#define CONVERTED(a, kind) convert_##kind(a)
+#endif"""
+"""What kernels with vectors of integers need in addition."""
 
 ALIGNED = (
     f"{IMAGES};\n"
@@ -49,7 +63,7 @@ class OpenCLTiled(OpenCL, TiledDialect):
 
     def __init__(self, lanes: int) -> None:
         self.macros = MACROS.format(lanes=lanes)
-        self.types = {"float32": "vector", "bool": "mask"}
+        self.types = {"float32": "vector", "bool": "mask", "int32": f"int{lanes}", "uint32": f"uint{lanes}"}
         # What is written for a vector as for a number; truth is an integer with all bits set.
         self.operations = {
             **{name: OpenCL.operations[name] for name in OPERATIONS},
@@ -58,7 +72,13 @@ class OpenCLTiled(OpenCL, TiledDialect):
             "maximum": "MAXIMUM({0}, {1})",
             "floor": "FLOOR({0})",
             "select": "{0} ? (vector)({1}) : (vector)({2})",
+            **{name: OpenCL.operations[name] for name in ON_INTEGERS},
+            "convert": "CONVERT({0}, {type})",
+            "minimum.int32": f"LEAST(int{lanes}, {{0}}, {{1}})",
+            "minimum.uint32": f"LEAST(uint{lanes}, {{0}}, {{1}})",
+            "maximum.int32": f"MOST(int{lanes}, {{0}}, {{1}})",
         }
+        self.integers_top = (INTEGERS.format(lanes=lanes),)
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""

@@ -54,7 +54,7 @@ class Schedule(ABC):
 
     `arguments` says how to call the kernel, `pixels` how many neighbours of a row a work item computes,
     `order` how a matrix is stored among the weights; `language` and `suffix` are set where they are its own;
-    `instead` names the schedule of programs that it refuses.
+    `instead` names the schedule of programs that it refuses. `bytewise`: its array of weights holds bytes.
     """
 
     name: str
@@ -64,6 +64,7 @@ class Schedule(ABC):
     language: str = ""
     suffix: str = ""
     instead: str = PLAIN
+    bytewise: bool = False
     order: str = "matrices input-major: D_in x D_out, in C order"
 
     def refusal(self, program: Program) -> str:

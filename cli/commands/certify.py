@@ -37,7 +37,8 @@ def certify(
     all steps hold, 1 if one does not, which it names, and 2 if the file is not a certificate.
     """
     from ...compiler.artifact import CERTIFICATE_NAME
-    from ...compiler.proof.checker import Refused, check
+    from ...compiler.proof.checker import check
+    from ...compiler.proof.evidence import INTEGERS, Refused
 
     path = file / CERTIFICATE_NAME if file.is_dir() else file
     if not path.is_file():
@@ -50,9 +51,22 @@ def certify(
     except Refused as step:
         say(f"refused: {step}")
         raise typer.Exit(STATUS_REFUSED) from None
+    if held["schema"] == INTEGERS:
+        table(*sums_table(held))
+        say("holds: no operation rounds; every number is the reference's, for all images of integers")
+        return
     table(*layers_table(held))
     bound = max(held["bound"]["output"])
     say(f"holds: |output - reference| <= {bound:g} for all images in their ranges, {steps_of(bound)}")
+
+
+def sums_table(held: Any) -> tuple[str, tuple[str, ...], list[list[str]]]:
+    """Return title, heads and rows: how large a partial sum of each affine map may be, in any order."""
+    rows = [
+        [str(layer), f"{max(sums):.8g}", f"{max(sums) / 2**24:.3f}"]
+        for layer, sums in enumerate(held["sums"].values())
+    ]
+    return "Sums of integers", ("layer", "largest partial sum", "of 2^24"), rows
 
 
 def layers_table(held: Any) -> tuple[str, tuple[str, ...], list[list[str]]]:

@@ -29,14 +29,15 @@ from ..core.enclosure import round_up
 from ..core.ir import Program
 from ..core.profiles import FLUSH, UNIT_ROUNDOFF, SineContract
 from ..core.sums import parts, rounding
-from . import bounds, scaled
+from . import bounds, scaled, whole
+from .evidence import FLOATS, INTEGERS
 
 if TYPE_CHECKING:
     from ..schedules.schedules import Schedule
 
 Array = NDArray[np.float64]
 
-SCHEMA = "wamnet-certificate-1"
+SCHEMA = FLOATS
 """Name and version of the form; spec/certificate.schema.json."""
 
 DIGITS = 4
@@ -193,21 +194,48 @@ def certificate(
 ) -> Mapping[str, Any]:
     """Return the certificate of a kernel, as JSON's types; `manifest` has the digests of its files."""
     return {
-        "schema": SCHEMA,
-        "manifest_digest": manifest["digest"],
-        "program_digest": manifest["program"],
-        "files": dict(manifest["files"]),
-        "profile": manifest["profile"]["name"],
+        **_about(SCHEMA, common, schedule, emitted, manifest),
         "sine": {
             "text": sine.text,
             "error_bound": sine.error,
             "domain": sine.domain if math.isfinite(sine.domain) else None,
         },
-        "program": ir.text(common),
-        "parameters": _places(common, schedule, emitted),
         "layers": [dict(step) for step in proof.layers],
         "outputs": [dict(step) for step in proof.outputs],
         "bound": {"output": list(proof.bound), "against": manifest["bound"]["against"]},
+    }
+
+
+def integers(
+    program: Program, schedule: Schedule, emitted: Program, manifest: Mapping[str, Any]
+) -> Mapping[str, Any]:
+    """Return the certificate of a kernel in which nothing rounds: ends of all values, largest sums."""
+    known = whole.known(program)
+    sums = {
+        str(index): whole.magnitudes(program, node, known[node.args[0]]).tolist()
+        for index, node in enumerate(program.nodes)
+        if node.op == "affine"
+    }
+    return {
+        **_about(INTEGERS, program, schedule, emitted, manifest),
+        "ranges": [[float(value.low.min()), float(value.high.max())] for value in known],
+        "sums": sums,
+        "bound": dict(manifest["bound"]),
+    }
+
+
+def _about(
+    schema: str, program: Program, schedule: Schedule, emitted: Program, manifest: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return what a certificate of any form says of its kernel: digests, the program's text, its weights."""
+    return {
+        "schema": schema,
+        "manifest_digest": manifest["digest"],
+        "program_digest": manifest["program"],
+        "files": dict(manifest["files"]),
+        "profile": manifest["profile"]["name"],
+        "program": ir.text(program),
+        "parameters": _places(program, schedule, emitted),
     }
 
 
@@ -220,8 +248,8 @@ def _places(common: Program, schedule: Schedule, emitted: Program) -> dict[str, 
     for name, array in emitted.parameters.items():
         coded[name] = np.arange(count, count + array.size, dtype=np.float64).reshape(array.shape)
         count += array.size
-    packed = np.zeros(0)
-    if count < 2**24:
+    packed = np.zeros(0, np.int64)
+    if count < 2**24 and not schedule.bytewise:
         arrays = {name: array.astype(np.float32) for name, array in coded.items()}
         packed = schedule.pack(replace(emitted, parameters=arrays)).astype(np.int64)
     at = np.full(count, -1)

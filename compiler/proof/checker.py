@@ -1,7 +1,7 @@
 """Check a certificate: derive every number again from the program's text and the kernel's weights.
 
 1. The files beside it have the lengths that the manifest states and the digests that both state; the text
-   and the weights make the program's [`_read`].
+   and the weights make the program's [`evidence.read`].
 2. The text is that of a network of sines or rectifiers; anything else is refused [`_layers`].
 3. Each layer: magnitudes, rounding of sums in parts, the sine's error [`_layer`]; each output: how far each
    layer's errors reach, by norms that hold for the scalings in the certificate [`_output`].
@@ -13,8 +13,6 @@ It shares no code with what wrote the certificate except the promises of sines. 
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import re
 from decimal import ROUND_CEILING, Decimal
 from fractions import Fraction
@@ -23,9 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from ...refimpl.reading import parse_json, plain_name, read_file, refusing, stated_bytes
+from ...refimpl.reading import refusing
 from ..core.profiles import OPENCL_SINE, emitted_sine
 from ..core.sine import POLYNOMIALS
+from .evidence import INTEGERS, NODE, Refused, read, same
+from .integer_checker import check_integers
 
 U, TINY, WIDER = 2.0**-24, 2.0**-126, 1 + 2.0**-34
 """float32's rounding and smallest normal number; a factor of more than float64 can be off in what follows."""
@@ -33,68 +33,33 @@ U, TINY, WIDER = 2.0**-24, 2.0**-126, 1 + 2.0**-34
 PROMISES = {promise.text: promise for promise in (*map(emitted_sine, POLYNOMIALS), OPENCL_SINE)}
 """What is known of sines, by the name that a certificate gives."""
 
-NODE = re.compile(r"  %(\d+) = (\w+)((?: %\d+,?)*)(?: \{(.*)\})? : \w+(?:\[(\d+)\])?")
-"""A line of a program's text: number, operation, operands, attributes, length of the result."""
-
-
-class Refused(Exception):
-    """A step of a certificate that does not hold."""
-
 
 def check(path: Path) -> dict[str, Any]:
     """Return a certificate whose every step holds, else raise `Refused`; `InputError` for other files."""
     told = "it must be a whole certificate beside its kernel", "compile the model again"
     with refusing("certificate", str(path), *told), np.errstate(over="ignore", invalid="ignore"):
-        held, manifest, text, arrays = _read(path)
+        held, manifest, text, arrays = read(path)
+        if held["schema"] == INTEGERS:
+            check_integers(held, text, arrays)
+            same("manifest: bound", manifest["bound"]["output"], held["bound"]["output"])
+            return held
         layers, box = _layers(text)
         promise: Any = PROMISES.get(held["sine"]["text"])
         if promise is None or promise.domain != (held["sine"]["domain"] or np.inf):
             raise Refused("sine: nobody promises it")
-        _same("sine", manifest["sine"]["text"], promise.text)
+        same("sine", manifest["sine"]["text"], promise.text)
         _at_least("sine: error_bound", [held["sine"]["error_bound"]], [promise.error], exact=True)
-        _same("layers", len(held["layers"]), len(layers))
+        same("layers", len(held["layers"]), len(layers))
         matrices, own = [], []
         for number, layer in enumerate(layers):
             errors, box = _layer(f"layer {number}", held["layers"][number], layer, box, arrays, promise)
             own.append(errors)
             matrices.append(arrays[layer["weight"]] * (layer["scale"] or 1.0))
-        _same("outputs", [o["output"] for o in held["outputs"]], list(range(len(own[-1]))))
+        same("outputs", [o["output"] for o in held["outputs"]], list(range(len(own[-1]))))
         found = [_output(f"output {o['output']}", o, matrices[1:], own) for o in held["outputs"]]
         _at_least("bound: output", held["bound"]["output"], found)
         _at_least("manifest: bound", manifest["bound"]["output"], found)
         return held
-
-
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any]]:
-    """Return the certificate, the manifest, the program's text and its parameters, once all digests agree."""
-    texts = [read_file(p, "certificate") for p in (path, path.parent / "manifest.json")]
-    held, manifest = (parse_json(text, "certificate", "restore it") for text in texts)
-    _same("schema", held["schema"], "wamnet-certificate-1")
-    files = {}
-    for name in (plain_name(name, "manifest: name of a file", "restore it") for name in manifest["files"]):
-        stated = stated_bytes(manifest, name, "manifest", "restore it")
-        files[name] = read_file(path.parent / name, "file", "restore it", stated=stated)
-    for name, data in files.items():
-        _same(f"digest of {name}", held["files"].get(name), hashlib.sha256(data).hexdigest())
-    kernel = [manifest["digest"], manifest["profile"]["name"]]
-    _same("digest of the kernel, and profile", [held["manifest_digest"], held["profile"]], kernel)
-    raw, text = np.frombuffer(files["weights.bin"], "<f4"), str(held["program"])
-    arrays = {}
-    for name, place in held["parameters"].items():
-        if "base64" in place:
-            array = np.frombuffer(base64.b64decode(place["base64"], validate=True), "<f4")
-        else:
-            many = len(place["rows"]) * len(place["columns"]) > len(raw)
-            _same(f"{name}: more numbers than weights.bin has", many, False)
-            at = place["offset"] + np.add.outer(place["rows"], place["columns"])
-            array = raw[at if at.min() >= 0 else len(raw)]
-        arrays[name] = array.reshape(place["shape"])
-    pieces = b"".join(arrays[name].tobytes() for name in sorted(arrays))
-    digest = hashlib.sha256(text.encode() + pieces).hexdigest()
-    _same("digest of the program in the certificate", held["program_digest"], digest)
-    _same("digest of the program in the manifest", manifest["program"], digest)
-    _same("weights: all are finite", all(np.isfinite(array).all() for array in arrays.values()), True)
-    return held, manifest, text, {name: array.astype(np.float64) for name, array in arrays.items()}
 
 
 def _layers(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
@@ -107,7 +72,7 @@ def _layers(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
     def other(m: Any) -> tuple[Any, float]:
         first, second = sorted(arguments(m), key=lambda a: a[2] == "constant")
         value = float(second[4].removeprefix("value="))
-        _same("program: a constant in float32", float(np.float32(value)), value)
+        same("program: a constant in float32", float(np.float32(value)), value)
         return first, value
 
     (at,) = (nodes[int(i)] for i in re.findall(r"(?m)^  output \w+ = %(\d+)$", text))
@@ -122,7 +87,7 @@ def _layers(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
                 at, scale = other(at)
         elif end:
             raise Refused(f"program: %{at[1]} is {end}, no activation of a layer")
-        _same(f"program: operation of %{at[1]}", at[2], "affine")
+        same(f"program: operation of %{at[1]}", at[2], "affine")
         names = dict(pair.split("=") for pair in at[4].split(", "))
         layers.insert(0, {**names, "node": int(at[1]), "scale": scale, "end": end, "floor": floor})
         (at,) = arguments(at)
@@ -132,7 +97,7 @@ def _layers(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
     zero, count = taps[2] == "zero", int(taps[0]) * int(taps[1])
     low = np.tile(np.concatenate([np.full(n, min(a, 0.0) if zero else a) for n, a, _ in ends]), count)
     high = np.tile(np.concatenate([np.full(n, max(b, 0.0) if zero else b) for n, _, b in ends]), count)
-    _same("program: numbers in a window", at[5], str(len(low)))
+    same("program: numbers in a window", at[5], str(len(low)))
     owner = np.tile(np.repeat(np.arange(len(ends)), [n for n, _, _ in ends]), count)
     row = np.repeat(np.arange(int(taps[0])), len(low) // int(taps[0]))
     parts = [np.flatnonzero((owner == image) & (row == y)) for image in range(len(ends)) for y in set(row)]
@@ -154,7 +119,7 @@ def _layer(name: str, stated: Any, layer: Any, given: Any, arrays: Any, promise:
         rounded = U * scale * reach + 2 * TINY
         ends = np.sort(layer["scale"] * ends, axis=0) + np.outer([-1, 1], rounded)
         own, reach = scale * own + rounded, scale * reach
-    _same(f"{name}: node", stated["node"], layer["node"])
+    same(f"{name}: node", stated["node"], layer["node"])
     size, argument = sizes.max() * max(scale, 1.0) * (1 + 2.0**-10), reach.max() * (1 + 2.0**-20)
     sine = layer["end"] == "sin"
     if size >= 3.4e38 or (sine and not argument <= promise.domain):
@@ -205,7 +170,7 @@ def _output(name: str, stated: Any, matrices: Any, own: Any) -> float:
     """Check the step of one output: how far each layer's errors reach; return its bound."""
     scales = [np.array(scale, np.float64) for scale in stated["scalings"]]
     row, last = matrices[-1][stated["output"]], float(own[-1][stated["output"]])
-    _same(f"{name}: sizes of scalings", [s.shape for s in scales], [e.shape for e in own[:-1]])
+    same(f"{name}: sizes of scalings", [s.shape for s in scales], [e.shape for e in own[:-1]])
     if not all(np.isfinite(scale).all() and (scale > 0).all() for scale in scales):
         raise Refused(f"{name}: scalings must be positive numbers")
     short, sizes, found = float(np.linalg.norm(row / scales[-1])), np.abs(row), [last]
@@ -222,7 +187,7 @@ def _output(name: str, stated: Any, matrices: Any, own: Any) -> float:
             if not norm_is_below(norm, after, matrix, before):
                 raise Refused(f"{name}: the norm of layer {at} is not below {norm}")
             short, sizes = short * norm, sizes @ np.abs(matrix)
-    _same(f"{name}: number of norms", len(stated["norm_bounds"]), len(scales) - 1)
+    same(f"{name}: number of norms", len(stated["norm_bounds"]), len(scales) - 1)
     _at_least(f"{name}: layer_bounds", stated["layer_bounds"], found)
     _at_least(f"{name}: error_bound", [stated["error_bound"]], [total := (sum(found) + TINY) * WIDER])
     return total
@@ -264,9 +229,3 @@ def _at_least(step: str, stated: Any, found: Any, exact: bool = False) -> None:
         least = float(wanted) if exact else _up(float(wanted))
         if type(value) not in (int, float) or not least <= value <= 1e308:
             raise Refused(f"{step} is {value!r}: it must be a number, at least {least!r}")
-
-
-def _same(step: str, stated: Any, wanted: Any) -> None:
-    """Refuse what is not what it must be."""
-    if stated != wanted:
-        raise Refused(f"{step} is {stated!r}: it must be {wanted!r}")

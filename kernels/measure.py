@@ -8,9 +8,11 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 PAUSE_S = 0.3
@@ -36,6 +38,26 @@ class Times:
         return (max(self.seconds) - min(self.seconds)) / self.median
 
 
+@contextmanager
+def environment(values: Mapping[str, str]) -> Iterator[None]:
+    """Set variables of the environment, also for what is started, and set them back."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def rest(seconds: float) -> None:
+    """Wait; tests, which assert no times, do without."""
+    time.sleep(seconds)
+
+
 def in_turns(
     ways: Mapping[str, Callable[[], float | None]],
     repeats: int,
@@ -50,7 +72,7 @@ def in_turns(
     found: dict[str, list[float]] = {name: [] for name in ways}
     for _ in range(repeats):
         for name, way in ways.items():
-            time.sleep(pause_s)
+            rest(pause_s)
             start = clock()
             own = way()
             found[name].append(clock() - start if own is None else own)

@@ -28,7 +28,7 @@ from ...compiler.artifact import Artifact
 from ...compiler.languages.interface import DENOISE, ENCODE, PATH, WEIGHTS, Interface
 from ...compiler.schedules.schedules import PLAIN
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
-from .executor import INDEX_LIMIT, Executor, Kernel, Memory, words
+from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor, Kernel, Memory, words
 from .images import widest
 
 COMPILER_VARIABLE = "CC"
@@ -71,6 +71,11 @@ TRIAL = """\
 #else
 #define LANES 4
 #endif
+#if defined(__AVX512VNNI__) && defined(__AVX512BW__)
+#define BYTES 1
+#else
+#define BYTES 0
+#endif
 
 static void show(float value)
 {
@@ -95,13 +100,13 @@ int main(int count, char **arguments)
     show(sqrtf(third));
     show(-one * 0.0f + -0.0f);
     show(large * large * large * large * large * large * 0.0f == 0.0f ? one : 0.0f);
-    printf("%d\\n", LANES);
+    printf("%d %d\\n", BYTES, LANES);
     return 0;
 }
 """
 """A program in which each freedom that a compiler may take shows: order of sums, contraction, reciprocals,
-denormal numbers, signs of zeros, comparison with NaN. Last it prints the floats in a vector register that
-kernels are compiled for, 1 where the compiler has no vectors."""
+denormal numbers, signs of zeros, comparison with NaN. Last it prints whether kernels are compiled for an
+instruction for products of bytes, and the floats in a vector register: 1 where there are no vectors."""
 
 SCHEDULES = {16: "fft32", 8: "fft32x8", 4: "fft32x4"}
 """Schedule of a denoiser by the floats in a vector register: each took the least time of all when GCC
@@ -230,11 +235,12 @@ class CExecutor(Executor):
         except (OSError, ValueError, subprocess.TimeoutExpired) as error:
             rule = f"what it compiles does not run here ({type(error).__name__})"
             raise ExecutorUnavailable(f"c: {self.device}: {rule}; {WAY_OUT}") from None
-        *bits, lanes = found or [""]
+        *bits, byte_products, lanes = found or ["", ""]
         if bits != trial_bits():
             rule = "what it compiles does not compute as IEEE 754 says"
             way_out = f"take options that relax arithmetic out of {COMPILER_VARIABLE}"
             raise ExecutorUnavailable(f"c: {self.device}: {rule}; {way_out}")
+        self.byte_schedule = BYTE_SCHEDULE if byte_products == "1" else ""
         self.schedule = SCHEDULES.get(int(lanes), PLAIN)
         self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
 

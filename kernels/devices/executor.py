@@ -48,6 +48,10 @@ Size = tuple[int, int]
 KEPT_KERNELS = 64
 """Kernels that an executor keeps built: programs use a few; a process that makes thousands stays small."""
 
+BYTE_SCHEDULE = "dot16"
+"""Schedule of networks of integers on processors with an instruction for products of bytes. Without it loops
+and shifts take far longer than tiles of floats."""
+
 INDEX_LIMIT = 2**31
 """Numbers of an image must be fewer where a kernel's indices are `int`."""
 
@@ -101,7 +105,8 @@ class Executor(ABC):
 
     `lanes` is the number of paths that its path kernels should follow at once, `schedule` the name of the
     schedule that suits a denoiser on it, for pictures of at least `schedule_pixels`: smaller ones are done
-    with the plain kernel before the other is compiled; `schedule_reason` says why. `driver` is the driver's
+    with the plain kernel before the other is compiled; `schedule_reason` says why.
+    `byte_schedule`: that of networks of integers, where the device multiplies bytes. `driver` is the driver's
     version, where `device` does not name it. `trains` says whether it has a compiled trainer. `homes` are the
     homes of weights, apart from the target's usual one, whose kernels it runs
     [compiler/languages/interface.py].
@@ -113,6 +118,7 @@ class Executor(ABC):
     schedule: str = PLAIN
     schedule_pixels: int = 0
     schedule_reason: str = "the only one"
+    byte_schedule: str = ""
     driver: str = ""
     trains: bool = False
     homes: tuple[str, ...] = ()

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.training.step_kernel import StepKernel
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import INDEX_LIMIT, Executor, Kernel, Memory, Part, Size, in_order, shapes
+from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor, Kernel, Memory, Part, Size, in_order, shapes
 from .images import Images, widest
 from .opencl_trainer import OpenCLTrainer
 
@@ -42,6 +43,22 @@ loop around them."""
 CPU_SCHEDULES = {16: "fft32", 8: "fft32x8"}
 """Schedule of a denoiser by the floats in a vector register of a processor; others have registers of 4. Each
 took the least time of all when PoCL compiled for such a processor; tiles take what it refuses."""
+
+HAS_BYTES = """\
+#if defined(__AVX512VNNI__) && defined(__has_builtin)
+#if __has_builtin(__builtin_ia32_vpdpbusd512)
+#define FOUND 1
+#endif
+#endif
+#ifndef FOUND
+#define FOUND 0
+#endif
+__kernel void wamnet_has_bytes(__global int *found)
+{
+    *found = FOUND;
+}
+"""
+"""A kernel that says whether the compiler has VNNI's instruction for products of bytes."""
 
 GPU_SCHEDULE = "group4"
 """Schedule of a denoiser on a graphics processor."""
@@ -102,6 +119,17 @@ class OpenCLExecutor(Executor):
         else:
             self.schedule_reason = "built-in choice for unknown devices"
         self._kept: Memory | None = None
+
+    @cached_property
+    def byte_schedule(self) -> str:  # type: ignore[override]
+        """Return the schedule of bytes where the compiler has VNNI's instruction."""
+        if self.schedule != CPU_SCHEDULES[16]:
+            return ""
+        answer = np.zeros(1, np.int32)
+        held = cl.Buffer(self._context, cl.mem_flags.WRITE_ONLY, answer.nbytes)
+        self._compiled(HAS_BYTES).wamnet_has_bytes(self._queue, (1,), None, held)
+        cl.enqueue_copy(self._queue, answer, held)
+        return BYTE_SCHEDULE if answer[0] else ""
 
     def _first_run(self, size: Size) -> Size:
         """PoCL compiles when a kernel is first enqueued."""

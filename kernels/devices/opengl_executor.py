@@ -140,7 +140,8 @@ class OpenGLExecutor(Executor):
 
     def _check_promise(self, artifact: Artifact) -> None:
         """Refuse a bound that the device cannot keep."""
-        if artifact.manifest["bound"]["output"] and ORDER_EXTENSION not in self._context.extensions:
+        rounds = any(artifact.manifest["bound"]["output"] or ())
+        if rounds and ORDER_EXTENSION not in self._context.extensions:
             raise CompileError(
                 f"{self.device} lacks {ORDER_EXTENSION}, whose `precise` the error bound needs: use profile "
                 "native, which then promises nothing, or executor opencl or numpy"

@@ -15,8 +15,7 @@ from ...compiler.schedules import schedules
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.variants import FULL, plan_model
 from ...refimpl.frame import Frame
-from ...refimpl.network.dataset import feature_image
-from ...refimpl.network.denoise import Model
+from ...refimpl.network.denoise import Model, input_image
 from ..devices.executor import Executor
 from ..devices.images import Images
 from ..memory import keep_freed_memory
@@ -50,7 +49,7 @@ class RunResult:
 
 def images_of(model: Model, frame: Frame) -> Images:
     """Return the encoded feature images (H, W, C) that the model's kernel reads, by name."""
-    return {name: feature_image(frame, (name,), model.normalization) for name in model.features}
+    return {name: input_image(model, frame, (name,)) for name in model.features}
 
 
 def denoise_on(

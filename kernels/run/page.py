@@ -7,7 +7,8 @@
 2. The encoding of the features is split where they are more than colour buffers [`encoders`].
 3. Each variant of the network is one or two passes, with its bound [`variant`].
 4. A page cannot trust its compiler (GLSL ES 3.00 has no `precise`): it carries a small picture's features,
-   and for each variant the reference's output in float64 with a bound for each number [`check`].
+   and for each variant the reference's output in float64 with a bound for each number [`check`]; of a network
+   of integers, whose bits every device has, the SHA-256 of the output too.
 
 Everything is JSON's types; arrays are base64 of little-endian numbers. spec/webpage.md describes the form.
 """
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_plan
-from ...compiler.core.ir import digest
+from ...compiler.core.ir import digest, sha256
 from ...compiler.core.lower import lower
 from ...compiler.languages.glsl_es import MOST_BUFFERS
 from ...compiler.plan import plan_program
@@ -46,6 +47,7 @@ from ...refimpl.light.transport import Settings
 from ...refimpl.light.variation import RANGES, ranges_from_json
 from ...refimpl.network import factored
 from ...refimpl.network.denoise import Model, check_model, learned_feature_spp
+from ...refimpl.network.whole import INPUT_LEVELS
 from .denoise_on import images_of
 
 SCHEMA = "wamnet-page-2"
@@ -103,10 +105,16 @@ class Network:
 
 
 def networks_of(model: Model, fast: Model | None = None, rank: int = RANK) -> tuple[Network, ...]:
-    """Return the variants of a page: the whole network, and one of low rank with its weights in either way.
+    """Return the variants of a page: the full network, and one of low rank with its weights in either way.
 
     `fast`: what is cut to the rank, if it is another model, such as one that was trained on in this form.
+    A network of integers is the only one: a rank rounds (WHO-11).
     """
+    if model.is_whole or (fast is not None and fast.is_whole):
+        if fast is not None:
+            rule = "a network of integers cannot be cut to a rank, and is the only one of its page"
+            raise InputError("second model", "given", rule, "leave it out")
+        return (Network("full", model),)
     cut = fast or model
     n_out, n_in = cut.siren.weights[0].shape
     most = min(rank, factored.largest_rank(cut.window.size, n_in, n_out), 4 * MOST_BUFFERS)
@@ -164,6 +172,7 @@ def page_data(
         ],
         "check": {
             "size": CHECK_PX,
+            "levels": INPUT_LEVELS if first.is_whole else 1,
             "images": {n: {"channels": a.shape[-1], "values": _packed(a)} for n, a in images.items()},
         },
         "variants": variants,
@@ -247,8 +256,10 @@ def encoders(
 ) -> list[dict[str, Any]]:
     """Return the encoding as passes of at most as many features as there are colour buffers."""
     parts = [features[first : first + MOST_BUFFERS] for first in range(0, len(features), MOST_BUFFERS)]
-    found = [compile_encode(part, model.normalization, TARGET, profile, planes) for part in parts]
-    return [{"source": one.source, "images": [asdict(image) for image in one.images]} for one in found]
+    found = [
+        compile_encode(part, model.normalization, TARGET, profile, planes, model.is_whole) for part in parts
+    ]
+    return [{"source": one.source, "images": [image.facts for image in one.images]} for one in found]
 
 
 def variant(network: Network, images: Mapping[str, NDArray[np.float32]], profile: str) -> dict[str, Any]:
@@ -258,6 +269,7 @@ def variant(network: Network, images: Mapping[str, NDArray[np.float32]], profile
     plan = plan_program(program, TARGET, profile, network.schedule, rank)
     artifact = compile_plan(plan)
     held = plan.expected({feature: images[feature] for feature in model.features})
+    bits = sha256(held.value.astype("<f4").tobytes()) if plan.is_whole else None
     whole = artifact.manifest["factored"]["rounding"] if rank else artifact.manifest["bound"]
     return {
         "name": network.name,
@@ -270,7 +282,11 @@ def variant(network: Network, images: Mapping[str, NDArray[np.float32]], profile
         "products": sum(_products(kernel) for kernel in artifact.kernels),
         "bound": None if whole["output"] is None else max(whole["output"]),
         "passes": [_pass(kernel) for kernel in artifact.kernels],
-        "check": {"expected": _packed(held.value, "<f8"), "bound": _packed(_raised(held.bound))},
+        "check": {
+            "expected": _packed(held.value, "<f8"),
+            "bound": _packed(held.most_from(held.value)),
+            "sha256": bits,
+        },
         "picture": held.value,
     }
 
@@ -306,11 +322,6 @@ def check(
     job = Job(CHECK_PX, CHECK_PX, 1, CHECK_SEED, settings)
     frame = render(animation.scenes[0], job).frame
     return dict(images_of(replace(model, features=tuple(features)), frame))
-
-
-def _raised(bound: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return a bound in float32, rounded up."""
-    return np.nextafter(bound.astype(np.float32), np.float32(np.inf))
 
 
 def _packed(array: NDArray[Any], kind: str = "<f4") -> str:

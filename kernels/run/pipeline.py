@@ -31,6 +31,7 @@ from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.dataset import check_features
 from ...refimpl.network.denoise import Model, check_model
+from ...refimpl.network.whole import INPUT_LEVELS
 from ..devices.executor import Executor, Part
 from ..devices.passes import PICTURE
 from .render_on import SAMPLES_AT_ONCE, compile_scene
@@ -73,8 +74,9 @@ class Pipeline:
         check_features(self._features)
         self._whole = whole
         self.path = self._compiled(scene)
+        self._in_integers = model.is_whole
         self.encode = compile_encode(
-            self._features, model.normalization, executor.name, profile, self.path.planes
+            self._features, model.normalization, executor.name, profile, self.path.planes, model.is_whole
         )
         self.denoise = compile_plan(choose(executor, plan, size, pictures).plan)
         self._drawn = self._closed = False
@@ -117,11 +119,15 @@ class Pipeline:
         return self._read(PICTURE)
 
     def image(self, feature: str) -> NDArray[np.float32]:
-        """Return a feature image (H, W, C) of the picture that was drawn last, encoded."""
+        """Return a feature image (H, W, C) of the picture that was drawn last, encoded.
+
+        Of a network of integers it is what they stand for, steps of 1 / 127.
+        """
         if feature not in self._features:
             known = ", ".join(self._features)
             raise InputError("feature image", feature, f"there are {known}", "name it in show=")
-        return self._read(feature)
+        found = self._read(feature)
+        return found / np.float32(INPUT_LEVELS) if self._in_integers else found
 
     def _read(self, name: str) -> NDArray[np.float32]:
         """Copy an image to the host."""

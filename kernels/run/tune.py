@@ -32,6 +32,7 @@ from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_plan
 from ...compiler.core.ir import Program
 from ...compiler.plan import Plan
+from ...compiler.schedules.emit import kernel_gather
 from ...refimpl import rng
 from ...refimpl.errors import CompileError
 from ...refimpl.network.denoise import Model
@@ -105,6 +106,8 @@ def choose(executor: Executor, plan: Plan, size: tuple[int, int], pictures: int 
             height, width = found.size
             text = f"tuned on this device on {found.day}: {best.ms:.3g} ms at {width}x{height}"
             return Choice(plan.scheduled(best.schedule), f"{text}, {best.again_s:.2g} s to build")
+    if kernel_gather(plan.analysed).whole and (name := executor.byte_schedule):
+        return Choice(plan.scheduled(name), "built-in choice for integers on devices that multiply bytes")
     return Choice(plan.scheduled(executor.schedule_for(size)), executor.schedule_reason)
 
 

@@ -12,8 +12,12 @@ import pytest
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.trace import trace
 from wamnet.kernels.devices import c_executor
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
+from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network.whole import forward_whole, rounded
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror")
 """What a careful project compiles with."""
@@ -312,3 +316,72 @@ def test_picture_too_large_for_indices(executor_named, kit, monkeypatch):
 def test_a_pipeline_is_the_composition_of_its_kernels(executor_named, kit):
     """PPL-7: paths, encoding and denoiser of one header each, to the bit."""
     kit.check_composed(executor_named("c"))
+
+
+# ---- integers ----------------------------------------------------------------------------------------------
+
+READ = """
+#include <stdio.h>
+#include <stdlib.h>
+#include "denoise.h"
+int main(void)
+{{
+    static float result[{count}];
+    float *weights = malloc({bytes} + 1);
+    FILE *file = fopen("weights.bin", "rb");
+    if (!weights || !file || fread(weights, 1, {bytes}, file) != {bytes}) {{
+        return 1;
+    }}
+    fclose(file);
+    wamnet_image({images}, weights, result, {width}, {height});
+    for (int i = 0; i < {count}; ++i) {{
+        printf("%a\\n", (double)result[i]);
+    }}
+    free(weights);
+    return 0;
+}}
+"""
+"""A program that reads weights as bytes, as they are exported: some are not floats."""
+
+HOSTILE = ["-Ofast", "-march=native", "-funsafe-math-optimizations"]
+"""Options under which floats promise nothing."""
+
+
+@pytest.mark.parametrize("border", ["clamp", "zero"])
+@pytest.mark.parametrize(
+    "options",
+    [
+        [*WARNINGS, *SANITIZERS, "-O1"],
+        [*WARNINGS, *SANITIZERS, "-march=native"],
+        HOSTILE,
+        [*HOSTILE, *WAYS[1]],
+    ],
+    ids=["clean", "clean with vectors", "hostile", "hostile and portable"],
+)
+@pytest.mark.parametrize("schedule", ["plain", "tile8", "dot16"])
+def test_integers_are_exact_whatever_the_options(executor_named, tmp_path, schedule, options, border):
+    """Layers fill no vector, pictures no tile, rows of taps no four bytes."""
+    executor_named("c")
+    network = rounded(siren.init([100, 37, 5, 3], 3.0, 5.0, seed=2), 5)
+    images = tuple(Image(name, n, -127.0, 127.0, whole=True) for name, n in (("a", 3), ("b", 1)))
+    gather = Gather(dataset.Window(5, border), images)
+    traced = trace(lambda x: forward_whole(network, x), {"window": Type(shape=(100,))}, gather)
+    artifact = compile_program(traced, "c", "ieee", schedule)
+    assert artifact.manifest["schedule"]["name"] == schedule
+    random = np.random.default_rng(3)
+    given = {i.name: random.integers(-127, 128, (3, 31, i.channels)).astype(np.float32) for i in images}
+    padded = dataset.pad(np.concatenate(list(given.values()), axis=-1), gather.window)
+    expected = forward_whole(network, dataset.all_windows(padded, gather.window))
+    (tmp_path / artifact.source_name).write_text(artifact.source)
+    (tmp_path / "weights.bin").write_bytes(artifact.weights.tobytes())
+    data = "".join(array(f"in_{name}", x) for name, x in given.items())
+    arguments = ", ".join(f"in_{name}" for name in given)
+    sizes = {"count": expected.size, "bytes": artifact.weights.nbytes, "width": 31, "height": 3}
+    (tmp_path / "main.c").write_text(data + READ.format(images=arguments, **sizes))
+    command = os.environ.get(c_executor.COMPILER_VARIABLE, "cc").split()
+    subprocess.run([*command, "-std=c99", *options, "-o", "main", "main.c", "-lm"], cwd=tmp_path, check=True)
+    lines = subprocess.run(
+        ["./main"], cwd=tmp_path, check=True, capture_output=True, text=True
+    ).stdout.split()
+    found = np.array([float.fromhex(line) for line in lines], np.float32).reshape(expected.shape)
+    assert found.tobytes() == expected.tobytes()

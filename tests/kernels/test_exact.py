@@ -34,8 +34,12 @@ EXAMPLES = settings.default.max_examples // 10
 KINDS = ("random", "tiny", "signed zeros", "threshold", "extreme")
 """Kinds of images."""
 
-WAYS = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules if s.name != "inlined"]
-"""Each schedule; the inlined one takes 20 s to compile for the paper's network, and has a test of its own."""
+APART = ("inlined", "dot16")
+"""The inlined schedule takes 20 s to compile for the paper's network, and has a test of its own; that of
+bytes holds integers only."""
+
+WAYS = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules if s.name not in APART]
+"""The other schedules."""
 
 PRODUCT = ("weights[(tap + c) * 32 + j]", "value")
 """The factors of a product in a plain kernel for the paper's network."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from wamnet.kernels import measure
 from wamnet.kernels.measure import Times, in_turns
 
 
@@ -18,6 +19,14 @@ def test_ways_take_turns_after_warm_runs() -> None:
     found = in_turns({"a": way("a"), "b": way("b")}, 2, pause_s=0.0, clock=lambda: float(next(readings)))
     assert order == ["a", "b"] * 3
     assert found == {"a": Times((1.0, 1.0)), "b": Times((1.0, 1.0))}
+
+
+def test_each_measured_run_comes_after_a_rest(monkeypatch) -> None:
+    """Warm runs do not."""
+    order: list[object] = []
+    monkeypatch.setattr(measure, "rest", order.append)
+    in_turns({"a": lambda: order.append("a")}, 2, warm=1, pause_s=0.25)
+    assert order == ["a", 0.25, "a", 0.25, "a"]
 
 
 def test_a_way_may_measure_itself() -> None:

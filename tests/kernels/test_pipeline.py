@@ -22,7 +22,8 @@ from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import dataset
-from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.denoise import Model, denoise_pixel
+from wamnet.refimpl.network.whole import rounded
 
 SCALES = dataset.Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 SETTINGS = Settings(max_depth=3)
@@ -377,3 +378,22 @@ def test_too_large_a_picture_is_refused(executor_named, model_of):
         InputError, match=r"size of the picture on .* is 65536 x 65536 with 3 channels: one im"
     ):
         Pipeline(executor_named("opencl"), scene("empty"), model, (65536, 65536))
+
+
+def test_a_pipeline_of_integers_shows_what_they_stand_for(executor, model_of):
+    """Its pictures are those of the network on images that the device rounds: a step is 1 / 127."""
+    model = model_of(("color", "normal"), 3, "clamp")
+    whole = replace(model, siren=rounded(model.siren, 3))
+    with Pipeline(executor, scene("cornell"), whole, (5, 7), settings=SETTINGS) as pipeline:
+        found = pipeline.run(seed=3)
+        shown = {name: pipeline.image(name) for name in whole.features}
+    steps = {name: np.rint(image * 127).astype(np.float32) for name, image in shown.items()}
+    assert all(np.array_equal(steps[n] / np.float32(127), image) for n, image in shown.items())
+    joined = np.concatenate(list(steps.values()), axis=-1)
+    windows = dataset.all_windows(dataset.pad(joined, whole.window), whole.window)
+    assert found.tobytes() == denoise_pixel(whole.siren, windows).tobytes()
+    with Pipeline(executor, scene("cornell"), model, (5, 7), settings=SETTINGS) as pipeline:
+        pipeline.run(seed=3)
+        for name, image in shown.items():
+            # Half a step, and the rounding of 127 x + 1/2 in float32.
+            assert np.abs(image - pipeline.image(name)).max() <= 0.5 / 127 + 2.0**-16

@@ -1,0 +1,126 @@
+"""Networks of integers: every executor and schedule gives the reference's bits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.targets import DENOISERS
+from wamnet.compiler.variants import plan_model
+from wamnet.kernels.devices.c_executor import COMPILER_VARIABLE, CExecutor
+from wamnet.kernels.run.tune import choose
+from wamnet.refimpl.errors import ExecutorUnavailable
+from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.whole import SINES, forward_whole, rounded
+
+EXAMPLES = max(settings.default.max_examples // 50, 1)
+"""Each example compiles a kernel, up to a second."""
+
+WAYS = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules]
+"""Each schedule with its target."""
+
+SLOW = {"inlined", "compute", "compute4", "group", "group4"}
+"""Schedules in straight code, which compilers take long for."""
+
+
+@st.composite
+def cases(draw, small):
+    """Draw a network and the shape of its images."""
+    channels = draw(st.sampled_from([{"a": 3}, {"a": 3, "b": 1}, {"a": 1, "b": 4, "c": 2}]))
+    size = draw(st.integers(1, 3 if small else 6))
+    hidden = draw(st.lists(st.integers(1, 8 if small else 40), min_size=0, max_size=3))
+    omega = draw(st.sampled_from([1.0, 9.0, 1e6]))
+    return {
+        "network": rounded(
+            siren.init(
+                [size * size * sum(channels.values()), *hidden, draw(st.integers(1, 4))],
+                omega,
+                omega,
+                seed=draw(st.integers(0, 2**31)),
+            ),
+            size,
+            draw(st.sampled_from(sorted(SINES))),
+        ),
+        "channels": channels,
+        "window": dataset.Window(size, draw(st.sampled_from(["clamp", "zero"]))),
+        "shape": draw(st.tuples(st.integers(1, 17), st.integers(1, 45))),
+        "level": draw(st.sampled_from([0, 1, 127])),
+        "seed": draw(st.integers(0, 2**32 - 1)),
+    }
+
+
+def lowered(case):
+    images = tuple(Image(name, n, -127.0, 127.0, whole=True) for name, n in case["channels"].items())
+    gather = Gather(case["window"], images)
+    types = {"window": Type(shape=(gather.n_inputs,))}
+    return trace(lambda window: forward_whole(case["network"], window), types, gather)
+
+
+def images_of(case):
+    """Return whole images: all 0, of few levels, or of all."""
+    random, level = np.random.default_rng(case["seed"]), case["level"]
+    return {
+        name: random.integers(-level, level + 1, (*case["shape"], n)).astype(np.float32)
+        for name, n in case["channels"].items()
+    }
+
+
+def reference(case, images):
+    """Return the picture (H, W, C) of the reference."""
+    joined = np.concatenate(list(images.values()), axis=-1)
+    padded = dataset.pad(joined, case["window"])
+    return forward_whole(case["network"], dataset.all_windows(padded, case["window"]))
+
+
+@pytest.mark.parametrize(("target", "schedule"), WAYS)
+@settings(max_examples=EXAMPLES)
+@given(data=st.data(), profile=st.sampled_from(["ieee", "native"]))
+def test_every_schedule_gives_the_bits_of_the_reference(
+    executor_named, target, schedule, data, profile
+) -> None:
+    executor = executor_named({"opengl": "opengl-egl"}.get(target, target))
+    case = data.draw(cases(schedule in SLOW))
+    images = images_of(case)
+    artifact = compile_program(lowered(case), target, profile, schedule)
+    assert artifact.manifest["bound"]["output"] == [0.0] * artifact.manifest["output"]["channels"]
+    found = executor.run(artifact, images)
+    assert found.tobytes() == reference(case, images).astype(np.float32).tobytes()
+
+
+# ---- the executors' choice --------------------------------------------------------------------------------
+
+
+def chosen(executor, whole):
+    """Return the schedule of a network, of integers or of floats, for a picture of 64 x 64."""
+    network = siren.init([12 * 12 * 6, 32, 32, 3], 1.0, 3.0, seed=1)
+    siren_or_whole = rounded(network, 12) if whole else network
+    model = Model(siren_or_whole, ("color", "normal"), dataset.Window(12), dataset.Normalization())
+    plan = choose(executor, plan_model(model, executor.name), (64, 64)).plan
+    return plan.schedule.name
+
+
+@pytest.mark.parametrize("name", ["opencl", "c"])
+def test_bytes_are_chosen_where_they_are_multiplied(executor_named, monkeypatch, tmp_path, name) -> None:
+    monkeypatch.setenv("WAMNET_CACHE", str(tmp_path))  # nothing is tuned there
+    executor = executor_named(name)
+    direct = {"fft32": "tile16", "fft32x8": "tile8", "fft32x4": "tile4"}[executor.schedule]
+    assert chosen(executor, True) == (executor.byte_schedule or direct)
+    assert chosen(executor, False) == executor.schedule
+    monkeypatch.setattr(executor, "byte_schedule", "")
+    assert chosen(executor, True) == direct
+
+
+def test_a_compiler_without_the_instruction_does_not_get_bytes(monkeypatch) -> None:
+    """Loops would take much longer than tiles of floats."""
+    monkeypatch.setenv(COMPILER_VARIABLE, "cc -mno-avx512vnni")
+    try:
+        with CExecutor() as executor:
+            assert not executor.byte_schedule
+    except ExecutorUnavailable as error:  # a compiler for another processor
+        pytest.skip(str(error))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
 from typing import Any
 
 from ...compiler.artifact import Artifact
@@ -23,7 +22,7 @@ def images(model: Model) -> list[dict[str, Any]]:
     """Return the images of a model, as manifests of kernels say it."""
     gather = lower(model).gather
     assert gather is not None, "models have windows"
-    return [asdict(image) for image in gather.images]
+    return [image.facts for image in gather.images]
 
 
 def encoding(model: Model) -> str:

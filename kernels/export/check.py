@@ -3,8 +3,8 @@
 1. Tools that compile or validate the files are run; one that is missing is a verdict and no error
    [`COMPILED`].
 2. What is nearest to the target runs the denoiser on the pair's images [`runner`]; each number must lie
-   within the pair's bound. With a scene its paths are run too, and compared with the
-   reference's sums [`_paths`].
+   within the pair's bound, be its bits where that is 0. With a scene its paths are run too, and compared
+   with the reference's sums [`_paths`].
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.core.ir import sha256
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..bench import peer_onnxruntime
 from ..devices.executor import Executor, Part
@@ -44,7 +45,7 @@ class Verdict:
     """What was found: `compiled` and `executed` name tools and device, or say what was missing or wrong.
 
     `error` is the largest error, `bound` the largest of the pair's bounds, `share` the largest error / bound,
-    `paths` the share of the sums that agree.
+    `paths` the share of the sums that agree, `digest` the SHA-256 of the picture.
     """
 
     target: str
@@ -58,6 +59,7 @@ class Verdict:
     share: float | None = None
     paths: float | None = None
     wrong: str = ""
+    digest: str = ""
 
     @property
     def holds(self) -> bool:
@@ -66,21 +68,26 @@ class Verdict:
 
     def cells(self) -> tuple[str, ...]:
         """Return the row of a table: target, weights, emitted, compiled, executed, error, bound, paths."""
-        bound = "-" if self.bound is None else f"{self.bound:.1e}" + ("" if self.promised else ", expected")
+        bound = _number(self.bound) + ("" if self.promised else ", expected")
         return (
             self.target,
             self.weights,
             f"{self.size / 1000:.0f} kB",
             self.compiled,
             self.executed,
-            "-" if self.error is None else f"{self.error:.1e}",
-            bound,
+            _number(self.error),
+            bound if self.bound is not None else "-",
             "-" if self.paths is None else f"{self.paths:.1%}",
         )
 
 
 HEAD = ("target", "weights", "emitted", "compiled by", "executed on", "error", "bound", "paths alike")
 """The heads of such a table."""
+
+
+def _number(value: float | None) -> str:
+    """Return an error for a table; 0 is exact."""
+    return "-" if value is None else f"{value:.1e}" if value else "0"
 
 
 def check(export: Export) -> Verdict:
@@ -99,12 +106,24 @@ def check(export: Export) -> Verdict:
         return Verdict(*known, compiled, "refused", wrong=str(error))
     pair = export.pair
     off = np.abs(found.astype(np.float64) - pair.output)
-    share = float(np.max(off / pair.bound))
-    wrong = "" if share <= 1 else f"off by {off.max():.3g}, {share:.3g} times the bound"
+    share = float(np.max(_shares(off, pair.bound)))
+    times = f"{share:.3g} times the bound" if pair.bound.any() else "where each bit is promised"
+    wrong = "" if share <= 1 else f"off by {off.max():.3g}, {times}"
     if paths is not None and not paths >= PATHS_ALIKE:
         wrong = wrong or f"{paths:.1%} of the paths' sums agree, of at least {PATHS_ALIKE:.0%}"
     numbers = (float(off.max()), float(pair.bound.max()))
-    return Verdict(*known, compiled, device, *numbers, pair.promised, share, paths, wrong)
+    return Verdict(*known, compiled, device, *numbers, pair.promised, share, paths, wrong, digest_of(found))
+
+
+def digest_of(picture: NDArray[np.float32]) -> str:
+    """Return the SHA-256 of a picture as raw little-endian float32, as `check/output.f32` holds one."""
+    return sha256(np.ascontiguousarray(picture, "<f4").tobytes())
+
+
+def _shares(off: NDArray[np.float64], bound: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return errors as shares of their bounds; no error is 0 even of a bound 0, any other then infinite."""
+    with np.errstate(divide="ignore"):
+        return np.divide(off, bound, out=np.zeros_like(off), where=off != 0)
 
 
 UNTOLD: Mapping[str, str] = {"metal": "none of Apple's here", "onnx": "onnx.checker"}

@@ -5,7 +5,8 @@
    lies in its range, spread by multiples of the golden ratio [`_spread`].
    Of several contrasts the one is taken whose output is clipped least [`_livelier`].
 3. The output is the reference's in float64, rounded to float32; the bound is computed for this picture, of
-   this kernel, and holds the rounding. A kernel without a bound states what the emitted sine's would have.
+   this kernel, and holds the rounding; it is 0 where nothing rounds. A kernel without a bound states what
+   the emitted sine's would have.
 
 Files are raw little-endian float32, rows from the top, channels interleaved; check.json names their shapes.
 """
@@ -115,8 +116,7 @@ def pair(plan: Plan, model: Model, promised: bool, programs: PathPrograms | None
         images = _encoded(model, dict(zip(planes, sums, strict=True)))
     held = (plan if promised else plan_program(lower(model), "numpy")).expected(images)
     output = held.value.astype(np.float32)
-    rounded = np.nextafter((held.bound + np.abs(output - held.value)).astype(np.float32), np.float32(np.inf))
-    return Pair(images, output, rounded, promised, sums, planes)
+    return Pair(images, output, held.most_from(output), promised, sums, planes)
 
 
 def _livelier(program: Program, size: tuple[int, int]) -> dict[str, NDArray[np.float32]]:
@@ -139,6 +139,7 @@ def _spread(gather: Gather, size: tuple[int, int], contrast: float) -> dict[str,
         count = size[0] * size[1] * image.channels
         shares = 0.5 + contrast * (((np.arange(count) + 1) * GOLDEN + number / 7) % 1.0 - 0.5)
         values = (image.low + (image.high - image.low) * shares).reshape(*size, image.channels)
+        values = np.rint(values) if image.whole else values
         found[image.name] = np.clip(values.astype(np.float32), np.float32(image.low), np.float32(image.high))
     return found
 
@@ -158,7 +159,9 @@ def _encoded(model: Model, sums: Mapping[str, NDArray[np.float32]]) -> dict[str,
     for name in model.features:
         planes = [sums[plane].astype(np.float64) for plane in emit_path.GROUPS[FEATURES[name].layer]]
         layer = planes[0] if len(planes) == 1 else np.stack(planes, axis=-1)
-        encoded = encode_sums({FEATURES[name].layer: layer}, 1.0, (name,), model.normalization)[name]
+        encoded = encode_sums(
+            {FEATURES[name].layer: layer}, 1.0, (name,), model.normalization, model.is_whole
+        )[name]
         image = encoded[..., None] if encoded.ndim == 2 else encoded
         found[name] = image.astype(np.float32)
     return found

@@ -121,15 +121,20 @@ extern "C" void wamnet_call(const int *sizes, float *const *buffers, int columns
 
 
 class HostRunner(BufferRunner):
-    """A compiler and the glue of one language; what it has built stays loaded as long as the process."""
+    """A compiler and the glue of one language; what it has built stays loaded as long as the process.
+
+    `last`: options that come after all others. Some relax arithmetic: floats then lose their bound, integers
+    keep their bits.
+    """
 
     program = "c++"
     suffix = ".cpp"
     options: tuple[str, ...] = ("-std=c++20", "-pthread")
     homes = (TABLE, BLOCK)
 
-    def __init__(self) -> None:
+    def __init__(self, *last: str) -> None:
         super().__init__()
+        self._last = last
         self._folder = tempfile.TemporaryDirectory(prefix="wamnet-host-")
         self._count = 0
         try:
@@ -152,7 +157,7 @@ class HostRunner(BufferRunner):
         (folder / f"glue{self.suffix}").write_text(glue, encoding="utf-8")
         tools.run(
             self.program,
-            *(*self.options, *OPTIONS, "-I.", "-o", "kernel.so", f"glue{self.suffix}", "-lm"),
+            *(*self.options, *OPTIONS, *self._last, "-I.", "-o", "kernel.so", f"glue{self.suffix}", "-lm"),
             folder=folder,
         )
         function = ctypes.CDLL(str(folder / "kernel.so")).wamnet_call

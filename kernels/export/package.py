@@ -31,12 +31,12 @@ from ...compiler.scenes.host_pass import feature_pass
 from ...compiler.scenes.lower_encode import layers_of
 from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
-from ...compiler.targets import target_named
 from ...compiler.variants import FULL, parse, plan_model, vary
 from ...refimpl.errors import InputError
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.denoise import Model, learned_feature_spp
+from ...refimpl.network.whole import Whole
 from ...refimpl.reading import SIZES
 from . import bindings, check_pair, onnx_export, readme
 from .targets import NAMES, ONNX, TARGETS, Limit, Place, Row
@@ -138,20 +138,17 @@ def _graph(request: Request) -> Export:
         raise InputError("--schedule", request.schedule, "a runtime orders a graph's work", "leave it out")
     varied = vary(parse(request.variant), request.model)
     data = onnx_export.graph(varied.model)
-    pair = check_pair.pair(plan_program(lower(varied.model), "numpy"), varied.model, promised=False)
+    plan, model = plan_program(lower(varied.model), "numpy"), varied.model
+    pair = check_pair.pair(plan, model, promised=model.is_whole)
     files = {"denoise/denoise.onnx": data}
     files |= {f"check/{name}": content for name, content in pair.files().items()}
-    model = varied.model
     facts = {
-        "language": onnx_export.TEXT,
-        "profile": {"name": "native", "text": "the runtime's own sine, of which ONNX promises nothing"},
         "model": _model(request),
         "scene": None,
         "images": bindings.images(model),
         "window": {"size": model.window.size, "border": model.window.border},
         "output": {"name": "result", "channels": 3, "encoding": bindings.encoding(model)},
-        "bound": {"output": None, "against": "nothing: a runtime may compute Sin as it likes"},
-        "assumes": "",
+        **onnx_export.promise(model),
         "certificate": None,
         "weights": {"where": "inline", "count": _count(model), "file": None, "order": "initialisers"},
         "limits": [],
@@ -199,7 +196,7 @@ def _facts(
         "window": {"size": size, "border": first["window"]["border"]},
         "output": held["output"],
         "bound": held["bound"],
-        "assumes": target_named(denoiser.target).assumes,
+        "assumes": denoiser.plan.assumes,
         "certificate": f"denoise/{held['certificate']}" if held["certificate"] else None,
         "weights": {
             "where": how,
@@ -223,8 +220,10 @@ def _model(request: Request) -> dict[str, Any]:
 
 
 def _count(model: Model) -> int:
-    """Return the number of a model's weights and biases."""
-    return int(sum(array.size for array in (*model.siren.weights, *model.siren.biases)))
+    """Return the number of a model's weights and biases, and of the factors of one of integers."""
+    network = model.siren
+    factors = network.factors if isinstance(network, Whole) else ()
+    return sum(array.size for array in (*network.weights, *network.biases, *factors))
 
 
 def _place(row: Row, wanted: str) -> tuple[str, Place]:
@@ -314,14 +313,16 @@ def _of_scene(
             None,
             None,
             {
-                name: feature_pass(programs, name, model.normalization, target, header)
+                name: feature_pass(programs, name, model.normalization, target, header, model.is_whole)
                 for name in model.features
             },
         )
     path = compile_path(
         programs, target, request.profile, groups=tuple(dict.fromkeys(layers_of(model.features)))
     )
-    encoder = compile_encode(model.features, model.normalization, target, request.profile, path.planes)
+    encoder = compile_encode(
+        model.features, model.normalization, target, request.profile, path.planes, model.is_whole
+    )
     return path, encoder, {}
 
 

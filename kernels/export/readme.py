@@ -68,11 +68,10 @@ def readme(facts: Mapping[str, Any], files: Sequence[str]) -> str:
 def _facts(facts: Mapping[str, Any]) -> list[str]:
     """Return the lines about the whole."""
     bound, window, weights = facts["bound"]["output"], facts["window"], facts["weights"]
-    promise = (
-        f"at most {max(bound):g} from the float64 reference, for every picture in the stated ranges"
-        if bound
-        else f"no promise ({facts['bound']['against']})"
-    )
+    promise = f"no promise ({facts['bound']['against']})"
+    if bound:
+        size = f"at most {max(bound):g} from the float64 reference"
+        promise = f"{size if any(bound) else 'none, the same bits'}, for every picture in the stated ranges"
     images = [
         f"* Image `{i['name']}`: {i['channels']} channels in [{i['low']:g}, {i['high']:g}]; {i['encoding']}."
         for i in facts["images"]

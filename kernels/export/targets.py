@@ -139,10 +139,13 @@ DISPATCH = "dispatch(ceil(width / {across}), ceil(height / {down}), 1)"
 SPECTRA = ("fft32x8", "fft32", "fft32x4")
 """Schedules of spectra. Most processors have AVX2's registers, or get two instructions for each vector."""
 
-ON_PROCESSORS = (*SPECTRA, "tile16", "tile8", "tile4", "vector16")
+BYTES = ("dot16",)
+"""Schedules of bytes, for networks of integers: the fastest on processors with VNNI, and slow on others."""
+
+ON_PROCESSORS = (*SPECTRA, "tile16", "tile8", "tile4", "vector16", *BYTES)
 """Schedules of OpenCL for processors."""
 
-IN_C = ("tile8", "tile16", "tile4", *SPECTRA, PLAIN)
+IN_C = ("tile8", "tile16", "tile4", *SPECTRA, *BYTES, PLAIN)
 """Schedules of C. Those of spectra are the fastest, but only GCC and clang take them."""
 
 GL_CODE = """\

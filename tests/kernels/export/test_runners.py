@@ -13,6 +13,8 @@ import pytest
 
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.trace import trace
 from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
 from wamnet.compiler.scenes.lower_encode import layers_of
 from wamnet.compiler.scenes.lower_scene import lower_scene
@@ -23,7 +25,11 @@ from wamnet.kernels.export import check, runners, tools
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network.dataset import Normalization, encode_sums
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization, Window, all_windows, encode_sums, pad
+from wamnet.refimpl.network.whole import forward_whole, rounded
+
+pytestmark = pytest.mark.apart  # drivers of many targets stay in memory
 
 FEATURES = ("color", "normal")
 """What paths add up here."""
@@ -86,6 +92,25 @@ def test_grouped_kernels_keep_their_bound(runner, kit, schedule, border):
             name: random.uniform(-2, 2, (*shape, n)).astype(np.float32) for name, n in (("a", 4), ("b", 1))
         }
         assert kit.excess(runner, program, images, artifact) <= 1
+
+
+@pytest.mark.parametrize("border", ["clamp", "zero"])
+@pytest.mark.parametrize("schedule", ["plain", "group", "group4"])
+def test_integers_have_the_reference_s_digest(runner, schedule, border):
+    """WHO-10: the SHA-256 of the picture is the same in every language."""
+    if schedule not in {each.name for each in EXPORTED.get(runner.name, DENOISERS["c"]).schedules}:
+        pytest.skip("its language has no groups")
+    network = rounded(siren.init([45, 7, 5, 3], 3.0, 5.0, seed=1), 3)
+    images = tuple(Image(name, n, -127.0, 127.0, whole=True) for name, n in (("a", 4), ("b", 1)))
+    gather = Gather(Window(3, border), images)
+    program = trace(lambda window: forward_whole(network, window), {"window": Type(shape=(45,))}, gather)
+    random = np.random.default_rng(3)
+    numbers = random.integers(-127, 128, (11, 37, 5)).astype(np.float32)
+    artifact = compile_program(program, runner.name, "native", schedule)
+    found = runner.run(artifact, {"a": numbers[..., :4].copy(), "b": numbers[..., 4:].copy()})
+    held = forward_whole(network, all_windows(pad(numbers, gather.window), gather.window))
+    assert len(np.unique(held)) > 50
+    assert check.digest_of(found) == check.digest_of(held)
 
 
 def test_a_group_that_does_not_wait_is_found(runner, kit):

@@ -28,6 +28,7 @@ from ...refimpl import metrics
 from ...refimpl.frame import Frame
 from ...refimpl.network import dataset
 from ...refimpl.network.denoise import Model, denoise
+from ...refimpl.network.whole import round_image
 from ..devices.images import Images
 from .contender import Variant
 
@@ -60,7 +61,9 @@ class Crop:
 
     def interpreted(self, program: Program) -> Array:
         """Return the output (rows, columns, 3) of a program of one window, in float64."""
-        seen = windows(kernel_gather(program), self.images)
+        gather = kernel_gather(program)
+        images = {n: round_image(image) for n, image in self.images.items()} if gather.whole else self.images
+        seen = windows(gather, images)
         (found,) = interpret(program, {"window": seen}, np.float64).values()
         crop: Array = self.cut(found)
         return crop
@@ -80,7 +83,9 @@ class Crop:
         return self._rounding[key]
 
     def _rounded(self, plan: Plan) -> tuple[Array, float]:
-        """Compute both; the bound is infinite where a sine promises nothing."""
+        """Compute both; the bound is infinite where a sine promises nothing, and 0 of integers."""
+        if plan.is_whole:
+            return self.interpreted(plan.reference), 0.0
         near = self._near(plan.analysed) if plan.shares_bound else self.images
         found = plan.enclosures(near, slice(0, self.rows), of_cut=False)
         (bound,) = bounds.output_errors(plan.analysed, found).values()

@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler import variants
 from ...compiler.core import profiles, sine
 from ...compiler.core.ir import Program
 from ...compiler.core.lower import lower
+from ...compiler.variants import parse, vary
 from ...refimpl.errors import ExecutorUnavailable
 from ...refimpl.network.denoise import Model
 from ..devices.executor import Executor
@@ -42,7 +44,8 @@ MACHINE = "machine"
 class Variant:
     """A form of the network that trades accuracy for speed: a rank, a profile, a model trained as the form.
 
-    `model` None: the benchmark's own; `steps`: how many steps the model was trained on from that one.
+    `model` None: the benchmark's own; `steps`: how many steps the model was trained on from that one. `made`:
+    the variant that is made of it [compiler/variants.py].
     """
 
     name: str
@@ -51,10 +54,12 @@ class Variant:
     profile: str = IEEE
     model: Model | None = None
     steps: int = 0
+    made: str = variants.FULL
 
     def of(self, model: Model) -> Model:
         """Return the network that is run when `model` is the benchmark's."""
-        return self.model or model
+        found = self.model or model
+        return found if self.made == variants.FULL else vary(parse(self.made), found).model
 
     def program(self, model: Model) -> Program:
         """Return what the form computes when `model` is the benchmark's, without its rank."""

@@ -16,12 +16,13 @@ from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_program
 from ...compiler.plan import analysed
 from ...compiler.schedules.emit import kernel_gather
+from ...compiler.schedules.emit_dot import Dot
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import DENOISERS, TARGETS, schedule_named, target_named
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.network.denoise import Model
 from ..devices.images import Images
-from . import peer_oidn, peer_onnxruntime, peer_tinygrad, peer_torch
+from . import peer_oidn, peer_onnxruntime, peer_openvino, peer_tinygrad, peer_torch
 from .contender import FULL, IEEE, NO_CACHE, Contender, Opened, Tools, Variant
 from .cost import fused, sines_of
 from .workload import Given
@@ -38,6 +39,9 @@ VARIANTS: tuple[Variant, ...] = (
 )
 """Forms of the network that need no training; what is cut away is trained first [`of_machine`]."""
 
+INTEGERS = Variant("whole8", "integers: the same bits on every device", made="whole8")
+"""The network in integers."""
+
 CACHES = {
     "numpy": NO_CACHE,
     "opencl": "PoCL keeps kernels on disk, ~/.cache/pocl",
@@ -48,6 +52,7 @@ CACHES = {
 PEERS: tuple[Contender, ...] = (
     *peer_torch.CONTENDERS,
     *peer_onnxruntime.CONTENDERS,
+    *peer_openvino.CONTENDERS,
     *peer_tinygrad.CONTENDERS,
     *peer_oidn.CONTENDERS,
 )
@@ -91,8 +96,9 @@ def _open_kernel(
 
 def _read(artifact: Artifact, given: Given) -> Images:
     """Return the images that a kernel reads: a form may see fewer features than the network."""
-    first = artifact.kernels[0]
-    return {image.name: given.images[image.name] for image in kernel_gather(first.program).images}
+    gather = kernel_gather(artifact.kernels[0].program)
+    images = given.integers if gather.whole else given.images
+    return {image.name: images[image.name] for image in gather.images}
 
 
 def _bound_of(artifact: Artifact) -> float | None:
@@ -120,7 +126,16 @@ def of_machine(
         found += [kernel(name, schedule) for schedule in schedules]
         if name in TARGETS and name != "numpy":
             found += _varied(name, suits, [*(VARIANTS[:1] if quick else VARIANTS), *forms])
+        if name != "numpy" and not quick:
+            found += _of_integers(name, suits)
     return [*found, *(peer for peer in PEERS if not quick or peer.name in QUICK)]
+
+
+def _of_integers(executor: str, suits: str) -> list[Contender]:
+    """Return the kernels of a network of integers: in bytes where a language has such, and in floats."""
+    direct = _of_two_passes(executor, suits)
+    bytewise = [s.name for s in DENOISERS[executor].schedules if isinstance(s, Dot)]
+    return [kernel(executor, each, INTEGERS) for each in dict.fromkeys([*bytewise, direct])]
 
 
 def _varied(executor: str, suits: str, variants: Sequence[Variant]) -> list[Contender]:

@@ -2,11 +2,13 @@
 
 Eager, and compiled by `torch.compile` with its default options. Pictures are in channels-last order, which is
 the order of rows with interleaved channels: nothing is copied on the way in or out.
+
+It trains too, eager and with its own Adam: a peer of the compiled trainer [`trainer`].
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,8 @@ from numpy.typing import NDArray
 
 from ...refimpl.network.activation import RELU, SINE
 from ...refimpl.network.denoise import Model
+from ...refimpl.network.siren import Siren
+from ...refimpl.network.train import Recipe
 from .contender import Contender, Opened, Tools, activation_in, told_as_missing
 from .cost import layered
 from .workload import Given
@@ -66,6 +70,47 @@ def _open_compiled(tools: Tools, model: Model, size: int) -> Opened:
     """Return the network that PyTorch compiles when it is first run."""
     with told_as_missing("torch.compile"):
         return _open(compiled=True, model=model)
+
+
+def trainer(
+    recipe: Recipe,
+    network: Siren,
+    draw: Callable[[int], Any],
+    pool: tuple[NDArray[Any], NDArray[Any]] | None = None,
+) -> Callable[[int], None]:
+    """Return a function that does so many steps of a recipe, from where its last call ended.
+
+    `draw` gives for a step's number its windows (N, D_in) and colours (N, 3), or those of the `pool` (N,).
+    """
+    with told_as_missing("torch"):
+        import torch
+    weights = [torch.tensor(weight, requires_grad=True) for weight in network.weights]
+    biases = [torch.tensor(bias, requires_grad=True) for bias in network.biases]
+    optimizer = torch.optim.Adam([*weights, *biases], lr=recipe.learning_rate, fused=True)
+    omegas = [recipe.omega_0_first] + [recipe.omega_0_hidden] * len(recipe.widths)
+    gathered = None if pool is None else [torch.from_numpy(array) for array in pool]
+    number = [0]
+
+    def step() -> None:
+        if gathered is None:
+            x, target = map(torch.from_numpy, draw(number[0]))
+        else:
+            pick = torch.from_numpy(draw(number[0]))
+            x, target = (array[pick] for array in gathered)
+        for layer, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
+            x = torch.nn.functional.linear(x, weight, bias)
+            if layer < len(weights) - 1:
+                x = torch.sin(omegas[layer] * x)
+        optimizer.zero_grad()
+        torch.nn.functional.mse_loss(x, target).backward()
+        optimizer.step()
+        number[0] += 1
+
+    def run(steps: int) -> None:
+        for _ in range(steps):
+            step()
+
+    return run
 
 
 CONTENDERS = (

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from ...refimpl.errors import InputError
 from ...refimpl.frame import LAYERS, Frame
 from ...refimpl.network import dataset, siren
 from ...refimpl.network.denoise import Model
+from ...refimpl.network.whole import round_image
 from ..devices.images import Images
 from ..run.denoise_on import images_of
 
@@ -43,6 +45,11 @@ class Given:
     frame: Frame
     images: Images
 
+    @cached_property
+    def integers(self) -> Images:
+        """Return the images as networks of integers read them."""
+        return {name: round_image(image) for name, image in self.images.items()}
+
     @property
     def pixels(self) -> int:
         """Return the number of pixels."""
@@ -63,14 +70,14 @@ def given(model: Model, frame: Frame) -> Given:
     return Given(frame, images_of(model, frame))
 
 
-def noise(size: int) -> Frame:
+def noise(size: int, seed: int = 1) -> Frame:
     """Return all layers (size, size, C) of numbers in [0, 1), or in [-1, 1) for directions."""
     check_size(size)
     layers = {}
     for number, layer in enumerate(LAYERS.values()):
         side = min(size, NOISE_PX)
         pixels = rng.counter(np.arange(side * side))
-        words = rng.uniforms(rng.counter(1), pixels, rng.counter(number), rng.counter(0))
+        words = rng.uniforms(rng.counter(seed), pixels, rng.counter(number), rng.counter(0))
         values = np.stack(words[: layer.channels], axis=-1).reshape(side, side, -1)
         signed = layer.name in ("normal", "direction", "position")
         layers[layer.name] = 2 * values - 1 if signed else values

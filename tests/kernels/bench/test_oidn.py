@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from packages import needed
 
 from wamnet.kernels.bench.peer_oidn import prefiltered
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 
-pytest.importorskip("pyoidn", reason="Open Image Denoise is missing: pip install 'wamnet[baselines]'")
+pytestmark = [pytest.mark.apart, pytest.mark.needs("packages")]
+
+
+@pytest.fixture(autouse=True)
+def pyoidn():
+    """Give the package, or skip."""
+    return needed("pyoidn")
+
 
 SIZE = 64
 
@@ -36,9 +44,7 @@ def test_each_auxiliary_image_loses_its_noise():
         assert after <= before / 4, name
 
 
-def test_images_that_it_refuses_are_told(monkeypatch):
-    import pyoidn
-
+def test_images_that_it_refuses_are_told(monkeypatch, pyoidn):
     monkeypatch.setattr(pyoidn, "OIDN_FORMAT_FLOAT3", 12345)
     with pytest.raises(InputError, match=r"albedo for Open Image Denoise is \(64, 64, 3\): it says: "):
         prefiltered(Frame({"color": np.ones((SIZE, SIZE, 3)), **two_surfaces()}))

@@ -22,8 +22,11 @@ from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model, denoise
 
-pytestmark = pytest.mark.filterwarnings("default")
-"""Warnings of a peer are not faults of the project."""
+pytestmark = [
+    pytest.mark.apart,
+    pytest.mark.needs("programs"),
+    pytest.mark.filterwarnings("default"),  # warnings of a peer are not faults of the project
+]
 
 LIBRARY_SINE = SineContract("4 ulp, as OpenCL asks of a library", 4 * 2.0**-24)
 """A sine of a library: an ulp of a number in [-1, 1] is at most 2^-24, and libraries promise 1 to 4."""
@@ -68,7 +71,11 @@ def test_a_peer_computes_the_network(peer, border, activation) -> None:
     assert (np.abs(picture - denoise(model, frame, np.float64)) <= bound).all()
 
 
-@pytest.mark.parametrize("peer", [p for p in contenders.PEERS if not p.variant], ids=lambda peer: peer.name)
+OTHERS = [p for p in contenders.PEERS if not p.variant and not p.name.endswith("int8")]
+"""Peers that are another denoiser; those in 8 bits of this network: test_integers.py."""
+
+
+@pytest.mark.parametrize("peer", OTHERS, ids=lambda peer: peer.name)
 def test_another_denoiser_makes_a_picture(peer) -> None:
     """A flat grey picture with flat features stays grey: what it returns is linear, and then encoded."""
     layers = {name: np.full((32, 32, 3), 0.5, np.float32) for name in ("color", "albedo")}

@@ -1,0 +1,71 @@
+"""Networks of integers in the benchmark: images are rounded, the bound is 0, others' 8 bits are near."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wamnet.compiler.variants import parse, vary
+from wamnet.kernels.bench import contenders, peer_onnxruntime, peer_openvino, workload
+from wamnet.kernels.bench.accuracy import Crop
+from wamnet.kernels.bench.contender import Tools
+from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network.denoise import Model, denoise
+
+pytestmark = pytest.mark.apart
+
+SIZE = 48
+"""Width and height of the pictures."""
+
+
+@pytest.fixture(scope="module")
+def model():
+    """A network that gives colours inside of [0, 1]."""
+    features, window = ("color", "normal"), dataset.Window(4)
+    network = siren.init((dataset.n_inputs(features, window), 8, 8, 3), 1.0, 3.0, seed=1)
+    last = network.biases[-1] * 0 + np.float32(0.5)
+    return Model(
+        siren.Siren((*network.weights[:-1], network.weights[-1] / 4), (*network.biases[:-1], last), 1.0, 3.0),
+        features,
+        window,
+        dataset.Normalization(),
+    )
+
+
+@pytest.mark.parametrize(
+    ("executor", "schedule"), [("opencl", "dot16"), ("opencl", "tile16"), ("c", "dot16")]
+)
+def test_kernels_of_integers_give_the_reference_s_bits(executor_named, model, executor, schedule):
+    executor_named(executor)
+    frame = workload.noise(SIZE)
+    given = workload.given(model, frame)
+    contender = contenders.kernel(executor, schedule, contenders.INTEGERS)
+    assert contender.name == f"{executor}:{schedule}:whole8"
+    with Tools() as tools:
+        opened = contender.open(tools, model, SIZE)
+        found = opened.run(given)
+    assert opened.schedule == schedule
+    assert opened.bound == 0.0
+    assert opened.certified
+    wanted = denoise(vary(parse("whole8"), model).model, frame)
+    assert found.tobytes() == wanted.tobytes()
+    crop = Crop(model, given.images)
+    reference, bound = crop.rounding(contenders.INTEGERS, executor, schedule)
+    assert bound == 0.0
+    assert np.array_equal(crop.cut(found), reference)
+
+
+IN_8_BITS = (*peer_onnxruntime.CONTENDERS[1:], *peer_openvino.CONTENDERS)
+"""Others' networks of 8 bits."""
+
+
+@pytest.mark.parametrize("peer", IN_8_BITS, ids=lambda peer: peer.name)
+def test_networks_in_8_bits_of_others_are_near(model, peer):
+    """Not a bound of ours: 8 bits of three layers, which end near the middle, are off by a few steps."""
+    if reason := peer.missing():
+        pytest.skip(reason)
+    frame = workload.noise(SIZE)
+    given = workload.given(model, frame)
+    with Tools() as tools:
+        found = peer.open(tools, model, SIZE).run(given)
+    assert np.abs(found - denoise(model, frame)).max() <= 0.05

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Callable, Mapping
-from functools import cache
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from ...compiler.core.passes import pipeline
 from ...compiler.core.profiles import profile_named
 from ...compiler.core.trace import trace
 from ...compiler.scenes.emit_path import END
-from ...compiler.scenes.lower_scene import PATH, SURFACE, lower_scene
+from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import DENOISERS, target_named
@@ -37,12 +38,14 @@ from ...refimpl.light import scene as scene_module
 from ...refimpl.light.render import Job
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.dataset import Window
+from ...refimpl.network.whole import INPUT_LEVELS, Whole
 from .case import given
 from .functions import Function, components, names
 from .kinds import FUNCTIONS
 from .kinds.files import model_from
 from .kinds.images import frame_of
 from .kinds.paths import VERTEX
+from .kinds.whole import layers, network_from
 from .numbers import from_json
 
 Own = Callable[[Mapping[str, Any], str], Mapping[str, Any]]
@@ -54,13 +57,13 @@ class OnExecutor:
 
     def __init__(self, executor: Executor) -> None:
         self.executor = executor
-        own: dict[str, Own] = {"picture.denoised": self._denoised}
+        own: dict[str, Own] = {"picture.denoised": self._denoised, "whole.forward": self._whole}
         if target_named(executor.name).paths:
             own |= {"path.whole": self._vertices, "picture.rendered": self._rendered}
         self._own: Mapping[str, Own] = own
         self.kinds = [*FUNCTIONS, *self._own]
         self._compiled = cache(self._compile)
-        self._path_kernel = cache(self._compile_path)
+        self._path_kernel, self._programs = cache(self._compile_path), cache(self._lowered)
 
     def answer(self, kind: str, inputs: Mapping[str, Any], profile: str) -> Mapping[str, Any]:
         """Return the executor's outputs."""
@@ -98,10 +101,13 @@ class OnExecutor:
 
     def _compile_path(self, scene: str, settings: str, profile: str) -> PathArtifact:
         """Return the kernel that reports the last vertex of paths."""
-        programs = lower_scene(
-            scene_module.from_json(scene), Settings(**json.loads(settings)), most_unrolled(self.executor.name)
-        )
+        stopped = Settings(**json.loads(settings))
+        programs = replace(self._programs(scene, replace(stopped, max_depth=0)), settings=stopped)
         return compile_path(programs, self.executor.name, profile, self.executor.lanes, tuple(END))
+
+    def _lowered(self, scene: str, settings: Settings) -> PathPrograms:
+        """Return the programs of a path, which do not depend on the depth."""
+        return lower_scene(scene_module.from_json(scene), settings, most_unrolled(self.executor.name))
 
     def _denoised(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
         """Return a denoised picture."""
@@ -109,6 +115,24 @@ class OnExecutor:
         model = model_from(base64.b64decode(inputs["model"]))
         schedule = None if self.executor.name in DENOISERS else PLAIN
         return {"picture": denoise_on(self.executor, model, frame, profile, schedule).image}
+
+    def _whole(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
+        """Return what each layer of a network of integers gives, from kernels of a window of one pixel."""
+        network = network_from(inputs)
+        images = tuple(
+            Image(f"n{i}", 1, -INPUT_LEVELS, INPUT_LEVELS, whole=True) for i in range(network.widths[0])
+        )
+        gather = Gather(Window(1), images)
+        types = {"window": Type(shape=(gather.n_inputs,))}
+        pixel = {f"n{i}": np.full((1, 1, 1), n, np.float32) for i, n in enumerate(np.ravel(inputs["n"]))}
+        found: dict[str, Any] = {}
+        for name, width in _widths(network).items():
+            for first in range(0, width, 3):
+                wanted = range(first, min(first + 3, width))
+                program = trace(partial(_some, network, name, wanted), types, gather)
+                picture = self.executor.run(self._kernel(program, profile), pixel)
+                found.setdefault(name, []).extend(picture[0, 0].tolist())
+        return {name: np.array(values) for name, values in found.items()}
 
     def _rendered(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
         """Return mean and variance of each pixel."""
@@ -159,3 +183,15 @@ def _program(function: Function, wanted: list[int]) -> Program:
         return np.stack([found[i] for i in wanted], axis=-1)
 
     return trace(call, {"window": Type(shape=(len(images),))}, gather)
+
+
+def _widths(network: Whole) -> dict[str, int]:
+    """Return the length of what each layer of a network gives, by the name of the output."""
+    *hidden, last = network.widths[1:]
+    return {**{f"layer_{i}": width for i, width in enumerate(hidden)}, "color": last}
+
+
+def _some(network: Whole, name: str, wanted: Sequence[int], window: Any) -> Any:
+    """Return some numbers of what a layer gives; a program is made of it."""
+    found = layers(network, window)[name]
+    return np.stack([found[..., i] for i in wanted], axis=-1)

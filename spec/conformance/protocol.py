@@ -135,7 +135,8 @@ class Session:
     @staticmethod
     def _thread(child: _Child, target: Callable[..., None], *arguments: Any) -> None:
         """Start a thread that serves a program; those that are done are forgotten."""
-        thread = threading.Thread(target=target, args=(child, *arguments), daemon=True)
+        name = WRITER if target is _write else None
+        thread = threading.Thread(target=target, args=(child, *arguments), name=name, daemon=True)
         child.threads[:] = [known for known in child.threads if known.is_alive()] + [thread]
         thread.start()
 
@@ -152,12 +153,14 @@ class Session:
         child, self._child = self._child, None
         if child is None:
             return
-        process = child.process
+        process, patience_s = child.process, 0.0 if at_once else PATIENCE_S
         assert process.stdin is not None
-        if not any(thread.name == WRITER and thread.is_alive() for thread in child.threads):
+        if _written(child, patience_s):
             process.stdin.close()
+        else:
+            patience_s = 0.0
         with suppress(subprocess.TimeoutExpired):
-            process.wait(timeout=0.0 if at_once else PATIENCE_S)
+            process.wait(timeout=patience_s)
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
@@ -177,11 +180,18 @@ class Session:
 
 def _write(child: _Child, line: bytes) -> None:
     """Write a request; a program that has ended is noticed by the end of its output."""
-    threading.current_thread().name = WRITER
     assert child.process.stdin is not None
     with suppress(OSError, ValueError):
         while line:
             line = line[child.process.stdin.write(line) :]
+
+
+def _written(child: _Child, patience_s: float) -> bool:
+    """Wait until all lines are written, and return whether they are: an answer may be there before."""
+    writers = [thread for thread in child.threads if thread.name == WRITER]
+    for thread in writers:
+        thread.join(patience_s / len(writers))
+    return not any(thread.is_alive() for thread in writers)
 
 
 def _read_lines(child: _Child) -> None:

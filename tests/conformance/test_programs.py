@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
 from wamnet.refimpl.errors import InputError
-from wamnet.spec.conformance import run
+from wamnet.spec.conformance import protocol, run
 from wamnet.spec.conformance.case import Case, Output
 from wamnet.spec.conformance.protocol import NoAnswerError, Session
 from wamnet.spec.conformance.report import first_blamed
@@ -163,6 +165,24 @@ def test_what_a_program_has_started_ends_with_it(verdicts, tmp_path):
 def test_programs_that_do_not_introduce_themselves_are_refused(verdicts, command, text):
     with pytest.raises(InputError, match=rf"^--program is .*: it must answer to hello \({text}.*; see spec"):
         verdicts(command, ["random.block"], 1.0)
+
+
+def test_a_program_that_has_answered_ends_by_itself(program, monkeypatch, tmp_path):
+    """Also where its answer is there before the thread that wrote the request is done: it was killed then."""
+    write = protocol._write
+
+    def slow(child, line):
+        write(child, line)
+        time.sleep(0.3)
+
+    monkeypatch.setattr(protocol, "_write", slow)
+    ended = tmp_path / "ended"
+    command = program()
+    with Path(command[-1]).open("a") as file:
+        file.write(f"\nopen({str(ended)!r}, 'w').close()\n")
+    with Session(command, 60.0) as session:
+        session.hello()
+    assert ended.exists()
 
 
 ACCEPTS = (

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from ..case import Kind
 from ..functions import Function
-from . import files, images, light, materials, network, numbers, paths, pictures, surfaces
+from . import files, images, light, materials, network, numbers, paths, pictures, surfaces, whole
 
 FUNCTIONS: Mapping[str, Function] = {
     f.name: f for f in (*numbers.FUNCTIONS, *light.FUNCTIONS, *surfaces.FUNCTIONS, *materials.FUNCTIONS)
@@ -22,6 +22,7 @@ KINDS: Mapping[str, Kind] = {
         *images.KINDS,
         *files.KINDS,
         *pictures.KINDS,
+        *whole.KINDS,
         *(function.kind() for function in FUNCTIONS.values()),
     )
 }

@@ -1,0 +1,365 @@
+"""Kinds of networks of integers: inputs, the sine, a network layer by layer, rounding. Every bound is 0."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....refimpl.network import siren, whole
+from ....refimpl.network.siren import Siren
+from ....refimpl.network.whole import EXACT, INPUT_LEVELS, LARGEST_INT, SINES, TURN, WEIGHT_LEVELS, Whole
+from ..case import Case, Kind, Output
+from ..functions import drawn
+from .network import NETWORK, _as_inputs, _from_inputs
+
+Array = NDArray[Any]
+
+SOURCE = "integers: no operation rounds"
+"""Where the bound 0 comes from."""
+
+PARTS = ("weight", "factor", "bias")
+"""The arrays of a layer, as inputs name them."""
+
+
+def exact(outputs: Mapping[str, Any]) -> dict[str, Output]:
+    """Return what is expected, to the bit, and what a deviation is blamed on."""
+    return {name: Output(value, 0.0, SOURCE, clause=blamed(name)) for name, value in outputs.items()}
+
+
+def blamed(name: str) -> str:
+    """Return the clause that an output follows from, "" for that of the case."""
+    if name.startswith("layer_"):
+        return "WHO-4"
+    own = {"color": "WHO-6", "weight_0": "WHO-8", "n": "", "value": ""}
+    return own.get(name, "WHO-7")
+
+
+def integers(values: Array) -> Array:
+    """Return whole floats (...) as integers."""
+    return np.asarray(values).astype(np.int64)
+
+
+# ---- inputs and the sine ----------------------------------------------------------------------------------
+
+
+def _input(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the integers of encoded features."""
+    return {"n": integers(whole.round_image(np.asarray(inputs["x"], np.float32)))}
+
+
+def _input_cases() -> list[Case]:
+    """Return ties with their neighbours, the ends, tiny numbers and others."""
+    ties = ((np.array([-127, -64, -1, 0, 1, 63, 126]) + 0.5) / INPUT_LEVELS).astype(np.float32)
+    rows: dict[str, Array] = {
+        "ties": ties,
+        "just below ties": np.nextafter(ties, np.float32(-2)),
+        "just above ties": np.nextafter(ties, np.float32(2)),
+        "ends, zeros and denormal numbers": np.array(
+            [-1.0, 1.0, 0.0, -0.0, 1e-45, -1e-45, 2.0**-9], np.float32
+        ),
+        "": (2.0 * drawn("whole.input", 0, 12) - 1.0).astype(np.float32),
+    }
+    found = []
+    for index, (note, x) in enumerate(rows.items()):
+        inputs = {"x": x.astype(np.float64)}
+        found.append(Case(f"whole.input/{index}", "WHO-2", inputs, exact(_input(inputs)), (), note))
+    return found
+
+
+def _sine(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the integers of phases."""
+    phases = np.asarray(inputs["phase"], np.float64).astype(np.uint32)
+    return {"value": integers(whole.whole_sine(phases, int(inputs["amplitude"])))}
+
+
+def _sine_cases() -> list[Case]:
+    """Return phases at the ends of each quarter, of words, at roundings, and others."""
+    quarter = TURN // 4
+    ends = np.array([[k * quarter - 1, k * quarter, k * quarter + 64] for k in range(1, 5)]).ravel()
+    rows: list[tuple[str, Array]] = [
+        ("ends of quarters", ends),
+        ("words beyond a turn: the upper bits mean nothing", np.array([2**24, 2**31, 2**32 - 1, 0xABCDEF01])),
+        ("steps of 64 phases", np.array([63, 64, 127, 128, 2**22 - 65, 2**22 - 64])),
+        ("", (drawn("whole.sine", 0, 24) * 2**32).astype(np.uint64)),
+    ]
+    found: list[Case] = []
+    for amplitude in SINES:
+        for note, phase in [*rows, ("both sides of all steps of a quarter", _steps(amplitude))]:
+            inputs = {"amplitude": amplitude, "phase": phase.astype(np.int64)}
+            name = f"whole.sine/{len(found)}"
+            found.append(Case(name, "WHO-5", inputs, exact(_sine(inputs)), (), note))
+    return found
+
+
+def _steps(amplitude: int) -> Array:
+    """Return the last phase of each step of a quarter, and the first phase of the next."""
+    values = whole.whole_sine(np.arange(0, TURN // 4, 64).astype(np.uint32), amplitude)
+    first = 64 * (1 + np.flatnonzero(np.diff(values)))
+    return np.stack((first - 1, first), axis=-1).ravel()
+
+
+# ---- networks ---------------------------------------------------------------------------------------------
+
+
+def _network(index: int) -> Whole:
+    """Return the network of a case: of 8 bits or 10, with a large omega_0 in one, without a hidden layer."""
+    widths, omega, amplitude = (
+        ([8, 6, 5, 3], 3.0, 127),
+        ([8, 6, 5, 3], 1e6, 127),
+        ([12, 4, 3], 9.0, 511),
+        ([4, 3], 1.0, 127),
+    )[index]
+    return whole.rounded(siren.init(widths, omega, omega, seed=index), 2, amplitude)
+
+
+def _inputs_of(network: Whole) -> dict[str, Any]:
+    """Return a network as inputs of a case."""
+    found: dict[str, Any] = {"amplitude": network.amplitude, "fraction": network.fraction}
+    for name, arrays in zip(PARTS, (network.weights, network.factors, network.biases), strict=True):
+        found |= {f"{name}_{layer}": integers(array) for layer, array in enumerate(arrays)}
+    return found
+
+
+def network_from(inputs: Mapping[str, Any]) -> Whole:
+    """Return the network of a case, or refuse it."""
+    count = sum(name.startswith("weight_") for name in inputs)
+    given = [[np.asarray(inputs[f"{name}_{layer}"], np.float64) for layer in range(count)] for name in PARTS]
+    fields = {name: int(inputs[name]) for name in ("amplitude", "fraction")}
+
+    def network(dtype: type[np.floating[Any]]) -> Whole:
+        weights, factors, biases = (tuple(array.astype(dtype) for array in arrays) for arrays in given)
+        return Whole(weights, biases, 1.0, 1.0, factors=factors, **fields)  # type: ignore[arg-type]
+
+    whole.check_whole(network(np.float64))  # float32 rounds what is beyond the limits to what is not
+    return network(np.float32)
+
+
+def layers(network: Whole, numbers: Any) -> dict[str, Any]:
+    """Return the numbers of each hidden layer, and the colour; inputs (..., D_in) may be traced."""
+    hidden = whole.sine_layers(network, numbers, len(network.weights) - 1)
+    found = {f"layer_{layer}": values for layer, (_, values) in enumerate(hidden)}
+    return {**found, "color": whole.forward_whole(network, numbers)}
+
+
+def _forward(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the integers of each hidden layer, and the colour."""
+    found = layers(network_from(inputs), np.asarray(inputs["n"], np.float32))
+    return {name: value if name == "color" else integers(value) for name, value in found.items()}
+
+
+def _forward_cases() -> list[Case]:
+    """Return networks at random inputs and at the ends; then some at limits, and some that are refused."""
+    rows: list[tuple[str, str, Whole, Array]] = []
+    for index in range(4):
+        network = _network(index)
+        n_in = network.widths[0]
+        random = (drawn("whole.forward", index, n_in) * 255).astype(np.int64) - INPUT_LEVELS
+        for note, n in (
+            ("a million turns a layer" if index == 1 else "", random),
+            ("all inputs at an end", np.full(n_in, -INPUT_LEVELS)),
+            ("black", np.zeros(n_in, np.int64)),
+        ):
+            rows.append((note, "WHO-6", network, n))
+    one, most = _network(3), _at_the_limit(0.0)
+    plain = replace(one, fraction=0, factors=(np.ones(3),), biases=(np.array([5.0, -300.0, 2e4]),))
+    for note, clause, network, n in (
+        ("a fraction of 5 digits", "WHO-6", replace(_network(0), fraction=5), np.full(8, 100)),
+        ("a fraction of 0 digits", "WHO-6", plain, np.array([127, 90, -64, -5])),
+        ("colours of 2^31 - 1", "WHO-6", most, np.full(4, INPUT_LEVELS)),
+        ("colours of 1 - 2^31", "WHO-6", most, np.full(4, -INPUT_LEVELS)),
+        ("the least last bias", "WHO-1", replace(one, biases=(np.full(3, -(2.0**24)),)), np.zeros(4)),
+    ):
+        rows.append((note, clause, network, n))
+    refused: list[tuple[str, str, Whole]] = [
+        ("a weight of 9 bits", "WHO-1", replace(one, weights=(one.weights[0] * 0 + WEIGHT_LEVELS + 1,))),
+        ("a weight of -128", "WHO-1", replace(one, weights=(one.weights[0] * 0 - WEIGHT_LEVELS - 1,))),
+        ("a factor of 25 bits", "WHO-1", replace(one, factors=(np.full(3, 2.0**24),))),
+        ("rows of zeros with a factor of 25 bits", "WHO-1", _zeros(factor=2.0**24)),
+        ("a factor below 0", "WHO-1", replace(one, factors=(-one.factors[0],))),
+        ("a last bias of 2^24", "WHO-1", _zeros(bias=2.0**24)),
+        ("a last bias of -2^24 - 1", "WHO-1", _zeros(bias=-(2.0**24) - 1)),
+        ("a hidden bias below 0", "WHO-1", _with_hidden_bias(-1.0)),
+        ("a hidden bias of a turn", "WHO-1", _with_hidden_bias(float(TURN))),
+        ("sums of 2^24", "WHO-3", _wide()),
+        ("colours beyond int32", "WHO-6", replace(one, factors=(one.factors[0] * 0 + 2.0**24 - 1,))),
+        ("colours of 2^31", "WHO-6", _at_the_limit(1.0)),
+        ("colours of -2^31", "WHO-6", _at_the_limit(-1.0)),
+        ("an amplitude without a sine", "WHO-1", replace(one, amplitude=128)),
+        ("a fraction of 9 digits", "WHO-1", replace(one, fraction=9)),
+        ("a fraction below 0", "WHO-1", replace(one, fraction=-1)),
+    ]
+    cases: list[Case] = []
+    for note, clause, network, n in rows:
+        inputs = {**_inputs_of(network), "n": integers(n)}
+        cases.append(Case(f"whole.forward/{len(cases)}", clause, inputs, exact(_forward(inputs)), (), note))
+    for note, clause, network in refused:
+        inputs = {**_inputs_of(network), "n": np.zeros(network.widths[0], np.int64)}
+        cases.append(Case(f"whole.forward/{len(cases)}", clause, inputs, None, (), note))
+    return cases
+
+
+def _at_the_limit(more: float) -> Whole:
+    """Return a layer whose colours reach 2^31 - 1 in magnitude; the first bias is `more` farther from 0."""
+    weights = np.full((3, 4), float(WEIGHT_LEVELS))
+    factor, rest = divmod(LARGEST_INT, INPUT_LEVELS * 4 * WEIGHT_LEVELS)
+    sign = -1.0 if more < 0 else 1.0
+    biases = np.array([sign * rest + more, -rest, rest - 7.0])
+    return replace(_network(3), weights=(weights,), factors=(np.full(3, float(factor)),), biases=(biases,))
+
+
+def _zeros(factor: float = 1.0, bias: float = 0.0) -> Whole:
+    """Return a layer of zeros."""
+    one = _network(3)
+    return replace(
+        one, weights=(one.weights[0] * 0,), factors=(np.full(3, factor),), biases=(np.full(3, bias),)
+    )
+
+
+def _with_hidden_bias(value: float) -> Whole:
+    """Return the first network with another bias of a neuron."""
+    network = _network(0)
+    biases = [bias.copy() for bias in network.biases]
+    biases[1][2] = value
+    return replace(network, biases=tuple(biases))
+
+
+def _wide() -> Whole:
+    """Return a network whose last sums may be 2^24 with 10 bits; if all inputs agree, they are smaller."""
+    last = np.full((3, 259), float(WEIGHT_LEVELS))
+    last[:, 1::2] *= -1.0
+    last[:, 0] = -(-EXACT // 511) - 258 * WEIGHT_LEVELS
+    weights, ones = (np.ones((259, 1)), last), (np.ones(259), np.ones(3))
+    return Whole(weights, tuple(0 * some for some in ones), 1.0, 1.0, factors=ones, amplitude=511)
+
+
+# ---- rounding ---------------------------------------------------------------------------------------------
+
+
+def _rounded(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a network in integers: first what the weights depend on, and those of the first layer last."""
+    network = whole.rounded(_from_inputs(inputs), int(inputs["size"]), int(inputs["amplitude"]))
+    found = {name: value for name, value in _inputs_of(network).items() if name != "amplitude"}
+    order = sorted(found, key=lambda name: (name.startswith("weight_"), name == "weight_0"))
+    return {name: found[name] for name in order}
+
+
+def _rounded_cases() -> list[Case]:
+    """Return networks as they begin, and with what is hard to round; then some that are refused."""
+    one = siren.init([8, 6, 5, 3], 3.0, 2.0, seed=5)
+    zeros = [weight.copy() for weight in one.weights]
+    zeros[0][1], zeros[1][2] = 0.0, 1e-42
+    biases = (*one.biases[:2], np.array([1.0, -1.0, 0.25]))
+    loud = _louder(one, 19200.0)
+    loud = replace(loud, biases=(*one.biases[:2], np.array([5.25, -5.75, 100.0]) / 2.0**16))
+    flat = siren.init([1, 264, 1], 3.0, 2.0, seed=7)
+    ramp = np.sign(flat.weights[1]) * (1.0 - np.arange(264) / 2.0**13)
+    flat = replace(flat, weights=(flat.weights[0], ramp))
+    first = replace(siren.init([264, 1, 1], 3.0, 2.0, seed=7), weights=(ramp, np.array([[0.5]])))
+    rows: list[tuple[str, str, Siren, int, int]] = [
+        ("", "WHO-7", one, 2, 127),
+        ("10 bits", "WHO-7", one, 2, 511),
+        ("a row of zeros, one of denormals", "WHO-7", replace(one, weights=tuple(zeros)), 2, 127),
+        ("factors that wrap", "WHO-7", replace(one, omega_0_first=1e9), 2, 127),
+        ("colours that need a smaller fraction", "WHO-7", _louder(one, 300.0), 2, 127),
+        ("errors are passed from tap to tap", "WHO-8", siren.init([27, 2, 3], 5.0, 2.0, seed=6), 3, 127),
+        ("colours that need the fraction 0", "WHO-7", loud, 2, 127),
+        ("biases that need a smaller fraction", "WHO-7", replace(one, biases=biases), 2, 127),
+        ("a flat row: its sum limits the factor", "WHO-7", flat, 1, 511),
+        ("inputs of 10 bits would be too large for the first layer", "WHO-3", first, 1, 511),
+        ("a quotient that order moves across an integer", "WHO-7", _at_an_integer(), 2, 127),
+        ("halves in the last layer, and integers as quotients", "WHO-7", _halves([4, 4, 3]), 2, 127),
+        ("halves in one layer, the first and the last", "WHO-8", _halves([4, 3]), 2, 127),
+        ("errors that would lead beyond 127", "WHO-8", _beyond(), 2, 127),
+    ]
+    refused: list[tuple[str, str, Siren, int, int]] = [
+        ("colours beyond all fractions", "WHO-7", _louder(one, 1e6), 2, 127),
+        ("an amplitude without a sine", "WHO-1", one, 2, 255),
+        ("windows that the first layer does not have", "WHO-8", one, 3, 127),
+    ]
+    cases = []
+    for index, (note, clause, network, size, amplitude) in enumerate([*rows, *refused]):
+        inputs = {**_as_inputs(network), "size": size, "amplitude": amplitude}
+        expected = exact(_rounded(inputs)) if index < len(rows) else None
+        cases.append(Case(f"whole.rounded/{index}", clause, inputs, expected, (), note))
+    return cases
+
+
+def _louder(network: Siren, scale: float) -> Siren:
+    """Return a network whose last weights are larger."""
+    return replace(network, weights=(*network.weights[:-1], network.weights[-1] * np.float32(scale)))
+
+
+def _at_an_integer() -> Siren:
+    """Return a network where the least integers at least W (g / N) / 127 and W g / N / 127 differ."""
+    network = siren.init([4, 2, 2, 3], 3.0, 2.0, seed=8)
+    g = network.omega_0_hidden / (2.0 * np.pi) * TURN
+    near = INPUT_LEVELS * WEIGHT_LEVELS * np.arange(1.0, 200.0) / g
+    quotients = near * (g / INPUT_LEVELS) / WEIGHT_LEVELS, near * g / INPUT_LEVELS / WEIGHT_LEVELS
+    wanted = near[np.ceil(quotients[0]) != np.ceil(quotients[1])][0]
+    weights = [weight.astype(np.float64) for weight in network.weights]
+    weights[1][0] = wanted, wanted / 2
+    return replace(network, weights=tuple(weights))
+
+
+def _halves(widths: Sequence[int]) -> Siren:
+    """Return a network whose last layer has the factor 2, and multiples and biases that are halves."""
+    network = siren.init(widths, 3.0, 2.0, seed=9)
+    step = INPUT_LEVELS / 2.0**24
+    last = np.array([[254.0, 1.0, 3.0, 5.0], [-1.0, -3.0, -5.0, -254.0], [7.0, 254.0, 13.0, -9.0]]) * step
+    biases = np.array([0.5, 1.5, -2.5]) / 2.0**24
+    return replace(network, weights=(*network.weights[:-1], last), biases=(*network.biases[:-1], biases))
+
+
+def _beyond() -> Siren:
+    """Return a network whose first layer passes errors of one sign to a tap of 127, which is rounded last."""
+    network = siren.init([4, 2, 3], 1e6, 2.0, seed=10)
+    row = np.array([100.45, 100.2, 127.0, 99.9]) / 1270.0
+    return replace(network, weights=(np.stack((row, -row)), *network.weights[1:]))
+
+
+LAYERS = {
+    "weight_l": "integer[D_out][D_in], for each layer l from 0",
+    "factor_l": "integer[D_out]",
+    "bias_l": "integer[D_out]",
+}
+"""What a layer of integers is, for the page."""
+
+KINDS = (
+    Kind(
+        "whole.input",
+        "Inputs in integers",
+        {"x": "float[n], float32 in [-1, 1]"},
+        {"n": "integer[n]"},
+        _input_cases,
+        _input,
+    ),
+    Kind(
+        "whole.sine",
+        "The sine of a phase, in integers",
+        {"amplitude": "integer, 127 or 511", "phase": "integer[n] below 2^32"},
+        {"value": "integer[n]"},
+        _sine_cases,
+        _sine,
+    ),
+    Kind(
+        "whole.forward",
+        "A network of integers, layer by layer",
+        {"amplitude": "integer", "fraction": "integer", **LAYERS, "n": "integer[D_in] in [-127, 127]"},
+        {"layer_l": "integer[D_out], of each hidden layer l", "color": "float[3]"},
+        _forward_cases,
+        _forward,
+    ),
+    Kind(
+        "whole.rounded",
+        "A trained network in integers",
+        {**NETWORK, "size": "integer: taps along a side of the window", "amplitude": "integer"},
+        {**LAYERS, "fraction": "integer"},
+        _rounded_cases,
+        _rounded,
+    ),
+)
+"""The kinds of this module."""

@@ -11,8 +11,8 @@
  * [refuse] leaves the request by longjmp, and all memory of a request is freed at its end [get].
  *
  * Sections: memory and refusal, JSON, numbers in requests, answers, SHA-256 and base64, vectors, random numbers,
- * sampling, scenes, intersection, materials, the sky, light transport, images, network, metrics, model files,
- * kinds, protocol.
+ * sampling, scenes, intersection, materials, the sky, light transport, images, network, networks of
+ * integers, metrics, model files, kinds, protocol.
  */
 #include <errno.h>
 #include <float.h>
@@ -1893,8 +1893,8 @@ static network new_network(size_t layers, const size_t *widths) {
     return made;
 }
 
-/* SIR-1 */
-static network read_network(const json *in) {
+/* SIR-1: the weights and biases. */
+static network read_parameters(const json *in) {
     array weights[MOST_LAYERS], biases[MOST_LAYERS];
     size_t widths[MOST_LAYERS + 1] = {0}, layers = 0;
     char name[32];
@@ -1914,6 +1914,11 @@ static network read_network(const json *in) {
         made.weights[l] = weights[l].values;
         made.biases[l] = biases[l].values;
     }
+    return made;
+}
+
+static network read_network(const json *in) {
+    network made = read_parameters(in);
     made.omega_first = number(in, "omega_0_first");
     made.omega_hidden = number(in, "omega_0_hidden");
     return made;
@@ -1939,6 +1944,181 @@ static void adam(double *theta, double g, double *m, double *v, double rate, dou
 
 /* SIN-7: beyond the domain the emitted sine is 0; within it any sine is near enough (PRO-4). */
 static double emitted_sine(double x) { return fabs(x) > 12800 && isfinite(x) ? 0 : sin(x); }
+
+/* ---- networks of integers: WHO -------------------------------------------------------------------------- */
+
+enum { INPUT_LEVELS = 127, MOST_FRACTION = 8, MOST_WIDTH = 8192 };
+static const double TURN = 16777216, MOST_INT = 2147483647;
+
+/* WHO-1: weights and biases are integers here, in double precision, which holds them. */
+typedef struct {
+    network of;
+    double *factors[MOST_LAYERS], amplitude;
+    int fraction;
+} whole;
+
+/* WHO-2: of a feature in [-1, 1] that is rounded to single precision; the sum is exact. */
+static double whole_input(double x) { return floor(INPUT_LEVELS * x + 0.5); }
+
+/* WHO-5 */
+typedef struct {
+    uint32_t amplitude, c1, c3, c5;
+    int shift;
+} polynomial;
+
+static const polynomial SINES[] = {{127, 51053, 20871, 2332, 24}, {511, 51355, 20996, 2347, 22}};
+
+static const polynomial *sine_with(double amplitude) {
+    for (size_t i = 0; i < sizeof SINES / sizeof *SINES; i++)
+        if (SINES[i].amplitude == amplitude) return &SINES[i];
+    refuse("an amplitude is 127 or 511");
+}
+
+static int32_t whole_sine(const polynomial *s, uint32_t phase) {
+    uint32_t k = phase >> 22 & 1 ? ~phase : phase, m = k >> 6 & 0xffff, z = m * m >> 16;
+    uint32_t slope = s->c1 - (z * (s->c3 - (z * s->c5 >> 16)) >> 16);
+    int32_t size = (int32_t)((m * slope + (1u << (s->shift - 1))) >> s->shift);
+    return phase >> 23 & 1 ? -size : size;
+}
+
+static double largest_input(const whole *n, size_t layer) { return layer ? n->amplitude : INPUT_LEVELS; }
+
+static bool is_last(const whole *n, size_t layer) { return layer + 1 == n->of.layers; }
+
+/* WHO-3: the largest that a sum of row i can be. */
+static double largest_sum(const whole *n, size_t layer, size_t i) {
+    size_t in = n->of.widths[layer];
+    double found = 0;
+    for (size_t k = 0; k < in; k++) found += fabs(n->of.weights[layer][i * in + k]);
+    return found * largest_input(n, layer);
+}
+
+static bool whole_within(const double *values, size_t count, double least, double most) {
+    for (size_t i = 0; i < count; i++)
+        if (!(values[i] >= least && values[i] <= most) || floor(values[i]) != values[i]) return false;
+    return true;
+}
+
+/* WHO-1, WHO-3, WHO-6: return what is wrong with a network, or nothing. */
+static const char *wrong(const whole *n) {
+    for (size_t l = 0; l < n->of.layers; l++) {
+        size_t in = n->of.widths[l], out = n->of.widths[l + 1];
+        bool last = is_last(n, l);
+        if (!whole_within(n->of.weights[l], in * out, -127, 127)) return "a weight is not in [-127, 127]";
+        if (!whole_within(n->factors[l], out, 0, TURN - 1)) return "a factor is not in [0, 2^24)";
+        if (!whole_within(n->of.biases[l], out, last ? -TURN : 0, TURN - 1)) return "a bias is out of its range";
+        for (size_t i = 0; i < out; i++) {
+            double most = largest_sum(n, l, i), color = most * n->factors[l][i] + fabs(n->of.biases[l][i]);
+            if (most >= TURN) return "a sum can reach 2^24";
+            if (last && color > MOST_INT) return "a colour can leave int32";
+        }
+    }
+    return NULL;
+}
+
+/* WHO-6: double precision holds int32. */
+static double whole_color(double u, int fraction) {
+    return floor(ldexp(clamp(u, 0, ldexp(1, 16 + fraction)), -fraction)) / 65536;
+}
+
+static uint32_t word_of(double x) { return (uint32_t)(int32_t)x; }
+
+/* WHO-3, WHO-4, WHO-5, WHO-6: what a layer gives. */
+static double *whole_layer(const whole *n, size_t layer, const double *x) {
+    size_t in = n->of.widths[layer], out = n->of.widths[layer + 1];
+    const polynomial *sine = sine_with(n->amplitude);
+    double *y = get(out, sizeof *y);
+    for (size_t i = 0; i < out; i++) {
+        double a = 0, m = n->factors[layer][i], b = n->of.biases[layer][i];
+        for (size_t k = 0; k < in; k++) a += n->of.weights[layer][i * in + k] * x[k];
+        if (is_last(n, layer)) y[i] = whole_color(a * m + b, n->fraction);
+        else y[i] = whole_sine(sine, word_of(a) * word_of(m) + word_of(b));
+    }
+    return y;
+}
+
+/* WHO-8: the neighbours of a tap that is rounded, by rows below it and columns ahead of it, and their shares. */
+static const struct {
+    long below, ahead;
+    double share;
+} NEIGHBOURS[] = {{0, 1, 7}, {1, -1, 3}, {1, 0, 5}, {1, 1, 1}};
+
+/* WHO-8: round the taps of one channel, whose first is row[0], in place. */
+static void diffuse(double *row, long size, long channels) {
+    for (long y = 0; y < size; y++)
+        for (long step = 0; step < size; step++) {
+            long way = y % 2 ? -1 : 1, x = y % 2 ? size - 1 - step : step;
+            double *tap = row + (y * size + x) * channels, value = *tap, total = 0;
+            *tap = clamp(rint(value), -127, 127);
+            for (int pass = 0; pass < 2; pass++)
+                for (size_t i = 0; i < sizeof NEIGHBOURS / sizeof *NEIGHBOURS; i++) {
+                    long below = NEIGHBOURS[i].below, ahead = way * NEIGHBOURS[i].ahead;
+                    if (y + below >= size || x + ahead < 0 || x + ahead >= size) continue;
+                    if (!pass) total += NEIGHBOURS[i].share;
+                    else tap[(below * size + ahead) * channels] += (value - *tap) * (NEIGHBOURS[i].share / total);
+                }
+        }
+}
+
+/* WHO-7: round a layer of n to one of made, whose fraction, widths and amplitude are known. */
+static void round_layer(const network *n, whole *made, size_t layer, size_t size) {
+    size_t in = n->widths[layer], out = n->widths[layer + 1], channels = in / (size * size);
+    bool last = is_last(made, layer);
+    double g = last ? ldexp(1, 16 + made->fraction) : omega(n, layer) / (2 * PI) * TURN;
+    double largest = largest_input(made, layer), most = floor((TURN - 1) / largest) - 2 * (double)in;
+    for (size_t i = 0; i < out; i++) {
+        double *row = made->of.weights[layer] + i * in, top = 0, sums = 0;
+        for (size_t k = 0; k < in; k++) {
+            row[k] = n->weights[layer][i * in + k] * (g / largest);
+            top = fmax(top, fabs(row[k]));
+            sums += fabs(row[k]);
+        }
+        double m = ceil(fmax(1, fmax(top / 127, sums / most)));
+        double b = rint(n->biases[layer][i] * g + (last ? ldexp(1, made->fraction - 1) : 0));
+        for (size_t k = 0; k < in; k++) row[k] /= m;
+        for (size_t k = 0; k < in && layer; k++) row[k] = rint(row[k]);
+        for (size_t c = 0; c < channels && !layer; c++) diffuse(row + c, (long)size, (long)channels);
+        made->factors[layer][i] = last ? m : fmod(m, TURN);
+        made->of.biases[layer][i] = last ? b : b - TURN * floor(b / TURN);
+    }
+}
+
+static whole new_whole(const network *n, double amplitude) {
+    whole made = {.of = new_network(n->layers, n->widths), .amplitude = amplitude, .fraction = MOST_FRACTION};
+    sine_with(amplitude);
+    for (size_t l = 0; l < n->layers; l++) made.factors[l] = get(n->widths[l + 1], sizeof(double));
+    return made;
+}
+
+/* WHO-7: with the largest fraction that is possible. */
+static whole rounded(const network *n, size_t size, double amplitude) {
+    whole made = new_whole(n, amplitude);
+    if (n->widths[0] % (size * size)) refuse("the first layer has no window of this size");
+    for (size_t l = 0; l <= n->layers; l++)
+        if (n->widths[l] > MOST_WIDTH) refuse("a layer has more than %d numbers", MOST_WIDTH);
+    for (size_t l = 0; l + 1 < n->layers; l++) round_layer(n, &made, l, size);
+    for (; made.fraction >= 0; made.fraction--) {
+        round_layer(n, &made, n->layers - 1, size);
+        if (!wrong(&made)) return made;
+    }
+    refuse("with no fraction it has an integer form: %s", wrong(&made));
+}
+
+static whole read_whole(const json *in) {
+    network given = read_parameters(in);
+    whole made = new_whole(&given, number(in, "amplitude"));
+    char name[32];
+    made.of = given;
+    made.fraction = (int)whole_of(field(in, "fraction"), 0, MOST_FRACTION, "the fraction");
+    for (size_t l = 0; l < given.layers; l++) {
+        snprintf(name, sizeof name, "factor_%u", (unsigned)l);
+        array factors = array_in(in, name, 1);
+        if (factors.count != given.widths[l + 1]) refuse("factors do not fit the layer");
+        made.factors[l] = factors.values;
+    }
+    if (wrong(&made)) refuse("%s", wrong(&made));
+    return made;
+}
 
 /* ---- metrics: MET --------------------------------------------------------------------------------------- */
 
@@ -2587,6 +2767,52 @@ static void do_adam_run(const json *in) {
     for (int i = 0; i < 3; i++) answer_array(names[i], told[i]);
 }
 
+static void do_whole_input(const json *in) {
+    array x = array_in(in, "x", 1);
+    for (size_t i = 0; i < x.count; i++) {
+        if (!(fabs(x.values[i]) <= 1)) refuse("a feature is in [-1, 1]");
+        x.values[i] = whole_input((float)x.values[i]);
+    }
+    answer_array("n", x);
+}
+
+static void do_whole_sine(const json *in) {
+    const polynomial *sine = sine_with(number(in, "amplitude"));
+    array phase = array_in(in, "phase", 1);
+    if (!whole_within(phase.values, phase.count, 0, 4294967295.0)) refuse("a phase is a word");
+    for (size_t i = 0; i < phase.count; i++) phase.values[i] = whole_sine(sine, (uint32_t)phase.values[i]);
+    answer_array("value", phase);
+}
+
+static void do_whole_forward(const json *in) {
+    whole n = read_whole(in);
+    array x = array_in(in, "n", 1);
+    char name[32];
+    if (x.count != n.of.widths[0]) refuse("n does not fit the first layer");
+    if (!whole_within(x.values, x.count, -INPUT_LEVELS, INPUT_LEVELS)) refuse("an input is not in [-127, 127]");
+    double *at = x.values;
+    for (size_t l = 0; l < n.of.layers; l++) {
+        at = whole_layer(&n, l, at);
+        snprintf(name, sizeof name, "layer_%u", (unsigned)l);
+        array told = {.axes = 1, .shape = {n.of.widths[l + 1]}, .count = n.of.widths[l + 1], .values = at};
+        answer_array(is_last(&n, l) ? "color" : name, told);
+    }
+}
+
+static void do_whole_rounded(const json *in) {
+    network n = read_network(in);
+    size_t size = (size_t)whole_of(field(in, "size"), 1, 64, "the window's size");
+    whole made = rounded(&n, size, number(in, "amplitude"));
+    char name[32];
+    answer_network(&made.of, "weight", "bias");
+    for (size_t l = 0; l < n.layers; l++) {
+        snprintf(name, sizeof name, "factor_%u", (unsigned)l);
+        size_t count = n.widths[l + 1];
+        answer_array(name, (array){.axes = 1, .shape = {count}, .count = count, .values = made.factors[l]});
+    }
+    answer_whole("fraction", (uint32_t)made.fraction);
+}
+
 static void do_display(const json *in) { answer_number("encoded", to_display(number(in, "linear"), 0)); }
 
 static void do_sine(const json *in) { answer_number("sin", emitted_sine(number(in, "x"))); }
@@ -2759,6 +2985,10 @@ static const struct {
     {"network.gradient", do_gradient},
     {"adam.step", do_adam_step},
     {"adam.run", do_adam_run},
+    {"whole.input", do_whole_input},
+    {"whole.sine", do_whole_sine},
+    {"whole.forward", do_whole_forward},
+    {"whole.rounded", do_whole_rounded},
     {"encoding.display", do_display},
     {"sine", do_sine},
     {"image.features", do_features},

@@ -183,12 +183,14 @@ def _write(folder: Path, contents: Any) -> None:
 
 def _checked(made: Export) -> None:
     """Say what compiles and runs an export here, and how far off it is; end with status 1 if wrong."""
-    from ...kernels.export.check import HEAD
+    from ...kernels.export.check import HEAD, digest_of
     from ...kernels.export.check import check as checked
 
     verdict = checked(made)
     for name, value in zip(HEAD, verdict.cells(), strict=True):
         say(f"{name}: {value}")
+    if verdict.bound == 0:
+        say(f"SHA-256 of the picture: {verdict.digest}; the reference's: {digest_of(made.pair.output)}")
     if not verdict.holds:
         say(f"wrong: {verdict.wrong}")
         raise typer.Exit(STATUS_WRONG)

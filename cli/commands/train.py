@@ -38,8 +38,13 @@ wamnet train -i noisy.exr -t reference.exr --resume --steps 20000
 
 wamnet train --dataset cubes --from model.safetensors --variant window8+rank16 --steps 2000
 
-wamnet train --dataset cubes --from model.safetensors --rank 12 --executor opencl -o small.safetensors"""
+wamnet train --dataset cubes --from model.safetensors --rank 12 --executor opencl -o small.safetensors
+
+wamnet train --dataset cubes --from model.safetensors --whole -o integers.safetensors"""
 """Shown below the help of `wamnet train`."""
+
+WHOLE = "whole8"
+"""The variant that --whole is short for."""
 
 CHECKPOINT_INTERVAL_S = 30.0
 """Seconds between two checkpoints: what a power cut may cost. Ctrl-C costs nothing."""
@@ -80,10 +85,18 @@ Cut = Annotated[
     typer.Option(
         "--variant",
         metavar="NAME",
-        help="Train on this variant of the model that --from names, as in window8+rank16.",
+        help="Train on this variant of the model that --from names, as in window8+rank16. whole8 and whole10 "
+        "end with integers, rounded on the frames; with --from and no --steps nothing else is done.",
         show_default=False,
     ),
 ]
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Resume from the checkpoint beside the model, with its own recipe.")
+]
+Restart = Annotated[
+    bool, typer.Option("--restart", help="Start again, and replace the checkpoint of an earlier run.")
+]
+Integers = Annotated[bool, typer.Option("--whole", help="Short for --variant whole8: integers of 8 bits.")]
 
 
 def train(
@@ -110,16 +123,12 @@ def train(
     rank: Rank = None,
     begin: Begin = None,
     variant: Cut = None,
+    whole: Integers = False,
     activation: options.ActivationName = None,
     steps: Annotated[int | None, typer.Option(help="Training steps.", show_default="the preset's")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first weights and of the draws.")] = None,
-    resume: Annotated[
-        bool,
-        typer.Option("--resume", help="Resume from the checkpoint beside the model, with its own recipe."),
-    ] = False,
-    restart: Annotated[
-        bool, typer.Option("--restart", help="Start again, and replace the checkpoint of an earlier run.")
-    ] = False,
+    resume: Resume = False,
+    restart: Restart = False,
     executor: options.Trainer = TrainerName.numpy,
 ) -> None:
     """Train a network on noisy frames and their references, or on the training frames of a data set.
@@ -140,10 +149,14 @@ def train(
         state = load_checkpoint(saved) if resume else None
         recipe = _wanted(preset, state, features, steps, seed, rank, activation)
         network = _first_network(begin, state)
-        if variant is not None:
-            _check_alone(variant, {"--rank": rank, "--features": features, "--activation": activation})
-            recipe, network = _begin_varied(recipe, begin, variant)
+        name = _variant_named(variant, whole, state)
+        if name is not None:
+            chosen = {"--rank": rank, "--features": features, "--activation": activation}
+            recipe, network = _of_variant(recipe, begin, name, chosen)
         pairs = read_training(dataset, inputs, targets, recipe.features)
+        if begin is not None and name is not None and whole_bits(name) and steps is None:
+            _round_only(begin, pairs, output, recipe)
+            return
         state = _fit_to_the_end(recipe, pairs, output, state, network, executor.value)
         say(f"{output}: {state.step} steps; checkpoint in {saved}")
 
@@ -167,6 +180,50 @@ def _wanted(
         recipe = with_activation(recipe, activation)
     check_recipe(recipe)
     return recipe
+
+
+def _variant_named(variant: str | None, whole: bool, state: TrainState | None) -> str | None:
+    """Return the name of the variant that the options ask for; a resumed run has its own."""
+    if variant is not None and whole:
+        raise InputError("--variant", variant, "--whole is short for whole8", "give one of them")
+    name = WHOLE if whole else variant
+    if name is not None and state is not None:
+        raise InputError("--variant", name, "a resumed run keeps the checkpoint's", "leave it out")
+    return name
+
+
+def whole_bits(name: str) -> int | None:
+    """Return the bits of a variant that is only rounded to integers, or None for another one."""
+    from ...compiler.variants import parse
+
+    steps = parse(name).steps
+    return int(steps[0][1]) if len(steps) == 1 and steps[0][0] == "whole" else None
+
+
+def _of_variant(
+    recipe: Recipe, begin: Path | None, name: str, chosen: dict[str, Any]
+) -> tuple[Recipe, Siren | None]:
+    """Return recipe and first network of a variant; integers by themselves need no model to begin with."""
+    from ...compiler.variants import amplitude_of
+    from ...refimpl.network.train import check_recipe
+
+    bits = whole_bits(name)
+    if begin is not None or bits is None:
+        _check_alone(name, chosen)
+        return _begin_varied(recipe, begin, name)
+    found = replace(recipe, whole=amplitude_of(bits))
+    check_recipe(found)
+    return found, None
+
+
+def _round_only(begin: Path, pairs: Sequence[tuple[Frame, Frame]], output: Path, recipe: Recipe) -> None:
+    """Write a model in integers, rounded on the frames and not trained, and say so."""
+    from ...compiler.model_file import save_model
+    from ...refimpl.network.train import whole_of
+    from ..common.inputs import load_model
+
+    save_model(output, whole_of(load_model(begin), pairs, recipe.whole, recipe.seed))
+    say(f"{output}: {begin} in integers, rounded on {len(pairs)} frames")
 
 
 def _first_network(begin: Path | None, state: TrainState | None) -> Siren | None:
@@ -202,7 +259,7 @@ def varied(recipe: Recipe, model: Model, name: str) -> tuple[Recipe, Siren]:
     from ...compiler.core import sine
     from ...refimpl.network.train import check_recipe
 
-    varied = variants.vary(variants.parse(name), model)
+    varied, amplitude = variants.vary(variants.parse(name), model).floats
     if varied.degree != sine.DEGREE:
         rule = "the degree of a sine is chosen when a kernel is compiled, not trained"
         raise InputError("--variant", name, rule, "leave it out of the name here")
@@ -216,6 +273,7 @@ def varied(recipe: Recipe, model: Model, name: str) -> tuple[Recipe, Siren]:
         omega_0_hidden=network.omega_0_hidden,
         rank=varied.rank,
         activation=network.activation,
+        whole=amplitude,
     )
     check_recipe(found)
     return found, network
@@ -318,7 +376,7 @@ def fit(
     The run continues from `state`, or begins with the weights of `network`, or with random ones.
     """
     from ...compiler.model_file import save_checkpoint, save_model
-    from ...refimpl.network.train import model_of
+    from ...refimpl.network.train import model_of, whole_of
 
     saved, seen = checkpoint_path(output), state.step if state is not None else 0
     started = kept = monotonic()
@@ -342,7 +400,10 @@ def fit(
                 on_checkpoint=lambda now: save_checkpoint(saved, now),
             )
     seconds = monotonic() - started
-    save_model(output, model_of(state, facts(pairs)))
+    model = model_of(state, facts(pairs))
+    if recipe.whole:
+        model = whole_of(model, pairs, recipe.whole, recipe.seed)
+    save_model(output, model)
     return state, seconds
 
 

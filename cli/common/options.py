@@ -196,7 +196,7 @@ Variant = Annotated[
         "--variant",
         metavar="NAME",
         help="Fewer operations: [bold]full[/], or some of without-FEATURE, windowN, hiddenN, rankN, sineN "
-        "with + between them, as in window8+rank16.",
+        "with + between them, as in window8+rank16; or integers: whole8, the same bits on every device.",
         show_default="full",
     ),
 ]

@@ -47,7 +47,16 @@ def test_the_schedule_is_the_fastest_or_the_named_one(wamnet, samples, tmp_path,
     assert f"schedule {name}: " in outcome.out
     manifest = json.loads((tmp_path / "x/manifest.json").read_text())
     assert manifest["kernels"][-1]["schedule"]["name"] == name
-    assert manifest["schedules"] == ["tile8", "tile16", "tile4", "fft32x8", "fft32", "fft32x4", "plain"]
+    assert manifest["schedules"] == [
+        "tile8",
+        "tile16",
+        "tile4",
+        "fft32x8",
+        "fft32",
+        "fft32x4",
+        "dot16",
+        "plain",
+    ]
     assert f"* Schedule: {name}: " in (tmp_path / "x/README.md").read_text()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 
 import numpy as np
@@ -252,6 +253,90 @@ def test_factors_are_trained_on_a_device(wamnet, pair, tmp_path, executor_named)
     resumed = wamnet("train", *pair[:4], "--resume", "--steps", 5, "-o", "cut.safetensors")
     assert resumed.status == 0
     assert load_checkpoint(tmp_path / "cut.checkpoint.safetensors").step == 5
+
+
+def test_a_model_is_rounded_on_frames(wamnet, refused, pair, tmp_path) -> None:
+    """As the reference does it, with nothing trained and no checkpoint; its kernels have bound 0."""
+    assert wamnet("train", *pair, "--steps", 2, "-o", "full.safetensors").status == 0
+    outcome = wamnet("train", *pair[:4], "--from", "full.safetensors", "--whole", "-o", "w.safetensors")
+    assert outcome.status == 0
+    assert outcome.out == "w.safetensors: full.safetensors in integers, rounded on 1 frames\n"
+    assert not (tmp_path / "w.checkpoint.safetensors").exists()
+    frames = exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr")
+    want = reference.whole_of(load_model(tmp_path / "full.safetensors"), [frames], 127)
+    found = load_model(tmp_path / "w.safetensors")
+    assert found.is_whole
+    assert found.info == want.info
+    for a, b in zip(
+        found.siren.weights + found.siren.biases, want.siren.weights + want.siren.biases, strict=True
+    ):
+        assert np.array_equal(a, b)
+    assert wamnet("compile", "w.safetensors", "--target", "c", "-o", "kernel").status == 0
+    manifest = json.loads((tmp_path / "kernel" / "manifest.json").read_text())
+    assert manifest["bound"]["output"] == [0.0, 0.0, 0.0]
+    again = ("train", *pair[:4], "--from", "w.safetensors", "--whole")
+    assert "the model is one of integers" in refused(*again)
+    further = ("train", *pair[:4], "--from", "w.safetensors", "--steps", 2)
+    assert "first network is of integers: training moves floats" in refused(*further)
+
+
+def test_integers_from_the_start_and_resumed(wamnet, refused, pair, tmp_path) -> None:
+    """Floats until the last step, so that a run that resumes gives the same bytes; ten bits by their name."""
+    ten = ("--variant", "whole10")
+    assert wamnet("train", *pair, "--steps", 3, *ten, "-o", "all.safetensors").status == 0
+    found = load_model(tmp_path / "all.safetensors")
+    assert found.is_whole
+    assert found.siren.amplitude == 511
+    assert load_checkpoint(tmp_path / "all.checkpoint.safetensors").recipe.whole == 511
+    # A recipe of the same length that is stopped after two steps.
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reference, "train_step", _stopped_after(2, reference.train_step))
+        outcome = wamnet("train", *pair, "--steps", 3, *ten, "-o", "parts.safetensors")
+    assert outcome.status == 130
+    assert wamnet("train", *pair[:4], "--resume", "-o", "parts.safetensors").status == 0
+    assert (tmp_path / "parts.safetensors").read_bytes() == (tmp_path / "all.safetensors").read_bytes()
+    text = "--variant is whole8: a resumed run keeps the checkpoint's; leave it out"
+    assert text in refused("train", *pair[:4], "--resume", "--whole", "-o", "parts.safetensors")
+
+
+def _stopped_after(count: int, step):
+    """Return a training step that an interrupt ends after so many."""
+    calls: list[int] = []
+
+    def stopped(*arguments):
+        calls.append(1)
+        if len(calls) > count:
+            raise KeyboardInterrupt
+        return step(*arguments)
+
+    return stopped
+
+
+def test_a_narrower_network_is_trained_and_rounded(wamnet, pair, tmp_path, executor_named) -> None:
+    """window8+whole8: the window is cut, the compiled trainer moves floats, the end is of integers."""
+    executor_named("opencl")
+    assert wamnet("train", *pair, "--steps", 2, "-o", "full.safetensors").status == 0
+    more = ("--from", "full.safetensors", "--variant", "window8+whole8", "--steps", 3)
+    options = (*pair[:4], *more, "--executor", "opencl", "-o", "w.safetensors")
+    assert wamnet("train", *options).status == 0
+    found = load_model(tmp_path / "w.safetensors")
+    assert found.is_whole
+    assert found.window.size == 8
+    assert load_checkpoint(tmp_path / "w.checkpoint.safetensors").siren.widths == found.siren.widths
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (["--whole", "--rank", "4"], "recipe: rank is 4: a network of integers has sines, and no rank"),
+        (["--whole", "--activation", "relu"], "recipe: activation is relu: a network of integers has sines"),
+        (["--whole", "--variant", "whole10"], "--variant is whole10: --whole is short for whole8"),
+        (["--variant", "whole9"], "variant is whole9: there are whole8, whole10"),
+        (["--variant", "window8+whole8"], "--variant is window8+whole8: it is cut from a trained model"),
+    ],
+)
+def test_refusals_of_integers(refused, pair, options, text) -> None:
+    assert text in refused("train", *pair[:4], *options)
 
 
 def test_a_device_that_is_missing(refused, pair, monkeypatch) -> None:

@@ -327,10 +327,15 @@ class Page {
     this.reserveOutside();
     this.tellOutside();
     if (check) {
-      const held = check.share <= 1;
-      find("error").textContent = `${number(check.error)}, ${held ? "within" : "NOT within"} ${number(check.bound)}`;
+      const held = check.bits ? check.bits.same : check.share <= 1;
+      find("error").textContent = check.bits
+        ? bitsSentence(check.bits)
+        : `${number(check.error)}, ${held ? "within" : "NOT within"} ${number(check.bound)}`;
       find("error").classList.toggle("bad", !held);
+      find("digest").textContent = check.bits ? check.bits.digest : "";
     }
+    find("of-floats").hidden = facts.check.sha256 !== null;
+    find("of-integers").hidden = facts.check.sha256 === null;
   }
 
   tellPlaying() {
@@ -503,6 +508,18 @@ class Page {
 
 function raised(_, digits) {
   return `⁻${digits.replace(/\d/g, (digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit])}`;
+}
+
+/** What is said of a network each of whose bits is promised. */
+function bitsSentence({ same, first }) {
+  if (same) {
+    return "none: the same bits as the reference";
+  }
+  if (!first) {
+    return "NOT the bits of the reference: another SHA-256";
+  }
+  const place = `pixel (${first.x}, ${first.y}), ${["red", "green", "blue"][first.channel]}`;
+  return `NOT the bits of the reference: ${place} is ${first.found}, not ${first.wanted}`;
 }
 
 function variantText(variant) {

@@ -262,7 +262,8 @@ class Renderer {
     return Object.fromEntries(pairs);
   }
 
-  /** Denoise the picture that the page carries, and return the largest error and error / bound. */
+  /** Denoise the picture that the page carries: the largest error and error / bound, and whether its bits are
+   * the reference's where each is promised. */
   async check(name) {
     const variant = this.variant(name);
     const { size, images } = this.data.check;
@@ -289,9 +290,12 @@ class Renderer {
     expected.forEach((value, i) => {
       const off = Math.abs(found[4 * Math.floor(i / 3) + (i % 3)] - value);
       error = off <= error ? error : off; // a NaN stays
-      share = off / bound[i] <= share ? share : off / bound[i];
+      const part = off === 0 ? 0 : off / bound[i]; // a bound may be 0
+      share = part <= share ? share : part;
     });
-    return { error, share, bound: bound.reduce((a, b) => Math.max(a, b)) };
+    const { sha256 } = variant.facts.check;
+    const bits = sha256 && (await compareBits(found, expected, size, sha256));
+    return { error, share, bits, bound: bound.reduce((a, b) => Math.max(a, b)) };
   }
 
   /** Show two images of the last picture, left and right of a line at `wipe` (0 to 1). */
@@ -307,6 +311,8 @@ class Renderer {
     this.device.draw(this.screen, null, { left: images[left], right: images[right] }, (place) => {
       gl.uniform1f(place("wipe"), wipe);
       gl.uniform2f(place("is_signed"), left === "normal" ? 1 : 0, right === "normal" ? 1 : 0);
+      const levels = (name) => (name === "picture" ? 1 : this.data.check.levels);
+      gl.uniform2f(place("levels"), levels(left), levels(right));
     });
   }
 
@@ -337,18 +343,34 @@ uniform sampler2D left;
 uniform sampler2D right;
 uniform float wipe;
 uniform vec2 is_signed;
+uniform vec2 levels;
 out vec4 color;
 void main()
 {
     ivec2 size = textureSize(left, 0);
     ivec2 at = ivec2(int(gl_FragCoord.x), size.y - 1 - int(gl_FragCoord.y));
-    vec3 l = texelFetch(left, at, 0).rgb;
-    vec3 r = texelFetch(right, at, 0).rgb;
+    vec3 l = texelFetch(left, at, 0).rgb / levels.x;
+    vec3 r = texelFetch(right, at, 0).rgb / levels.y;
     l = mix(l, 0.5 + 0.5 * l, is_signed.x);
     r = mix(r, 0.5 + 0.5 * r, is_signed.y);
     color = vec4(gl_FragCoord.x < wipe * float(size.x) ? l : r, 1.0);
 }
 `;
+
+/** Compare the bits of a picture (RGBA) with the reference's (RGB): digest, and the first other number. */
+async function compareBits(found, expected, size, sha256) {
+  const rgb = Float32Array.from(expected, (_, i) => found[4 * Math.floor(i / 3) + (i % 3)]);
+  const [mine, wanted] = [rgb, Float32Array.from(expected)].map((values) => new Uint32Array(values.buffer));
+  const at = mine.findIndex((word, i) => word !== wanted[i]);
+  const pixel = Math.floor(at / 3);
+  const place = { x: pixel % size, y: Math.floor(pixel / size), channel: at % 3 };
+  const first = at < 0 ? null : { ...place, found: rgb[at], wanted: expected[at] };
+  // Browsers hash on pages that they trust: a file's, this machine's, or one that came encrypted.
+  const hash = globalThis.crypto?.subtle && (await crypto.subtle.digest("SHA-256", rgb));
+  const digits = hash && Array.from(new Uint8Array(hash), (byte) => byte.toString(16).padStart(2, "0"));
+  const digest = digits ? digits.join("") : first ? "" : sha256;
+  return { first, digest, same: !first && digest === sha256 };
+}
 
 function clamp(x, low, high) {
   return Math.max(low, Math.min(high, x));

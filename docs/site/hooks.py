@@ -14,6 +14,7 @@ import posixpath
 import re
 import shutil
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -56,8 +57,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
     docs = Path(config.docs_dir)
 
     def pages(folder: str) -> list[str]:
-        found = [path.relative_to(docs).as_posix() for path in sorted((docs / folder).glob("*.md"))]
-        return sorted(found, key=lambda name: not name.endswith("index.md"))
+        return [f"{folder}/{name}" for name in by_number(path.name for path in (docs / folder).glob("*.md"))]
 
     parts: list[Any] = ["spec/README.md"]
     for title, chapter in SECTION.findall((SPEC / "README.md").read_text()):
@@ -77,6 +77,16 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         "recipes.md",
     ]
     return config
+
+
+def by_number(names: Iterable[str]) -> list[str]:
+    """Return the names of a folder's pages: its index, then by number, so that 10 comes after 9."""
+
+    def key(name: str) -> tuple[bool, int, str]:
+        number = re.match(r"\d*", name)
+        return name != "index.md", int((number and number[0]) or 0), name
+
+    return sorted(names, key=key)
 
 
 def in_order(docs: Path) -> list[str]:

@@ -76,6 +76,24 @@ WRONG = {
         ('if node.op != "add"', 'if node.op not in ("add", "subtract")', r"a - \(-b\) became"),
         ("(kept, builder.nodes[other].args[0])", "(builder.nodes[other].args[0], kept)", "other numbers"),
     ],
+    "ex10_integers": [
+        (
+            "np.sum(np.abs(weights), axis=1)",
+            "np.abs(np.sum(weights, axis=1))",
+            "a partial sum of row .* reaches",
+        ),
+        (
+            "words * factor.astype(np.uint32) + bias.astype(np.uint32)",
+            "(sums * factor + bias).astype(np.int64).astype(np.uint32)",
+            "the phase of .* expected",
+        ),
+        ("x * q + (1 << (shift - 1))", "x * q", "whole.sine/.* bound 0"),
+        (
+            "np.minimum((x * q + (1 << (shift - 1))) >> shift, amplitude).astype(np.float32)",
+            "np.floor((x * q + (1 << (shift - 1))).astype(np.float32) / 2**shift)",
+            r"right in NumPy perhaps, but convert .* float32 is exact up to 2\^24",
+        ),
+    ],
 }
 """Of each exercise: a piece of the right answer, a wrong one in its place, and what the grader must say."""
 

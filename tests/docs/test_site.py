@@ -53,6 +53,11 @@ def test_a_page_s_links_to_the_spec_work_in_the_repository_and_on_the_site():
     assert hooks.into_site("[a](../docs/images/a.png)", "spec/x.md") == "[a](../images/a.png)"
 
 
+def test_pages_are_in_the_order_of_their_numbers():
+    pages = ["index.md", "1-c.md", "9-a.md", "10-b.md"]
+    assert hooks.by_number(sorted(pages)) == pages
+
+
 @pytest.mark.parametrize("chapter", chapter_files(), ids=lambda path: path.stem)
 def test_every_clause_has_an_anchor(site, chapter):
     page = links.Page((site / "spec" / f"{chapter.stem}.html").read_text())

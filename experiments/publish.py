@@ -2,11 +2,11 @@
 
     python experiments/publish.py out/quality/quality.json
     python experiments/publish.py speed/bench.json --name bench-minicubes --command 'wamnet bench ...'
-    python experiments/publish.py --run bench-train python bench/train.py
+    python experiments/publish.py --run bench-train wamnet bench train
 
 1. A file of results, of `wamnet bench` or of `wamnet demo` (report.json) is checked and becomes
    experiments/records/<name>.json [`lab/records.py`]. Its name is the experiment's, or `--name`.
-2. `--run NAME COMMAND...` runs a program of bench/ or experiments/, or `wamnet`, that prints Markdown tables;
+2. `--run NAME COMMAND...` runs a program of experiments/, or `wamnet`, that prints Markdown tables;
    their rows are the records [`lab/printed.py`]. It must end with status 0.
 3. `--picture FILE` adds a picture of frames, made smaller, to docs/images and its digest to the record.
 """
@@ -96,11 +96,9 @@ def opened(path: Path, command: str | None) -> dict[str, Any]:
 def ran(name: str, command: Sequence[str]) -> dict[str, Any]:
     """Run a program of the project, show what it prints, and return the rows of its tables."""
     program = list(command)
-    allowed = (
-        len(program) > 1 and program[0] == "python" and program[1].startswith(("bench/", "experiments/"))
-    )
+    allowed = len(program) > 1 and program[0] == "python" and program[1].startswith("experiments/")
     if not allowed and program[:1] != ["wamnet"]:
-        rule = "it must be python bench/..., python experiments/... or wamnet ..."
+        rule = "it must be python experiments/... or wamnet ..."
         raise InputError("command", shlex.join(program), rule, "correct it")
     here = Path(sys.executable)
     program[0] = str(here if program[0] == "python" else here.with_name("wamnet"))

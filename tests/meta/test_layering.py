@@ -14,8 +14,10 @@ PEERS = {
     "torch": "kernels/bench/peer_torch.py",
     "onnx": "kernels/bench/peer_onnxruntime.py",
     "onnxruntime": "kernels/bench/peer_onnxruntime.py",
+    "openvino": "kernels/bench/peer_openvino.py",
     "tinygrad": "kernels/bench/peer_tinygrad.py",
     "pyoidn": "kernels/bench/peer_oidn.py",
+    "mitsuba": "kernels/bench/peer_mitsuba.py",
 }
 """Packages that the benchmark compares with, and the only file of each."""
 
@@ -40,7 +42,7 @@ ALLOWED = {
 """What each part may import in addition to the standard library; its keys are in the order of imports."""
 
 ORDER = tuple(ALLOWED)
-OUTSIDE = ("tests", "bench", "experiments", "docs")
+OUTSIDE = ("tests", "experiments", "docs")
 """Folders that may import everything and that nothing may import."""
 
 
@@ -215,9 +217,7 @@ def test_nobody_imports_what_is_outside(house):
         for node, name in imports(source)
         if name.partition(".")[0] in OUTSIDE
     ]
-    house.refuse(
-        wrong, "Nothing imports tests, bench, experiments or docs: move what is shared into the package."
-    )
+    house.refuse(wrong, "Nothing imports tests, experiments or docs: move what is shared into the package.")
 
 
 def test_no_hidden_random_state(house):

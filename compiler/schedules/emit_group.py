@@ -185,9 +185,8 @@ class Grouped(Tiled):
             return "the order of its sums is not pinned as profile exact states"
         if reason := refused_by_vectors(program, self.dialect) or self._shared_matrix(program):
             return reason
-        gather = kernel_gather(program)
-        if gather.joined or any(image.channels > MOST_CHANNELS for image in gather.images):
-            return f"a tile holds {MOST_CHANNELS} channels at once, and one row of taps is one partial sum"
+        if reason := self._beyond_tile(kernel_gather(program)):
+            return reason
         if (numbers := self._numbers(program)) > LARGEST_NUMBERS:
             return (
                 f"two layers of {self.pixels} pixels are {numbers} numbers, of at most {LARGEST_NUMBERS}: "
@@ -199,12 +198,21 @@ class Grouped(Tiled):
             return f"its tile takes {shared} bytes that a group shares, of at most {most}"
         return ""
 
+    def _beyond_tile(self, gather: Gather) -> str:
+        """Return why a tile cannot hold the images, or nothing."""
+        if gather.joined or any(image.channels > MOST_CHANNELS for image in gather.images):
+            return f"a tile holds {MOST_CHANNELS} channels at once, and one row of taps is one partial sum"
+        return ""
+
+    def planes(self, gather: Gather) -> int:
+        """Return the most numbers of a pixel that are in the tile at once."""
+        return max(last - first for _, first, last in chunks(gather))
+
     def shared_bytes(self, program: Program) -> int:
         """Return the bytes of the tile."""
         gather = kernel_gather(program)
         width = self.group[0] * self.pixels + gather.columns - 1
-        channels = max(last - first for _, first, last in chunks(gather))
-        return 4 * width * (self.group[1] + gather.rows - 1) * channels
+        return 4 * width * (self.group[1] + gather.rows - 1) * self.planes(gather)
 
     def private_bytes(self, program: Program) -> int:
         """Return the bytes of an item's variables that live from one statement to another."""
@@ -224,13 +232,14 @@ class Grouped(Tiled):
     def _statements(self, program: Program) -> int:
         """Return the number of products of four in straight code, over all pixels."""
         affine = [node for node in program.nodes if node.op == "affine"]
-        rows = [
-            max(image.channels for image in kernel_gather(program).images)
-            if program.nodes[node.args[0]].op == "input"
-            else program.nodes[node.args[0]].type.shape[0]
-            for node in affine
-        ]
+        rows = [self._rows_at_once(program, program.nodes[node.args[0]]) for node in affine]
         return sum(self.pixels * n * -(-a.type.shape[0] // 4) for a, n in zip(affine, rows, strict=True))
+
+    def _rows_at_once(self, program: Program, source: Node) -> int:
+        """Return the rows of weights in straight code, of a map that reads the window or a layer."""
+        if source.op == "input":
+            return max(image.channels for image in kernel_gather(program).images)
+        return source.type.shape[0]
 
     def _window_rows(self, gather: Gather) -> NDArray[np.intp]:
         """Return the window's indices (n_inputs,) in the order of the loops."""
@@ -273,7 +282,6 @@ class GroupBody(InlinedBody):
     def defines(self) -> list[str]:
         """Return the sizes of group and tile, and the functions of elementwise groups."""
         grouped, names = self.grouped, self.sides
-        channels = max(last - first for _, first, last in chunks(self.gather))
         self.functions = [
             line
             for group in self.groups
@@ -290,7 +298,7 @@ class GroupBody(InlinedBody):
             self._define("TILE_WIDTH", columns, "all that windows touch"),
             self._define("TILE_HEIGHT", f"(GROUP_HEIGHT + {names.rows} - 1)"),
             self._define("PLANE", "(TILE_WIDTH * TILE_HEIGHT)", "numbers of a channel"),
-            self._define("TILE_NUMBERS", f"(PLANE * {channels})"),
+            self._define("TILE_NUMBERS", f"(PLANE * {grouped.planes(self.gather)})"),
             *self.functions,
         ]
 
@@ -346,21 +354,27 @@ class GroupBody(InlinedBody):
         first = weight.offset // 4
         if source.op == "input":
             for image, begin, end in chunks(self.gather):
-                self._load(image, begin, end)
+                self._load([self._pixel_at(image, c) for c in range(begin, end)])
                 self._products_of_taps(index, first, end - begin)
                 first += self.gather.rows * self.gather.columns * (end - begin) * self.vectors(index)
             return
         for i in range(n_in):
             values = [f"v{node.args[0]}_{p}_{i // 4}.{'xyzw'[i % 4]}" for p in range(self.grouped.pixels)]
-            self._multiply_by(index, str(first + i * self.vectors(index)), values)
+            self._multiply_by(index, str(first + i * self.vectors(index)), values, f"v{index}")
 
     def _prepare(self) -> None:
         """Write where the tile begins."""
         self._line(self.dialect.index("left", f"x - local_x - {self.sides.column}"))
         self._line(self.dialect.index("top", f"y - local_y - {self.sides.row}"))
 
-    def _load(self, image: Image, begin: int, end: int) -> None:
-        """Write the copy of channels [begin, end) of what the group's windows touch, by all its items."""
+    def _pixel_at(self, image: Image, channel: int) -> str:
+        """Return the text of a channel under the border rule."""
+        pixel = self.words.pixel_at.format(image=image.name, channels=image.channels, c=channel)
+        inside = self.gather.window.border == "clamp"
+        return pixel if inside else self.dialect.select("inside", pixel, "0.0f")
+
+    def _load(self, numbers: Sequence[str]) -> None:
+        """Write the copy of a pixel's numbers for all that the group's windows touch, by all its items."""
         border, index, clamp = self.gather.window.border, self.dialect.index, self.dialect.clamp
         self._line(self.words.wait)
         step = "GROUP_WIDTH * GROUP_HEIGHT"
@@ -371,39 +385,44 @@ class GroupBody(InlinedBody):
         self._line(index("column", f"{clamp}(tile_column, 0, width - 1)"))
         if border == "zero":
             self._line(self.words.truth("inside", "row == tile_row && column == tile_column"))
-        for c in range(begin, end):
-            pixel = self.words.pixel_at.format(image=image.name, channels=image.channels, c=c)
-            value = pixel if border == "clamp" else self.dialect.select("inside", pixel, "0.0f")
-            self._line(f"tile[{c - begin} * PLANE + i] = {value};")
+        for plane, value in enumerate(numbers):
+            self._line(f"tile[{plane} * PLANE + i] = {value};")
         self._close()
         self._line(self.words.wait)
 
     def _products_of_taps(self, index: int, first: int, channels: int) -> None:
         """Write the products of the tile's taps with the weights from vector `first` on."""
-        step, places = channels * self.vectors(index), self._places(index)
+        places = self._places(index)
         self._open(self.dialect.loop("dy", self.sides.rows))
         # A partial sum for each row of taps [sums.py].
         for p, j in places:
             self._line(self.words.vector(f"part_{p}_{j}", self.words.literal_zero))
-        self._open(self.dialect.loop("dx", self.sides.columns))
-        self._line(self.dialect.index("at", "(local_y + dy) * TILE_WIDTH + local_x + dx"))
-        start = f"{first} + (dy * {self.sides.columns} + dx) * {step}"
-        self._line(self.dialect.index(self.words.first_weight, start))
-        for c in range(channels):
-            names = [f"x{c}_{p}" for p in range(self.grouped.pixels)]
-            for p, name in enumerate(names):
-                value = f"tile[{c} * PLANE + at + {p} * GROUP_WIDTH]"
-                self._line(self.dialect.single(name, value))
-            first_of = f"{self.words.first_weight} + {c * self.vectors(index)}"
-            self._multiply_by(index, first_of, names, "part")
-        self._close()
+        self._row_of_taps(index, first, channels, "part")
         for p, j in places:
             self._line(f"v{index}_{p}_{j} += part_{p}_{j};")
         self._close()
 
-    def _multiply_by(self, index: int, first: str, values: Sequence[str], sums_of: str = "") -> None:
+    def _row_of_taps(self, index: int, first: int, planes: int, sums: str) -> None:
+        """Write the products of a row of taps, which are added to sums of this name."""
+        step = planes * self.vectors(index)
+        self._open(self.dialect.loop("dx", self.sides.columns))
+        self._line(self.dialect.index("at", "(local_y + dy) * TILE_WIDTH + local_x + dx"))
+        start = f"{first} + (dy * {self.sides.columns} + dx) * {step}"
+        self._line(self.dialect.index(self.words.first_weight, start))
+        for c in range(planes):
+            names = [f"x{c}_{p}" for p in range(self.grouped.pixels)]
+            for p, name in enumerate(names):
+                self._line(self._from_tile(name, f"tile[{c} * PLANE + at + {p} * GROUP_WIDTH]"))
+            first_of = f"{self.words.first_weight} + {c * self.vectors(index)}"
+            self._multiply_by(index, first_of, names, sums)
+        self._close()
+
+    def _from_tile(self, name: str, value: str) -> str:
+        """Return the declaration of what a tile holds at a place."""
+        return self.dialect.single(name, value)
+
+    def _multiply_by(self, index: int, first: str, values: Sequence[str], name: str) -> None:
         """Write the additions of a row of weights times each pixel's value, each weight read once."""
-        name = sums_of or f"v{index}"
         for j in range(self.vectors(index)):
             sums = " ".join(f"{name}_{p}_{j} += m * {value};" for p, value in enumerate(values))
             self._line(f"{{ {self.words.vector('m', f'w[{first} + {j}]')} {sums} }}")

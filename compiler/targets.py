@@ -27,16 +27,27 @@ from .languages.metal import Metal
 from .languages.opencl import OpenCL
 from .languages.weight_homes import HOMES
 from .languages.wgsl import WGSL
-from .schedules.buffers_group import ComputeGroup, CUDAGroup, MetalGroup, VulkanGroup, WGSLGroup, groups
+from .schedules.buffers_group import (
+    ComputeGroup,
+    CUDADot,
+    CUDAGroup,
+    MetalGroup,
+    VulkanDot,
+    VulkanGroup,
+    WGSLDot,
+    WGSLGroup,
+    groups,
+)
 from .schedules.c_dot import C_DOT
 from .schedules.c_fourier import C_FOURIER
 from .schedules.c_tiled import C_LADDER
+from .schedules.emit_dot import dots
 from .schedules.emit_inlined import Inlined
 from .schedules.emit_packed import Packed
 from .schedules.glsl_compute import GLSL_COMPUTE
 from .schedules.opencl_dot import OPENCL_DOT
 from .schedules.opencl_fourier import OPENCL_FOURIER
-from .schedules.opencl_group import OPENCL_GROUPS
+from .schedules.opencl_group import OPENCL_GROUP_DOT, OPENCL_GROUPS
 from .schedules.opencl_tiled import OPENCL_LADDER
 from .schedules.schedules import Plain, Printed, Schedule
 
@@ -111,7 +122,9 @@ TARGETS: Mapping[str, Target] = {
             paths={1: None},
         ),
         replace(
-            _dialect_target(OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_DOT, *OPENCL_GROUPS),
+            _dialect_target(
+                OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_DOT, *OPENCL_GROUPS, *OPENCL_GROUP_DOT
+            ),
             paths={lanes: opencl_path.of_lanes(lanes) for lanes in opencl_path.LANES},
         ),
         replace(_dialect_target(GLSL(), Inlined(GLSLInlined()), *GLSL_COMPUTE), unrolled=UNROLLED_BY_MESA),
@@ -130,9 +143,9 @@ EXPORTED: Mapping[str, Target] = {
             unrolled=UNROLLED_BY_MESA,
         ),
         _dialect_target(Compute(), *groups(ComputeGroup(), 8)),
-        _dialect_target(Vulkan(), *groups(VulkanGroup(), 8)),
-        _dialect_target(WGSL(), *groups(WGSLGroup(), 8)),
-        _dialect_target(CUDA(), *groups(CUDAGroup())),
+        _dialect_target(Vulkan(), *groups(VulkanGroup(), 8), *dots(VulkanDot(), 8)),
+        _dialect_target(WGSL(), *groups(WGSLGroup(), 8), *dots(WGSLDot(), 8)),
+        _dialect_target(CUDA(), *groups(CUDAGroup()), *dots(CUDADot())),
         _dialect_target(Metal(), *groups(MetalGroup())),
         replace(_dialect_target(ShadertoyDenoise()), schedules=(Inlined(ShadertoyDenoise()),)),
         _dialect_target(GodotDenoise()),

@@ -10,23 +10,28 @@
 
 It holds programs in which nothing rounds [proof/whole.py] and whose numbers are of 8 bits. A slot of a matrix
 counts four bytes as one number; weights are in the order of emit_tiled.py, with four inputs for each.
+
+For graphics processors, whose instructions multiply bytes that both have a sign, the tile is that of
+emit_group.py [`GroupDot`]: a word of it holds four channels of a pixel, counted over all images, and a word
+of a hidden layer is a vector of four numbers. Sums begin at 0.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core import weights
-from ..core.ir import Node, Program
+from ..core.ir import Gather, Node, Program
 from ..core.weights import Slot
 from ..languages.tiled_dialect import TiledDialect
 from ..proof import whole
 from .emit import kernel_gather
+from .emit_group import MOST_CHANNELS, GroupBody, GroupDialect, Grouped
 from .emit_tiled import Blocks, Tiled, TiledBody, readers_of_window
 
 FOUR = 4
@@ -40,6 +45,22 @@ LARGEST = 127
 
 START = "start"
 """How the slots end that hold where sums begin."""
+
+
+def refused_by_bytes(program: Program) -> str:
+    """Return why the numbers and weights of a program are not all integers in [-127, 127], or nothing."""
+    try:
+        known = whole.known(program)
+    except whole.Rounds as reason:
+        return f"it is not of integers: {reason}"
+    for node in program.nodes:
+        if node.op != "affine":
+            continue
+        if node.get("bias") is not None or known[node.args[0]].largest > LARGEST:
+            return "its numbers take more than 8 bits"
+        if np.abs(program.parameters[str(node["weight"])]).max() > LARGEST:
+            return "its weights take more than 8 bits"
+    return ""
 
 
 class DotDialect(TiledDialect):
@@ -87,17 +108,8 @@ class Dot(Tiled):
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
-        try:
-            known = whole.known(program)
-        except whole.Rounds as reason:
-            return f"it is not of integers: {reason}"
-        for node in program.nodes:
-            if node.op != "affine":
-                continue
-            if node.get("bias") is not None or known[node.args[0]].largest > LARGEST:
-                return "its numbers take more than 8 bits"
-            if np.abs(program.parameters[str(node["weight"])]).max() > LARGEST:
-                return "its weights take more than 8 bits"
+        if reason := refused_by_bytes(program):
+            return reason
         names = [node["weight"] for node in program.nodes if node.op == "affine"]
         if len(set(names)) < len(names):
             return "a matrix is applied twice"
@@ -248,3 +260,164 @@ class DotBody(TiledBody):
         self._line(words.advance("w", blocks.vectors))
         self._pixels([words.add_dot(f"sum[p][{j}]", f"w{j}", f"{place} + {FOUR} * i") for j in each])
         self._close()
+
+
+# ---- graphics processors ----------------------------------------------------------------------------------
+
+
+class GroupDotDialect(GroupDialect):
+    """What a language adds for bytes that a group shares; it comes before the language's grouped dialect.
+
+    `by` says what multiplies; `whole_kind` is the type of four integers, `whole_zero` its zeros. Kernels call
+    functions that the dialect's text must have: `wamnet_packed` makes four floats the bytes of a word, the
+    first one the lowest; `wamnet_dots(sums, weights, word)` adds to each of four sums the products of one
+    word of weights with a word; `wamnet_floats` makes sums floats; `wamnet_numbers` reads four words of
+    weights as floats.
+    """
+
+    by: str
+    whole_kind: str
+    whole_zero: str
+
+    def four(self, name: str, value: str) -> str:
+        """Return the declaration of four integers that may be added to."""
+        return f"{self.whole_kind} {name} = {value};"
+
+
+class GroupDot(Grouped):
+    """A tile of words for each group of items, `pixels` of a row for each item."""
+
+    order = (
+        "vectors filled up to multiples of 4 with zeros; matrices words x neurons, a word being four inputs "
+        "as bytes with a sign, the first one the lowest; of a matrix that reads the window the channels of "
+        f"all images make words that are filled up with zeros, at most {MOST_CHANNELS} of them at a time tap "
+        "by tap in rows, then word by word"
+    )
+
+    bytewise = True
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        return refused_by_bytes(program) or super().refusal(program)
+
+    def planes(self, gather: Gather) -> int:
+        """Return the most words of a pixel that are in the tile at once."""
+        return min(MOST_CHANNELS, -(-gather.channels // FOUR))
+
+    def inputs_of(self, program: Program, name: str) -> NDArray[np.intp]:
+        """Return the inputs (words, 4) of a matrix, of which its words have bytes; -1 fills a word up."""
+        gather, (_, inputs) = kernel_gather(program), program.parameters[name].shape
+        windowed = name in {str(node["weight"]) for node in readers_of_window(program)}
+        numbers = np.arange(gather.channels if windowed else inputs)
+        words = np.pad(numbers, (0, -len(numbers) % FOUR), constant_values=-1).reshape(-1, FOUR)
+        if not windowed:
+            return words
+        taps = gather.channels * np.arange(gather.rows * gather.columns)[:, None, None]
+        chunks = [words[first : first + MOST_CHANNELS] for first in range(0, len(words), MOST_CHANNELS)]
+        return np.concatenate([np.where(held < 0, -1, held + taps).reshape(-1, FOUR) for held in chunks])
+
+    def _beyond_tile(self, gather: Gather) -> str:
+        """Return nothing: words are of all images, and sums of integers have no order to keep."""
+        return ""
+
+    def _rows_at_once(self, program: Program, source: Node) -> int:
+        """Return the rows of words in straight code, of a map that reads the window or a layer."""
+        if source.op == "input":
+            return self.planes(kernel_gather(program))
+        return -(-source.type.shape[0] // FOUR)
+
+    def _shape(self, program: Program, name: str, shape: tuple[int, ...]) -> tuple[int, ...]:
+        """Return the shape of a stored parameter of a given shape."""
+        found = super()._shape(program, name, shape)
+        return found if len(shape) != 2 else (1, len(self.inputs_of(program, name)), found[-1])
+
+    def _stored(self, program: Program, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
+        """Return a parameter in its stored shape; the bytes of a matrix are there bit by bit."""
+        matrix = program.parameters[name]
+        if matrix.ndim != 2:
+            return super()._stored(program, name, shape)
+        # The last column, which -1 means, is of zeros.
+        filled = np.zeros((shape[-1], matrix.shape[1] + 1), np.int8)
+        filled[: len(matrix), :-1] = matrix
+        words = filled[:, self.inputs_of(program, name)].transpose(1, 0, 2)
+        return np.ascontiguousarray(words).view("<f4").reshape(shape)
+
+    def _body(self, program: Program) -> GroupDotBody:
+        """Return the writer of the kernel's statements."""
+        return GroupDotBody(program, self.dialect, kernel_gather(program), grouped=self)
+
+
+def dots(dialect: GroupDotDialect, width: int = 16) -> tuple[GroupDot]:
+    """Return the schedule for graphics processors in a language, of groups of `width` x 8 items.
+
+    It has not been measured on one.
+    """
+    idea = f"group4 with products of bytes, four at a time, of a network of integers: {dialect.by}"
+    return (GroupDot("groupdot", idea, dialect, 4, (width, 8), "group4"),)
+
+
+@dataclass
+class GroupDotBody(GroupBody):
+    """The statements of a grouped kernel of dots."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        assert isinstance(self.words, GroupDotDialect), f"{self.dialect.language} has no words for bytes"
+        self.dots = self.words
+
+    def _numbers_at(self, name: str, vector: int) -> str:
+        """Return the text of four numbers of a parameter that is a vector."""
+        return f"wamnet_numbers({super()._numbers_at(name, vector)})"
+
+    def _affine(self, index: int, node: Node) -> None:
+        """Write v = W x for all pixels: sums of integers, which become floats at the end."""
+        name, source = str(node["weight"]), node.args[0]
+        n_out, n_in = self.program.parameters[name].shape
+        self._comment(f"%{index}: affine map {name} from {n_in} to {n_out}")
+        sums, first = f"s{index}", self.slots[name].offset // 4
+        for p, j in self._places(index):
+            self._line(self.dots.four(f"{sums}_{p}_{j}", self.dots.whole_zero))
+        if self.program.nodes[source].op == "input":
+            self._of_window(index, first)
+        else:
+            for k in range(-(-n_in // FOUR)):
+                values = [f"b{index}_{p}_{k}" for p in range(self.grouped.pixels)]
+                for p, value in enumerate(values):
+                    parts = [f"{self._at(source, p, k)}.{part}" for part in "xyzw"]
+                    self._line(self.dialect.index(value, _packed(parts)))
+                self._multiply_by(index, str(first + k * self.vectors(index)), values, sums)
+        for p, j in self._places(index):
+            self._line(self.words.vector(f"v{index}_{p}_{j}", f"wamnet_floats({sums}_{p}_{j})"))
+
+    def _of_window(self, index: int, first: int) -> None:
+        """Write the products of all taps with the weights from vector `first` on."""
+        numbers = [self._pixel_at(image, c) for image in self.gather.images for c in range(image.channels)]
+        numbers += ["0.0f"] * (-len(numbers) % FOUR)
+        words = [_packed(numbers[i : i + FOUR]) for i in range(0, len(numbers), FOUR)]
+        for begin in range(0, len(words), MOST_CHANNELS):
+            held = words[begin : begin + MOST_CHANNELS]
+            self._load(held)
+            self._products_of_taps(index, first, len(held))
+            first += self.gather.rows * self.gather.columns * len(held) * self.vectors(index)
+
+    def _products_of_taps(self, index: int, first: int, channels: int) -> None:
+        """Write the products of the tile's words with the weights from vector `first` on."""
+        self._open(self.dialect.loop("dy", self.sides.rows))
+        self._row_of_taps(index, first, channels, f"s{index}")
+        self._close()
+
+    def _from_tile(self, name: str, value: str) -> str:
+        """Return the declaration of what a tile holds at a place."""
+        return self.dialect.index(name, value)
+
+    def _multiply_by(self, index: int, first: str, values: Sequence[str], name: str) -> None:
+        """Write the additions of a row of words' products with each pixel's word, each read once."""
+        for j in range(self.vectors(index)):
+            totals = [(f"{name}_{p}_{j}", value) for p, value in enumerate(values)]
+            sums = " ".join(f"{total} = wamnet_dots({total}, m, {value});" for total, value in totals)
+            self._line(f"{{ {self.dots.four('m', f'w[{first} + {j}]')} {sums} }}")
+
+
+def _packed(numbers: Sequence[str]) -> str:
+    """Return the text of four numbers as the bytes of a word."""
+    return f"wamnet_packed({', '.join(numbers)})"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from ..languages.dialect import Parts
 from ..languages.interface import DENOISE, Interface
+from .buffers_group import SHIFTED
+from .emit_dot import GroupDotDialect, dots
 from .emit_group import BufferGroup, Grouped
 from .opencl_tiled import ALIGNED, OpenCLTiled
 
@@ -46,3 +48,50 @@ OPENCL_GROUPS = (
     ),
 )
 """The schedules for graphics processors; none of them has been measured on one."""
+
+DOTS = f"""\
+int wamnet_packed(float a, float b, float c, float d)
+{{
+    uint low = ((uint)(int)a & 255u) | ((uint)(int)b & 255u) << 8;
+    return as_int(low | ((uint)(int)c & 255u) << 16 | (uint)(int)d << 24);
+}}
+int4 wamnet_dots(int4 sums, int4 weights, int word)
+{{
+#ifdef __opencl_c_integer_dot_product_input_4x8bit_packed
+    int x = dot_acc_sat_4x8packed_ss_int(as_uint(weights.x), as_uint(word), sums.x);
+    int y = dot_acc_sat_4x8packed_ss_int(as_uint(weights.y), as_uint(word), sums.y);
+    int z = dot_acc_sat_4x8packed_ss_int(as_uint(weights.z), as_uint(word), sums.z);
+    int w = dot_acc_sat_4x8packed_ss_int(as_uint(weights.w), as_uint(word), sums.w);
+    return (int4)(x, y, z, w);
+#else
+{SHIFTED}
+#endif
+}}
+vector wamnet_floats(int4 sums)
+{{
+    return (vector)((float)sums.x, (float)sums.y, (float)sums.z, (float)sums.w);
+}}
+vector wamnet_numbers(int4 bits)
+{{
+    return as_float4(bits);
+}}
+"""
+"""Words of bytes: no sum is near the ends of 32 bits, where the instruction would saturate."""
+
+
+class OpenCLGroupDot(GroupDotDialect, OpenCLGroup):
+    """The dialect's table for words of bytes."""
+
+    by = "cl_khr_integer_dot_product where -cl-std=CL3.0 and the device have it, else shifts"
+    whole_kind = "int4"
+    whole_zero = "(int4)(0)"
+    shared_tile = "__local int tile[TILE_NUMBERS];"
+    weights_as_vectors = "__global const int4 *w = (__global const int4 *)weights;"
+
+    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return the lines above the function."""
+        return [*super().top(kernel, parts), DOTS]
+
+
+OPENCL_GROUP_DOT = dots(OpenCLGroupDot())
+"""The schedule of bytes for graphics processors."""

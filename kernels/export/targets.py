@@ -107,6 +107,9 @@ def _texture(side: int) -> Limit:
 GROUPED = ("group4", "group", PLAIN)
 """Schedules of languages for graphics processors, the usual one first."""
 
+GROUPED_BYTES = (*GROUPED, "groupdot")
+"""The same where a language has a word for products of bytes."""
+
 
 def _storage(
     kernel: str, uniform: int = 0, name: str = "", schedules: tuple[str, ...] = GROUPED
@@ -130,8 +133,14 @@ def _fragment(kernel: str, rows: int) -> dict[str, Place]:
     }
 
 
-VULKAN_PLACES = _storage("glsl-vulkan", 16 * KILOBYTE, "maxUniformBufferRange")
-"""Places of weights for Vulkan, and what is made of its GLSL."""
+UNIFORM_RANGE = (16 * KILOBYTE, "maxUniformBufferRange")
+"""What Vulkan promises of a uniform block."""
+
+VULKAN_PLACES = _storage("glsl-vulkan", *UNIFORM_RANGE, GROUPED_BYTES)
+"""Places of weights for Vulkan."""
+
+TRANSLATED_PLACES = _storage("glsl-vulkan", *UNIFORM_RANGE)
+"""The same for what is made of its GLSL by way of SPIR-V 1.0, which has no products of bytes."""
 
 DISPATCH = "dispatch(ceil(width / {across}), ceil(height / {down}), 1)"
 """How kernels on buffers are started, in groups that compute so many pixels."""
@@ -139,13 +148,14 @@ DISPATCH = "dispatch(ceil(width / {across}), ceil(height / {down}), 1)"
 SPECTRA = ("fft32x8", "fft32", "fft32x4")
 """Schedules of spectra. Most processors have AVX2's registers, or get two instructions for each vector."""
 
-BYTES = ("dot16",)
-"""Schedules of bytes, for networks of integers: the fastest on processors with VNNI, and slow on others."""
+BYTES = ("dot16", "groupdot")
+"""Schedules of bytes, for networks of integers: the former is the fastest on processors with VNNI, and slow
+on others; the latter is for graphics processors."""
 
-ON_PROCESSORS = (*SPECTRA, "tile16", "tile8", "tile4", "vector16", *BYTES)
+ON_PROCESSORS = (*SPECTRA, "tile16", "tile8", "tile4", "vector16", BYTES[0])
 """Schedules of OpenCL for processors."""
 
-IN_C = ("tile8", "tile16", "tile4", *SPECTRA, *BYTES, PLAIN)
+IN_C = ("tile8", "tile16", "tile4", *SPECTRA, BYTES[0], PLAIN)
 """Schedules of C. Those of spectra are the fastest, but only GCC and clang take them."""
 
 GL_CODE = """\
@@ -192,7 +202,7 @@ ROWS: tuple[Row, ...] = (
             "opencl",
             64 * KILOBYTE,
             "CL_DEVICE_MAX_CONSTANT_BUFFER_SIZE",
-            (*ON_PROCESSORS, *GROUPED),
+            (*ON_PROCESSORS, *GROUPED_BYTES),
         )
         | _tabled("opencl"),
         _as(".cl"),
@@ -234,7 +244,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         "wgsl",
         "WGSL",
-        _storage("wgsl", 64 * KILOBYTE, "maxUniformBufferBindingSize"),
+        _storage("wgsl", 64 * KILOBYTE, "maxUniformBufferBindingSize", GROUPED_BYTES),
         _as(".wgsl"),
         "numbered",
         _buffers_code("const"),
@@ -243,7 +253,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         "hlsl",
         "HLSL, compute shader for fxc (shader model 5.0) and dxc (6.0)",
-        VULKAN_PLACES,
+        TRANSLATED_PLACES,
         _hlsl,
         "registers",
         _buffers_code("auto"),
@@ -262,7 +272,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         "spirv",
         "SPIR-V 1.0, compute shader",
-        VULKAN_PLACES,
+        TRANSLATED_PLACES,
         _spirv,
         "numbered",
         _buffers_code("VkPipeline"),
@@ -282,7 +292,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         "cuda",
         "CUDA C",
-        _storage("cuda") | _tabled("cuda"),
+        _storage("cuda", schedules=GROUPED_BYTES) | _tabled("cuda"),
         _as(".cu"),
         "arguments",
         _arguments_code(

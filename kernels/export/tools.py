@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
+from ...compiler.schedules.buffers_group import PORTABLE
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 
 PACKAGES: Mapping[str, str] = {
@@ -33,7 +34,7 @@ COMPILERS = {"cc": "CC", "c++": "CXX"}
 """Environment variables that name other compilers."""
 
 ENVIRONMENT = "vulkan1.0"
-"""The oldest Vulkan: SPIR-V 1.0, which all of them take."""
+"""The oldest Vulkan: SPIR-V 1.0 without extensions, which all of them take."""
 
 HLSL_STYLES: Mapping[str, str] = {"fxc": "50", "dxc": "60"}
 """Shader models by the compiler that takes them."""
@@ -76,12 +77,8 @@ def spirv(source: str, language: str = "glsl") -> bytes:
         folder = Path(name)
         (folder / "kernel.comp").write_text(source, encoding="utf-8")
         options = ["-D", "-e", "main"] if language == "hlsl" else []
-        run(
-            "glslangValidator",
-            *options,
-            *("-V", "--target-env", ENVIRONMENT, "-S", "comp", "-o", "kernel.spv", "kernel.comp"),
-            folder=folder,
-        )
+        options += [f"-D{PORTABLE}", "-V", "--target-env", ENVIRONMENT, "-S", "comp"]
+        run("glslangValidator", *options, "-o", "kernel.spv", "kernel.comp", folder=folder)
         validate(folder, "kernel.spv")
         return (folder / "kernel.spv").read_bytes()
 

@@ -36,7 +36,10 @@ def written(folder, target="opencl", schedule="plain", **kwargs):
 
 @pytest.mark.parametrize(
     ("target", "schedule"),
-    [("opencl", "plain"), ("opencl", "dot16"), ("c", "tile8"), ("c", "dot16"), ("wgsl", "plain")],
+    [
+        *(("opencl", "plain"), ("opencl", "dot16"), ("c", "tile8"), ("c", "dot16"), ("wgsl", "plain")),
+        *((target, "groupdot") for target in ("opencl", "cuda", "wgsl", "glsl-vulkan")),
+    ],
 )
 @pytest.mark.parametrize("amplitude", [127, 511])
 def test_certificates_hold(tmp_path, target, schedule, amplitude) -> None:

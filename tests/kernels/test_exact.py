@@ -34,9 +34,9 @@ EXAMPLES = settings.default.max_examples // 10
 KINDS = ("random", "tiny", "signed zeros", "threshold", "extreme")
 """Kinds of images."""
 
-APART = ("inlined", "dot16")
-"""The inlined schedule takes 20 s to compile for the paper's network, and has a test of its own; that of
-bytes holds integers only."""
+APART = ("inlined", "dot16", "groupdot")
+"""The inlined schedule takes 20 s to compile for the paper's network, and has a test of its own; those of
+bytes hold integers only."""
 
 WAYS = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules if s.name not in APART]
 """The other schedules."""

@@ -12,7 +12,7 @@ from kit import LONG, trained_sizes
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.schedules import emit_dot, emit_fourier
+from wamnet.compiler.schedules import emit_fourier
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import denoise_on
 from wamnet.kernels.devices import opencl_executor, opengl_executor
@@ -23,9 +23,7 @@ from wamnet.refimpl.network import dataset, denoise
 EXAMPLES = max(settings.default.max_examples // 20, 1)
 """Each example compiles a kernel, up to a second: a twentieth of what other tests draw."""
 
-LADDER = [
-    (t.name, s.name) for t in DENOISERS.values() for s in t.schedules[1:] if not isinstance(s, emit_dot.Dot)
-]
+LADDER = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules[1:] if not s.bytewise]
 """All schedules except for the plain ones, with their targets; those of integers: test_whole.py."""
 
 

@@ -15,9 +15,11 @@ from wamnet.compiler.core.ir import Gather, Image, Program, Type
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import analysed, plan_program
 from wamnet.compiler.proof import whole
+from wamnet.compiler.schedules.buffers_group import CUDADot, VulkanDot, WGSLDot
 from wamnet.compiler.schedules.c_dot import CDot
-from wamnet.compiler.schedules.emit_dot import Dot
+from wamnet.compiler.schedules.emit_dot import Dot, GroupDot
 from wamnet.compiler.schedules.opencl_dot import OpenCLDot
+from wamnet.compiler.schedules.opencl_group import OpenCLGroupDot
 from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window
@@ -153,12 +155,57 @@ def test_a_cut_or_another_arithmetic_is_not_whole() -> None:
 # ---- products of bytes -----------------------------------------------------------------------------------
 
 
-def test_the_text_of_dots(golden) -> None:
-    """The smallest network that has all parts: two images, a hidden layer, rows that are filled up."""
-    net = rounded(siren.init((16, 3, 3), 1.0, 5.0, seed=1), 2)
-    images = tuple(Image(name, n, -LARGEST, LARGEST, whole=True) for name, n in CHANNELS.items())
+def smallest(channels) -> Program:
+    """Return the smallest program that has all parts: several images, a hidden layer, what is filled up."""
+    images = tuple(Image(name, n, -LARGEST, LARGEST, whole=True) for name, n in channels.items())
     gather = Gather(Window(2, "zero"), images)
-    found = analysed(trace(lambda x: forward_whole(net, x), {"window": Type(shape=(16,))}, gather))
+    net = rounded(siren.init((gather.n_inputs, 3, 3), 1.0, 5.0, seed=1), 2)
+    types = {"window": Type(shape=(gather.n_inputs,))}
+    return analysed(trace(lambda x: forward_whole(net, x), types, gather))
+
+
+@pytest.mark.parametrize("dialect", [CUDADot(), WGSLDot(), VulkanDot(), OpenCLGroupDot()])
+def test_the_text_of_grouped_dots(golden, dialect) -> None:
+    tiny = GroupDot("groupdot", "a tiny group", dialect, 1, (4, 2))
+    found = tiny.emit(smallest({"a": 3, "b": 2}), ["a tiny kernel"], False)
+    golden(f"groupdot.denoise{dialect.suffix}", found)
+
+
+@pytest.mark.parametrize("channels", [{"a": 3, "b": 1}, {"a": 2, "b": 17}])
+def test_the_words_of_grouped_dots_are_the_weights(channels) -> None:
+    """Read the array as the kernel does: four words at a time, tap by tap, word by word."""
+    found, held = smallest(channels), sum(channels.values())
+    tiny = GroupDot("groupdot", "a tiny group", CUDADot(), 1, (4, 2))
+    packed, slots = tiny.pack(found), tiny.layout(found)
+    windowed = True
+    for name, matrix in found.parameters.items():
+        if matrix.ndim != 2:
+            continue
+        read, at = np.zeros_like(matrix), slots[name].offset
+        count, taps = (held, range(4)) if windowed else (matrix.shape[1], range(1))
+        words = range(-(-count // 4))
+        for first in words[::4]:
+            for tap in taps:
+                for word in words[first : first + 4]:
+                    found_bytes = packed[at : at + 4].view(np.int8).reshape(4, 4)
+                    inputs = [i for i in range(4 * word, 4 * word + 4) if i < count]
+                    read[:, [tap * count + i for i in inputs]] = found_bytes[:3, : len(inputs)]
+                    assert not found_bytes[3].any(), "no neuron, no weight"
+                    assert not found_bytes[:, len(inputs) :].any(), "what fills a word up is 0"
+                    at += 4
+        assert np.array_equal(read, matrix)
+        windowed = False
+
+
+def test_a_tile_of_words_takes_a_quarter() -> None:
+    """Five channels are two words of a pixel; 21 are six, of which four are in the tile at once."""
+    for channels, words in (({"a": 3, "b": 2}, 2), ({"a": 4, "b": 17}, 4)):
+        tiny = GroupDot("groupdot", "a tiny group", WGSLDot(), 4, (8, 8))
+        assert tiny.shared_bytes(smallest(channels)) == 4 * words * (8 * 4 + 1) * (8 + 1)
+
+
+def test_the_text_of_dots(golden) -> None:
+    found = smallest(CHANNELS)
     for dialect in (CDot(), OpenCLDot(4)):
         tiny = Dot("dot4", "a tiny tile", dialect, 4, 2)
         golden(f"dot4.denoise{dialect.suffix}", tiny.emit(found, ["a tiny kernel"], True))
@@ -202,3 +249,5 @@ def test_what_bytes_do_not_hold_is_refused(changed, reason) -> None:
     found = program(lambda window: pixel(net, window), is_whole=isinstance(net, Whole))
     assert reason in Dot("dot16", "", CDot(), 16, 14).refusal(found)
     assert bool(reason) == bool(Dot("dot16", "", CDot(), 16, 14).refusal(found))
+    assert (reason in GroupDot("groupdot", "", WGSLDot(), 4).refusal(found)) or not reason
+    assert bool(reason) == bool(GroupDot("groupdot", "", WGSLDot(), 4).refusal(found))

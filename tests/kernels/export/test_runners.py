@@ -6,7 +6,7 @@ A runner whose tools are missing skips its tests and says so; `make test` names 
 from __future__ import annotations
 
 import subprocess
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window, all_windows, encode_sums, pad
-from wamnet.refimpl.network.whole import forward_whole, rounded
+from wamnet.refimpl.network.whole import check_whole, forward_whole, rounded
 
 pytestmark = pytest.mark.apart  # drivers of many targets stay in memory
 
@@ -95,22 +95,53 @@ def test_grouped_kernels_keep_their_bound(runner, kit, schedule, border):
 
 
 @pytest.mark.parametrize("border", ["clamp", "zero"])
-@pytest.mark.parametrize("schedule", ["plain", "group", "group4"])
+@pytest.mark.parametrize("schedule", ["plain", "group", "group4", "groupdot"])
 def test_integers_have_the_reference_s_digest(runner, schedule, border):
     """WHO-10: the SHA-256 of the picture is the same in every language."""
     if schedule not in {each.name for each in EXPORTED.get(runner.name, DENOISERS["c"]).schedules}:
-        pytest.skip("its language has no groups")
+        pytest.skip("its language has no groups, or no products of bytes")
     network = rounded(siren.init([45, 7, 5, 3], 3.0, 5.0, seed=1), 3)
-    images = tuple(Image(name, n, -127.0, 127.0, whole=True) for name, n in (("a", 4), ("b", 1)))
-    gather = Gather(Window(3, border), images)
-    program = trace(lambda window: forward_whole(network, window), {"window": Type(shape=(45,))}, gather)
-    random = np.random.default_rng(3)
-    numbers = random.integers(-127, 128, (11, 37, 5)).astype(np.float32)
-    artifact = compile_program(program, runner.name, "native", schedule)
-    found = runner.run(artifact, {"a": numbers[..., :4].copy(), "b": numbers[..., 4:].copy()})
-    held = forward_whole(network, all_windows(pad(numbers, gather.window), gather.window))
+    numbers = np.random.default_rng(3).integers(-127, 128, (11, 37, 5)).astype(np.float32)
+    found, held = denoised(runner, schedule, network, Window(3, border), {"a": 4, "b": 1}, numbers)
     assert len(np.unique(held)) > 50
     assert check.digest_of(found) == check.digest_of(held)
+
+
+def denoised(runner, schedule, network, window, channels, numbers):
+    """Return a runner's picture and the reference's, of numbers (H, W, C) that are images side by side."""
+    images = tuple(Image(name, n, -127.0, 127.0, whole=True) for name, n in channels.items())
+    gather = Gather(window, images)
+    types = {"window": Type(shape=(gather.n_inputs,))}
+    program = trace(lambda window: forward_whole(network, window), types, gather)
+    artifact = compile_program(program, runner.name, "native", schedule)
+    assert artifact.manifest["schedule"]["name"] == schedule
+    pieces = np.split(numbers, np.cumsum(list(channels.values()))[:-1], axis=-1)
+    found = runner.run(artifact, {name: piece.copy() for name, piece in zip(channels, pieces, strict=True)})
+    held = forward_whole(network, all_windows(pad(numbers, window), window))
+    return found, held.astype(np.float32)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (9, 35)])
+@pytest.mark.parametrize("border", ["clamp", "zero"])
+def test_bytes_at_the_ends_of_their_range(runner, shape, border):
+    """WHO-12: all numbers and weights are 127 or -127, in 21 channels, so that a tile is filled twice.
+
+    A byte that is taken for one without a sign, or that carries into the next one, is found by each product.
+    """
+    if "groupdot" not in {each.name for each in EXPORTED.get(runner.name, DENOISERS["c"]).schedules}:
+        pytest.skip("its language has no products of bytes")
+    random = np.random.default_rng(4)
+    network = rounded(siren.init([4 * 21, 9, 6, 3], 3.0, 5.0, seed=1), 2)
+    ends = [np.where(random.random(w.shape) < 0.5, -127, 127).astype(w.dtype) for w in network.weights[:-1]]
+    middle = np.full(3, 2.0 ** (15 + network.fraction), np.float32)
+    biases, weights = (*network.biases[:-1], middle), (*ends, network.weights[-1])
+    network = replace(network, weights=weights, biases=biases)
+    check_whole(network)
+    numbers = random.choice(np.float32([-127, 127]), (*shape, 21))
+    channels = {"a": 4, "b": 1, "c": 16}
+    found, held = denoised(runner, "groupdot", network, Window(2, border), channels, numbers)
+    assert len(np.unique(held)) >= min(50, held.size)
+    assert found.tobytes() == held.tobytes()
 
 
 def test_a_group_that_does_not_wait_is_found(runner, kit):

@@ -56,10 +56,14 @@ def refused_by_bytes(program: Program) -> str:
     for node in program.nodes:
         if node.op != "affine":
             continue
-        if node.get("bias") is not None or known[node.args[0]].largest > LARGEST:
+        read, matrix = known[node.args[0]], program.parameters[str(node["weight"])]
+        if node.get("bias") is not None or read.largest > LARGEST:
             return "its numbers take more than 8 bits"
-        if np.abs(program.parameters[str(node["weight"])]).max() > LARGEST:
+        if np.abs(matrix).max() > LARGEST:
             return "its weights take more than 8 bits"
+        # What does not round may be a multiple of a fraction.
+        if read.grain < 0 or (matrix != np.floor(matrix)).any():
+            return "its numbers or weights are fractions"
     return ""
 
 

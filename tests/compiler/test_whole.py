@@ -235,6 +235,21 @@ def test_the_bytes_of_dots_are_the_weights() -> None:
         assert not begun[len(matrix) :].any()
 
 
+@pytest.mark.parametrize("schedule", ["dot16", "groupdot"])
+@pytest.mark.parametrize("halved", ["weights", "numbers", "nothing"])
+def test_halves_are_no_bytes(schedule, halved) -> None:
+    """They do not round, so that the program is exact; as bytes they would lose their halves."""
+    first, second = np.float32([[1, 2, 3, 5], [3, -1, 1, 7]]), np.float32([[1, 2], [3, -1]])
+    scale, half = (np.float32(0.5 if halved == what else 1.0) for what in ("weights", "numbers"))
+    found = program(lambda x: np.clip(half * np.clip(x @ first.T, 0.0, 99.0) @ (scale * second).T, 0.0, 9.0))
+    assert whole.holds(found)
+    picked = compile_program(found, "opencl", schedule=schedule).manifest["schedule"]
+    assert (picked["name"] == schedule) == (halved == "nothing")
+    assert (
+        picked.get("reason", "its numbers or weights are fractions") == "its numbers or weights are fractions"
+    )
+
+
 @pytest.mark.parametrize(
     ("changed", "reason"),
     [

@@ -1953,7 +1953,7 @@ static const double TURN = 16777216, MOST_INT = 2147483647;
 /* WHO-1: weights and biases are integers here, in double precision, which holds them. */
 typedef struct {
     network of;
-    double *factors[MOST_LAYERS], amplitude;
+    double *factors[MOST_LAYERS], *multiples[MOST_LAYERS], amplitude; /* multiples: factors before the modulo */
     int fraction;
 } whole;
 
@@ -2060,11 +2060,16 @@ static void diffuse(double *row, long size, long channels) {
         }
 }
 
+/* WHO-7: what a sum of 1 is in units of a phase, or of a colour. */
+static double unit_of(const network *n, const whole *made, size_t layer) {
+    return is_last(made, layer) ? ldexp(1, 16 + made->fraction) : omega(n, layer) / (2 * PI) * TURN;
+}
+
 /* WHO-7: round a layer of n to one of made, whose fraction, widths and amplitude are known. */
 static void round_layer(const network *n, whole *made, size_t layer, size_t size) {
     size_t in = n->widths[layer], out = n->widths[layer + 1], channels = in / (size * size);
     bool last = is_last(made, layer);
-    double g = last ? ldexp(1, 16 + made->fraction) : omega(n, layer) / (2 * PI) * TURN;
+    double g = unit_of(n, made, layer);
     double largest = largest_input(made, layer), most = floor((TURN - 1) / largest) - 2 * (double)in;
     for (size_t i = 0; i < out; i++) {
         double *row = made->of.weights[layer] + i * in, top = 0, sums = 0;
@@ -2078,6 +2083,7 @@ static void round_layer(const network *n, whole *made, size_t layer, size_t size
         for (size_t k = 0; k < in; k++) row[k] /= m;
         for (size_t k = 0; k < in && layer; k++) row[k] = rint(row[k]);
         for (size_t c = 0; c < channels && !layer; c++) diffuse(row + c, (long)size, (long)channels);
+        made->multiples[layer][i] = m;
         made->factors[layer][i] = last ? m : fmod(m, TURN);
         made->of.biases[layer][i] = last ? b : b - TURN * floor(b / TURN);
     }
@@ -2086,7 +2092,10 @@ static void round_layer(const network *n, whole *made, size_t layer, size_t size
 static whole new_whole(const network *n, double amplitude) {
     whole made = {.of = new_network(n->layers, n->widths), .amplitude = amplitude, .fraction = MOST_FRACTION};
     sine_with(amplitude);
-    for (size_t l = 0; l < n->layers; l++) made.factors[l] = get(n->widths[l + 1], sizeof(double));
+    for (size_t l = 0; l < n->layers; l++) {
+        made.factors[l] = get(n->widths[l + 1], sizeof(double));
+        made.multiples[l] = get(n->widths[l + 1], sizeof(double));
+    }
     return made;
 }
 
@@ -2102,6 +2111,110 @@ static whole rounded(const network *n, size_t size, double amplitude) {
         if (!wrong(&made)) return made;
     }
     refuse("with no fraction it has an integer form: %s", wrong(&made));
+}
+
+/* WHO-14: C of inputs x (count, in), as R (in, in) of C = R^T R for inputs in order of their variance. */
+static double *root_of(const double *x, size_t count, size_t in, const double *mean, size_t *order) {
+    double *c = get(in * in, sizeof *c), *root = get(in * in, sizeof *root), spread = 0;
+    for (size_t k = 0; k < count; k++)
+        for (size_t i = 0; i < in; i++)
+            for (size_t j = 0; j < in; j++)
+                c[i * in + j] += (x[k * in + i] - mean[i]) * (x[k * in + j] - mean[j]) / (double)count;
+    for (size_t i = 0; i < in; i++) spread += c[i * in + i] / (double)in;
+    for (size_t i = 0; i < in; i++) {
+        size_t at = i;
+        c[i * in + i] += fmax(spread, 1) / 100;
+        for (; at && c[order[at - 1] * in + order[at - 1]] > c[i * in + i]; at--) order[at] = order[at - 1];
+        order[at] = i;
+    }
+    for (size_t i = 0; i < in; i++)
+        for (size_t j = i; j < in; j++) {
+            double left = c[order[i] * in + order[j]];
+            for (size_t k = 0; k < i; k++) left -= root[k * in + i] * root[k * in + j];
+            root[i * in + j] = j == i ? sqrt(left) : left / root[i * in + i];
+        }
+    return root;
+}
+
+/* WHO-14: the integers q near a row of real weights w, both in the order of R; y is E[(n - E n)(s - w n)]. */
+static void choose(const double *root, size_t in, double *w, double *y, double *q) {
+    for (size_t i = 0; i < in; i++) {
+        for (size_t k = 0; k < i; k++) y[i] -= root[k * in + i] * y[k];
+        y[i] /= root[i * in + i];
+    }
+    for (size_t i = in; i-- > 0;) {
+        for (size_t k = i + 1; k < in; k++) y[i] -= root[i * in + k] * y[k];
+        y[i] /= root[i * in + i];
+        w[i] += y[i];
+    }
+    for (size_t i = in; i-- > 0;) {
+        double handed = 0;
+        for (size_t j = i + 1; j < in; j++) handed += root[i * in + j] * (w[j] - q[j]);
+        q[i] = clamp(rint(w[i] + handed / root[i * in + i]), -127, 127);
+    }
+}
+
+/* WHO-14: round a layer on inputs: x of the network that is made, sums in units of a phase or a colour. */
+static void round_layer_on(const network *n, whole *made, size_t layer, const double *x, const double *sums,
+                           size_t count) {
+    size_t in = n->widths[layer], out = n->widths[layer + 1], *order = get(in, sizeof *order);
+    double *mean = get(in, sizeof *mean), *w = get(in, sizeof *w), *y = get(in, sizeof *y), *q = get(in, sizeof *q);
+    bool last = is_last(made, layer);
+    double g = unit_of(n, made, layer);
+    for (size_t k = 0; k < count; k++)
+        for (size_t i = 0; i < in; i++) mean[i] += x[k * in + i] / (double)count;
+    const double *root = root_of(x, count, in, mean, order);
+    for (size_t o = 0; o < out; o++) {
+        double m = made->multiples[layer][o], bias = 0, *row = made->of.weights[layer] + o * in;
+        for (size_t i = 0; i < in; i++) {
+            w[i] = n->weights[layer][o * in + order[i]] * (g / largest_input(made, layer)) / m;
+            y[i] = 0;
+        }
+        for (size_t k = 0; k < count; k++) {
+            double missing = sums[k * out + o] / m;
+            for (size_t i = 0; i < in; i++) missing -= w[i] * x[k * in + order[i]];
+            for (size_t i = 0; i < in; i++)
+                y[i] += (x[k * in + order[i]] - mean[order[i]]) * missing / (double)count;
+        }
+        choose(root, in, w, y, q);
+        for (size_t i = 0; i < in; i++) row[order[i]] = q[i];
+        for (size_t k = 0; k < count; k++) {
+            double held = 0;
+            for (size_t i = 0; i < in; i++) held += row[i] * x[k * in + i];
+            bias += (sums[k * out + o] - held * m) / (double)count;
+        }
+        bias = rint(bias + (last ? ldexp(1, made->fraction - 1) : 0));
+        made->of.biases[layer][o] = last ? bias : bias - TURN * floor(bias / TURN);
+    }
+}
+
+/* WHO-14: on windows in [-1, 1]. */
+static whole rounded_on(const network *n, size_t size, double amplitude, const array *windows) {
+    whole plain = rounded(n, size, amplitude), made = rounded(n, size, amplitude);
+    size_t count = windows->shape[0];
+    const double *values = windows->values;
+    double *x = get(windows->count, sizeof *x);
+    for (size_t i = 0; i < windows->count; i++) x[i] = whole_input(values[i]);
+    for (size_t l = 0; l < n->layers; l++) {
+        size_t in = n->widths[l], out = n->widths[l + 1];
+        bool last = is_last(&made, l);
+        double g = unit_of(n, &made, l);
+        double *sums = get(count * out, sizeof *sums), *next = get(count * out, sizeof *next);
+        for (size_t k = 0; k < count; k++)
+            for (size_t o = 0; o < out; o++) {
+                double sum = n->biases[l][o];
+                for (size_t i = 0; i < in; i++) sum += n->weights[l][o * in + i] * values[k * in + i];
+                sums[k * out + o] = sum * g;
+            }
+        round_layer_on(n, &made, l, x, sums, count);
+        if (last) break;
+        for (size_t k = 0; k < count; k++)
+            memcpy(next + k * out, whole_layer(&made, l, x + k * in), out * sizeof *next);
+        for (size_t i = 0; i < count * out; i++) sums[i] = sin(sums[i] / TURN * (2 * PI));
+        values = sums;
+        x = next;
+    }
+    return wrong(&made) ? plain : made;
 }
 
 static whole read_whole(const json *in) {
@@ -2799,18 +2912,33 @@ static void do_whole_forward(const json *in) {
     }
 }
 
+static void answer_rounded(const whole *made) {
+    char name[32];
+    answer_network(&made->of, "weight", "bias");
+    for (size_t l = 0; l < made->of.layers; l++) {
+        snprintf(name, sizeof name, "factor_%u", (unsigned)l);
+        size_t count = made->of.widths[l + 1];
+        answer_array(name, (array){.axes = 1, .shape = {count}, .count = count, .values = made->factors[l]});
+    }
+    answer_whole("fraction", (uint32_t)made->fraction);
+}
+
 static void do_whole_rounded(const json *in) {
     network n = read_network(in);
     size_t size = (size_t)whole_of(field(in, "size"), 1, 64, "the window's size");
     whole made = rounded(&n, size, number(in, "amplitude"));
-    char name[32];
-    answer_network(&made.of, "weight", "bias");
-    for (size_t l = 0; l < n.layers; l++) {
-        snprintf(name, sizeof name, "factor_%u", (unsigned)l);
-        size_t count = n.widths[l + 1];
-        answer_array(name, (array){.axes = 1, .shape = {count}, .count = count, .values = made.factors[l]});
-    }
-    answer_whole("fraction", (uint32_t)made.fraction);
+    answer_rounded(&made);
+}
+
+static void do_whole_rounded_on(const json *in) {
+    network n = read_network(in);
+    size_t size = (size_t)whole_of(field(in, "size"), 1, 64, "the window's size");
+    array windows = array_in(in, "windows", 2);
+    if (!windows.count || windows.shape[1] != n.widths[0]) refuse("windows do not fit the first layer");
+    for (size_t i = 0; i < windows.count; i++)
+        if (!(fabs(windows.values[i]) <= 1)) refuse("a feature is in [-1, 1]");
+    whole made = rounded_on(&n, size, number(in, "amplitude"), &windows);
+    answer_rounded(&made);
 }
 
 static void do_display(const json *in) { answer_number("encoded", to_display(number(in, "linear"), 0)); }
@@ -2989,6 +3117,7 @@ static const struct {
     {"whole.sine", do_whole_sine},
     {"whole.forward", do_whole_forward},
     {"whole.rounded", do_whole_rounded},
+    {"whole.rounded_on", do_whole_rounded_on},
     {"encoding.display", do_display},
     {"sine", do_sine},
     {"image.features", do_features},

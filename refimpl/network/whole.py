@@ -237,12 +237,12 @@ def rounded_on(siren: Siren, windows: Array, size: int, amplitude: int = 127) ->
         wanted = (np.matmul(values, weight.T) + bias) * unit
         found = nearest(weight * (unit / largest) / factor[:, None], wanted / factor, numbers)
         sums = np.matmul(numbers, found.T)
-        bias = np.rint(np.mean(wanted - sums * factor, axis=0))
+        bias = np.mean(wanted - sums * factor, axis=0)
         weights[layer] = found.astype(np.float32)
         if layer == last:
             biases[layer] = np.rint(bias + 2.0**network.fraction / 2).astype(np.float32)
             break
-        biases[layer] = np.mod(bias, TURN).astype(np.float32)
+        biases[layer] = np.mod(np.rint(bias), TURN).astype(np.float32)
         values = np.sin(wanted * (2.0 * math.pi / TURN))
         numbers = whole_sine(phase(sums, network.factors[layer], biases[layer]), amplitude)
         numbers = numbers.astype(np.float64)

@@ -27,7 +27,7 @@ BUDGET = {
     "kernels/judge": 1450,
     "kernels/bench": 3150,
     "kernels/export": 2650,
-    "spec/conformance": 4900,
+    "spec/conformance": 4950,
     "cli": 300,
     "cli/commands": 4950,
     "cli/common": 1050,

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....refimpl.network import siren, whole
+from ....refimpl.network import dataset, siren, whole
+from ....refimpl.network.dataset import Window
 from ....refimpl.network.siren import Siren
 from ....refimpl.network.whole import EXACT, INPUT_LEVELS, LARGEST_INT, SINES, TURN, WEIGHT_LEVELS, Whole
 from ..case import Case, Kind, Output
@@ -240,8 +241,12 @@ def _wide() -> Whole:
 
 
 def _rounded(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a network in integers: first what the weights depend on, and those of the first layer last."""
-    network = whole.rounded(_from_inputs(inputs), int(inputs["size"]), int(inputs["amplitude"]))
+    """Return a network in integers."""
+    return _in_order(whole.rounded(_from_inputs(inputs), int(inputs["size"]), int(inputs["amplitude"])))
+
+
+def _in_order(network: Whole) -> dict[str, Any]:
+    """Return what a network holds: first what the weights depend on, and those of the first layer last."""
     found = {name: value for name, value in _inputs_of(network).items() if name != "amplitude"}
     order = sorted(found, key=lambda name: (name.startswith("weight_"), name == "weight_0"))
     return {name: found[name] for name in order}
@@ -321,6 +326,56 @@ def _beyond() -> Siren:
     return replace(network, weights=(np.stack((row, -row)), *network.weights[1:]))
 
 
+# ---- on windows -------------------------------------------------------------------------------------------
+
+CHOSEN = "integers: what is rounded is at least 2^-12 from a tie, and float64 is off by less than 2^-20"
+"""Where the bound 0 comes from: the covariance has a condition of at most 100 D_in + 1 (WHO-14), so that any
+way to solve for a dozen inputs is off by some 1e-9."""
+
+
+def _rounded_on(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a network in integers that was rounded on windows."""
+    windows = np.asarray(inputs["windows"], np.float64)
+    size, amplitude = int(inputs["size"]), int(inputs["amplitude"])
+    return _in_order(whole.rounded_on(_from_inputs(inputs), windows, size, amplitude))
+
+
+def _windows(index: int, network: Siren) -> Array:
+    """Return the windows (32, D_in) of two frames of 4 x 4 pixels, smooth along the rows."""
+    channels = network.widths[0] // 4
+    steps = 2.0 * drawn("whole.rounded_on", index, 2 * 4 * 4 * channels).reshape(2, 4, 4, channels) - 1.0
+    frames = np.clip(np.cumsum(steps, axis=2), -1.0, 1.0).astype(np.float32)
+    padded = [dataset.all_windows(dataset.pad(f, Window(2)), Window(2)) for f in frames]
+    return np.concatenate(padded).reshape(-1, network.widths[0]).astype(np.float64)
+
+
+def _rounded_on_cases() -> list[Case]:
+    """Return networks of 8 and 10 bits, of one layer, and two whose colours are large."""
+    loud = siren.init([8, 4, 3], 3.0, 3.0, seed=2)
+    rows = [
+        ("", siren.init([8, 4, 3], 3.0, 3.0, seed=0), 127),
+        ("10 bits, two hidden layers", siren.init([12, 4, 4, 3], 3.0, 3.0, seed=1), 511),
+        ("no hidden layer", siren.init([8, 3], 3.0, 3.0, seed=2), 127),
+        ("colours would leave int32: as without windows", _louder(loud, 137.125), 127),
+        ("the fraction 0: half a step is added before the bias is rounded", _louder(loud, 20000.0), 127),
+    ]
+    cases = []
+    for index, (note, network, amplitude) in enumerate(rows):
+        inputs = {
+            **_as_inputs(network),
+            "size": 2,
+            "amplitude": amplitude,
+            "windows": _windows(index, network),
+        }
+        given = ("factor", "fraction")
+        expected = {
+            name: Output(value, 0.0, CHOSEN, clause="WHO-7" if name.startswith(given) else "WHO-14")
+            for name, value in _rounded_on(inputs).items()
+        }
+        cases.append(Case(f"whole.rounded_on/{index}", "WHO-14", inputs, expected, (), note))
+    return cases
+
+
 LAYERS = {
     "weight_l": "integer[D_out][D_in], for each layer l from 0",
     "factor_l": "integer[D_out]",
@@ -360,6 +415,19 @@ KINDS = (
         {**LAYERS, "fraction": "integer"},
         _rounded_cases,
         _rounded,
+    ),
+    Kind(
+        "whole.rounded_on",
+        "A trained network in integers, rounded on windows",
+        {
+            **NETWORK,
+            "size": "integer: taps along a side of the window",
+            "amplitude": "integer",
+            "windows": "float[N][D_in], float32 in [-1, 1]",
+        },
+        {**LAYERS, "fraction": "integer"},
+        _rounded_on_cases,
+        _rounded_on,
     ),
 )
 """The kinds of this module."""

@@ -23,7 +23,7 @@ PEERS = {
 
 ALLOWED = {
     "refimpl": {"numpy"},
-    "compiler": {"numpy", "safetensors"},
+    "compiler": {"numpy", "safetensors", "pcpp"},
     "kernels": {"numpy", "pyopencl", "pocl", "moderngl", "wgpu", *PEERS},
     "spec": {"numpy"},
     "cli": {
@@ -66,6 +66,7 @@ ROOMS = {
         "core": (),
         "languages": ("core",),
         "proof": ("core",),
+        "reading": ("core", "proof"),
         "schedules": ("core", "languages", "proof"),
         "": ("core", "languages", "proof", "schedules"),
         "scenes": ("core", "languages", "proof", "schedules", ""),

@@ -1,0 +1,84 @@
+"""The languages that are read: their parsers, their compilers' macros, and names of their own."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .lanes import Unread
+from .syntax import Parser, Text
+from .wgsl_syntax import WgslParser
+
+
+@dataclass(frozen=True)
+class Language:
+    """How texts of a target are read.
+
+    `compilers` are sets of macros between which a text may make a difference: each is checked. `within`: the
+    host calls the kernel for pixels of the picture only. `fragment`: one pixel's result is a variable.
+    `brings`: names that the text does not declare. `host`: a function of the text that calls the kernel for
+    every work item.
+    """
+
+    parser: type[Parser] = Parser
+    preprocessed: bool = True
+    compilers: tuple[Mapping[str, str], ...] = ({},)
+    within: bool = False
+    fragment: bool = False
+    brings: tuple[str, ...] = ()
+    host: str = ""
+
+
+LANGUAGES: Mapping[str, Language] = {
+    "opencl": Language(),
+    "c": Language(
+        compilers=(
+            {"FLT_EVAL_METHOD": "0"},
+            {"FLT_EVAL_METHOD": "0", "__GNUC__": "12", "__AVX__": "1", "__AVX512F__": "1"},
+        ),
+        within=True,
+        host="wamnet_image",
+    ),
+    "opengl": Language(
+        compilers=({"GL_ARB_gpu_shader5": "1"},), within=True, fragment=True, brings=("gl_FragCoord",)
+    ),
+    "glsl-es": Language(within=True, fragment=True, brings=("gl_FragCoord",)),
+    "glsl-vulkan": Language(brings=("gl_GlobalInvocationID",)),
+    "wgsl": Language(WgslParser, preprocessed=False),
+    "metal": Language(),
+    "cuda": Language(brings=("threadIdx", "blockIdx", "blockDim")),
+}
+"""By a manifest's target."""
+
+
+def parsed(source: str, language: Language, macros: Mapping[str, str]) -> Text:
+    """Return a text, parsed."""
+    return language.parser(preprocessed(source, macros) if language.preprocessed else source).parse()
+
+
+def preprocessed(source: str, macros: Mapping[str, str]) -> str:
+    """Return a text with its macros replaced and its branches chosen; other directives are left out."""
+    import pcpp
+
+    class Reader(pcpp.Preprocessor):  # type: ignore[misc]
+        def on_include_not_found(self, *given: Any) -> Any:
+            raise pcpp.OutputDirective(pcpp.Action.IgnoreAndRemove)
+
+        def on_directive_handle(self, directive: Any, *given: Any) -> Any:
+            if directive.value in ("pragma", "version", "extension"):
+                raise pcpp.OutputDirective(pcpp.Action.IgnoreAndRemove)
+            return super().on_directive_handle(directive, *given)
+
+        def on_directive_unknown(self, directive: Any, *given: Any) -> Any:
+            raise Unread(f"a compiler for which line {directive.lineno} is #{directive.value}")
+
+    reader = Reader()
+    reader.line_directive = None
+    for name, value in macros.items():
+        reader.define(f"{name} {value}")
+    reader.parse(source)
+    written = io.StringIO()
+    reader.write(written)
+    return written.getvalue()

@@ -1,0 +1,540 @@
+"""A parser of the languages that kernels are written in: C and its children; wgsl_syntax.py adds WGSL.
+
+A tree is made of tuples whose first item names the form. What the grammar below does not know is refused, so
+that no construct passes unread. Qualifiers that change no value are dropped; those of memory are kept.
+
+    expression   ("number", text), ("name", n), ("call", callee, [arguments]), ("at", a, index),
+                 ("of", a, member), ("unary", op, a), ("binary", op, a, b), ("choice", c, a, b),
+                 ("assign", op, target, value), ("step", op, target), ("cast", type, a), ("list", [values])
+    statement    ("declare", Variable, value or None), ("declarations", [...]), ("union", name, [Variable]),
+                 ("do", expression), ("for", start, condition, step, body), ("if", c, then, otherwise),
+                 ("return", value or None), ("block", [statements])
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import Any
+
+from .lanes import Unread
+
+Tree = tuple[Any, ...]
+
+TOKEN = re.compile(
+    r"\s+|(?P<number>0[xX][0-9a-fA-F]+[uU]?|(?:\d+\.\d*|\.\d+|\d+)(?:[eE][+-]?\d+)?[fFuUhi]?)"
+    r"|(?P<name>[A-Za-z_]\w*)|(?P<text>\"[^\"]*\")"
+    r"|(?P<sign>->|\+\+|--|<<=|>>=|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^]=|::|[-+*/%&|^~!<>=?:;,.(){}\[\]@])"
+)
+"""Numbers, names, texts and signs."""
+
+IGNORED = {
+    *[
+        "const",
+        "static",
+        "inline",
+        "restrict",
+        "__restrict__",
+        "__restrict",
+        "volatile",
+        "extern",
+        "precise",
+        "highp",
+        "in",
+        "flat",
+        "noexcept",
+    ],
+    *[
+        "__kernel",
+        "kernel",
+        "__global",
+        "device",
+        "constant",
+        "__constant",
+        "__private",
+        "private",
+        "readonly",
+        "writeonly",
+        "uniform",
+    ],
+    *["__device__", "__global__", "__forceinline__", "buffer", "out", "smooth", "global", "shared_read"],
+}
+"""Qualifiers that change no value."""
+
+SHARED = {"__local", "local", "threadgroup", "__shared__", "shared"}
+"""Qualifiers of memory that the work items of a group share."""
+
+SCALARS = {
+    "void": "void", "bool": "bool", "float": "float32", "int": "int32", "uint": "uint32", "f32": "float32",
+    "int32_t": "int32", "uint32_t": "uint32", "i32": "int32", "u32": "uint32", "sampler2D": "image",
+}  # fmt: skip
+"""Names of types of one number."""
+
+BINARY = [
+    {"||"}, {"&&"}, {"|"}, {"^"}, {"&"}, {"==", "!="}, {"<", ">", "<=", ">="}, {"<<", ">>"}, {"+", "-"},
+    {"*", "/", "%"},
+]  # fmt: skip
+"""Operators of two operands, from those that bind least."""
+
+
+@dataclass(frozen=True)
+class Type:
+    """A type: of one number, or of `width` of them; a pointer to them; a struct by its name."""
+
+    kind: str
+    width: int = 1
+    pointer: bool = False
+
+
+@dataclass
+class Variable:
+    """A name with its type; `sizes` of an array, expressions; `shared` by a group."""
+
+    name: str
+    type: Type
+    sizes: list[Any] = field(default_factory=list)
+    shared: bool = False
+
+
+@dataclass
+class Function:
+    """A function: what it takes, and its statements."""
+
+    name: str
+    takes: list[Variable]
+    body: Tree
+
+
+@dataclass
+class Text:
+    """A parsed text: functions and variables outside them by name, structs' members, sizes of work groups."""
+
+    functions: dict[str, Function] = field(default_factory=dict)
+    outside: list[tuple[Variable, Any]] = field(default_factory=list)
+    structs: dict[str, list[Variable]] = field(default_factory=dict)
+    group: tuple[int, ...] | None = None
+
+
+def tokens(text: str) -> list[tuple[str, str, int]]:
+    """Return (kind, text, line) of every token; comments and lines of a preprocessor are blanks."""
+    text = re.sub(r"/\*.*?\*/|//[^\n]*", lambda m: re.sub(r"[^\n]", " ", m[0]), text, flags=re.S)
+    text = re.sub(r"(?m)^[ \t]*#.*$", "", text)
+    found, at = [], 0
+    while at < len(text):
+        m = TOKEN.match(text, at)
+        if not m:
+            raise Unread(f"line {text.count(chr(10), 0, at) + 1}: {text[at]!r}")
+        if m.lastgroup:
+            found.append((m.lastgroup, m[0], text.count("\n", 0, at) + 1))
+        at = m.end()
+    return found
+
+
+class Parser:
+    """Reads one text: `parse()`."""
+
+    def __init__(self, text: str) -> None:
+        self.tokens, self.at, self.text = [*tokens(text), ("end", "", 0)], 0, Text()
+        self.types = {name: Type(kind) for name, kind in SCALARS.items()}
+        for base, kind in (
+            ("float", "float32"),
+            ("int", "int32"),
+            ("uint", "uint32"),
+            ("char", "int8"),
+            ("uchar", "int8"),
+        ):
+            self.types |= {f"{base}{n}": Type(kind, n) for n in (2, 3, 4, 8, 16)}
+        for base, kind in (("vec", "float32"), ("ivec", "int32"), ("uvec", "uint32")):
+            self.types |= {f"{base}{n}": Type(kind, n) for n in (2, 3, 4)}
+
+    # ---- tokens --------------------------------------------------------------------------------------------
+
+    @property
+    def _now(self) -> str:
+        return self.tokens[self.at][1]
+
+    def _ahead(self, n: int = 1) -> str:
+        return self.tokens[min(self.at + n, len(self.tokens) - 1)][1]
+
+    def _take(self, wanted: str | None = None) -> str:
+        kind, text, line = self.tokens[self.at]
+        if kind == "end" or (wanted is not None and text != wanted):
+            raise Unread(f"line {line}: {text!r}" + (f" where {wanted!r} is read" if wanted else ""))
+        self.at += 1
+        return text
+
+    def _has(self, wanted: str) -> bool:
+        """Take a token if it is there."""
+        if self.tokens[self.at][0] != "end" and self._now == wanted:
+            self.at += 1
+            return True
+        return False
+
+    def _skip_brackets(self, opening: str, closing: str) -> None:
+        self._take(opening)
+        depth = 1
+        while depth:
+            token = self._take()
+            depth += (token == opening) - (token == closing)
+
+    # ---- declarations --------------------------------------------------------------------------------------
+
+    def parse(self) -> Text:
+        """Return the whole text."""
+        while self.tokens[self.at][0] != "end":
+            self._outside()
+        return self.text
+
+    def _outside(self) -> None:
+        """Read a declaration outside functions."""
+        if self._has(";"):
+            return
+        if self._now == "using":
+            while not self._has(";"):
+                self._take()
+        elif self._now == "extern" and self._ahead().startswith('"'):
+            self.at += 2
+        elif self._now == "precision":
+            self.at += 4
+        elif self._now == "typedef":
+            self._typedef()
+        elif self._now == "struct" and self._ahead(2) == "{":
+            self._take()
+            name = self._take()
+            self._struct(name)
+            self._take(";")
+        else:
+            self._declaration_outside()
+
+    def _typedef(self) -> None:
+        self._take("typedef")
+        if self._has("struct"):
+            at = self.at
+            self._skip_brackets("{", "}")
+            name, end = self._take(), self.at
+            self.at = at
+            self._struct(name)
+            self.at = end
+        else:
+            base = self._type()
+            name = self._take()
+            if self._has("__attribute__"):
+                at = self.at
+                self._skip_brackets("(", ")")
+                words = self.tokens[at : self.at]
+                sizes = [i for i, token in enumerate(words) if token[1] == "vector_size"]
+                if sizes:
+                    self.at, end = at + sizes[0] + 1, self.at
+                    size = constant(self._expression())
+                    self.at = end
+                    base = Type(base.kind, size // 4)
+            self.types[name] = base
+        self._take(";")
+
+    def _struct(self, name: str) -> None:
+        """Read the members of a struct; one of a single array of numbers is a vector."""
+        members = self._members()
+        if len(members) == 1 and len(members[0].sizes) == 1:
+            self.types[name] = Type(members[0].type.kind, constant(members[0].sizes[0]))
+        else:
+            self.types[name] = Type(name)
+        self.text.structs[name] = members
+
+    def _members(self) -> list[Variable]:
+        self._take("{")
+        found = []
+        while not self._has("}"):
+            _, type_ = self._qualified()
+            found.append(self._variable(type_))
+            while self._has(","):
+                found.append(self._variable(type_))
+            self._take(";")
+        return found
+
+    def _qualifiers(self) -> bool:
+        """Skip qualifiers; return whether the variable is shared."""
+        shared = False
+        while True:
+            if self._now in SHARED:
+                shared = True
+                self._take()
+            elif self._now == "layout":
+                self._take()
+                at = self.at
+                self._skip_brackets("(", ")")
+                words = [token[1] for token in self.tokens[at : self.at]]
+                if "local_size_x" in words:
+                    sizes = [
+                        words[words.index(f"local_size_{a}") + 2] for a in "xyz" if f"local_size_{a}" in words
+                    ]
+                    self.text.group = tuple(map(int, sizes))
+            elif self._now == "__attribute__":
+                self._take()
+                at = self.at
+                self._skip_brackets("(", ")")
+                words = [token[1] for token in self.tokens[at : self.at]]
+                if "reqd_work_group_size" in words:
+                    self.text.group = tuple(int(w) for w in words if w.isdigit())
+            elif self._now == "[" and self._ahead() == "[":
+                self._skip_brackets("[", "]")
+            elif self._now in IGNORED:
+                self._take()
+            else:
+                return shared
+
+    def _qualified(self) -> tuple[bool, Type]:
+        """Read a type with qualifiers before, between and behind."""
+        shared = self._qualifiers()
+        found = self._type()
+        while True:
+            shared |= self._qualifiers()
+            if self._now in ("*", "&"):
+                found = Type(found.kind, found.width, pointer=self._take() == "*")
+            else:
+                return shared, found
+
+    def _is_type(self) -> bool:
+        """Return whether a type begins here."""
+        kind, text, _ = self.tokens[self.at]
+        return kind == "name" and (
+            text in self.types or text in IGNORED or text in SHARED or text in ("struct", "union")
+        )
+
+    def _type(self) -> Type:
+        name = self._take()
+        if name not in self.types:
+            raise Unread(f"line {self.tokens[self.at - 1][2]}: type {name!r}")
+        return self.types[name]
+
+    def _variable(self, type_: Type, shared: bool = False) -> Variable:
+        """Read the name and the sizes of an array."""
+        found = Variable(self._take(), type_, shared=shared)
+        while self._now == "[" and self._ahead() != "[":
+            self._take()
+            found.sizes.append(None if self._now == "]" else self._expression())
+            self._take("]")
+        self._qualifiers()
+        return found
+
+    def _declaration_outside(self) -> None:
+        shared = self._qualifiers()
+        if self._has(";"):
+            return
+        if self._ahead() == "{":  # a block of GLSL: its members are names of the text
+            self._take()
+            self.text.outside += [(member, None) for member in self._members()]
+            if self._now != ";":
+                self._take()
+            self._take(";")
+            return
+        also, type_ = self._qualified()
+        name = self._take()
+        if self._now != "(":
+            self.at -= 1
+            self._variables(type_, shared or also, self.text.outside)
+            return
+        takes = self._parameters()
+        self._qualifiers()
+        if not self._has(";"):
+            self.text.functions[name] = Function(name, takes, self._block())
+
+    def _parameters(self) -> list[Variable]:
+        self._take("(")
+        found = []
+        while not self._has(")"):
+            shared, type_ = self._qualified()
+            if type_.kind == "void" and self._now == ")":
+                continue
+            found.append(self._variable(type_, shared))
+            self._has(",")
+        return found
+
+    def _variables(self, type_: Type, shared: bool, into: list[tuple[Variable, Any]]) -> None:
+        """Read declared names with their values, up to the semicolon."""
+        while True:
+            own = Type(type_.kind, type_.width, pointer=True) if self._has("*") else type_
+            self._qualifiers()
+            found = self._variable(own, shared)
+            into.append((found, self._value() if self._has("=") else None))
+            if not self._has(","):
+                break
+        self._take(";")
+
+    def _value(self) -> Tree:
+        """Read the value of a declaration: an expression, or a list in braces."""
+        if not self._has("{"):
+            return self._expression()
+        found = []
+        while not self._has("}"):
+            found.append(self._value())
+            self._has(",")
+        return ("list", found)
+
+    # ---- statements ----------------------------------------------------------------------------------------
+
+    def _block(self) -> Tree:
+        self._take("{")
+        found = []
+        while not self._has("}"):
+            found.append(self._statement())
+        return ("block", found)
+
+    def _statement(self) -> Tree:
+        if self._now == "{":
+            return self._block()
+        if self._has(";"):
+            return ("block", [])
+        if self._now == "_Pragma":
+            self._take()
+            self._skip_brackets("(", ")")
+            return self._statement()
+        if self._now in ("for", "if", "return"):
+            found: Tree = getattr(self, f"_read_{self._take()}")()
+            return found
+        if self._declares():
+            return self._declare()
+        done = self._expression()
+        self._take(";")
+        return ("do", done)
+
+    def _declares(self) -> bool:
+        """Return whether a declaration begins here: a type and a name behind it, not a cast or a call."""
+        return self._is_type() and self._ahead() != "("
+
+    def _declare(self) -> Tree:
+        if self._now == "union":
+            return self._union()
+        shared, type_ = self._qualified()
+        found: list[tuple[Variable, Any]] = []
+        self._variables(type_, shared, found)
+        pairs: list[Tree] = [("declare", variable, value) for variable, value in found]
+        return pairs[0] if len(pairs) == 1 else ("declarations", pairs)
+
+    def _union(self) -> Tree:
+        """Read a union of arrays, which are the same numbers."""
+        self._take("union")
+        members = self._members()
+        name = self._take()
+        self._take(";")
+        return ("union", name, members)
+
+    def _read_for(self) -> Tree:
+        self._take("(")
+        start = self._statement()
+        condition = self._expression()
+        self._take(";")
+        step = self._expression()
+        self._take(")")
+        return ("for", start, condition, step, self._statement())
+
+    def _read_if(self) -> Tree:
+        self._take("(")
+        condition = self._expression()
+        self._take(")")
+        then = self._statement()
+        return ("if", condition, then, self._statement() if self._has("else") else ("block", []))
+
+    def _read_return(self) -> Tree:
+        value = None if self._now == ";" else self._expression()
+        self._take(";")
+        return ("return", value)
+
+    # ---- expressions ---------------------------------------------------------------------------------------
+
+    def _expression(self) -> Tree:
+        target = self._choice()
+        if self._now in ("=", "+=", "-=", "*=", "/=", "|=", "&=", "^=", "<<=", ">>="):
+            op = self._take()
+            return ("assign", op[:-1], target, self._value() if self._now == "{" else self._expression())
+        return target
+
+    def _choice(self) -> Tree:
+        condition = self._binary(0)
+        if not self._has("?"):
+            return condition
+        then = self._expression()
+        self._take(":")
+        return ("choice", condition, then, self._expression())
+
+    def _binary(self, level: int) -> Tree:
+        if level == len(BINARY):
+            return self._unary()
+        found = self._binary(level + 1)
+        while self._now in BINARY[level] and self.tokens[self.at][0] == "sign":
+            op = self._take()
+            found = ("binary", op, found, self._binary(level + 1))
+        return found
+
+    def _unary(self) -> Tree:
+        if self._now in ("-", "+", "!", "~", "&", "*"):
+            op = self._take()
+            return ("unary", op, self._unary())
+        if self._now in ("++", "--"):
+            op = self._take()
+            return ("step", op, self._unary())
+        cast = self._cast()
+        return self._postfix(self._primary()) if cast is None else cast
+
+    def _cast(self) -> Tree | None:
+        """Read `(type)value`, `(type){...}` or `(type)(a, b, ...)`."""
+        at = self.at
+        if not self._has("("):
+            return None
+        if not self._is_type():
+            self.at = at
+            return None
+        _, type_ = self._qualified()
+        if not self._has(")"):
+            self.at = at
+            return None
+        if self._now == "{":
+            return self._postfix(("cast", type_, self._value()))
+        if type_.width > 1 and self._now == "(":
+            self._take()
+            values = self._values(")")
+            return self._postfix(("cast", type_, values[0] if len(values) == 1 else ("list", values)))
+        return ("cast", type_, self._unary())
+
+    def _values(self, closing: str) -> list[Tree]:
+        found: list[Tree] = []
+        while not self._has(closing):
+            found.append(self._expression())
+            self._has(",")
+        return found
+
+    def _primary(self) -> Tree:
+        kind, text, line = self.tokens[self.at]
+        if kind == "number":
+            return ("number", self._take())
+        if kind == "name":
+            return ("name", self._take())
+        if text == "(":
+            self._take()
+            found = self._expression()
+            self._take(")")
+            return found
+        raise Unread(f"line {line}: {text!r}")
+
+    def _postfix(self, found: Tree) -> Tree:
+        while True:
+            if self._has("("):
+                found = ("call", found, self._values(")"))
+            elif self._has("["):
+                found = ("at", found, self._expression())
+                self._take("]")
+            elif self._has(".") or self._has("->"):
+                found = ("of", found, self._take())
+            elif self._now in ("++", "--"):
+                found = ("step", self._take(), found)
+            else:
+                return found
+
+
+def constant(tree: Tree) -> int:
+    """Return the value of an expression of literal integers."""
+    if tree[0] == "number":
+        return int(tree[1].rstrip("uU"), 0)
+    if tree[0] == "binary" and tree[1] in ("+", "-", "*", "/"):
+        a, b = constant(tree[2]), constant(tree[3])
+        return {"+": a + b, "-": a - b, "*": a * b, "/": a // b if b else 0}[tree[1]]
+    raise Unread(f"the size of a type: {tree!r}")

@@ -1,0 +1,114 @@
+"""The parser of WGSL: expressions and most statements are those of syntax.py, declarations are its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .lanes import Unread
+from .syntax import SCALARS, Function, Parser, Tree, Type, Variable
+
+
+class WgslParser(Parser):
+    """Reads one text of WGSL."""
+
+    def _outside(self) -> None:
+        while self._has("@"):
+            name = self._take()
+            if self._now == "(":
+                at = self.at
+                self._skip_brackets("(", ")")
+                if name == "workgroup_size":
+                    words = [t[1] for t in self.tokens[at : self.at] if t[0] == "number"]
+                    self.text.group = tuple(map(int, words))
+        word = self._take()
+        if word == "struct":
+            name = self._take()
+            self.text.structs[name] = self._members_of("{", "}")
+            self._has(";")
+        elif word in ("var", "const", "override"):
+            self.at -= 1
+            self.text.outside.append(self._declare()[1:])
+        elif word == "alias":
+            name = self._take()
+            self._take("=")
+            self.types[name] = self._type()
+            self._take(";")
+        elif word in ("requires", "enable", "diagnostic"):
+            while not self._has(";"):
+                self._take()
+        elif word == "fn":
+            name = self._take()
+            takes = self._members_of("(", ")")
+            if self._has("-"):
+                self._take(">")
+                self._type()
+            self.text.functions[name] = Function(name, takes, self._block())
+        elif word != ";":
+            raise Unread(f"line {self.tokens[self.at - 1][2]}: {word!r}")
+
+    def _members_of(self, opening: str, closing: str) -> list[Variable]:
+        """Read names with types between brackets."""
+        self._take(opening)
+        found = []
+        while not self._has(closing):
+            while self._has("@"):
+                self._take()
+                if self._now == "(":
+                    self._skip_brackets("(", ")")
+            found.append(self._typed(self._take()))
+            self._has(",")
+        return found
+
+    def _typed(self, name: str, shared: bool = False) -> Variable:
+        """Read `: type`, if there is one; sizes of arrays belong to the variable."""
+        found = Variable(name, Type("auto"), shared=shared)
+        if self._has(":"):
+            found.type = self._sized(found.sizes)
+        return found
+
+    def _sized(self, sizes: list[Any]) -> Type:
+        if self._now != "array":
+            return self._type()
+        self._take()
+        self._take("<")
+        inner: list[Any] = []
+        element = self._sized(inner)
+        sizes += [self._binary(8) if self._has(",") else None, *inner]
+        self._take(">")
+        return element
+
+    def _type(self) -> Type:
+        name = self._take()
+        if name == "ptr":
+            self._take("<")
+            self._take()
+            self._take(",")
+            found = self._sized([])
+            self._take(">")
+            return Type(found.kind, found.width, pointer=True)
+        if name[:3] == "vec" and name[3:4].isdigit() and self._has("<"):
+            inner = self._type()
+            self._take(">")
+            return Type(inner.kind, int(name[3]))
+        if name in SCALARS or name in self.types:
+            return self.types[name]
+        if name in self.text.structs:
+            return Type(name)
+        raise Unread(f"line {self.tokens[self.at - 1][2]}: type {name!r}")
+
+    def _declares(self) -> bool:
+        return self._now in ("var", "let", "const")
+
+    def _declare(self) -> Tree:
+        self._take()
+        shared = False
+        if self._has("<"):
+            while not self._has(">"):
+                shared |= self._take() == "workgroup"
+        variable = self._typed(self._take(), shared)
+        value = self._expression() if self._has("=") else None
+        self._take(";")
+        return ("declare", variable, value)
+
+    def _is_type(self) -> bool:
+        return False

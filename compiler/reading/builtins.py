@@ -1,0 +1,120 @@
+"""Functions that the languages bring, as far as kernels call them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .field import Number, blended, choice, expression, hashed, literal
+from .lanes import Wrong, chosen, clamped
+from .memory import Pointer, Texel, Weights
+
+if TYPE_CHECKING:
+    from .machine import Machine
+
+
+def extreme(name: str, sign: int) -> Callable[..., Any]:
+    """Return min or max, of numbers or of integers."""
+
+    def of_two(machine: Machine, a: Any, b: Any) -> Any:
+        if isinstance(a, Number) or isinstance(b, Number):
+            return expression(name, *machine.both(a, b), commutes=True)
+        return clamped(a, b, sign)
+
+    return of_two
+
+
+MINIMUM, MAXIMUM = extreme("minimum", -1), extreme("maximum", 1)
+
+
+def clamp(machine: Machine, value: Any, low: Any, high: Any) -> Any:
+    """Return a value between two others."""
+    return MINIMUM(machine, MAXIMUM(machine, value, low), high)
+
+
+def select(machine: Machine, no: Any, yes: Any, where: Any) -> Any:
+    """Return WGSL's choice."""
+    if isinstance(where, Number):
+        return choice(where, *machine.both(yes, no))
+    return choose(machine, where, yes, no)
+
+
+def choose(machine: Machine, where: Any, a: Any, b: Any) -> Any:
+    """Return a in some lanes and b in the others."""
+    if isinstance(where, bool):
+        return a if where else b
+    if isinstance(a, Number) or isinstance(b, Number):
+        return blended(*machine.both(a, b), where)
+    if isinstance(a, (bool, np.ndarray)):
+        return np.where(where, a, b)
+    if a is None or b is None:
+        raise Wrong("a variable is written in some lanes only")
+    return chosen(machine.lanes, where, a, b)
+
+
+def of_one(name: str) -> Callable[..., Any]:
+    """Return a function of one number."""
+    return lambda machine, a: expression(name, a)
+
+
+def conversion(kind: str) -> Callable[..., Any]:
+    """Return a conversion to a kind of number; coordinates stay as they are."""
+
+    def convert(machine: Machine, a: Any) -> Any:
+        if isinstance(a, Number):
+            return machine.cast(a, kind)
+        return literal(a, kind) if kind == "float32" and isinstance(a, int) else a
+
+    return convert
+
+
+def as_int(machine: Machine, a: Number) -> Number:
+    """Return the bits of a float, of which only the magnitude's are known [`bits`]."""
+    return Number(a.value, hashed("bits", a.known), "int32", compared=(a, a))
+
+
+def as_float(machine: Machine, a: Number) -> Number:
+    """Return the float of a magnitude's bits."""
+    if a.compared is None or not np.array_equal(
+        a.known, hashed("magnitude", hashed("bits", a.compared[0].known))
+    ):
+        raise Wrong("it makes a float of other bits than a magnitude's")
+    return expression("absolute", a.compared[0])
+
+
+def bits(name: str, a: Number, b: Number) -> Number:
+    """Return what an operator of bits makes of two integers."""
+    if name == "bitwise_and" and a.compared and b.literal == 0x7FFFFFFF:
+        return Number(a.value, hashed("magnitude", a.known), "int32", compared=a.compared)
+    return expression(name, a, b, commutes=not name.endswith("shift"))
+
+
+def fetch(machine: Machine, image: Any, place: Any, level: Any) -> Any:
+    """Return a texel: of an image, or of the weights."""
+    if not isinstance(image, Pointer):
+        return Texel(image, *place)
+    if not 0 <= place[0] < Weights.TEXELS:
+        raise Wrong(f"the weights have no column {place[0]}")
+    return (image.memory.load(place[1] * Weights.TEXELS + place[0], 1, machine),)
+
+
+def several(machine: Machine, *given: Any) -> Any:
+    """Return a vector of values; one number is each of them."""
+    return given[0] if len(given) == 1 and isinstance(given[0], Number) else list(given)
+
+
+BUILTINS: dict[str, Callable[..., Any]] = {
+    "clamp": clamp, "select": select, "texelFetch": fetch,
+    "textureSize": lambda machine, image, level: image.size,
+    **dict.fromkeys(("min", "fmin", "fminf"), MINIMUM), **dict.fromkeys(("max", "fmax", "fmaxf"), MAXIMUM),
+    **dict.fromkeys(("floor", "floorf"), of_one("floor")),
+    **dict.fromkeys(("fabs", "fabsf", "abs"), of_one("absolute")),
+    **dict.fromkeys(("int", "i32", "convert_int"), conversion("int32")),
+    **dict.fromkeys(("uint", "u32", "convert_uint"), conversion("uint32")),
+    **dict.fromkeys(("float", "f32", "convert_float"), conversion("float32")),
+    **dict.fromkeys(("ivec2", "vec4"), several),
+    **{f"as_int{n}": as_int for n in ("", 4, 8, 16)}, **{f"as_float{n}": as_float for n in ("", 4, 8, 16)},
+}  # fmt: skip
+"""By name: called with the machine and the arguments."""

@@ -1,0 +1,415 @@
+"""A machine that runs the text of a kernel on the numbers of field.py, in all lanes at once.
+
+Integers are Python's, or `Place`s where lanes differ [lanes.py]. Loops run as often as they say. Reading what
+was not written, reading or writing beyond an array or a picture, and branching on a number of the picture are
+refused; so is what the machine does not know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .builtins import bits, choose
+from .field import Number, blended, choice, difference, expression, literal, part_of, product, stacked, total
+from .lanes import Lanes, Mask, Place, Unread, Wrong, plus, times
+from .memory import Memory, Pointer
+from .syntax import Text, Tree, Type, Variable
+
+COMPARES: dict[str, Callable[[Any], Any]] = {
+    "<": lambda d: d < 0, ">": lambda d: d > 0, "<=": lambda d: d <= 0,
+    ">=": lambda d: d >= 0, "==": lambda d: d == 0, "!=": lambda d: d != 0,
+}  # fmt: skip
+"""Comparisons by the sign of a difference."""
+
+MOST_TURNS = 2**16
+"""Most turns of a loop: no kernel comes near, and one that does not end is refused."""
+
+BITS: dict[str, tuple[str, Callable[[int, int], int]]] = {
+    "&": ("bitwise_and", int.__and__), "|": ("bitwise_or", int.__or__), "^": ("bitwise_xor", int.__xor__),
+    ">>": ("right_shift", int.__rshift__), "<<": ("left_shift", int.__lshift__),
+}  # fmt: skip
+"""Operators of bits: a program's name of each, and what it makes of Python's integers."""
+
+
+class Machine:
+    """Runs one text: `call(name, arguments)`; `outside` are the names that the text does not declare."""
+
+    def __init__(
+        self,
+        text: Text,
+        lanes: Lanes,
+        outside: dict[str, Any],
+        builtins: dict[str, Callable[..., Any]],
+        added: Callable[[Number, Mask], Number],
+    ) -> None:
+        self.text, self.lanes, self.builtins, self.added = text, lanes, builtins, added
+        self.mask: Mask | None = None
+        self.entered: Mask | None = None
+        self.base = 0
+        self.frames: list[dict[str, Any]] = [dict(outside)]
+        for variable, value in text.outside:
+            if variable.name not in self.frames[0]:
+                self._declare(variable, value)
+        self.returned: list[Any] = []
+
+    # ---- names ---------------------------------------------------------------------------------------------
+
+    def _find(self, name: str) -> dict[str, Any]:
+        frame: dict[str, Any]
+        for frame in reversed(self.frames[self.base :]):
+            if name in frame:
+                return frame
+        if name not in self.frames[0]:
+            raise Wrong(f"{name} is not declared")
+        return self.frames[0]
+
+    def _declare(self, variable: Variable, value: Tree | None) -> None:
+        type_, given = variable.type, None if value is None else self.value(value, variable.type)
+        if variable.sizes:
+            sizes = tuple(int(self.value(size)) for size in variable.sizes)
+            memory = Memory(variable.name, int(np.prod(sizes)) * type_.width)
+            held = Pointer(memory, 0, type_.width, sizes)
+            for k, one in enumerate(given or []):
+                memory.store(k * type_.width, type_.width, one, self)
+            given = held
+        elif type_.width > 1 and not type_.pointer and not (isinstance(given, list) and not numbers(given)):
+            memory = Memory(variable.name, type_.width)
+            if given is not None:
+                memory.store(0, type_.width, stacked(given) if numbers(given) else given, self)
+            given = Pointer(memory, 0, type_.width, ())
+        self.frames[-1][variable.name] = given
+
+    def written(self, value: Any, name: str) -> Any:
+        """Return a value that every running lane has written."""
+        if value is None or (
+            isinstance(value, Number) and value.held is not None and (~value.held & self.running).any()
+        ):
+            raise Wrong(f"{name} is read before it is written")
+        return value
+
+    @property
+    def running(self) -> Mask:
+        """The lanes (lanes,) in which a statement has an effect now."""
+        return self.lanes.active if self.mask is None else self.mask & self.lanes.active
+
+    # ---- statements ----------------------------------------------------------------------------------------
+
+    def call(self, name: str, given: list[Any]) -> Any:
+        """Run a function of the text, and return its value."""
+        function = self.text.functions[name]
+        frame = {v.name: value for v, value in zip(function.takes, given, strict=True)}
+        outer = self.base, self.entered, self.lanes.active
+        self.base, self.entered = len(self.frames), self.mask
+        self.frames.append(frame)
+        self.returned.append(None)
+        self.run(function.body)
+        del self.frames[self.base :]
+        self.base, self.entered, self.lanes.active = outer
+        return self.returned.pop()
+
+    def run(self, tree: Tree) -> bool:
+        """Run a statement; return whether it ended the function."""
+        return bool(getattr(self, f"_run_{tree[0]}")(*tree[1:]))
+
+    def _run_block(self, statements: list[Tree]) -> bool:
+        self.frames.append({})
+        ended = any(self.run(statement) for statement in statements)
+        self.frames.pop()
+        return ended
+
+    def _run_declare(self, variable: Variable, value: Tree | None) -> None:
+        self._declare(variable, value)
+
+    def _run_declarations(self, pairs: list[Tree]) -> None:
+        for pair in pairs:
+            self.run(pair)
+
+    def _run_union(self, name: str, members: list[Variable]) -> None:
+        sizes = {v.name: int(self.value(v.sizes[0])) for v in members}
+        memory = Memory(name, max(sizes[v.name] * v.type.width for v in members))
+        self.frames[-1][name] = {v.name: Pointer(memory, 0, v.type.width, (sizes[v.name],)) for v in members}
+
+    def _run_do(self, tree: Tree) -> None:
+        self.value(tree)
+
+    def _run_return(self, value: Tree | None) -> bool:
+        if value is not None:
+            if self.returned[-1] is not None or self.mask is not self.entered:
+                raise Wrong("a function returns a value in some lanes only")
+            self.returned[-1] = self.value(value)
+        if self.mask is self.entered:
+            return True
+        assert self.mask is not None
+        self.lanes.active = self.lanes.active & ~self.mask
+        return False
+
+    def _run_if(self, condition: Tree, then: Tree, otherwise: Tree) -> bool:
+        found = self._truth(self.value(condition))
+        if isinstance(found, bool):
+            return self.run(then if found else otherwise)
+        outer = self.mask
+        ended = []
+        for part, branch in ((found, then), (~found, otherwise)):
+            self.mask = part if outer is None else outer & part
+            ended.append(bool((self.mask & self.lanes.active).any()) and self.run(branch))
+        self.mask = outer
+        return False
+
+    def _run_for(self, start: Tree, condition: Tree, step: Tree, body: Tree) -> bool:
+        self.frames.append({})
+        self.run(start)
+        outer, ended, turns = self.mask, False, 0
+        while not ended:
+            turns += 1
+            if turns > MOST_TURNS:
+                raise Wrong(f"a loop runs more than {MOST_TURNS} times")
+            found = self._truth(self.value(condition))
+            if isinstance(found, bool):
+                if not found:
+                    break
+            else:
+                self.mask = found if self.mask is None else self.mask & found
+                if not self.running.any():
+                    break
+            ended = self.run(body)
+            mask, self.mask = self.mask, None
+            self.value(step)
+            self.mask = mask
+        self.mask = outer
+        self.frames.pop()
+        return ended
+
+    def _truth(self, value: Any) -> Any:
+        if isinstance(value, (bool, int)):
+            return bool(value)
+        if isinstance(value, np.ndarray):
+            return value
+        raise Wrong("it branches on a number of the picture")
+
+    # ---- expressions ---------------------------------------------------------------------------------------
+
+    def value(self, tree: Tree, type_: Type | None = None) -> Any:
+        """Return the value of an expression, as a type if one is given."""
+        found = getattr(self, f"_value_{tree[0]}")(*tree[1:])
+        if isinstance(found, Pointer) and found.sizes == ():
+            found = found.load(self)
+        return found if type_ is None else self.converted(found, type_)
+
+    def converted(self, value: Any, type_: Type) -> Any:
+        """Return what a variable of a type holds of a value."""
+        if isinstance(value, list):
+            return [self.converted(one, type_) for one in value]
+        if (
+            type_.pointer
+            or not isinstance(value, (int, Number))
+            or type_.kind == "bool"
+            or isinstance(value, bool)
+        ):
+            return value
+        if type_.kind == "float32" and isinstance(value, int):
+            return literal(value, "float32")
+        if isinstance(value, Number) and value.kind != type_.kind and value.kind != "bool":
+            return self.cast(value, type_.kind)
+        return value
+
+    def cast(self, value: Number, kind: str) -> Number:
+        """Return a number as one of another kind."""
+        if kind not in ("float32", "int32", "uint32") or value.kind == kind:
+            return value
+        return (
+            expression("convert", value, kind=kind) if value.literal is None else literal(value.literal, kind)
+        )
+
+    def _value_number(self, text: str) -> Any:
+        if text.startswith(("0x", "0X")) or not any(c in text for c in ".eEf"):
+            return int(text.rstrip("uUi"), 0)
+        return literal(float(text.rstrip("fF")), "float32")
+
+    def _value_name(self, name: str) -> Any:
+        if name in ("true", "false"):
+            return name == "true"
+        return self.written(self._find(name)[name], name)
+
+    def _value_list(self, values: list[Tree]) -> Any:
+        return [self.value(value) for value in values]
+
+    def _value_call(self, callee: Tree, arguments: list[Tree]) -> Any:
+        if callee[0] != "name":
+            raise Unread("a call of what has no name")
+        name = callee[1]
+        if name in self.text.functions:
+            takes = self.text.functions[name].takes
+            given = [self.value(tree, v.type) for tree, v in zip(arguments, takes, strict=True)]
+            return self.call(name, given)
+        if name not in self.builtins:
+            raise Unread(f"function {name}()")
+        return self.builtins[name](self, *(self.value(tree) for tree in arguments))
+
+    def _value_at(self, array: Tree, index: Tree) -> Any:
+        at, found = self.value(index), getattr(self, f"_value_{array[0]}")(*array[1:])
+        if isinstance(found, Pointer) and found.sizes:
+            return found.at(at)
+        if isinstance(found, Pointer):
+            return Pointer(found.memory, plus(found.offset, at), 1, ())
+        return found.component(at, self) if hasattr(found, "component") else part_of(found, at)
+
+    def _value_of(self, whole: Tree, member: str) -> Any:
+        found = getattr(self, f"_value_{whole[0]}")(*whole[1:])
+        if isinstance(found, dict):
+            return found[member]
+        if isinstance(found, Pointer) and found.sizes in ((), (None,)) and member not in "xyzwrgba":
+            return Pointer(found.memory, found.offset, 1, (found.width,))
+        if isinstance(found, Pointer):
+            found = found.load(self)
+        at = "xyzw".find(member) if member in "xyzw" else "rgba".find(member)
+        if isinstance(found, (tuple, list)):
+            return found[at]
+        return found.component(at, self) if hasattr(found, "component") else part_of(found, at)
+
+    def _value_unary(self, op: str, tree: Tree) -> Any:
+        if op == "&":
+            found = getattr(self, f"_value_{tree[0]}")(*tree[1:])
+            if not isinstance(found, Pointer):
+                raise Wrong("it takes the address of what has none")
+            return Pointer(found.memory, found.offset, found.width)
+        found = self.value(tree)
+        if op == "*":
+            return found.at(0)
+        if op == "-":
+            if isinstance(found, Number):
+                known = found.literal is not None
+                return literal(-found.literal, found.kind) if known else expression("negative", found)  # type: ignore[operator]
+            return times(found, -1)
+        if op == "!":
+            return ~found if isinstance(found, np.ndarray) else not found
+        if op == "+":
+            return found
+        raise Unread(f"operator {op}")
+
+    def _value_binary(self, op: str, left: Tree, right: Tree) -> Any:
+        a = self.value(left)
+        if op in ("&&", "||"):
+            if isinstance(a, bool) and a == (op == "||"):
+                return a
+            b = self.value(right)
+            if isinstance(a, bool):
+                return b
+            return a & b if op == "&&" else a | b
+        return self.operate(op, a, self.value(right))
+
+    def operate(self, op: str, a: Any, b: Any) -> Any:
+        """Return what an operator makes of two values."""
+        if isinstance(a, Number) or isinstance(b, Number):
+            return self._operate_numbers(op, *self.both(a, b))
+        if isinstance(a, Pointer):
+            return Pointer(a.memory, plus(a.offset, times(b, a.width), -1 if op == "-" else 1), a.width)
+        if op in COMPARES:
+            if isinstance(a, Place):
+                return COMPARES[op](a.against(b))
+            if isinstance(b, Place):
+                return COMPARES[op](-b.against(a))
+            return COMPARES[op](a - b)
+        if op in "+-":
+            return plus(a, b, 1 if op == "+" else -1)
+        if op == "*":
+            return times(a, b)
+        if isinstance(a, Place) or isinstance(b, Place):
+            raise Unread(f"operator {op} of coordinates")
+        if op in "/%" and b:
+            return int(a / b) if op == "/" else a - b * int(a / b)
+        if op in BITS:
+            return BITS[op][1](a, b)
+        raise Unread(f"operator {op}")
+
+    def both(self, a: Any, b: Any) -> tuple[Number, Number]:
+        """Return two numbers of one kind: an integer of the text becomes one of the other's."""
+        if isinstance(a, Number) and isinstance(b, Number):
+            return a, b
+        if not isinstance(a, (int, Number)) or not isinstance(b, (int, Number)):
+            raise Wrong("it mixes coordinates and numbers of the picture")
+        kind = next(n.kind for n in (a, b) if isinstance(n, Number))
+        one, other = (n if isinstance(n, Number) else literal(n, kind) for n in (a, b))
+        return one, other
+
+    def _operate_numbers(self, op: str, a: Number, b: Number) -> Number:
+        if op == "+":
+            return self.added(total(a, b), self.running)
+        if op == "-":
+            return difference(a, b)
+        if op == "*":
+            return product(a, b)
+        if op in ("<", ">", "<=", ">="):
+            a, b = (a, b) if op[0] == "<" else (b, a)
+            found = expression("less_equal" if "=" in op else "less", a, b, kind="bool")
+            return Number(found.value, found.shape, "bool", compared=(a, b))
+        if op in BITS:
+            return bits(BITS[op][0], a, b)
+        raise Unread(f"operator {op} of numbers")
+
+    def _value_choice(self, condition: Tree, then: Tree, otherwise: Tree) -> Any:
+        found = self.value(condition)
+        if isinstance(found, bool):
+            return self.value(then if found else otherwise)
+        a, b = self.value(then), self.value(otherwise)
+        if isinstance(found, Number):
+            return choice(found, *self.both(a, b))
+        return choose(self, found, a, b)
+
+    def _value_assign(self, op: str, target: Tree, value: Tree) -> Any:
+        place = getattr(self, f"_value_{target[0]}")(*target[1:]) if target[0] != "name" else None
+        new = self.value(value)
+        if numbers(new):
+            new = new[0] if len(new) == 1 else stacked(new)
+        if target[0] == "name":
+            frame = self._find(target[1])
+            place = frame[target[1]]
+            if not isinstance(place, Pointer) or place.sizes:
+                return self._assign(frame, target[1], op, new)
+        if not isinstance(place, Pointer) or place.sizes:
+            raise Wrong("it assigns to what cannot be written")
+        if op:
+            new = self.operate(op, place.load(self), new)
+        if isinstance(new, int) and not isinstance(new, bool):
+            new = literal(new, "float32")
+        place.store(new, self)
+        return new
+
+    def _assign(self, frame: dict[str, Any], name: str, op: str, new: Any) -> Any:
+        """Write a variable that has no memory."""
+        held = frame[name]
+        if op:
+            new = self.operate(op, self.written(held, name), new)
+        if isinstance(held, Number) and isinstance(new, (int, Number)):
+            new = self.converted(new, Type(held.kind))
+        if self.mask is not None:
+            new = (
+                blended(new, held, self.mask)
+                if isinstance(new, Number)
+                else choose(self, self.mask, new, held)
+            )
+        frame[name] = new
+        return new
+
+    def _value_step(self, op: str, target: Tree) -> Any:
+        return self._value_assign(op[0], target, ("number", "1"))
+
+    def _value_cast(self, type_: Type, tree: Tree) -> Any:
+        found = self.value(tree)
+        if type_.kind == "void":
+            return None
+        if type_.pointer:
+            return Pointer(found.memory, found.offset, type_.width)
+        if isinstance(found, list):
+            found = self.converted(found, type_)
+            return found[0] if len(found) == 1 else stacked(found)
+        if type_.kind == "int32" and isinstance(found, Place):
+            return found
+        return self.converted(found, type_)
+
+
+def numbers(value: Any) -> bool:
+    """Return whether a value is a list of numbers, which make a vector; one of integers does not."""
+    return isinstance(value, list) and bool(value) and all(isinstance(one, Number) for one in value)

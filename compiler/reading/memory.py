@@ -1,0 +1,185 @@
+"""What a text reads and writes: its arrays, the images, the weights and the result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .field import Number, blended, hashed, leaf, part_of, stacked, wide
+from .lanes import Place, Wrong, plus, times
+
+if TYPE_CHECKING:
+    from .claim import Claim
+    from .machine import Machine
+
+
+@dataclass(frozen=True)
+class Pointer:
+    """A place of `width` numbers in a memory; `sizes` of an array, (None,) of a pointer, () of a variable."""
+
+    memory: Any
+    offset: Any
+    width: int = 1
+    sizes: tuple[int | None, ...] = (None,)
+
+    def at(self, index: Any) -> Pointer:
+        """Return the place of an element."""
+        step = self.width
+        for size in self.sizes[1:]:
+            step *= size or 1
+        return Pointer(self.memory, plus(self.offset, times(index, step)), self.width, self.sizes[1:])
+
+    def load(self, machine: Machine) -> Any:
+        """Return what is there."""
+        return self.memory.load(self.offset, self.width, machine)
+
+    def store(self, value: Any, machine: Machine) -> None:
+        """Write a number, or a vector."""
+        self.memory.store(self.offset, self.width, value, machine)
+
+
+class Memory:
+    """An array of a text: what was written, by offset; a vector is several numbers."""
+
+    def __init__(self, name: str, size: int) -> None:
+        self.name, self.size = name, size
+        self.cells: dict[int, tuple[Any, int | None]] = {}
+
+    def _checked(self, offset: Any, width: int) -> int:
+        if not isinstance(offset, int):
+            raise Wrong(f"{self.name} has an index that differs between lanes")
+        if not 0 <= offset <= self.size - width:
+            raise Wrong(f"{self.name} has no number {offset}: it has {self.size}")
+        return offset
+
+    def load(self, offset: Any, width: int, machine: Machine) -> Any:
+        """Return `width` numbers that have been written."""
+        offset = self._checked(offset, width)
+        cells = [self.cells.get(offset + k, (None, None)) for k in range(width)]
+        first = cells[0][0]
+        if width > 1 and wide(first) == width and all(cell == (first, k) for k, cell in enumerate(cells)):
+            return machine.written(first, self.name)
+        parts = [machine.written(part_of(*cell), self.name) for cell in cells]
+        return parts[0] if width == 1 else stacked(parts)
+
+    def store(self, offset: Any, width: int, value: Any, machine: Machine) -> None:
+        """Write `width` numbers, in the lanes that run."""
+        offset = self._checked(offset, width)
+        for k in range(width):
+            new: tuple[Any, int | None] = (value, k if width > 1 else None)
+            if machine.mask is not None:
+                old = self.cells.get(offset + k, (None, None))
+                new = (blended(part_of(*new), part_of(*old), machine.mask), None)
+            self.cells[offset + k] = new
+
+
+class Image:
+    """An image: every number of it is an unknown of the claim."""
+
+    def __init__(self, name: str, channels: int, size: tuple[Place, Place]) -> None:
+        self.name, self.channels, self.size, self.lanes = name, channels, size, size[0].lanes
+
+    def load(self, offset: Any, width: int, machine: Machine) -> Number:
+        """Return numbers of it, each within the picture."""
+        parts = [self._one(plus(offset, k), machine) for k in range(width)]
+        return parts[0] if width == 1 else stacked(parts)
+
+    def _one(self, offset: Any, machine: Machine) -> Number:
+        values = offset.values if isinstance(offset, Place) else np.full(self.lanes.count, offset)
+        count = self.size[0].values * self.size[1].values * self.channels
+        if (((values < 0) | (values >= count)) & machine.running).any():
+            raise Wrong(f"image {self.name} is read beyond its ends")
+        return leaf(hashed(f"image {self.name}", values))
+
+    def store(self, *given: Any) -> None:
+        """Refuse."""
+        raise Wrong(f"image {self.name} is written")
+
+
+@dataclass(frozen=True)
+class Texel:
+    """A pixel of a texture, whose channels are read one by one."""
+
+    image: Image
+    column: Any
+    row: Any
+
+    def component(self, c: int, machine: Machine) -> Number:
+        """Return a channel; the pixel must be within the picture."""
+        for at, size in zip((self.column, self.row), self.image.size, strict=True):
+            values = at.values if isinstance(at, Place) else np.full(size.lanes.count, at)
+            if (((values < 0) | (values >= size.values)) & machine.running).any():
+                raise Wrong(f"image {self.image.name} is read beyond its ends")
+        place = times(plus(times(self.row, self.image.size[0]), self.column), self.image.channels)
+        return self.image.load(plus(place, c), 1, machine)
+
+
+class Weights:
+    """The weights, as a buffer; a texture of them has rows of `TEXELS`."""
+
+    TEXELS = 1024
+
+    def __init__(self, numbers: Number) -> None:
+        self.numbers = numbers
+
+    def load(self, offset: Any, width: int, machine: Machine) -> Number:
+        """Return numbers of the file."""
+        count = self.numbers.value.shape[2]
+        if not isinstance(offset, int) or not 0 <= offset <= count - width:
+            raise Wrong(f"the weights are read at {offset}: there are {count}")
+        part = slice(offset, offset + width) if width > 1 else offset
+        return Number(self.numbers.value[..., part], self.numbers.known[..., part], weight=True)
+
+    def store(self, *given: Any) -> None:
+        """Refuse."""
+        raise Wrong("the weights are written")
+
+
+class Result:
+    """The picture that a text writes: its own pixels, with what the claim says, and all of them."""
+
+    def __init__(self, claim: Claim, channels: int) -> None:
+        self.claim, self.channels = claim, channels
+        self.written = np.zeros((claim.pixels, channels, claim.lanes.count), dtype=bool)
+
+    def store(self, offset: Any, width: int, value: Any, machine: Machine) -> None:
+        """Check numbers that are written."""
+        for k in range(width):
+            self._one(plus(offset, k), part_of(value, k if width > 1 else None), machine)
+
+    def load(self, *given: Any) -> None:
+        """Refuse."""
+        raise Wrong("the result is read")
+
+    def _one(self, offset: Any, value: Any, machine: Machine) -> None:
+        x, width, y, height = self.claim.lanes.known
+        running = machine.running
+        if not running.any():
+            return
+        values = offset.values if isinstance(offset, Place) else np.full(len(x), offset)
+        at = set((values - (y * width + x) * self.channels)[running].tolist())
+        if len(at) != 1 or not 0 <= (place := at.pop()) < self.claim.pixels * self.channels:
+            raise Wrong("it writes a result that is not its own")
+        pixel, channel = divmod(place, self.channels)
+        if ((x + pixel >= width) | (y >= height))[running].any():
+            raise Wrong("it writes a result beyond the picture")
+        self.hold(pixel, channel, value, running)
+
+    def hold(self, pixel: int, channel: int, value: Any, running: Any) -> None:
+        """Check the number of one channel of one pixel, in the lanes that run."""
+        wanted = self.claim.outputs[pixel].known[..., channel]
+        known = value.known if isinstance(value, Number) else np.zeros(1, dtype=np.uint64)
+        if not np.array_equal(np.broadcast_to(known, wanted.shape)[running], wanted[running]):
+            missing = self.claim.missing()
+            why = f": {missing} are never made" if missing else ", though all its sums are made"
+            raise Wrong(f"output {channel} is not the program's{why}")
+        self.written[pixel, channel] |= running
+
+    def complete(self) -> None:
+        """Refuse a text that leaves a pixel out."""
+        x, width, y, height = self.claim.lanes.known
+        for pixel, written in enumerate(self.written):
+            if not written[:, (x + pixel < width) & (y < height)].all():
+                raise Wrong("it leaves a pixel without a result")

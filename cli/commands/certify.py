@@ -1,4 +1,4 @@
-"""`wamnet certify`: check a certificate, and show where the error that it bounds comes from."""
+"""`wamnet certify`: check a certificate and the text beside it, and show where the error comes from."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from typing import Annotated, Any
 import typer
 
 from ...refimpl.errors import InputError
+from ..common.packages import need
 from ..common.terminal import say, table
 
 EXAMPLES = """Examples:
 
 wamnet certify kernel-opencl/denoise.certificate.json
 
-wamnet certify kernel-opencl"""
+wamnet certify kernel-opencl
+
+wamnet certify kernel-opencl --no-text"""
 """Shown below the help of `wamnet certify`."""
 
 STATUS_REFUSED = 1
@@ -30,11 +33,16 @@ def certify(
             show_default=False,
         ),
     ],
+    text: Annotated[
+        bool, typer.Option(help="Read the kernel's text too: does it compute the certified program?")
+    ] = True,
 ) -> None:
-    """Check the proof of a kernel's error bound, step by step, and show what each layer adds.
+    """Check the proof of a kernel's error bound, step by step, and that its text computes what was proven.
 
-    The checker derives every number again, from the weights and the program's text. It ends with status 0 if
-    all steps hold, 1 if one does not, which it names, and 2 if the file is not a certificate.
+    The checker derives every number again, from the weights and the program, and shows what each layer adds.
+    A reader then runs the text on unknowns, for pixels of pictures of any size, and compares every sum and
+    every operation with the program's. Both share no code with the compiler. Status 0: all steps hold; 1: one
+    does not, which is named; 2: the file is not a certificate.
     """
     from ...compiler.artifact import CERTIFICATE_NAME
     from ...compiler.proof.checker import check
@@ -48,16 +56,31 @@ def certify(
         )
     try:
         held = check(path)
+        if held["schema"] == INTEGERS:
+            table(*sums_table(held))
+            say("holds: no operation rounds; every number is the reference's, for all images of integers")
+        else:
+            table(*layers_table(held))
+            bound = max(held["bound"]["output"])
+            say(f"holds: |output - reference| <= {bound:g} for all images in their ranges, {steps_of(bound)}")
+        if text:
+            say(text_of(path))
     except Refused as step:
         say(f"refused: {step}")
         raise typer.Exit(STATUS_REFUSED) from None
-    if held["schema"] == INTEGERS:
-        table(*sums_table(held))
-        say("holds: no operation rounds; every number is the reference's, for all images of integers")
-        return
-    table(*layers_table(held))
-    bound = max(held["bound"]["output"])
-    say(f"holds: |output - reference| <= {bound:g} for all images in their ranges, {steps_of(bound)}")
+
+
+def text_of(path: Path) -> str:
+    """Say what the reader found of the text beside a certificate; `Refused` if it is another program's."""
+    from ...compiler.reading.check import check_text
+    from ...compiler.reading.lanes import Unread
+
+    need("pcpp", "to read the texts of kernels", "cli")
+    try:
+        found = check_text(path)
+    except Unread as error:
+        return f"text: not checked: this reader does not know {error}"
+    return f"text: computes that program: {found['sums']} sums, at {found['lanes']} places that stand for all"
 
 
 def sums_table(held: Any) -> tuple[str, tuple[str, ...], list[list[str]]]:

@@ -1,0 +1,131 @@
+"""Check the text of a kernel against its certificate: `check_text`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..proof.evidence import Refused, read
+from .builtins import BUILTINS
+from .claim import Claim
+from .lanes import Lanes, Place, Unread, Wrong, lanes_for
+from .languages import LANGUAGES, Language, parsed
+from .machine import Machine
+from .memory import Image, Memory, Pointer, Result, Weights
+from .syntax import Text
+
+LANES_SEED = 20261123
+"""Which borders meet in a lane; every run draws other unknowns [field.py]."""
+
+
+MEANINGLESS = (TypeError, ValueError, LookupError, AttributeError, ArithmeticError)
+"""What Python raises where a text does with its values what no text of a kernel does."""
+
+
+def check_text(path: Path) -> dict[str, int]:
+    """Return how much of the text beside a certificate was held against it.
+
+    Raises `Refused` for a text that does not compute the certificate's program, and `Unread` for one with
+    constructs that this reader does not know, or in a language that it does not read.
+    """
+    held, manifest, _, _ = read(path)
+    sources = [name for name in manifest["files"] if name != "weights.bin"]
+    if len(sources) != 1:
+        raise Unread(f"kernels of {len(sources)} texts")
+    weights = np.frombuffer((path.parent / "weights.bin").read_bytes(), "<f4")
+    return run_text((path.parent / sources[0]).read_text(), held, manifest, weights)
+
+
+def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, int]:
+    """Run a text in every lane, once for each kind of compiler that it makes a difference between."""
+    language = LANGUAGES.get(manifest["target"])
+    if language is None:
+        raise Unread(f"texts of target {manifest['target']}")
+    if "group" in manifest["schedule"]:
+        raise Unread("schedules of work groups")
+    pixels = int(manifest["schedule"].get("pixels", 1))
+    window, centre = int(manifest["window"]["size"]), int(manifest["window"]["centre"])
+    cap = window + pixels if pixels > 1 else max(centre, window - centre) + 1
+    lanes = lanes_for(cap, pixels, beyond=not language.within, seed=LANES_SEED)
+    claim = Claim(held, manifest, weights, lanes, pixels)
+    try:
+        for compiler in language.compilers:
+            claim.found.clear()
+            lanes.active = np.ones(lanes.count, dtype=bool)
+            text = parsed(source, language, compiler)
+            run_once(text, claim, manifest, language)
+            if language.host:
+                check_host(text, language.host, manifest["entry_point"], claim)
+    except Wrong as error:
+        raise Refused(f"text: {error}") from error
+    except MEANINGLESS as error:
+        raise Refused(f"text: it has no meaning to this reader ({error})") from error
+    return {"sums": len(claim.tables), "lanes": lanes.count, "compilers": len(language.compilers)}
+
+
+def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> None:
+    """Run a text, parsed: `Wrong` unless it writes the claim's outputs, and nothing else."""
+    lanes, channels = claim.lanes, int(manifest["output"]["channels"])
+    x, width, y, height = (lanes.place(axis) for axis in range(4))
+    result, target = Result(claim, channels), Memory("result", 4)
+    images = {f"image_{name}": Image(name, int(n), (width, height)) for name, n in claim.images}
+    weights = Pointer(Weights(claim.weights), 0)
+    size = {"width": width, "height": height}
+    given: dict[str, Any] = {
+        **size,
+        "size": size,
+        "x": x,
+        "y": y,
+        "weights": weights,
+        "weight_texture": weights,
+    }
+    if language.fragment:
+        given |= {**images, "result": Pointer(target, 0, 4, ())}
+    else:
+        given |= {name: Pointer(image, 0) for name, image in images.items()}
+        given["result"] = Pointer(result, 0)
+    item = Place(lanes, x.values // claim.pixels, x.form / claim.pixels)
+    known = items(lanes, item, y)
+    given |= dict.fromkeys(("invocation", "thread_place"), known["gl_GlobalInvocationID"])
+    names = {name: given[name] for name in {v.name for v, _ in text.outside} & set(given)}
+    names |= {name: known[name] for name in language.brings}
+    builtins = {**BUILTINS, "get_global_id": lambda machine, axis: (item, y)[axis]}
+    machine = Machine(text, lanes, names, builtins, claim.added)
+    entry = manifest["entry_point"] if manifest["entry_point"] in text.functions else "main"
+    machine.call(entry, [given[v.name] for v in text.functions[entry].takes])
+    if language.fragment:
+        for channel in range(channels):
+            result.hold(0, channel, target.load(channel, 1, machine), machine.running)
+    result.complete()
+
+
+def check_host(text: Text, host: str, kernel: str, claim: Claim) -> None:
+    """Refuse a text whose loops do not call the kernel once for each work item, with what they are given."""
+    takes = [v.name for v in text.functions[host].takes]
+    for width, height in ((1, 1), (claim.pixels, 2), (claim.pixels + 1, 1), (3 * claim.pixels - 1, 3)):
+        given: dict[str, Any] = {name: Pointer(Memory(name, 0), 0) for name in takes}
+        given |= {"width": width, "height": height}
+        calls: list[tuple[Any, ...]] = []
+        rest = replace(text, functions={k: v for k, v in text.functions.items() if k != kernel}, outside=[])
+        note = {kernel: lambda machine, *values, calls=calls: calls.append(values)}
+        Machine(rest, claim.lanes, {}, {**BUILTINS, **note}, claim.added).call(host, list(given.values()))
+        places = [(x, y) for y in range(height) for x in range(0, width, claim.pixels)]
+        if calls != [(*given.values(), x, y) for x, y in places]:
+            raise Wrong(f"{host} does not call {kernel} once for each work item")
+
+
+def items(lanes: Lanes, x: Place, y: Place) -> Mapping[str, Any]:
+    """Return the names by which languages call a work item's place; CUDA's blocks have 8 by 4 threads."""
+    inside, block = {}, {}
+    for name, place, n in (("x", x, 8), ("y", y, 4)):
+        inside[name] = lanes.constant(place.values % n)
+        block[name] = Place(lanes, place.values // n, place.form / n)
+    pixel = {"x": x, "y": y}
+    return {
+        "gl_FragCoord": pixel, "gl_GlobalInvocationID": pixel,
+        "threadIdx": inside, "blockIdx": block, "blockDim": {"x": 8, "y": 4},
+    }  # fmt: skip

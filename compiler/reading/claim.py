@@ -1,0 +1,266 @@
+"""What a text must compute: a certificate's program, run on the numbers of field.py.
+
+An affine map is known by the value of its sum. Where the certificate's bound rests on partial sums
+[spec/profiles.md, PRO-6b], each of these is known as well, and a number of its own replaces it: a text that
+does not add up these parts finds no sum of the whole. A sum that has been found is a number of the program
+from there on [`Claim.added`]; all other operations must be those of the program, in its order.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.sine import exact_sine, sine
+from ..proof.evidence import INTEGERS, NODE
+from .field import (
+    Number,
+    P,
+    Words,
+    choice,
+    difference,
+    drawn,
+    expression,
+    hashed,
+    leaf,
+    literal,
+    product,
+    total,
+)
+from .lanes import Lanes, Mask, Unread
+
+COMMUTE = ("minimum", "maximum", "bitwise_and", "bitwise_xor", "bitwise_or")
+"""Operations whose operands may be exchanged, sums and products apart."""
+
+OPERATIONS: dict[str, Callable[[Number, Number], Number]] = {
+    "multiply": product, "add": total, "subtract": difference,
+    **{name: partial(expression, name, commutes=True) for name in COMMUTE},
+    **{name: partial(expression, name) for name in ("right_shift", "left_shift")},
+}  # fmt: skip
+"""Operations of a program's text, in addition to affine maps, sines, constants and conversions."""
+
+
+class Traced(np.lib.mixins.NDArrayOperatorsMixin):
+    """A number that the reference's sine is called with."""
+
+    def __init__(self, number: Number) -> None:
+        self.number = number
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *given: Any) -> Any:
+        a = [one.number if isinstance(one, Traced) else literal(float(one), "float32") for one in given]
+        name = ufunc.__name__
+        if name in OPERATIONS:
+            return Traced(OPERATIONS[name](*a))
+        if name == "less_equal":
+            found = expression(name, *a, kind="bool")
+            return Traced(Number(found.value, found.shape, "bool", compared=(a[0], a[1])))
+        return Traced(expression(name, *a))
+
+    def __array_function__(self, function: Any, types: Any, given: Any, named: Any) -> Any:
+        return Traced(choice(*(one.number for one in given)))
+
+
+class Claim:
+    """The program of a certificate, for each of the `pixels` of every lane; `outputs` has what these are."""
+
+    def __init__(self, held: Any, manifest: Any, raw: Any, lanes: Lanes, pixels: int) -> None:
+        self.text, self.lanes, self.pixels = str(held["program"]), lanes, pixels
+        self.parameters = held["parameters"]
+        self.exact = held["schema"] == INTEGERS
+        self.sine = self._sine(held)
+        self.weights = self._weights(raw)
+        self.tables: list[tuple[NDArray[np.uint32], str, str]] = []
+        self.first: dict[int, tuple[int, int]] = {}
+        self.found: set[int] = set()
+        self.images = re.findall(r"(?m)^  image (\w+): (\d+) ", self.text)
+        (self.window,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", self.text)
+        self.centre = int(manifest["window"]["centre"])
+        self.outputs = [self._pixel(p) for p in range(pixels)]
+
+    def _sine(self, held: Any) -> Any:
+        """Return the sine that the certificate promises, as the spec defines it."""
+        promise = (held.get("sine") or {}).get("text", "")
+        degree = re.fullmatch(r"emitted, odd polynomial of degree (\d+)(, .*)?", promise)
+        if held["profile"] == "exact":
+            return exact_sine
+        return (lambda x: sine(x, int(degree[1]))) if degree else None
+
+    # ---- inputs --------------------------------------------------------------------------------------------
+
+    def _weights(self, raw: NDArray[np.float32]) -> Number:
+        """Return all weights (2, 1, n) of the file: those of the program as unknowns, others as they are."""
+        shape = hashed("weight", np.arange(len(raw)))
+        value = drawn(shape)
+        owned = np.zeros(len(raw), dtype=bool)
+        for place in self.parameters.values():
+            if "base64" in place:
+                raise Unread("weights that the file does not hold")
+            owned[(place["offset"] + np.add.outer(place["rows"], place["columns"])).ravel()] = True
+        for number in np.unique(raw[~owned]):
+            same = ~owned & (raw == number)
+            value[:, same] = literal(float(number), "float32").value
+        return Number(value[:, None], shape[None], weight=True)
+
+    def parameter(self, name: str) -> Number:
+        """Return a parameter's numbers, (2, 1, outputs * inputs) or (2, 1, outputs)."""
+        place = self.parameters[name]
+        at = (place["offset"] + np.add.outer(place["rows"], place["columns"])).ravel()
+        shape = self.weights.known[:, at]
+        return Number(self.weights.value[:, :, at], shape, weight=True)
+
+    def tap(self, image: str, channels: int, column: Any, row: Any, width: Any) -> list[Number]:
+        """Return the numbers of an image's pixel in every lane."""
+        return [
+            leaf(hashed(f"image {image}", (row * width + column) * channels + c)) for c in range(channels)
+        ]
+
+    def _input(self, at: int) -> Number:
+        """Return the window (2, lanes, n) of a pixel of each lane: tap by tap, all images' channels."""
+        x, width, y, height = self.lanes.known
+        taps, zero = [], self.window[2] == "zero"
+        for dy in range(int(self.window[0])):
+            for dx in range(int(self.window[1])):
+                column, row = x + at + dx - self.centre, y + dy - self.centre
+                pixel = np.clip(row, 0, height - 1) * width + np.clip(column, 0, width - 1)
+                for name, channels in self.images:
+                    for c in range(int(channels)):
+                        number = leaf(hashed(f"image {name}", pixel * int(channels) + c))
+                        if zero:
+                            inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+                            nothing = literal(0.0, "float32")
+                            value = np.where(inside, number.value, nothing.value)
+                            number = Number(value, np.where(inside, number.known, nothing.known))
+                        taps.append(number)
+        return Number(np.stack([t.value for t in taps], axis=-1), np.stack([t.known for t in taps], axis=-1))
+
+    # ---- the program ---------------------------------------------------------------------------------------
+
+    def _pixel(self, pixel: int) -> Number:
+        """Return the outputs of a pixel of each lane, and make a table of its sums."""
+        values: dict[str, Number] = {}
+        for m in filter(None, map(NODE.fullmatch, self.text.splitlines())):
+            number, op, named = m[1], m[2], dict(p.split("=") for p in (m[4] or "").split(", ") if p)
+            given = [values[i] for i in re.findall(r"%(\d+)", m[3])]
+            kind = m[0].rpartition(" : ")[2].partition("[")[0]
+            if op == "input":
+                values[number] = self._input(pixel)
+            elif op == "affine":
+                values[number] = self._affine(number, given[0], named, is_window=values["0"] is given[0])
+            elif op == "constant":
+                values[number] = literal(float(named["value"]), kind)
+            elif op == "parameter":
+                values[number] = self.parameter(named["name"])
+            elif op == "convert":
+                values[number] = (
+                    expression("convert", given[0], kind=kind) if given[0].kind != kind else given[0]
+                )
+            elif op == "sin" and self.sine:
+                values[number] = self.sine(Traced(given[0])).number
+            elif op in OPERATIONS:
+                values[number] = OPERATIONS[op](*given)
+            else:
+                raise Unread(f"operation {op} of %{number}")
+        (output,) = re.findall(r"(?m)^  output \w+ = %(\d+)$", self.text)
+        return values[output]
+
+    def _affine(self, node: str, given: Number, named: Any, is_window: bool) -> Number:
+        """Return W x + b, and note its value and those of its parts."""
+        weight = self.parameter(named["weight"])
+        outputs = self.parameters[named["weight"]]["shape"][0]
+        matrix = weight.value[:, 0].reshape(2, outputs, -1)
+        whole: Any = np.zeros((2, 1, 1), dtype=np.uint64)
+        parts = self._parts(matrix.shape[2]) if is_window and not self.exact else []
+        for name, part in parts if len(parts) > 1 else []:
+            own = dot(given.value[..., part], matrix[..., part])
+            self._note(own, "part", f"the sum of %{node} over {name}")
+            whole = (whole + renamed(own)) % P
+        if len(parts) < 2:
+            whole = dot(given.value, matrix)
+        if "bias" in named:
+            whole = (whole + self.parameter(named["bias"]).value) % P
+        self._note(whole, "sum", f"the sums of %{node}")
+        return Number(whole, hashed("found", *whole))
+
+    def _parts(self, n: int) -> list[tuple[str, NDArray[np.intp]]]:
+        """Return the partial sums of a window: of each image and row of taps."""
+        counts = [int(channels) for _, channels in self.images]
+        owner = np.tile(np.repeat(np.arange(len(counts)), counts), n // sum(counts))
+        rows = int(self.window[0])
+        row = np.repeat(np.arange(rows), n // rows)
+        return [
+            (f"image {name}, row {y}", np.flatnonzero((owner == i) & (row == y)))
+            for i, (name, _) in enumerate(self.images)
+            for y in range(rows)
+        ]
+
+    def _note(self, value: Words, kind: str, name: str) -> None:
+        """Keep sums (2, lanes, n), to be found by the first lane's numbers."""
+        for j, word in enumerate(value[0, 0].tolist()):
+            self.first.setdefault(word, (len(self.tables), j))
+        self.tables.append((value.astype(np.uint32), kind, name))
+
+    # ---- what a text has found -----------------------------------------------------------------------------
+
+    def added(self, number: Number, running: Mask) -> Number:
+        """Return a sum of a text: a number of the program, or a part, if it is one; else as it is."""
+        if number.shape is not None or number.value.shape[1] == 1:
+            return number
+        words = number.value[0, 0] % P
+        if words.ndim == 0:
+            hit = self.first.get(int(words))
+            if hit is None or not self._is(number.value, hit, running):
+                return number
+            return self._found(number.value, hit[0], np.ones(1, dtype=bool)[0])
+        hits = [self.first.get(word) for word in words.tolist()]
+        if not any(hits):
+            return number
+        good = [h is not None and self._is(number.value[..., k], h, running) for k, h in enumerate(hits)]
+        if not any(good):
+            return number
+        table = next(h[0] for h, ok in zip(hits, good, strict=True) if h and ok)
+        return self._found(number.value, table, np.array(good))
+
+    def _is(self, value: Words, hit: tuple[int, int], running: Mask) -> bool:
+        (table, j), value = hit, value % P
+        wanted = self.tables[table][0][..., j]
+        return bool(running.all() and np.array_equal(value, wanted)) or np.array_equal(
+            value[:, running], wanted[:, running]
+        )
+
+    def _found(self, value: Words, table: int, good: Any) -> Number:
+        self.found.add(table)
+        value = value % P
+        if self.tables[table][1] == "part":
+            return Number(np.where(good, renamed(value), value))
+        return Number(value, np.where(good, hashed("found", *value), hashed("sum", *value)))
+
+    def missing(self) -> str | None:
+        """Return the first sum of the program that a text has not made."""
+        return next((name for k, (_, _, name) in enumerate(self.tables) if k not in self.found), None)
+
+
+def renamed(value: Words) -> Words:
+    """Return the number that stands for a part in the sums that it goes into."""
+    return drawn(hashed("part", *value))
+
+
+def dot(given: Words, matrix: Words) -> Words:
+    """Return the sums (2, lanes, m) of products of (2, lanes, n) and (2, m, n) in the field.
+
+    Halves of 16 bits: their products, added up, stay below 2^53.
+    """
+
+    def halves(a: Words) -> list[Any]:
+        return [(a & np.uint64(0xFFFF)).astype(np.float64), (a >> np.uint64(16)).astype(np.float64)]
+
+    (a0, a1), (b0, b1) = halves(given), halves(matrix.transpose(0, 2, 1))
+    sums = [(a0 @ b0), (a0 @ b1 + a1 @ b0), (a1 @ b1)]
+    low, middle, high = (s.astype(np.uint64) % P for s in sums)
+    shift = np.uint64(16)
+    found: Words = (low + (middle << shift) % P + ((high << shift) % P << shift) % P) % P
+    return found

@@ -1,0 +1,189 @@
+"""Reading kernels' texts: the compiler's own are accepted in each language, faults are not (spec/text.md)."""
+
+import importlib.util
+import json
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wamnet.compiler import artifact
+from wamnet.compiler.compile import compile_plan, compile_program
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.proof.evidence import Refused, read
+from wamnet.compiler.reading import field
+from wamnet.compiler.reading.check import check_text, run_text
+from wamnet.compiler.reading.lanes import Place, Unread, Wrong, lanes_for
+from wamnet.compiler.reading.languages import LANGUAGES
+from wamnet.compiler.variants import plan_model
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
+
+pytest.importorskip("pcpp", reason="the preprocessor of texts is missing: pip install 'wamnet[cli]'")
+
+ROOT = Path(__file__).parents[2]
+FAULTS = importlib.util.spec_from_file_location("text_faults", ROOT / "experiments" / "text_faults.py")
+NAME = artifact.CERTIFICATE_NAME
+
+
+def model(size=3, border="zero", activation="sine", seed=5):
+    network = siren.init((size**2 * 6, 6, 5, 3), 1.0, 3.0, seed, activation=activation)
+    return Model(network, ("color", "normal"), Window(size, border), Normalization())
+
+
+def kernel(folder, target, schedule="plain", **kwargs):
+    """Write a kernel; return its certificate's path."""
+    artifact.write(compile_program(lower(model(**kwargs)), target, schedule=schedule), folder)
+    return folder / NAME
+
+
+def parts(path):
+    """Return the text of a kernel, its certificate, manifest and weights."""
+    held, manifest, _, _ = read(path)
+    (name,) = (name for name in manifest["files"] if name != "weights.bin")
+    weights = np.frombuffer((path.parent / "weights.bin").read_bytes(), "<f4")
+    return (path.parent / name).read_text(), held, manifest, weights
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    return parts(kernel(tmp_path_factory.mktemp("plain"), "opencl"))
+
+
+def changed(given, old, new, count=1):
+    source, *others = given
+    assert source.count(old) >= count, f"the text has no {old!r}"
+    return (source.replace(old, new, count), *others)
+
+
+@pytest.mark.parametrize("target", sorted(LANGUAGES))
+@pytest.mark.parametrize(("size", "border"), [(3, "zero"), (4, "clamp")])
+def test_plain_texts_compute_what_is_certified(target, size, border, tmp_path):
+    """TXT-1, TXT-7: every language that is read."""
+    found = check_text(kernel(tmp_path, target, size=size, border=border))
+    # Two images' rows of taps, the whole of the first layer, and the two others.
+    assert found["sums"] == 2 * size + 3
+
+
+@pytest.mark.parametrize(("target", "schedule"), [("c", "tile8"), ("opencl", "tile8"), ("opencl", "tile16")])
+@pytest.mark.parametrize("activation", ["sine", "relu"])
+def test_register_tiles_compute_what_is_certified(target, schedule, activation, tmp_path):
+    path = kernel(tmp_path, target, schedule, activation=activation)
+    pixels = json.loads((tmp_path / "manifest.json").read_text())["schedule"]["pixels"]
+    assert pixels > 1
+    assert check_text(path)["sums"] == pixels * 9
+
+
+@pytest.mark.parametrize("target", ["c", "opencl", "opengl", "wgsl"])
+@pytest.mark.parametrize("size", [3, 4])
+def test_texts_of_integers_compute_what_is_certified(target, size, tmp_path):
+    plan = plan_model(model(size=size, border="clamp"), target, variant="whole8")
+    artifact.write(compile_plan(plan), tmp_path)
+    assert check_text(tmp_path / NAME)["sums"] == 3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ("part1[j] = 0.0f;", ";", "read before it is written"),
+        ("weights[(tap + c) * 6 + j]", "weights[(tap + c) * 6 + j + 1]", "never made"),
+        ("v1[j] += part1[j];", "v1[j] += part1[j] + weights[0] - weights[0];", "never made"),
+        ("height - 1);", "height);", "beyond its ends|never made"),
+        ("x >= width || ", "", "beyond"),
+        ("t16 * t38", "t16 * t37", "the sums of %4 are never made"),
+        ("[(y * width + x) * 3 + i] =", "[(y * width + x) * 3 + 2 - i] =", "not the program's"),
+        ("i < 3; ++i) {\n        result", "i < 2; ++i) {\n        result", "without a result"),
+        ("0.318309873f", "0.318309903f", "the sums of %4 are never made"),
+    ],
+)
+def test_faults_are_named(plain, old, new, why):
+    with pytest.raises(Refused, match=why):
+        run_text(*changed(plain, old, new))
+
+
+def test_a_sum_in_another_order_is_accepted(plain):
+    """Any order is what the bound allows; parts of rows are not to be mixed."""
+    assert run_text(*changed(plain, "for (int c = 0; c < 3; ++c)", "for (int c = 2; c >= 0; --c)"))
+    turned = changed(plain, "part1[j] = 0.0f;", "if (dy == 0) { part1[j] = 0.0f; }")
+    with pytest.raises(Refused, match="never made"):
+        run_text(*turned)
+
+
+def test_what_is_not_known_is_not_skipped(plain):
+    with pytest.raises(Unread, match="barrier"):
+        run_text(*changed(plain, "float v1[6];", "float v1[6]; barrier(1);"))
+    with pytest.raises(Unread, match="line"):
+        run_text(*changed(plain, "float v1[6];", "while (x < 0) { x = 0; } float v1[6];"))
+
+
+@pytest.mark.parametrize(("target", "schedule", "count"), [("opencl", "plain", 60), ("c", "tile8", 12)])
+def test_planted_faults_are_noticed(target, schedule, count, tmp_path):
+    """TXT-8: what holds the reader."""
+    module = importlib.util.module_from_spec(FAULTS)
+    FAULTS.loader.exec_module(module)
+    source, *others = parts(kernel(tmp_path, target, schedule))
+    every = [f for f in module.faults(source) if not spare(source, f)]
+    random.Random(7).shuffle(every)
+    for fault in every[:count]:
+        assert not accepted(source[: fault.start] + fault.new + source[fault.end :], *others), fault
+
+
+def accepted(*given):
+    try:
+        return run_text(*given)
+    except (Refused, Unread):
+        return None
+
+
+def spare(source, fault):
+    """Return whether a fault makes an array larger, which changes nothing."""
+    before = source[: fault.start].rpartition("\n")[2]
+    return before.strip().startswith(("float", "union")) and "[" in before and "=" not in before
+
+
+def test_numbers_that_cancel_are_seen():
+    """(a + b) - b is a in a field; its magnitudes say otherwise."""
+    a, b = (field.product(w, x) for w, x in [unknowns(1), unknowns(2)])
+    twice = field.difference(field.total(a, b), b)
+    assert np.array_equal(twice.value[0] % field.P, a.value[0] % field.P)
+    assert not np.array_equal(twice.value[1] % field.P, a.value[1] % field.P)
+
+
+def unknowns(n):
+    """Return a weight and a number of an image."""
+    weight = field.leaf(field.hashed("weight", np.array([n])), weight=True)
+    return weight, field.leaf(field.hashed("image", np.array([n])))
+
+
+def test_sums_do_not_depend_on_their_order():
+    terms = [field.product(*unknowns(n)) for n in range(5)]
+    one, other = terms[0], terms[-1]
+    for term in terms[1:]:
+        one = field.total(one, term)
+    for term in terms[:-1]:
+        other = field.total(term, other)
+    assert np.array_equal(one.value % field.P, other.value % field.P)
+
+
+def test_lanes_decide_what_may_be_compared():
+    lanes = lanes_for(4, 1, beyond=False, seed=1)
+    x, width, y = (lanes.place(axis) for axis in (0, 1, 2))
+    assert isinstance(x, Place)
+    assert (x.plus(4).against(width) < 0).any()
+    with pytest.raises(Wrong, match="beyond 4"):
+        x.plus(5).against(0)
+    with pytest.raises(Wrong, match="no lane decides"):
+        x.against(y)
+    with pytest.raises(Wrong, match="no lane decides"):
+        x.times(width).against(3)
+
+
+def test_lanes_have_every_case_of_a_row():
+    """Each distance to both borders up to the cap, and beyond it, with the other axis far away."""
+    lanes = lanes_for(3, 1, beyond=False, seed=1)
+    x, width, y, height = lanes.known
+    far = (y > 3) & (height - 1 - y > 3)
+    cases = {(min(a, 4), min(b, 4)) for a, b in zip(x[far], (width - 1 - x)[far], strict=True)}
+    assert cases == {(a, b) for a in range(5) for b in range(5)}

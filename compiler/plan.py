@@ -168,7 +168,9 @@ class Plan:
         errors = bounds.output_errors(program, found)[program.outputs[0][0]]
         if not all(math.isfinite(error) for error in errors):
             return Bound(None, tuple(ranges))
-        proof = None if self.cut else certificate.prove(program, found, self.sine)
+        proof = (
+            None if self.cut else certificate.prove(program, found, self.sine, self.schedule.spectra(program))
+        )
         return Bound(proof.bound if proof else tuple(float(e) for e in errors), tuple(ranges), proof)
 
     @cached_property

@@ -18,7 +18,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,8 +29,9 @@ from ..core.enclosure import round_up
 from ..core.ir import Program
 from ..core.profiles import FLUSH, UNIT_ROUNDOFF, SineContract
 from ..core.sums import parts, rounding
-from . import bounds, scaled, whole
+from . import bounds, scaled, spectra, spectra_search, whole
 from .evidence import FLOATS, INTEGERS
+from .spectra import Spectra
 
 if TYPE_CHECKING:
     from ..schedules.schedules import Schedule
@@ -56,27 +57,69 @@ class Proof:
     bound: tuple[float, ...]
 
 
-def prove(program: Program, found: Sequence[bounds.Enclosure], sine: SineContract) -> Proof | None:
-    """Return the proof for an analysed program over all images, or None where it has no certificate."""
+def prove(
+    program: Program,
+    found: Sequence[bounds.Enclosure],
+    sine: SineContract,
+    of: Spectra | None = None,
+) -> Proof | None:
+    """Return the proof for an analysed program over all images, or None where it has no certificate.
+
+    `of`: how the first layer's sums are computed from spectra, if they are.
+    """
     output = program.outputs[0][1]
     network = scaled.network(program, found, output)
     if sine.error is None or len(network) < 2 or program.nodes[network[0].read].op != "input":
         return None
-    if found[network[0].affine].own is None:  # a schedule's own sums, which the steps know nothing of
+    if found[network[0].affine].own is None and of is None:  # sums of which the steps know nothing
+        return None
+    matrices = [layer.scale * _array(program, layer, "weight") for layer in network]
+    if not scaled.decomposable(matrices[1:]):
         return None
     low, high = bounds.window_box(program.gather)  # type: ignore[arg-type]
+    groups = scaled.outputs(len(matrices[-1]))
+    lasts = [[*matrices[1:-1], matrices[-1][rows]] for rows in groups]
+    joint = [_joint(of, program, network[0], last, low, high) if of else None for last in lasts]
     layers, own = [], []
     for number, layer in enumerate(network):
         blocks = parts(None if number else program.gather, len(low))
-        step, errors, ends = _layer(program, layer, low, high, sine, blocks)
+        step, errors, ends = _layer(program, layer, low, high, sine, blocks, None if number else joint[0])
         layers.append({"node": layer.affine, **step})
         own.append(errors)
         low, high = _activated(program, layer, sine, *ends)
-    matrices = [layer.scale * _array(program, layer, "weight") for layer in network[1:]]
-    if not all(np.isfinite(errors).all() for errors in own) or not scaled.decomposable(matrices):
+    if not all(np.isfinite(errors).all() for errors in own):
         return None
-    outputs = [step for rows in scaled.outputs(len(own[-1])) for step in _outputs(matrices, own, rows)]
+    pairs = zip(groups, joint, strict=True)
+    outputs = [step for rows, first in pairs for step in _outputs(matrices[1:], own, rows, first)]
     return Proof(tuple(layers), tuple(outputs), tuple(step["error_bound"] for step in outputs))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What spectra add to the first layer's arguments, e of all neurons: |s e| is below the sum of `steps`.
+
+    `before` are the scalings of the channels, `after` those of all layers' values.
+    """
+
+    of: Spectra
+    before: Array
+    after: list[Array]
+    steps: tuple[float, ...]
+
+    @property
+    def error(self) -> float:
+        """Return the bound of |s e|."""
+        return math.fsum(self.steps)
+
+
+def _joint(
+    of: Spectra, program: Program, layer: scaled.Layer, later: Sequence[Array], low: Array, high: Array
+) -> Joint:
+    """Return what spectra add to the first layer, given the matrices after it, with scalings that suit."""
+    weight, omega, channels = _array(program, layer, "weight"), abs(layer.scale), len(of.centres)
+    radius = np.maximum(high[:channels] - of.centres, of.centres - low[:channels])
+    before, after = spectra_search.scalings(of, omega * weight, radius, later)
+    return Joint(of, before, after, spectra.reach(of, weight, radius, before, omega * after[0]))
 
 
 def _array(program: Program, layer: scaled.Layer, name: str) -> Array:
@@ -88,7 +131,13 @@ def _array(program: Program, layer: scaled.Layer, name: str) -> Array:
 
 
 def _layer(
-    program: Program, layer: scaled.Layer, low: Array, high: Array, sine: SineContract, blocks: Sequence[Any]
+    program: Program,
+    layer: scaled.Layer,
+    low: Array,
+    high: Array,
+    sine: SineContract,
+    blocks: Sequence[Any],
+    joint: Joint | None,
 ) -> tuple[dict[str, Any], Array, tuple[Array, Array]]:
     """Return the step of one layer for inputs (n,) in [low, high], its part of the errors (m,), and a range.
 
@@ -101,10 +150,16 @@ def _layer(
         np.maximum(-weight, 0.0),
         np.maximum(np.abs(low), np.abs(high)),
     )
-    own = rounding(weight, bias, low - FLUSH, high + FLUSH, blocks)
-    own = own + FLUSH * (np.sum(up + down, axis=1) + largest.sum() + 4 * (len(low) + 1))
     sizes = (up + down) @ (largest + FLUSH) + np.abs(bias)
-    slack = own + 2.0**-40 * sizes
+    if joint is None:
+        own = rounding(weight, bias, low - FLUSH, high + FLUSH, blocks)
+        own = own + FLUSH * (np.sum(up + down, axis=1) + largest.sum() + 4 * (len(low) + 1))
+        slack = own + 2.0**-40 * sizes
+    else:
+        more = joint.error / (omega * joint.after[0])
+        own = spectra.last_sum(joint.of, weight, bias, sizes, more)
+        slack = own + more + 2.0**-40 * sizes
+        sizes = spectra.sizes(joint.of, weight, np.maximum(high, -low)) + 2 * (sizes + more)
     most, negated = up @ high - down @ low + bias + slack, up @ -low - down @ -high - bias + slack
     reach = np.maximum(most, negated)
     if layer.multiply != layer.affine:
@@ -144,14 +199,21 @@ def _activated(
     return np.maximum(least, floor), np.maximum(most, floor)
 
 
-def _outputs(matrices: Sequence[Array], own: Sequence[Array], rows: Sequence[int]) -> list[dict[str, Any]]:
+def _outputs(
+    matrices: Sequence[Array], own: Sequence[Array], rows: Sequence[int], joint: Joint | None
+) -> list[dict[str, Any]]:
     """Return the steps of outputs that share scalings: from each layer's errors to each output's."""
     last = matrices[-1][rows]
-    scales = scaled.scalings([*matrices[:-1], last], own[0])
+    scales = joint.after if joint else scaled.scalings([*matrices[:-1], last], own[0])
+    more = {}
+    if joint:
+        steps = [_up(value * WIDER) for value in joint.steps]
+        more = {"spectra": {"scalings": joint.before.tolist(), "step_bounds": steps}}
     norms = [
         _up(float(np.linalg.norm(after[:, None] * matrix / before, 2)) * (1 + 1e-9))
         for matrix, before, after in zip(matrices[:-1], scales, scales[1:], strict=False)
     ]
+    firsts = [joint.error if joint else 0.0, *[0.0] * (len(scales) - 1)]
     reach, least = [1.0], [np.eye(len(own[-2]))]
     for norm, matrix in zip(reversed(norms), reversed(matrices[:-1]), strict=True):
         reach.insert(0, reach[0] * norm)
@@ -160,16 +222,18 @@ def _outputs(matrices: Sequence[Array], own: Sequence[Array], rows: Sequence[int
     for row, number in zip(last, rows, strict=True):
         short = float(np.linalg.norm(row / scales[-1]))
         by_norms = [
-            short * norm * float(np.linalg.norm(s * e))
-            for norm, s, e in zip(reach, scales, own[:-1], strict=True)
+            short * norm * (float(np.linalg.norm(s * e)) + first)
+            for norm, s, e, first in zip(reach, scales, own[:-1], firsts, strict=True)
         ]
         by_size = [float(np.abs(row) @ matrix @ e) for matrix, e in zip(least, own[:-1], strict=True)]
-        layers = [min(pair) * WIDER for pair in zip(by_norms, by_size, strict=True)] + [
-            float(own[-1][number])
-        ]
+        # What spectra add is known of all neurons together only.
+        by_size[0] = math.inf if joint else by_size[0]
+        layers = [min(pair) * WIDER for pair in zip(by_norms, by_size, strict=True)]
+        layers.append(float(own[-1][number]))
         found.append(
             {
                 "output": number,
+                **more,
                 "scalings": [scale.tolist() for scale in scales],
                 "norm_bounds": norms,
                 "layer_bounds": [_up(value) for value in layers],
@@ -200,9 +264,32 @@ def certificate(
             "error_bound": sine.error,
             "domain": sine.domain if math.isfinite(sine.domain) else None,
         },
+        **_spectra(common, schedule, emitted),
         "layers": [dict(step) for step in proof.layers],
         "outputs": [dict(step) for step in proof.outputs],
         "bound": {"output": list(proof.bound), "against": manifest["bound"]["against"]},
+    }
+
+
+def _spectra(common: Program, schedule: Schedule, emitted: Program) -> dict[str, Any]:
+    """Return how the first layer's sums are computed from spectra, and where those are, if they are."""
+    of = schedule.spectra(common)
+    if of is None:
+        return {}
+    names = {str(node["weight"]): node.get("bias") for node in common.nodes if node.op == "affine"}
+    weight, bias = next(iter(names.items()))
+    layout = schedule.layout(emitted)
+    order = of.order.tolist()
+    return {
+        "spectra": {
+            "points": of.points,
+            "lanes": of.lanes,
+            "block": of.block,
+            "centres": of.centres.tolist(),
+            "order": order,
+            "table": {"offset": layout[weight].offset, "shape": list(layout[weight].shape)},
+            "bias": None if bias is None else layout[str(bias)].offset,
+        }
     }
 
 
@@ -251,7 +338,7 @@ def _places(common: Program, schedule: Schedule, emitted: Program) -> dict[str, 
     packed = np.zeros(0, np.int64)
     if count < 2**24 and not schedule.bytewise:
         arrays = {name: array.astype(np.float32) for name, array in coded.items()}
-        packed = schedule.pack(replace(emitted, parameters=arrays)).astype(np.int64)
+        packed = schedule.coded(emitted, arrays).astype(np.int64)
     at = np.full(count, -1)
     at[packed] = np.arange(len(packed))
     found: dict[str, Any] = {}

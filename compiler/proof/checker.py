@@ -4,7 +4,8 @@
    and the weights make the program's [`evidence.read`].
 2. The text is that of a network of sines or rectifiers; anything else is refused [`_layers`].
 3. Each layer: magnitudes, rounding of sums in parts, the sine's error [`_layer`]; each output: how far each
-   layer's errors reach, by norms that hold for the scalings in the certificate [`_output`].
+   layer's errors reach, by norms that hold for the scalings in the certificate [`_output`]. Sums from
+   spectra have steps of their own [spectra_checker.py].
 4. Elimination in integers proves that a matrix has a norm of at most N [`norm_is_below`].
    All other numbers are sums of magnitudes in float64, widened by more than it rounds.
 
@@ -26,6 +27,7 @@ from ..core.profiles import OPENCL_SINE, emitted_sine
 from ..core.sine import POLYNOMIALS
 from .evidence import INTEGERS, NODE, Refused, read, same
 from .integer_checker import check_integers
+from .spectra_checker import Tables
 
 U, TINY, WIDER = 2.0**-24, 2.0**-126, 1 + 2.0**-34
 """float32's rounding and smallest normal number; a factor of more than float64 can be off in what follows."""
@@ -38,7 +40,7 @@ def check(path: Path) -> dict[str, Any]:
     """Return a certificate whose every step holds, else raise `Refused`; `InputError` for other files."""
     told = "it must be a whole certificate beside its kernel", "compile the model again"
     with refusing("certificate", str(path), *told), np.errstate(over="ignore", invalid="ignore"):
-        held, manifest, text, arrays = read(path)
+        held, manifest, text, arrays, raw = read(path)
         if held["schema"] == INTEGERS:
             check_integers(held, text, arrays)
             same("manifest: bound", manifest["bound"]["output"], held["bound"]["output"])
@@ -50,13 +52,22 @@ def check(path: Path) -> dict[str, Any]:
         same("sine", manifest["sine"]["text"], promise.text)
         _at_least("sine: error_bound", [held["sine"]["error_bound"]], [promise.error], exact=True)
         same("layers", len(held["layers"]), len(layers))
-        matrices, own = [], []
+        matrices, own, tables, joint = [], [], None, {}
+        if "spectra" in held:
+            tables = Tables(held["spectra"], *_arrays(layers[0], arrays), raw, *box[:2])
+            joint = {o["output"]: _joint(tables, layers[0], o) for o in held["outputs"]}
         for number, layer in enumerate(layers):
-            errors, box = _layer(f"layer {number}", held["layers"][number], layer, box, arrays, promise)
+            first = None if tables is None or number else (tables, *joint[0])
+            errors, box = _layer(
+                f"layer {number}", held["layers"][number], layer, box, arrays, promise, first
+            )
             own.append(errors)
             matrices.append(arrays[layer["weight"]] * (layer["scale"] or 1.0))
         same("outputs", [o["output"] for o in held["outputs"]], list(range(len(own[-1]))))
-        found = [_output(f"output {o['output']}", o, matrices[1:], own) for o in held["outputs"]]
+        found = [
+            _output(f"output {o['output']}", o, matrices[1:], own, joint.get(o["output"], (0.0,))[0])
+            for o in held["outputs"]
+        ]
         _at_least("bound: output", held["bound"]["output"], found)
         _at_least("manifest: bound", manifest["bound"]["output"], found)
         return held
@@ -104,16 +115,37 @@ def _layers(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
     return layers, (low, high, parts if len(parts) > 1 else None)
 
 
-def _layer(name: str, stated: Any, layer: Any, given: Any, arrays: Any, promise: Any) -> Any:
-    """Check a layer's step; return what it adds to its numbers' errors (m,), and the next one's `given`."""
+def _arrays(layer: Any, arrays: Any) -> tuple[Any, Any]:
+    """Return W and b of a layer."""
+    weight = arrays[layer["weight"]]
+    return weight, arrays[layer["bias"]] if "bias" in layer else np.zeros(len(weight))
+
+
+def _joint(tables: Tables, layer: Any, stated: Any) -> tuple[float, Any]:
+    """Return the bound of |s e| of an output's scalings, e what spectra add to arguments, and of each sum."""
+    after, scale = np.array(stated["scalings"][0], np.float64), abs(layer["scale"] or 1.0)
+    steps = tables.steps(np.array(stated["spectra"]["scalings"], np.float64), scale * after)
+    _at_least("spectra: step_bounds", stated["spectra"]["step_bounds"], np.array(steps) * WIDER)
+    return sum(steps), sum(steps) / (scale * after)
+
+
+def _layer(name: str, stated: Any, layer: Any, given: Any, arrays: Any, promise: Any, first: Any) -> Any:
+    """Check a layer's step; return what it adds to its numbers' errors (m,), and the next one's `given`.
+
+    `first`: what spectra are, and how far they let each sum be off, of a layer whose sums come from them.
+    """
     low, high, parts = given
-    weight, scale = arrays[layer["weight"]], abs(layer["scale"] or 1.0)
-    bias = arrays[layer["bias"]] if "bias" in layer else np.zeros(len(weight))
+    (weight, bias), scale = _arrays(layer, arrays), abs(layer["scale"] or 1.0)
     own, least, most = _sum(weight, bias, low - TINY, high + TINY, parts)
     largest = np.maximum(-low, high)
     own = own + TINY * (np.abs(weight).sum(axis=1) + largest.sum() + 4 * (len(low) + 1))
-    sizes = np.abs(weight) @ (largest + TINY) + np.abs(bias)
-    ends = np.stack([least, most]) + np.outer([-1, 1], own + 2.0**-40 * sizes)
+    sizes, more = np.abs(weight) @ (largest + TINY) + np.abs(bias), 0.0
+    slack = 2.0**-40 * sizes
+    if first:
+        tables, _, more = first
+        own = tables.last(sizes, more)
+        sizes = tables.most() + 2 * (sizes + more)
+    ends = np.stack([least, most]) + np.outer([-1, 1], own + more + slack)
     reach = np.abs(ends).max(axis=0)
     if layer["scale"] is not None:
         rounded = U * scale * reach + 2 * TINY
@@ -166,8 +198,11 @@ def _additions(sizes: Any, cap: Any) -> Any:
     return np.minimum(largest, cap[:, None]).sum(axis=1)
 
 
-def _output(name: str, stated: Any, matrices: Any, own: Any) -> float:
-    """Check the step of one output: how far each layer's errors reach; return its bound."""
+def _output(name: str, stated: Any, matrices: Any, own: Any, joint: float) -> float:
+    """Check the step of one output: how far each layer's errors reach; return its bound.
+
+    `joint`: the bound of |s_1 e|, e being what spectra add to the first layer's arguments.
+    """
     scales = [np.array(scale, np.float64) for scale in stated["scalings"]]
     row, last = matrices[-1][stated["output"]], float(own[-1][stated["output"]])
     same(f"{name}: sizes of scalings", [s.shape for s in scales], [e.shape for e in own[:-1]])
@@ -176,7 +211,10 @@ def _output(name: str, stated: Any, matrices: Any, own: Any) -> float:
     short, sizes, found = float(np.linalg.norm(row / scales[-1])), np.abs(row), [last]
     for at in range(len(scales) - 1, -1, -1):
         by_norms = short * float(np.linalg.norm(scales[at] * own[at]))
-        found.insert(0, min(by_norms, float(sizes @ own[at])) * WIDER)
+        if joint and not at:  # which is known of all neurons together only
+            found.insert(0, (by_norms + short * joint) * WIDER)
+        else:
+            found.insert(0, min(by_norms, float(sizes @ own[at])) * WIDER)
         if at:
             before, after, matrix = scales[at - 1], scales[at], matrices[at - 1]
             scaled = after[:, None] * matrix / before

@@ -26,8 +26,8 @@ class Refused(Exception):
     """A step of a certificate that does not hold."""
 
 
-def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any]]:
-    """Return the certificate, the manifest, the program's text and its parameters, once all digests agree."""
+def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any], Any]:
+    """Return certificate, manifest, the program's text, its parameters and all weights: all digests agree."""
     texts = [read_file(p, "certificate") for p in (path, path.parent / "manifest.json")]
     held, manifest = (parse_json(text, "certificate", "restore it") for text in texts)
     same("schema", held["schema"], INTEGERS if held["schema"] == INTEGERS else FLOATS)
@@ -55,7 +55,7 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
     same("digest of the program in the certificate", held["program_digest"], digest)
     same("digest of the program in the manifest", manifest["program"], digest)
     same("weights: all are finite", all(np.isfinite(array).all() for array in arrays.values()), True)
-    return held, manifest, text, {name: array.astype(np.float64) for name, array in arrays.items()}
+    return held, manifest, text, {name: a.astype(np.float64) for name, a in arrays.items()}, raw
 
 
 def same(step: str, stated: Any, wanted: Any) -> None:

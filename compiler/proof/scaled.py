@@ -170,10 +170,10 @@ def amplified(matrices: Sequence[Array], own: Sequence[Array], scales: Sequence[
 
 def scalings(matrices: Sequence[Array], error: Array) -> list[Array]:
     """Return s_1 ... s_(L-1) for which the first layer's errors (n,) reach the output least amplified."""
-    return [np.array(scale) for scale in _scalings(*map(_Held, (*matrices, _short(error))))]
+    return [np.array(scale) for scale in _scalings(*map(Held, (*matrices, short(error))))]
 
 
-class _Held:
+class Held:
     """An array that can be looked up: a manifest's bound and its certificate ask for the same scalings."""
 
     def __init__(self, array: Array) -> None:
@@ -184,11 +184,11 @@ class _Held:
         return hash(self._key)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Held) and self._key == other._key
+        return isinstance(other, Held) and self._key == other._key
 
 
 @lru_cache(maxsize=16)
-def _scalings(*held: _Held) -> list[Array]:
+def _scalings(*held: Held) -> list[Array]:
     """Return the scalings for matrices and, last, the first layer's errors."""
     *matrices, error = (array.array for array in held)
     widths = [matrix.shape[1] for matrix in matrices]
@@ -200,29 +200,36 @@ def _scalings(*held: _Held) -> list[Array]:
             means[i] = 0.9 * means[i] + 0.1 * gradient
             squares[i] = 0.99 * squares[i] + 0.01 * gradient**2
             logs[i] = logs[i] - 0.1 / (1 + step / 20) * means[i] / (np.sqrt(squares[i]) + 1e-6)
-    return [_short(np.exp(log - log.mean())) for log in logs]
+    return [short(np.exp(log - log.mean())) for log in logs]
 
 
-def _gradients(matrices: Sequence[Array], error: Array, logs: Sequence[Array], power: float) -> list[Array]:
-    """Return the derivatives of the leading term's logarithm by each log s_l.
+def chain(matrices: Sequence[Array], logs: Sequence[Array], power: float) -> tuple[float, list[Array]]:
+    """Return the logarithm of the product of all scaled norms, and its derivatives by each log s_l.
 
     The largest singular value stands for all as the norm of their vector that `power` belongs to.
     """
-    found = [np.zeros_like(log) for log in logs]
-    scaled = (np.exp(logs[0]) * error) ** 2
-    found[0] += scaled / max(float(scaled.sum()), 1e-300)
+    found, product = [np.zeros_like(log) for log in logs], 0.0
     for i, matrix in enumerate(matrices):
         after = np.exp(logs[i + 1])[:, None] if i + 1 < len(logs) else 1.0
         u, values, vt = np.linalg.svd(after * matrix / np.exp(logs[i]), full_matrices=False)
         shares = (values / max(float(values[0]), 1e-300)) ** power
         shares = shares / max(float(shares.sum()), 1e-300)
+        product += float(np.log(max(float(values[0]), 1e-300)))
         found[i] -= vt.T**2 @ shares
         if i + 1 < len(logs):
             found[i + 1] += u**2 @ shares
+    return product, found
+
+
+def _gradients(matrices: Sequence[Array], error: Array, logs: Sequence[Array], power: float) -> list[Array]:
+    """Return the derivatives of the leading term's logarithm by each log s_l."""
+    _, found = chain(matrices, logs, power)
+    scaled = (np.exp(logs[0]) * error) ** 2
+    found[0] += scaled / max(float(scaled.sum()), 1e-300)
     return found
 
 
-def _short(scale: Array) -> Array:
+def short(scale: Array) -> Array:
     """Return numbers of few bits near these."""
     mantissa, exponent = np.frexp(scale)
     found: Array = np.ldexp(np.round(mantissa * 2**DIGITS_BITS), exponent - DIGITS_BITS)

@@ -18,8 +18,8 @@ transformed when they are packed, in float64 [`fourier.spectrum`]. The bound is 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from ..languages.dialect import Dialect
 from ..languages.fourier_dialect import FourierDialect
 from ..proof import bounds
 from ..proof.bounds import Enclosure
+from ..proof.spectra import Spectra
 from . import fourier
 from .emit import kernel_gather
 from .emit_tiled import LARGEST_PRIVATE, Tiled, TiledBody, readers_of_window, refused_by_vectors
@@ -52,12 +53,16 @@ PRODUCTS = {
 
 @dataclass(frozen=True)
 class Sizes:
-    """Pairs of channels, vectors that hold all tiles' pairs, pairs of vectors of neurons, rows of a tile."""
+    """Pairs of channels, vectors that hold all tiles' pairs, pairs of vectors of neurons, rows of a tile.
+
+    `block`: pairs of channels whose products are added up by themselves.
+    """
 
     pairs: int
     inputs: int
     neurons: int
     out: int
+    block: int
 
 
 class Fourier(Tiled):
@@ -81,25 +86,45 @@ class Fourier(Tiled):
         gather, (layer,) = kernel_gather(program), readers_of_window(program)
         pairs = -(-gather.channels // 2)
         neurons = -(-layer.type.shape[0] // (2 * self.lanes))
-        return Sizes(pairs, -(-self.tiles * pairs // self.lanes), neurons, self.points - gather.rows + 1)
+        inputs, out = -(-self.tiles * pairs // self.lanes), self.points - gather.rows + 1
+        return Sizes(pairs, inputs, neurons, out, fourier.block_of(pairs))
 
     def extent(self, program: Program) -> tuple[int, int]:
         """Return the columns and rows of pixels that a work item computes."""
         out = self.sizes(program).out
         return self.tiles * out, out
 
+    def spectra(self, program: Program) -> Spectra:
+        """Return how the sums over the window are computed, for their bound."""
+        (layer,), found = readers_of_window(program), fourier.arrangement(program, self.lanes)
+        gather, count = kernel_gather(program), layer.type.shape[0]
+        held = found.centred(found.moved(program))
+        # Columns, groups, rows, pairs, halves, parts and places of neurons, as `layout` says.
+        stored = self._stored(held, found.weight, self._shape(program, found.weight, ())).astype(np.float64)
+        placed = stored[..., 0, :] + 1j * stored[..., 1, :]
+        placed = placed.transpose(1, 5, 2, 0, 4, 3).reshape(
+            -1, self.points, self.points // 2 + 1, *placed.shape[3:5]
+        )
+        placed = placed.reshape(*placed.shape[:3], -1)[:count, ..., : gather.channels]
+        table, bias = np.empty_like(placed), np.zeros(count)
+        table[found.order] = 2 * self.points * placed
+        if found.bias is not None:
+            bias[found.order] = held.parameters[found.bias]
+        block, centres = self.sizes(program).block, np.array(found.centres)
+        return Spectra(self.points, gather.rows, found.order, self.lanes, block, centres, table, bias)
+
     def enclosures(
         self, program: Program, sine: SineContract, images: Images | None = None, rows: slice = ALL
     ) -> list[Enclosure]:
         """Return the enclosure of every node: the sums over the window are those of spectra."""
-        gather, plan = kernel_gather(program), (self.points, self.lanes)
+        gather, of = kernel_gather(program), self.spectra(program)
         if images is None:
-            norm = fourier.largest_norm(gather, self.points)
-            return fourier.enclose(program, sine, bounds.window_box(gather), norm, plan)
+            norm = self.points * np.linalg.norm(fourier.radius(gather, of.centres))
+            return fourier.enclose(program, sine, bounds.window_box(gather), norm, of)
         found = windows(gather, images, rows)
         joined = np.concatenate([images[image.name] for image in gather.images], axis=-1, dtype=np.float64)
-        norms = fourier.tile_norms(joined, gather.window, self.points)[rows]
-        return fourier.enclose(program, sine, (found, found), norms, plan)
+        norms = fourier.tile_norms(joined, gather.window, self.points, of.centres)[rows]
+        return fourier.enclose(program, sine, (found, found), norms, of)
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
@@ -152,6 +177,22 @@ class Fourier(Tiled):
         }
         return 4 * self.lanes * (sum(vectors.values()) + hidden)
 
+    def pack(self, program: Program) -> NDArray[np.float32]:
+        """Return the weights (count,) as `layout` places them, the neurons of the first layer in order."""
+        return super().pack(self._held(program))
+
+    def _held(self, program: Program) -> Program:
+        """Return the program whose parameters are what the kernel holds, but for transforms."""
+        found = fourier.arrangement(program, self.lanes)
+        return found.centred(found.moved(program))
+
+    def coded(self, program: Program, parameters: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+        """Return other numbers in the places of the weights; 0 for those that the kernel does not hold."""
+        found = fourier.arrangement(program, self.lanes)
+        own = [found.weight, *([found.bias] if found.bias and any(found.centres) else [])]
+        lost = {name: np.zeros_like(parameters[name]) for name in own}
+        return super().pack(found.moved(replace(program, parameters={**parameters, **lost})))
+
     def _shape(self, program: Program, name: str, shape: tuple[int, ...]) -> tuple[int, ...]:
         """Return the shape of a stored parameter of a given shape."""
         (layer,), s = readers_of_window(program), self.sizes(program)
@@ -171,6 +212,8 @@ class Fourier(Tiled):
         columns, groups, n, pairs = shape[:4]
         matrix = program.parameters[name].astype(np.float64)
         spectra = fourier.spectrum(matrix, size, n).transpose(2, 1, 3, 0)[:columns]
+        # Frequencies that are their own negatives have real spectra; float64 leaves some 2^-53 there.
+        spectra[:: n // 2, :: n // 2] = spectra[:: n // 2, :: n // 2].real
         filled = np.zeros((columns, n, 2 * pairs, groups * 2 * self.lanes), np.complex128)
         filled[:, :, : spectra.shape[2], : spectra.shape[3]] = spectra
         # Channel j of the first half and channel j of the second are a pair.
@@ -258,6 +301,7 @@ class FourierBody(TiledBody):
         )
         self.vectors = self.dialect
         self.sizes = self.tile.sizes(self.program)
+        self.centres = fourier.arrangement(self.program, self.tile.lanes).centres
 
     def defines(self) -> list[str]:
         """Return the sizes, and the functions that transform rows and columns."""
@@ -269,6 +313,7 @@ class FourierBody(TiledBody):
             f"#define PIXELS {tile.pixels} /* pixels of a row that go through the layers together */",
             f"#define LANES {tile.lanes} /* numbers in a vector */",
             f"#define PAIRS {s.pairs} /* of channels */",
+            f"#define BLOCK {s.block} /* pairs whose products are added up by themselves */",
             f"#define INPUTS {s.inputs} /* vectors that hold the pairs of all tiles */",
             f"#define NEURONS {s.neurons} /* pairs of vectors of neurons */",
             "#define STRIDE (2 * (POINTS + 1)) /* vectors from row to row: not a multiple of 4096 bytes */",
@@ -315,6 +360,8 @@ class FourierBody(TiledBody):
                 part, pair = divmod(first + c, self.sizes.pairs)
                 value = f"image_{image.name}[(row_y * width + column) * {image.channels} + {c}]"
                 value = self._bordered(value)
+                if centre := self.centres[first + c]:
+                    value = f"({value}) - {words.literal(centre)}"
                 self._line(f"row.number[PLACE(tile * PAIRS + {pair}, dx * 2 + {part})] = {value};")
             first += image.channels
         self._close(2)
@@ -335,14 +382,20 @@ class FourierBody(TiledBody):
         self._line(words.walk(words.spectrum, slot.offset))
         self._open("for (int k = 0; k <= POINTS / 2; ++k) {")
         self._line(words.index("opposite", "(POINTS - k) % POINTS"))
+        # A column that is its own mirror image is mirrored, not computed twice: both parts of each complex
+        # image stay apart to the bit.
+        self._line(words.index("apart", "opposite != k"))
         self._open(words.loop("i", "INPUTS"))
-        for place, to in (("k", "column"), ("opposite", "mirror")):
-            row = f"rows + i * POINTS * STRIDE + 2 * {place}"
-            self._line(words.call("forward", row, "POINTS + 1", to, "1"))
+        row = "rows + i * POINTS * STRIDE + 2 *"
+        self._line(words.call("forward", f"{row} k", "POINTS + 1", "column", "1"))
+        self._open(words.when("opposite != k"))
+        self._line(words.call("forward", f"{row} opposite", "POINTS + 1", "mirror", "1"))
+        self._close()
+        self._line(words.pointer("other", "opposite != k ? mirror : column", written=False))
         self._open(words.loop("f", "POINTS"))
         self._line(words.index("g", "(POINTS - f) % POINTS"))
         self._line(f"{words.kind} a = column[2 * f], b = column[2 * f + 1];")
-        self._line(f"{words.kind} c = mirror[2 * g], d = mirror[2 * g + 1];")
+        self._line(f"{words.kind} c = other[2 * g], d = other[2 * g + 1];")
         self._line(words.pointer("to", "spectra.all + (i * POINTS + f) * 4"))
         for number, value in enumerate(("a + c", "b - d", "b + d", "c - a")):
             self._line(f"to[{number}] = {value};")
@@ -360,17 +413,20 @@ class FourierBody(TiledBody):
         """Write the products of a column of frequencies for all tiles."""
         words = self.vectors
         self._open(words.loop("f", "POINTS"))
-        self._line(words.vectors("real", "TILES", "2"))
-        self._line(words.vectors("imaginary", "TILES", "2"))
-        zeros = [f"{name}[t][{v}] = {words.zeros};" for name in ("real", "imaginary") for v in range(2)]
-        self._tiles(zeros)
-        self._open(words.loop("pair", "PAIRS"))
+        split = self.sizes.block < self.sizes.pairs
+        names = ["real", "imaginary"]
+        self._sums(["whole_real", "whole_imaginary"] if split else names)
+        if split:
+            self._open(words.loop("block", "PAIRS / BLOCK"))
+            self._sums(names)
+        self._open(words.loop("pair", "BLOCK"))
         for j in range(8):
             for line in words.walked(f"w{j}", words.spectrum, j):
                 self._line(line)
         self._line(words.advance(words.spectrum, 8))
+        pair = "block * BLOCK + pair" if split else "pair"
         lines = [
-            words.row("x", "spectra.number + SPECTRUM(t * PAIRS + pair, f)"),
+            words.row("x", f"spectra.number + SPECTRUM(t * PAIRS + {pair}, f)"),
             "float a = x[0], b = x[LANES], c = x[2 * LANES], d = x[3 * LANES];",
         ]
         for v in range(2):
@@ -379,16 +435,26 @@ class FourierBody(TiledBody):
                     lines.append(f"{part}[t][{v}] {sign}= w{2 * weight + v} * {value};")
         self._tiles(lines)
         self._close()
+        if split:
+            self._tiles([f"whole_{name}[t][{v}] += {name}[t][{v}];" for name in names for v in range(2)])
+            self._close()
         self._line(words.index("g", "(POINTS - f) % POINTS"))
+        of = "whole_" if split else ""
         self._tiles(
             [
-                "product[t * 2][2 * f] = real[t][0] - imaginary[t][1];",
-                "product[t * 2][2 * f + 1] = imaginary[t][0] + real[t][1];",
-                "product[t * 2 + 1][2 * g] = real[t][0] + imaginary[t][1];",
-                "product[t * 2 + 1][2 * g + 1] = real[t][1] - imaginary[t][0];",
+                f"product[t * 2][2 * f] = {of}real[t][0] - {of}imaginary[t][1];",
+                f"product[t * 2][2 * f + 1] = {of}imaginary[t][0] + {of}real[t][1];",
+                f"product[t * 2 + apart][2 * g] = {of}real[t][0] + {of}imaginary[t][1];",
+                f"product[t * 2 + apart][2 * g + 1] = {of}real[t][1] - {of}imaginary[t][0];",
             ]
         )
         self._close()
+
+    def _sums(self, names: list[str]) -> None:
+        """Write the declaration of all tiles' sums, which begin with zeros."""
+        for name in names:
+            self._line(self.vectors.vectors(name, "TILES", "2"))
+        self._tiles([f"{name}[t][{v}] = {self.vectors.zeros};" for name in names for v in range(2)])
 
     def _tiles(self, lines: list[str]) -> None:
         """Write a loop over tiles that keeps each tile's sums in registers of their own."""

@@ -16,12 +16,10 @@ Processing, 3rd edition, 2010, section 8.7.3).
 the split-radix algorithm with conjugate pairs of twiddle factors (I. Kamar and Y. Elcherif, Conjugate pair
 fast Fourier transform, Electronics Letters 25(5), 1989).
 
-The bound [`deviation`] is one of norms. As in N. Higham, Accuracy and Stability of Numerical Algorithms,
-2nd edition, 2002, section 24.1: all steps of a transform but rounding are multiples of unitary maps, so the
-errors of its steps pass through it with the norm that the numbers themselves have. The sum over frequencies
-and channels is bounded by the inequality of Cauchy and Schwarz:
-
-    |computed - exact| <= constant u |x| |w|,  |x| the norm of the tile's numbers, |w| that of the weights.
+Every number on the way is off by as much as the tile's energy lets it be [proof/spectra.py]. To make that
+energy small the middle of each channel's range is subtracted from it, and what that changes is in the bias;
+products are added up in blocks of channels; and neurons that matter alike share a complex image
+[`arrangement`].
 
 `low`, `high` and everything after the layer are as in bounds.py [`enclose`].
 """
@@ -31,17 +29,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.network import dataset
-from ..core.ir import Gather, Program
+from ..core.ir import Gather, Node, Program
+from ..core.ops import OPS
 from ..core.profiles import FLUSH, UNIT_ROUNDOFF, SineContract
-from ..core.sums import gamma
-from ..proof import bounds
+from ..proof import bounds, scaled, spectra
 from ..proof.bounds import Enclosure
 from .emit import kernel_gather
 
@@ -49,15 +47,6 @@ Array = NDArray[np.float64]
 
 Complex = tuple[Any, Any]
 """Real and imaginary part: numbers, arrays, or whatever has +, - and a product with a number."""
-
-TWIDDLE = UNIT_ROUNDOFF * (1 + 2.0**-20)
-"""Largest error of a twiddle factor, or relative one of a spectrum: rounded once, after float64."""
-
-COMPLEX_SUM_FLUSH = 6 * FLUSH
-"""Underflow of a complex sum: two operands and a result in each part, 3 sqrt(2) FLUSH, and their rounding."""
-
-COMPLEX_PRODUCT_FLUSH = 12 * FLUSH
-"""The same of a product with a twiddle factor: four operands, two products and a sum for each part."""
 
 
 # ---- the algorithm ---------------------------------------------------------------------------------------
@@ -135,13 +124,17 @@ def sums(tile: NDArray[Any], matrix: Array, size: int) -> NDArray[Any]:
     pairs = [unpack(both_ways((tile[..., j], tile[..., j + half]), -1)) for j in range(half)]
     channels = [first for first, _ in pairs] + [second for _, second in pairs]
     neurons = []
+    nothing = np.zeros((points, points), dtype)
     for n in range(len(matrix)):
-        real = imaginary = np.zeros((points, points), dtype)
-        for channel in range(weights.shape[3]):
-            (a, b), w = channels[channel], weights[n, :, :, channel]
-            g, h = w.real.astype(dtype), w.imag.astype(dtype)
-            real, imaginary = real + a * g - b * h, imaginary + a * h + b * g
-        neurons.append((real, imaginary))
+        whole = nothing, nothing
+        for block in spectra.blocks_of(weights.shape[3], block_of(half)):
+            real = imaginary = nothing
+            for channel in block:
+                (a, b), w = channels[channel], weights[n, :, :, channel]
+                g, h = w.real.astype(dtype), w.imag.astype(dtype)
+                real, imaginary = real + a * g - b * h, imaginary + a * h + b * g
+            whole = whole[0] + real, whole[1] + imaginary
+        neurons.append(whole)
     out, found = points - size + 1, np.zeros((points, points, 2 * len(matrix)), dtype)
     gap = -(-len(matrix) // 2)
     neurons += [(np.zeros_like(neurons[0][0]),) * 2] * gap
@@ -151,114 +144,144 @@ def sums(tile: NDArray[Any], matrix: Array, size: int) -> NDArray[Any]:
     return found[:out, :out, : len(matrix)]
 
 
+# ---- what a kernel holds ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """What a kernel holds in place of the first layer's numbers.
+
+    `order` (D_out,): the neuron at each place; `centres` (C,) are subtracted from the channels, and their
+    sums are in the bias. `weight`, `bias`: names of the layer's parameters;
+    `readers`: of the matrices after it.
+    """
+
+    order: NDArray[np.intp]
+    centres: tuple[float, ...]
+    weight: str
+    bias: str | None
+    readers: tuple[str, ...]
+
+    def moved(self, program: Program) -> Program:
+        """Return the program with the neurons in order."""
+        held = dict(program.parameters)
+        for name in (self.weight, *([self.bias] if self.bias else [])):
+            held[name] = held[name][self.order]
+        for name in self.readers:
+            held[name] = held[name][:, self.order]
+        return replace(program, parameters=held)
+
+    def centred(self, program: Program) -> Program:
+        """Return the program with the bias of centred channels, in float32."""
+        if self.bias is None:
+            return program
+        weight, bias = (program.parameters[name].astype(np.float64) for name in (self.weight, self.bias))
+        taps = np.tile(self.centres, weight.shape[1] // len(self.centres))
+        held = {**program.parameters, self.bias: (weight @ taps + bias).astype(np.float32)}
+        return replace(program, parameters=held)
+
+
+def arrangement(program: Program, lanes: int) -> Arrangement:
+    """Return the order of the neurons, and the centres, of a program whose first layer reads the window.
+
+    Neurons j and j + lanes share a complex image: those of similar scalings do [scaled.py], because an error
+    of one is an error of the other. Where something but sines, rectifiers and matrices reads the layer, or
+    its parameters are used twice, the order is that of the program.
+    """
+    index = next(i for i in range(len(program.nodes)) if _reads_window(program, i))
+    node = program.nodes[index]
+    weight, bias = str(node["weight"]), node.get("bias")
+    uses = [
+        str(n[key]) for n in program.nodes if n.op == "affine" for key in ("weight", "bias") if n.get(key)
+    ]
+    uses += [str(n["name"]) for n in program.nodes if n.op == "parameter"]
+    bias = str(bias) if bias is not None else None
+    low, high = (end[: kernel_gather(program).channels] for end in bounds.window_box(kernel_gather(program)))
+    middles = ((low + high) / 2).astype(np.float32).astype(np.float64)
+    centres = middles if bias and uses.count(bias) == 1 else np.zeros_like(low)
+    readers = _readers(program, index)
+    count = node.type.shape[0]
+    order = np.arange(count)
+    if readers and all(uses.count(name) == 1 for name in (weight, *readers, *([bias] if bias else []))):
+        order = _order(program, weight, readers, np.maximum(high - centres, centres - low), lanes)
+    return Arrangement(order, tuple(centres.tolist()), weight, bias, tuple(readers))
+
+
+def _readers(program: Program, first: int) -> list[str]:
+    """Return the matrices that read what is computed of a layer number by number; none if others read it."""
+    held, readers = {first}, []
+    for index, node in enumerate(program.nodes):
+        from_layer = [arg in held for arg in node.args]
+        if not any(from_layer):
+            continue
+        if node.op == "affine":
+            readers.append(str(node["weight"]))
+            continue
+        others = [program.nodes[arg] for arg in node.args if arg not in held]
+        if not OPS[node.op].elementwise or any(other.type.shape for other in others):
+            return []
+        held.add(index)
+    return [] if held & {index for _, index in program.outputs} else readers
+
+
+def _order(program: Program, weight: str, readers: Sequence[str], radius: Array, lanes: int) -> Any:
+    """Return the neuron at each place: two whose scalings are next to each other in size share an image."""
+    first = program.parameters[weight].astype(np.float64)
+    names = [str(node["weight"]) for node in program.nodes if node.op == "affine"]
+    later = [program.parameters[name].astype(np.float64) for name in names if name != weight]
+    shapes = [first.shape, *(matrix.shape for matrix in later)]
+    chain = all(a[0] == b[1] for a, b in pairwise(shapes))
+    if len(readers) != 1 or not chain or not scaled.decomposable(later):
+        return np.arange(len(first))
+    sizes = np.linalg.norm(first * np.tile(radius, first.shape[1] // len(radius)), axis=1)
+    ranked = np.argsort(scaled.scalings(later, sizes)[0], kind="stable")
+    places = np.arange(len(first)).reshape(-1)
+    lower = places[places // lanes % 2 == 0]
+    paired = [p for p in lower if p + lanes < len(first)]
+    seats = [place for p in paired for place in (p, p + lanes)]
+    seats += [p for p in places if p not in seats]
+    order = np.empty(len(first), np.intp)
+    order[seats] = ranked
+    return order
+
+
+def block_of(pairs: int) -> int:
+    """Return how many pairs of channels are added up by themselves: the least divisor above 1, or all."""
+    return next((n for n in range(2, pairs) if pairs % n == 0), pairs)
+
+
 # ---- the bound -------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Deviation:
-    """|computed - exact| <= relative |exact| + absolute, in the Euclidean norm of all numbers."""
-
-    relative: float
-    absolute: float
-
-
-@cache
-def of_transform(n: int) -> Deviation:
-    """Return the deviation of `transform` of n numbers.
-
-    A step is a product with numbers of magnitude 1, which adds `turned` of the norm, and sums of pairs, which
-    multiply the norm by sqrt(2) and add u of it. Parts with deviations r1 and r2 have max(r1, r2) together.
-    """
-    u, root = UNIT_ROUNDOFF, math.sqrt(2.0)
-    if n == 1:
-        return Deviation(0.0, 0.0)
-    if n == 2:
-        return Deviation(u, root * COMPLEX_SUM_FLUSH)
-    even, odd = of_transform(n // 2), of_transform(n // 4)
-    # Higham, lemma 3.5: a complex product is off by sqrt(2) gamma(2) of its magnitude.
-    turned = TWIDDLE + root * gamma(2) * (1 + TWIDDLE)
-    relative = (1 + u) * (odd.relative * (1 + turned) + turned) + u
-    absolute = root * odd.absolute * (1 + turned) + math.sqrt(n / 2) * COMPLEX_PRODUCT_FLUSH
-    absolute = root * (1 + u) * absolute + math.sqrt(n / 2) * COMPLEX_SUM_FLUSH
-    relative = (1 + u) * max(even.relative, relative) + u
-    absolute = root * (1 + u) * math.hypot(even.absolute, absolute) + math.sqrt(n) * COMPLEX_SUM_FLUSH
-    return Deviation(relative, absolute)
-
-
-def of_both_ways(n: int) -> Deviation:
-    """Return the deviation of `both_ways`: n transforms, and n of what they give."""
-    one = of_transform(n)
-    whole, stretch = math.sqrt(n) * one.absolute, math.sqrt(n) * (1 + one.relative)
-    return Deviation((1 + one.relative) ** 2 - 1, whole * (1 + stretch))
-
-
-@dataclass(frozen=True)
-class Layer:
-    """What the bound needs of a matrix: by neuron (D_out,), with the neuron whose transform it shares.
-
-    `norms`: sum of both neurons' |w|; `gains`: no tile's sums have a norm larger than this times the tile's.
-    """
-
-    points: int
-    channels: int
-    norms: Array
-    gains: Array
-
-
-def layer(matrix: Array, size: int, points: int, lanes: int) -> Layer:
-    """Return the numbers of a matrix (D_out, size * size * C) whose neurons j and j + lanes are a pair."""
-    spectra = 2 * points**2 * np.abs(spectrum(matrix, size, points))
-    gain = np.sqrt((spectra**2).sum(axis=3)).max(axis=(1, 2))
-    norm = np.sqrt((matrix**2).sum(axis=1))
-    filled = [np.pad(a, (0, -len(a) % (2 * lanes))).reshape(-1, 2, lanes) for a in (norm, gain)]
-    norms = np.repeat(filled[0].sum(axis=1, keepdims=True), 2, axis=1)
-    gains = np.repeat(np.sqrt((filled[1] ** 2).sum(axis=1, keepdims=True)), 2, axis=1)
-    widened = (a.reshape(-1)[: len(matrix)] * (1 + 2.0**-40) for a in (norms, gains))
-    return Layer(points, matrix.shape[1] // size**2, *widened)
-
-
-def deviation(of: Layer, norm: Array) -> tuple[Array, Array]:
-    """Return (largest error, largest number on the way) (..., D_out) of the sums of tiles of this norm (...).
-
-    The error is that of the complex number whose parts are two neurons' sums.
-    """
-    n, u, pairs = of.points, UNIT_ROUNDOFF, -(-of.channels // 2)
-    ways, norm = of_both_ways(n), np.asarray(norm, np.float64)[..., None]
-    # The channels' spectra: their norm is 2 n |x|.
-    relative = (1 + u) * ways.relative + u
-    absolute = math.sqrt(2) * n**2 * FLUSH * (1 + ways.relative) + ways.absolute
-    absolute = math.sqrt(pairs) * (2 * (1 + u) * absolute + 2 * n * COMPLEX_SUM_FLUSH)
-    # Products: 4 numbers a pair of channels in each sum; the weights' norm is |w| / 2 n.
-    own = math.sqrt(2) * gamma(4 * pairs) * (1 + relative) * (1 + TWIDDLE)
-    of_products = (relative * (1 + TWIDDLE) + TWIDDLE + own) * norm * of.norms
-    of_products = of_products + absolute * of.norms / n
-    reach = 2 * n * norm + absolute
-    of_products += 16 * FLUSH * (n * math.sqrt(2 * pairs) * (reach + of.norms) + 16 * n**2 * pairs)
-    # Back: the norm of both neurons' images, and what the products add to it.
-    image = of.gains * norm + n * of_products
-    back = (ways.relative * (1 + u) + u) * image + ways.absolute + n**2 * COMPLEX_SUM_FLUSH
-    return of_products + back, 4 * np.maximum(n * norm, image)
-
-
 def enclose(
-    program: Program, sine: SineContract, x: Any, norm: Array, plan: tuple[int, int]
+    program: Program, sine: SineContract, x: Any, norm: Array, of: spectra.Spectra
 ) -> list[Enclosure]:
     """Return the enclosure of every node, the sums over the window being computed from spectra.
 
-    `x`: the windows' box (low, high); `norm`: largest norm of the tile that holds a window; `plan`: points
-    and lanes.
+    `x`: the windows' box (low, high); `norm` (...): largest norm of the tile, centred, that holds a window.
     """
-    index = next(i for i, node in enumerate(program.nodes) if _reads_window(program, i))
+    index = next(i for i in range(len(program.nodes)) if _reads_window(program, i))
     node = program.nodes[index]
     until = replace(program, nodes=program.nodes[: index + 1], outputs=())
     exact = bounds.enclose(until, {"window": x}, sine)[index]
     matrix = program.parameters[str(node["weight"])].astype(np.float64)
-    error, size = deviation(layer(matrix, kernel_gather(program).rows, *plan), norm)
+    norm, whole = np.asarray(norm, np.float64)[..., None], float(np.linalg.norm(matrix))
+    error = spectra.alone(of, matrix, len(of.centres)) * norm
+    error = (
+        error + spectra.moved_bias(of, matrix, _bias(program, node)) + spectra.TINY * (1 + whole) * (1 + norm)
+    )
     # The bias is added last, and rounded once more.
-    whole = exact.largest + error
-    error = error + UNIT_ROUNDOFF * whole + 4 * FLUSH
-    known = bounds.held(exact.low, exact.high, error * (1 + bounds.OUTWARD), size + 2 * whole)
+    largest = exact.largest + error
+    error = error + UNIT_ROUNDOFF * largest + 4 * FLUSH
+    size = 4 * np.maximum(of.points, whole) * norm * (1 + 2.0**-10) + 2 * largest
+    known = bounds.held(exact.low, exact.high, error * (1 + bounds.OUTWARD), size)
     return bounds.enclose(program, {"window": x}, sine, known={index: known})
+
+
+def _bias(program: Program, node: Node) -> Array:
+    """Return a layer's bias (D_out,), zeros where it has none."""
+    held = node.get("bias")
+    return np.zeros(node.type.shape[0]) if held is None else program.parameters[str(held)].astype(np.float64)
 
 
 def _reads_window(program: Program, index: int) -> bool:
@@ -267,17 +290,21 @@ def _reads_window(program: Program, index: int) -> bool:
     return node.op == "affine" and program.nodes[node.args[0]].op == "input"
 
 
-def largest_norm(gather: Gather, points: int) -> Array:
-    """Return the largest norm () of a tile of images in their ranges."""
+def radius(gather: Gather, centres: Sequence[float]) -> Array:
+    """Return the largest magnitude (C,) of each channel, centred."""
     low, high = (end[: gather.channels] for end in bounds.window_box(gather))
-    found: Array = points * np.sqrt(np.sum(np.maximum(np.abs(low), np.abs(high)) ** 2))
+    found: Array = np.maximum(high - centres, centres - low)
     return found
 
 
-def tile_norms(image: Array, window: dataset.Window, points: int) -> Array:
-    """Return the norm (H, W) of the tile that holds each pixel of an image (H, W, C)."""
-    squares = (image**2).sum(axis=2)
-    found: Array = np.sqrt(_over_tiles(_over_tiles(squares, window, points).T, window, points).T)
+def tile_norms(image: Array, window: dataset.Window, points: int, centres: Sequence[float] = ()) -> Array:
+    """Return the norm (H, W) of the tile, centred, that holds each pixel of an image (H, W, C)."""
+    middle = np.zeros(image.shape[2]) + (centres if len(centres) else 0.0)
+    # |x - m|^2 = |m|^2 + (|x - m|^2 - |m|^2), the latter being 0 outside of a zero border.
+    whole = float(middle @ middle)
+    squares = ((image - middle) ** 2).sum(axis=2) - whole
+    more = _over_tiles(_over_tiles(squares, window, points).T, window, points).T
+    found: Array = np.sqrt(np.maximum(more, -(points**2) * whole) + points**2 * whole * (1 + 2.0**-40))
     return found
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ from ..core.weights import Slot
 from ..languages.dialect import Dialect
 from ..proof import bounds
 from ..proof.bounds import Enclosure
+from ..proof.spectra import Spectra
 from .emit import emit, kernel_gather, private_bytes
 
 Images = Mapping[str, NDArray[np.float32]]
@@ -109,6 +110,14 @@ class Schedule(ABC):
     def pack(self, program: Program) -> NDArray[np.float32]:
         """Return the weights (count,) as `layout` places them."""
         return weights.pack(program)
+
+    def coded(self, program: Program, parameters: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+        """Return other numbers (count,) in the places of the weights: to find where each one is."""
+        return self.pack(replace(program, parameters=parameters))
+
+    def spectra(self, program: Program) -> Spectra | None:
+        """Return how the sums over the window are computed from spectra, or None where they are not."""
+        return None
 
 
 class Plain(Schedule):

@@ -16,7 +16,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Type, sha256
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.proof import checker, evidence, scaled
+from wamnet.compiler.proof import checker, evidence, scaled, spectra_checker
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
@@ -121,6 +121,132 @@ def test_any_number_made_smaller_is_refused(path, changed):
     for held, place in smaller_numbers(path):
         with pytest.raises(checker.Refused, match=": "):
             pytest.fail(f"{place}: {checker.check(changed(denoise_certificate_json=held))}")
+
+
+# ---- spectra ---------------------------------------------------------------------------------------------
+
+
+def spectral(folder, target="opencl", schedule="fft32", activation="sine"):
+    """Write a kernel of spectra: 12 channels, of which 6 are centred, and 5 pairs of neurons."""
+    window = Window(9, "zero")
+    network = siren.init((window.size**2 * 12, 21, 6, 3), 2.0, 3.0, 5, activation=activation)
+    network = replace(network, biases=tuple(b + np.float32(0.25) for b in network.biases))
+    given = Model(network, ("color", "normal", "albedo", "position"), window, Normalization())
+    kernel = compile_program(lower(given), target, schedule=schedule)
+    assert kernel.manifest["schedule"]["name"] == schedule
+    artifact.write(kernel, folder)
+    return folder / NAME
+
+
+@pytest.fixture(scope="module")
+def of_spectra(tmp_path_factory):
+    return spectral(tmp_path_factory.mktemp("spectra"))
+
+
+@pytest.mark.parametrize(
+    ("target", "schedule", "activation"),
+    [("opencl", "fft32", "sine"), ("opencl", "fft32x4", "relu"), ("c", "fft32x8", "sine")],
+)
+def test_certificates_of_spectra_hold(tmp_path, target, schedule, activation):
+    path = spectral(tmp_path, target, schedule, activation)
+    held = checker.check(path)
+    assert held["spectra"]["centres"] == [0.5, 0.5, 0.5, 0.0, 0.0, 0.0] * 2
+    assert held["spectra"]["order"] != list(range(21))
+    jsonschema.validate(held, json.loads((SPEC / "certificate.schema.json").read_text()))
+
+
+def test_any_smaller_number_of_a_certificate_of_spectra_is_refused(of_spectra, tmp_path):
+    for name in ("manifest.json", "weights.bin", "denoise.cl"):
+        (tmp_path / name).write_bytes((of_spectra.parent / name).read_bytes())
+    held = certificate_of(of_spectra)
+    places = leaves(held)
+    # Of neurons one in seven: each takes the checker a second.
+    steps = [place for place in places if "step_bounds" in place]
+    assert len(steps) == 12
+    few = [place for place in places if place not in steps]
+    for place in steps[::3] + few[::17]:
+        (tmp_path / NAME).write_text(json.dumps(put(held, place, lambda x: math.nextafter(x, -math.inf))))
+        with pytest.raises(checker.Refused, match=": "):
+            pytest.fail(f"{place}: {checker.check(tmp_path / NAME)}")
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "match"),
+    [
+        (("spectra", "points"), 16, "spectra: shape"),
+        (("spectra", "points"), 64, "spectra: points"),
+        (("spectra", "lanes"), 8, "spectra: shape"),
+        (("spectra", "block"), 0, "lanes and block are counts"),
+        (("spectra", "block"), 3, "step_bounds"),
+        (("spectra", "centres", 0), 0.4, "centres in float32"),
+        (("spectra", "centres", 0), 0.25, "step_bounds|rounding_bound"),
+        (("spectra", "order", 0), 21, "spectra: order"),
+        (("spectra", "table", "offset"), 32, "real at 0|step_bounds"),
+        (("spectra", "table", "offset"), 10**9, "place in the weights"),
+        (("spectra", "bias"), None, "centres without a bias"),
+        (("spectra", "bias"), 0, "bound"),
+        (("outputs", 1, "spectra", "scalings"), [1.0], "number of scalings"),
+        (("outputs", 1, "spectra", "scalings", 0), -1.0, "must be positive"),
+        (("outputs", 1, "spectra", "scalings", 0), 64.0, "step_bounds"),
+    ],
+)
+def test_a_changed_step_of_spectra_is_refused_by_name(of_spectra, tmp_path, place, value, match):
+    for name in ("manifest.json", "weights.bin", "denoise.cl"):
+        (tmp_path / name).write_bytes((of_spectra.parent / name).read_bytes())
+    (tmp_path / NAME).write_text(json.dumps(put(certificate_of(of_spectra), place, lambda _: value)))
+    with pytest.raises(checker.Refused, match=match):
+        checker.check(tmp_path / NAME)
+
+
+def test_a_wrong_spectrum_in_the_weights_is_refused(of_spectra, tmp_path):
+    """One number of the table a thousandth off, all digests made to agree: its step is above its bound."""
+    held, manifest = certificate_of(of_spectra), json.loads((of_spectra.parent / "manifest.json").read_text())
+    raw = np.frombuffer((of_spectra.parent / "weights.bin").read_bytes(), "<f4").copy()
+    table = held["spectra"]["table"]
+    part = raw[table["offset"] :][: math.prod(table["shape"])]
+    part[np.abs(part).argmax()] *= np.float32(1.001)
+    manifest["files"] = held["files"] = {**manifest["files"], "weights.bin": sha256(raw.tobytes())}
+    (tmp_path / "weights.bin").write_bytes(raw.tobytes())
+    (tmp_path / "denoise.cl").write_bytes((of_spectra.parent / "denoise.cl").read_bytes())
+    (tmp_path / "manifest.json").write_text(json.dumps(manifest))
+    (tmp_path / NAME).write_text(json.dumps(held))
+    with pytest.raises(checker.Refused, match="spectra: step_bounds"):
+        checker.check(tmp_path / NAME)
+
+
+SPECTRAL_MUTANTS = {
+    "factor": ("[2.8]", "[2.7]"),
+    "eighth": ("[2.3]", "[2.2]"),
+    "sums": ("*factor, 1.0, 1.0]", "*factor, 1.0]"),
+    "unpacking": ("(low + 1) + 1 + centring", "(low + 1) + centring"),
+    "centring": ("1 + centring)", "1)"),
+    "table": ("np.sqrt(2 * ((after", "np.sqrt(1 * ((after"),
+    "rounding of products": ("np.sqrt(2 * (_norms(np.abs(bent))", "np.sqrt(1 * (_norms(np.abs(bent))"),
+    "additions": ("(2 if k else 1)", "1"),
+    "blocks": ("if done else 0.0", "if done and not done else 0.0"),
+    "pairs": ("after[self.both].max(axis=0)", "after[self.both].min(axis=0)"),
+    "combination": ("back = np.sqrt(squares.sum()) + ", "back = "),
+    "columns": ("squares.sum(axis=1)", "squares.sum(axis=1) / 2"),
+    "rows": ("back += low *", "back += low / 2 *"),
+    "mirrored": ("half == 0, 1.0, 2.0)", "half == 0, 1.0, 1.0)"),
+}
+"""A rule of each step made weaker, in the checker's text."""
+
+
+@pytest.mark.parametrize("mutant", SPECTRAL_MUTANTS)
+def test_each_rule_of_spectra_is_needed(of_spectra, monkeypatch, mutant):
+    """A checker with a weaker rule finds a smaller number: what it takes, the real one refuses."""
+    source, (old, new) = inspect.getsource(spectra_checker), SPECTRAL_MUTANTS[mutant]
+    assert source.count(old) == 1, mutant
+    weaker = dict(vars(spectra_checker))
+    exec(compile(source.replace(old, new), "mutant", "exec"), weaker)
+    held, raw = certificate_of(of_spectra), evidence.read(of_spectra)[4]
+    arrays, output = evidence.read(of_spectra)[3], held["outputs"][0]
+    low, high = np.tile(([0.0] * 3 + [-1.0] * 3) * 2, 81), np.ones(972)
+    scales = np.array(output["spectra"]["scalings"]), 2.0 * np.array(output["scalings"][0])
+    given = held["spectra"], arrays["W0"], arrays["b0"], raw, low, high
+    found = [made(*given).steps(*scales) for made in (spectra_checker.Tables, weaker["Tables"])]
+    assert sum(found[1]) < sum(found[0]) * (1 - 2.0**-10)
 
 
 # ---- rectifiers ------------------------------------------------------------------------------------------
@@ -279,9 +405,9 @@ def test_any_key_left_out_is_told(path, changed):
 
 
 def test_the_checker_shares_no_code_with_the_compiler_and_is_short():
-    """At most 220 lines of code, its texts not counted; of the compiler only what promises of sines are."""
-    own, total = {"evidence", "integer_checker"}, 0
-    for module in (checker, evidence):
+    """At most 370 lines of code, its texts not counted; of the compiler only what promises of sines are."""
+    own, total = {"evidence", "integer_checker", "spectra_checker"}, 0
+    for module in (checker, evidence, spectra_checker):
         source = inspect.getsource(module)
         tree = ast.parse(source)
         relative = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level}
@@ -291,7 +417,7 @@ def test_the_checker_shares_no_code_with_the_compiler_and_is_short():
         skipped = {n for text in texts for n in range(text.lineno, text.end_lineno + 1)}
         lines = [line for n, line in enumerate(source.splitlines(), 1) if n not in skipped]
         total += sum(bool(line.strip()) for line in lines)
-    assert total <= 220
+    assert total <= 370
 
 
 def test_kernels_without_a_proof_have_no_certificate(tmp_path):

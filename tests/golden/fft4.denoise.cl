@@ -21,6 +21,7 @@ typedef int4 mask;
 #define PIXELS 2 /* pixels of a row that go through the layers together */
 #define LANES 4 /* numbers in a vector */
 #define PAIRS 2 /* of channels */
+#define BLOCK 2 /* pairs whose products are added up by themselves */
 #define INPUTS 1 /* vectors that hold the pairs of all tiles */
 #define NEURONS 1 /* pairs of vectors of neurons */
 #define STRIDE (2 * (POINTS + 1)) /* vectors from row to row: not a multiple of 4096 bytes */
@@ -139,13 +140,17 @@ __kernel void wamnet_denoise(
     __global const vector *w = ((__global const vector *)weights);
     for (int k = 0; k <= POINTS / 2; ++k) {
         int opposite = (POINTS - k) % POINTS;
+        int apart = opposite != k;
         for (int i = 0; i < INPUTS; ++i) {
             forward(rows + i * POINTS * STRIDE + 2 * k, POINTS + 1, column, 1);
-            forward(rows + i * POINTS * STRIDE + 2 * opposite, POINTS + 1, mirror, 1);
+            if (opposite != k) {
+                forward(rows + i * POINTS * STRIDE + 2 * opposite, POINTS + 1, mirror, 1);
+            }
+            const vector *other = opposite != k ? mirror : column;
             for (int f = 0; f < POINTS; ++f) {
                 int g = (POINTS - f) % POINTS;
                 vector a = column[2 * f], b = column[2 * f + 1];
-                vector c = mirror[2 * g], d = mirror[2 * g + 1];
+                vector c = other[2 * g], d = other[2 * g + 1];
                 vector *to = spectra.all + (i * POINTS + f) * 4;
                 to[0] = a + c;
                 to[1] = b - d;
@@ -164,7 +169,7 @@ __kernel void wamnet_denoise(
                     imaginary[t][0] = (vector)(0.0f);
                     imaginary[t][1] = (vector)(0.0f);
                 }
-                for (int pair = 0; pair < PAIRS; ++pair) {
+                for (int pair = 0; pair < BLOCK; ++pair) {
                     vector w0 = w[0];
                     vector w1 = w[1];
                     vector w2 = w[2];
@@ -201,8 +206,8 @@ __kernel void wamnet_denoise(
                 for (int t = 0; t < TILES; ++t) {
                     product[t * 2][2 * f] = real[t][0] - imaginary[t][1];
                     product[t * 2][2 * f + 1] = imaginary[t][0] + real[t][1];
-                    product[t * 2 + 1][2 * g] = real[t][0] + imaginary[t][1];
-                    product[t * 2 + 1][2 * g + 1] = real[t][1] - imaginary[t][0];
+                    product[t * 2 + apart][2 * g] = real[t][0] + imaginary[t][1];
+                    product[t * 2 + apart][2 * g + 1] = real[t][1] - imaginary[t][0];
                 }
             }
             for (int tile = 0; tile < TILES; ++tile) {

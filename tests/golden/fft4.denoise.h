@@ -70,6 +70,7 @@ static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *w
 #define PIXELS 2 /* pixels of a row that go through the layers together */
 #define LANES 4 /* numbers in a vector */
 #define PAIRS 2 /* of channels */
+#define BLOCK 2 /* pairs whose products are added up by themselves */
 #define INPUTS 1 /* vectors that hold the pairs of all tiles */
 #define NEURONS 1 /* pairs of vectors of neurons */
 #define STRIDE (2 * (POINTS + 1)) /* vectors from row to row: not a multiple of 4096 bytes */
@@ -219,13 +220,17 @@ static inline void wamnet_pixel(
     const float *spectrum = weights;
     for (int k = 0; k <= POINTS / 2; ++k) {
         int opposite = (POINTS - k) % POINTS;
+        int apart = opposite != k;
         for (int i = 0; i < INPUTS; ++i) {
             wamnet_forward(rows + i * POINTS * STRIDE + 2 * k, POINTS + 1, column, 1);
-            wamnet_forward(rows + i * POINTS * STRIDE + 2 * opposite, POINTS + 1, mirror, 1);
+            if (opposite != k) {
+                wamnet_forward(rows + i * POINTS * STRIDE + 2 * opposite, POINTS + 1, mirror, 1);
+            }
+            const wamnet_vector *other = opposite != k ? mirror : column;
             for (int f = 0; f < POINTS; ++f) {
                 int g = (POINTS - f) % POINTS;
                 wamnet_vector a = column[2 * f], b = column[2 * f + 1];
-                wamnet_vector c = mirror[2 * g], d = mirror[2 * g + 1];
+                wamnet_vector c = other[2 * g], d = other[2 * g + 1];
                 wamnet_vector *to = spectra.all + (i * POINTS + f) * 4;
                 to[0] = a + c;
                 to[1] = b - d;
@@ -244,7 +249,7 @@ static inline void wamnet_pixel(
                     imaginary[t][0] = (wamnet_vector){0};
                     imaginary[t][1] = (wamnet_vector){0};
                 }
-                for (int pair = 0; pair < PAIRS; ++pair) {
+                for (int pair = 0; pair < BLOCK; ++pair) {
                     wamnet_vector w0;
                     wamnet_load(&w0, spectrum + 0 * LANES);
                     wamnet_vector w1;
@@ -289,8 +294,8 @@ static inline void wamnet_pixel(
                 for (int t = 0; t < TILES; ++t) {
                     product[t * 2][2 * f] = real[t][0] - imaginary[t][1];
                     product[t * 2][2 * f + 1] = imaginary[t][0] + real[t][1];
-                    product[t * 2 + 1][2 * g] = real[t][0] + imaginary[t][1];
-                    product[t * 2 + 1][2 * g + 1] = real[t][1] - imaginary[t][0];
+                    product[t * 2 + apart][2 * g] = real[t][0] + imaginary[t][1];
+                    product[t * 2 + apart][2 * g + 1] = real[t][1] - imaginary[t][0];
                 }
             }
             for (int tile = 0; tile < TILES; ++tile) {

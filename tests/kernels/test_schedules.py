@@ -175,10 +175,11 @@ FOURIER_FAULTS = {
     "border": ("clamp(top, 0, height - 1)", "clamp(top, 1, height - 1)"),
     "lane": ("PLACE(tile * PAIRS + 1", "PLACE(tile * PAIRS + 0"),
     "conjugate": ("b - d;", "b + d;"),
-    "opposite": ("product[t * 2 + 1][2 * g] =", "product[t * 2 + 1][2 * f] ="),
+    "opposite": ("product[t * 2 + apart][2 * g] =", "product[t * 2 + apart][2 * f] ="),
     "product": ("imaginary[t][1] += w1 * b;", "imaginary[t][1] -= w1 * b;"),
     "middle": ("if (opposite != k)", "if (opposite > k + 2)"),
     "rows": ("(tile * OUT + line) * STRIDE", "(tile * OUT + (line ^ 1)) * STRIDE"),
+    "mirror": ("opposite != k ? mirror : column", "column"),
     "block": ("int x = tile_x + block * PIXELS;", "int x = tile_x + (block ^ 1) * PIXELS;"),
     "weights": {
         "opencl": ("vector w3 = w[3];", "vector w3 = w[2];"),

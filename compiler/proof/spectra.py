@@ -121,16 +121,16 @@ def largest(grams: NDArray[np.inexact]) -> Array:
 
 def norms(matrices: NDArray[np.inexact]) -> Array:
     """Return numbers (...,) above the squares of the norms of matrices (..., m, n)."""
-    matrices = np.ascontiguousarray(matrices)
-    adjoint = np.ascontiguousarray(np.swapaxes(matrices.conj(), -1, -2))
-    return largest(matrices @ adjoint if matrices.shape[-2] < matrices.shape[-1] else adjoint @ matrices)
+    held = np.ascontiguousarray(matrices)
+    adjoint = np.ascontiguousarray(np.swapaxes(held.conj(), -1, -2))
+    return largest(held @ adjoint if held.shape[-2] < held.shape[-1] else adjoint @ held)
 
 
 def spectrum(weight: Array, size: int, points: int) -> Complex:
     """Return conj(DFT(w)) / N (N, N, D_out, C) of a matrix (D_out, size * size * C)."""
     taps = weight.reshape(len(weight), size, size, -1)
-    found: Complex = np.conj(np.fft.fft2(taps, (points, points), axes=(1, 2))).transpose(1, 2, 0, 3) / points
-    return found
+    found: Complex = np.conj(np.fft.fft2(taps, (points, points), axes=(1, 2)))
+    return found.transpose(1, 2, 0, 3) / points
 
 
 def blocks_of(channels: int, block: int) -> list[list[int]]:

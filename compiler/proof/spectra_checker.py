@@ -126,7 +126,8 @@ class Tables:
         taps = after[:, None] * self.weight / np.tile(scale, self.size**2)
 
         def partial(chosen: list[int]) -> float:
-            return np.sqrt((_norms(bent[..., chosen]) * mirrored).sum()) * np.linalg.norm(sizes[chosen])
+            largest = np.sqrt((_norms(bent[..., chosen]) * mirrored).sum())
+            return float(largest * np.linalg.norm(sizes[chosen]))
 
         centring = self.size / n if self.centres.any() else 0.0
         forwards = U * AGAIN * np.sqrt(_norms(taps)) * energy * (one * (low + 1) + 1 + centring)

@@ -115,4 +115,5 @@ class _First:
         channels = np.sum(shares[..., None, :] * np.abs(vectors) ** 2, axis=(0, 1, 3))
         left = np.abs(bent @ vectors) ** 2
         neurons = np.sum((shares / values)[..., None, :] * left, axis=(0, 1, 3))
-        return math.sqrt(total), np.bincount(self.image, channels), neurons
+        images: Array = np.bincount(self.image, channels).astype(np.float64)
+        return math.sqrt(total), images, neurons

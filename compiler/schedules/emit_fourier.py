@@ -119,7 +119,7 @@ class Fourier(Tiled):
         """Return the enclosure of every node: the sums over the window are those of spectra."""
         gather, of = kernel_gather(program), self.spectra(program)
         if images is None:
-            norm = self.points * np.linalg.norm(fourier.radius(gather, of.centres))
+            norm = np.array(self.points * np.linalg.norm(fourier.radius(gather, of.centres)))
             return fourier.enclose(program, sine, bounds.window_box(gather), norm, of)
         found = windows(gather, images, rows)
         joined = np.concatenate([images[image.name] for image in gather.images], axis=-1, dtype=np.float64)
@@ -182,7 +182,7 @@ class Fourier(Tiled):
         return super().pack(self._held(program))
 
     def _held(self, program: Program) -> Program:
-        """Return the program whose parameters are what the kernel holds, but for transforms."""
+        """Return the program whose parameters are what the kernel holds, before transforms."""
         found = fourier.arrangement(program, self.lanes)
         return found.centred(found.moved(program))
 

@@ -290,16 +290,16 @@ def _reads_window(program: Program, index: int) -> bool:
     return node.op == "affine" and program.nodes[node.args[0]].op == "input"
 
 
-def radius(gather: Gather, centres: Sequence[float]) -> Array:
+def radius(gather: Gather, centres: Array) -> Array:
     """Return the largest magnitude (C,) of each channel, centred."""
     low, high = (end[: gather.channels] for end in bounds.window_box(gather))
     found: Array = np.maximum(high - centres, centres - low)
     return found
 
 
-def tile_norms(image: Array, window: dataset.Window, points: int, centres: Sequence[float] = ()) -> Array:
+def tile_norms(image: Array, window: dataset.Window, points: int, centres: Any = 0.0) -> Array:
     """Return the norm (H, W) of the tile, centred, that holds each pixel of an image (H, W, C)."""
-    middle = np.zeros(image.shape[2]) + (centres if len(centres) else 0.0)
+    middle = np.zeros(image.shape[2]) + centres
     # |x - m|^2 = |m|^2 + (|x - m|^2 - |m|^2), the latter being 0 outside of a zero border.
     whole = float(middle @ middle)
     squares = ((image - middle) ** 2).sum(axis=2) - whole

@@ -177,9 +177,9 @@ def test_whole_frames_equal_the_definition(denoiser, name):
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("target", DENOISERS)
 def test_certified_bounds_are_below_a_step_of_a_display(name, target):
-    """Over all pictures, of all schedules that share the bound; sums from spectra state a larger one."""
-    for schedule in filter(shares_bound, DENOISERS[target].schedules):
-        for profile in ("ieee", "exact"):
+    """Over all pictures, of all schedules that hold the model; profile exact has no sums from spectra."""
+    for schedule in DENOISERS[target].schedules:
+        for profile in ("ieee", "exact") if shares_bound(schedule) else ("ieee",):
             artifact = compile_program(trained(name).program, target, profile, schedule.name)
             assert artifact.certificate is not None
             assert max(artifact.manifest["bound"]["output"]) < DISPLAY_STEP

@@ -179,6 +179,17 @@ class Plan:
         return self.shares_bound and self.cut is None and whole.holds(self.emitted)
 
     @property
+    def unproven(self) -> str:
+        """Return why its kernel has no certificate (CER-1), or nothing where it has one."""
+        if self.bound.exact or self.bound.proof:
+            return ""
+        if self.cut is not None:
+            return "it is two kernels, one after the other, of a first layer that is cut to a rank"
+        if self.sine.error is None:
+            return f"nothing is promised of the sine ({self.sine.text})"
+        return "the program is no network of sines or rectifiers whose steps the proof knows"
+
+    @property
     def assumes(self) -> str:
         """Return what the bound rests on that the language does not promise: nothing where nothing rounds."""
         return "" if self.is_whole else self.target.assumes

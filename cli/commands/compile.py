@@ -119,12 +119,18 @@ def compile_model(
 
 
 def _write(kernel: Files, folder: Path) -> None:
-    """Write a kernel, and say its files, and why its schedule is another one."""
+    """Write a kernel, and say its files, why its schedule is another one, and why it has no certificate."""
+    from ...compiler.artifact import Artifact
+
     for path in write_kernel(kernel, folder):
         say(str(path))
     picked = kernel.manifest.get("schedule", {})
     if "reason" in picked:
         say(f"schedule {picked['name']}, not {picked['asked']}: {picked['reason']}")
+    if not isinstance(kernel, Artifact):
+        say("no certificate: a scene's kernel has none, its path has no bound over all pixels")
+    elif kernel.plan.unproven:
+        say(f"no certificate: {kernel.plan.unproven}")
 
 
 def _chosen_here(model: Model, executor: str, profile: str, schedule: str | None, variant: str) -> str:

@@ -102,5 +102,23 @@ def test_numbers_that_a_weights_file_does_not_have_are_not_made_room_for(wamnet,
 
 def test_a_kernel_without_one_is_a_bad_file(wamnet, refused, samples, tmp_path):
     model = samples / "model.safetensors"
-    assert wamnet("compile", model, "--target", "glsl", "--profile", "native", "-o", "plain").status == 0
+    made = wamnet("compile", model, "--target", "glsl", "--profile", "native", "-o", "plain")
+    assert made.status == 0
+    assert "no certificate: nothing is promised of the sine (" in made.out
     assert "no such file; kernels of profile ieee have one" in refused("certify", "plain")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("--variant", "rank2"), "no certificate: it is two kernels, one after the other"),
+        (("--variant", "sine7"), None),
+        (("--variant", "window3"), None),
+    ],
+)
+def test_a_variant_has_a_certificate_or_says_why_not(wamnet, samples, tmp_path, given, said):
+    made = wamnet("compile", samples / "model.safetensors", "--target", "opencl", *given, "-o", "kernel")
+    assert made.status == 0
+    assert (said or "") in made.out
+    assert ("no certificate" in made.out) == (said is not None)
+    assert wamnet("certify", "kernel").status == (2 if said else 0)

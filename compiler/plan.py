@@ -187,7 +187,7 @@ class Plan:
             return "it is two kernels, one after the other, of a first layer that is cut to a rank"
         if self.sine.error is None:
             return f"nothing is promised of the sine ({self.sine.text})"
-        return "the program is no network of sines or rectifiers whose steps the proof knows"
+        return "the program is not a network of sines or rectifiers of the form that the proof knows"
 
     @property
     def assumes(self) -> str:

@@ -14,7 +14,7 @@ BUDGET = {
     "refimpl": 1150,
     "refimpl/light": 3550,
     "refimpl/network": 2050,
-    "compiler": 1650,
+    "compiler": 1700,
     "compiler/core": 3250,
     "compiler/languages": 2150,
     "compiler/proof": 3100,

@@ -98,7 +98,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("-o", "--output", type=Path, help="write the counts as JSON")
     options = parser.parse_args()
-    held, manifest, _, _ = read(options.folder / "denoise.certificate.json")
+    held, manifest, *_ = read(options.folder / "denoise.certificate.json")
     weights = np.frombuffer((options.folder / "weights.bin").read_bytes(), "<f4")
     (name,) = (name for name in manifest["files"] if name != "weights.bin")
     source = (options.folder / name).read_text()

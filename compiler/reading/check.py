@@ -32,7 +32,7 @@ def check_text(path: Path) -> dict[str, int]:
     Raises `Refused` for a text that does not compute the certificate's program, and `Unread` for one with
     constructs that this reader does not know, or in a language that it does not read.
     """
-    held, manifest, _, _ = read(path)
+    held, manifest, *_ = read(path)
     sources = [name for name in manifest["files"] if name != "weights.bin"]
     if len(sources) != 1:
         raise Unread(f"kernels of {len(sources)} texts")

@@ -41,7 +41,7 @@ def kernel(folder, target, schedule="plain", **kwargs):
 
 def parts(path):
     """Return the text of a kernel, its certificate, manifest and weights."""
-    held, manifest, _, _ = read(path)
+    held, manifest, *_ = read(path)
     (name,) = (name for name in manifest["files"] if name != "weights.bin")
     weights = np.frombuffer((path.parent / "weights.bin").read_bytes(), "<f4")
     return (path.parent / name).read_text(), held, manifest, weights

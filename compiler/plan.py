@@ -250,8 +250,8 @@ def plan_program(
     common = analysed(program, profile)
     if common.exact and chosen.assumes:
         raise CompileError(
-            f"profile {profile}: {chosen.language} has no word that keeps operations in order; use profile "
-            "ieee, or a target that has one"
+            f"profile {profile}: kernels in {chosen.language} rest on a compiler that keeps operations in "
+            "order, which their text does not demand; use profile ieee, or a target whose text does"
         )
     if rank and chosen.most is not None and rank > chosen.most:
         raise CompileError(

@@ -28,8 +28,8 @@ precision highp sampler2D;
 """What replaces the first lines of GLSL 3.30: numbers of 32 bits everywhere."""
 
 ASSUMES = (
-    "the compiler keeps the order of the operations of an expression, fused or not: the language has no word "
-    "to demand it. Run the check pair on a new device before you rely on the bound"
+    "the compiler keeps the order of the operations of an expression, fused or not, and rounds to nearest: "
+    "the language has no word to demand it. Run the check pair on a new device before you rely on the bound"
 )
 """What a bound rests on in a language without `precise`."""
 

@@ -16,7 +16,8 @@ from .openings import Buffers
 
 ASSUMES = (
     "the library is compiled with MTLCompileOptions.mathMode = .safe (fastMathEnabled = false before macOS "
-    "15, -fno-fast-math offline): the default relaxes arithmetic. Products may be fused with sums"
+    "15, -fno-fast-math offline): the default relaxes arithmetic. Products may be fused with sums. The "
+    "device rounds to nearest, which the language leaves open (MSL 8.2)"
 )
 """What the source cannot check by itself."""
 

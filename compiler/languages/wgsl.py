@@ -1,7 +1,7 @@
 """WGSL, the language of WebGPU: compute shaders on storage buffers, as those of GLSL for Vulkan.
 
-Values are declared by `let`, choices are the function `select`, and there is no `precise`: the standard lets
-a compiler reorder a sum only where the result is at least as accurate, and a bound rests on that.
+Values are declared by `let`, choices are the function `select`, and there is no `precise`. The standard lets
+a compiler reorder operations and round results up or down; a bound rests on one that does not [`ASSUMES`].
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from .glsl_buffers import GROUP, SAID, Declared
 from .interface import BLOCK, DENOISE, ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
 
 ASSUMES = (
-    "the compiler keeps the order of the operations of an expression, fused or not, or does better: the "
-    "standard asks for as much, and has no word to demand more. Run the check pair on a new device"
+    "the compiler keeps the order of the operations of an expression, fused or not, and rounds to nearest. "
+    "The standard lets it reorder them (WGSL 15.7.5) and round up or down (15.7.2), and has no word to "
+    "forbid that. Run the check pair on a new device before you rely on the bound"
 )
 """What a bound rests on."""
 

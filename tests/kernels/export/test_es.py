@@ -54,7 +54,7 @@ def test_the_bound_says_what_it_assumes(case):
 
 
 def test_a_profile_that_needs_an_order_is_refused(case):
-    with pytest.raises(CompileError, match=r"profile exact: GLSL ES .* has no word that keeps operations in"):
+    with pytest.raises(CompileError, match=r"exact: kernels in GLSL ES .* their text does not demand"):
         compile_program(case[0], "glsl-es", "exact")
 
 

@@ -13,9 +13,9 @@
  * profile   ieee: any order of summation, fused multiply-add allowed, emitted sine
  * sine      emitted, odd polynomial of degree 11
  * bound     |output - float64 reference| <= 0.00271 for all images in these ranges
- * assumes   the compiler keeps the order of the operations of an expression, fused or not: the
- *           language has no word to demand it. Run the check pair on a new device before you rely on
- *           the bound
+ * assumes   the compiler keeps the order of the operations of an expression, fused or not, and
+ *           rounds to nearest: the language has no word to demand it. Run the check pair on a new
+ *           device before you rely on the bound
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
  * arguments each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel
  *           row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the

@@ -14,7 +14,8 @@
  * bound     |output - float64 reference| <= 0.00271 for all images in these ranges
  * assumes   the library is compiled with MTLCompileOptions.mathMode = .safe (fastMathEnabled = false
  *           before macOS 15, -fno-fast-math offline): the default relaxes arithmetic. Products may
- *           be fused with sums
+ *           be fused with sums. The device rounds to nearest, which the language leaves open (MSL
+ *           8.2)
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
  * arguments Buffer 0 are the sizes, 32-bit integers: width, height; then buffers of floats, rows from the top,
  *           channels interleaved: 1 the weights, 2 the result (width *

@@ -12,9 +12,10 @@
  * profile   ieee: any order of summation, fused multiply-add allowed, emitted sine
  * sine      emitted, odd polynomial of degree 11
  * bound     |output - float64 reference| <= 0.00271 for all images in these ranges
- * assumes   the compiler keeps the order of the operations of an expression, fused or not, or does
- *           better: the standard asks for as much, and has no word to demand more. Run the check
- *           pair on a new device
+ * assumes   the compiler keeps the order of the operations of an expression, fused or not, and
+ *           rounds to nearest. The standard lets it reorder them (WGSL 15.7.5) and round up or down
+ *           (15.7.2), and has no word to forbid that. Run the check pair on a new device before you
+ *           rely on the bound
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
  * arguments Storage buffers of floats, rows from the top, channels interleaved; binding 0 is a uniform block of
  *           32-bit integers: width, height.

@@ -59,5 +59,8 @@ RUNNERS: Mapping[str, Opener] = {
     "c99": WAYS["c"].open,
     "glsl-vulkan/hlsl-fxc": _opener("wgpu_runner", "hlsl_runner", "fxc"),
     "glsl-vulkan/hlsl-dxc": _opener("wgpu_runner", "hlsl_runner", "dxc"),
+    "wgsl/tint": _opener("tint_runner", "TintRunner"),
+    "wgsl/tint-gles": _opener("tint_runner", "TintRunner", "opengles"),
 }
-"""By compiler target, and after a stroke what it is translated to; c99 is C, whose name an executor has."""
+"""By compiler target, and after a stroke what translates it, or to what; c99 is C, whose name an executor
+has."""

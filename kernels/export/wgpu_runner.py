@@ -43,7 +43,7 @@ KINDS = {
 """What WebGPU calls it."""
 
 
-def _declared(source: str) -> dict[int, str]:
+def declared(source: str) -> dict[int, str]:
     """Return the kinds of the buffers that a kernel declares, by binding."""
     return {int(m[1] or m[3]): KINDS[m[2] or m[4]] for m in DECLARED.finditer(source)}
 
@@ -81,7 +81,7 @@ class WgpuRunner(BufferRunner):
             # A layout of its own holds also what a kernel declares and does not read.
             entries = [
                 {"binding": place, "visibility": self._wgpu.ShaderStage.COMPUTE, "buffer": {"type": kind}}
-                for place, kind in _declared(source).items()
+                for place, kind in declared(source).items()
             ]
             bound = self._device.create_bind_group_layout(entries=entries)
             layout = self._device.create_pipeline_layout(bind_group_layouts=[bound])
@@ -90,7 +90,7 @@ class WgpuRunner(BufferRunner):
             )
         except Exception as error:  # noqa: BLE001 (the package has its own kinds)
             raise CompileError(f"{self.device} does not build the kernel: {error}") from None
-        return pipeline, bound, set(_declared(source))
+        return pipeline, bound, set(declared(source))
 
     def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
         kind = self._wgpu.BufferUsage.UNIFORM if name == WEIGHTS else 0
@@ -110,14 +110,14 @@ class WgpuRunner(BufferRunner):
         memory.held.destroy()
 
     def _launch(self, built: Any, launch: Launch) -> None:
-        device, (pipeline, layout, declared) = self._device, built
+        device, (pipeline, layout, numbers) = self._device, built
         sizes = launch.integers.tobytes()
         sizes += bytes(-len(sizes) % UNIFORM_BYTES)
         integers = device.create_buffer_with_data(data=sizes, usage=self._wgpu.BufferUsage.UNIFORM)
         entries = [
             {"binding": number, "resource": {"buffer": buffer, "offset": 0, "size": buffer.size}}
             for number, buffer in {0: integers, **launch.buffers}.items()
-            if number in declared
+            if number in numbers
         ]
         group = device.create_bind_group(layout=layout, entries=entries)
         encoder = device.create_command_encoder()

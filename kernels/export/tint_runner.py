@@ -1,0 +1,245 @@
+"""Exported WGSL on Dawn, the WebGPU of Chromium, whose compiler is Tint: by its bindings for Node.
+
+1. The npm package `webgpu` is Dawn. A process of Node opens a device [`SCRIPT`]: of Vulkan, for which Tint
+   writes SPIR-V, or of OpenGL ES, for which it writes GLSL ES.
+2. A launch is a line of JSON to that process with the kernel and all buffers, and a line of JSON back with
+   what the kernel wrote [`TintRunner`].
+
+Where the environment as it is has no device, another one is tried [`TRIED`]: Dawn does not take lavapipe of
+Mesa 22, which lacks `shaderUniformArrayDynamicIndexing`, but SwiftShader, which Chromium brings; OpenGL ES
+needs no display if the environment says so.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.languages.interface import BLOCK
+from ...refimpl.errors import CompileError, ExecutorUnavailable
+from ..devices.executor import Kernel
+from .buffer_runner import BufferRunner, Launch
+from .wgpu_runner import UNIFORM_BYTES, declared
+
+WAY_OUT = "npm install --global webgpu, and a driver of Vulkan or OpenGL ES"
+"""How to get a device."""
+
+LEVELS: Mapping[str, str] = {"vulkan": "core", "opengles": "compatibility"}
+"""Levels of WebGPU by Dawn's name of what it drives."""
+
+TRIED: Mapping[str, Mapping[str, str]] = {
+    "vulkan": {"VK_ICD_FILENAMES": "/usr/lib/chromium/vk_swiftshader_icd.json"},
+    "opengles": {"EGL_PLATFORM": "surfaceless"},
+}
+"""What the environment is given where it has no device by itself, unless it says otherwise."""
+
+CLOSE_S = 10
+"""Seconds that Node may take to end."""
+
+SCRIPT = """\
+import { createRequire } from "node:module";
+import { createInterface } from "node:readline";
+import { pathToFileURL } from "node:url";
+const say = (words) => process.stdout.write(JSON.stringify(words) + "\\n");
+const [backend, featureLevel] = process.argv.slice(1);
+let adapter;
+try {
+  const path = createRequire(process.cwd() + "/").resolve("webgpu");
+  const { create, globals } = await import(pathToFileURL(path));
+  Object.assign(globalThis, globals);
+  globalThis.gpu = create([`backend=${backend}`]);
+  adapter = await gpu.requestAdapter({ featureLevel });
+} catch (error) {
+  say({ missing: error.message });
+  process.exit(0);
+}
+if (!adapter) {
+  say({ missing: "Dawn has no adapter" });
+  process.exit(0);
+}
+const { maxStorageBuffersPerShaderStage, maxStorageBufferBindingSize, maxBufferSize } = adapter.limits;
+const requiredLimits = { maxStorageBuffersPerShaderStage, maxStorageBufferBindingSize, maxBufferSize };
+const device = await adapter.requestDevice({ requiredLimits });
+const made = new Map();
+say({ device: adapter.info.device || adapter.info.description, described: adapter.info.description });
+
+async function built({ source, entry, kinds }) {
+  const key = entry + source;
+  if (!made.has(key)) {
+    device.pushErrorScope("validation");
+    const module = device.createShaderModule({ code: source });
+    const entries = Object.entries(kinds).map(([binding, type]) => (
+      { binding: Number(binding), visibility: GPUShaderStage.COMPUTE, buffer: { type } }
+    ));
+    const bound = device.createBindGroupLayout({ entries });
+    const layout = device.createPipelineLayout({ bindGroupLayouts: [bound] });
+    const pipeline = device.createComputePipeline({ layout, compute: { module, entryPoint: entry } });
+    const error = await device.popErrorScope();
+    if (error) {
+      throw error;
+    }
+    made.set(key, { pipeline, bound });
+  }
+  return made.get(key);
+}
+
+async function launched({ buffers, groups, kinds, ...kernel }) {
+  const { pipeline, bound } = await built({ kinds, ...kernel });
+  const { UNIFORM, STORAGE, COPY_SRC, COPY_DST, MAP_READ } = GPUBufferUsage;
+  const held = Object.entries(buffers).map(([binding, text]) => {
+    const bytes = Buffer.from(text, "base64");
+    const usage = (kinds[binding] === "uniform" ? UNIFORM : STORAGE | COPY_SRC) | COPY_DST;
+    const buffer = device.createBuffer({ size: bytes.length, usage });
+    device.queue.writeBuffer(buffer, 0, bytes);
+    return { binding, buffer, size: bytes.length };
+  });
+  const entries = held.map(({ binding, buffer }) => ({ binding: Number(binding), resource: { buffer } }));
+  const group = device.createBindGroup({ layout: bound, entries });
+  const encoder = device.createCommandEncoder();
+  const compute = encoder.beginComputePass();
+  compute.setPipeline(pipeline);
+  compute.setBindGroup(0, group);
+  compute.dispatchWorkgroups(...groups, 1);
+  compute.end();
+  const read = held.filter(({ binding }) => kinds[binding] === "storage").map((each) => {
+    const copy = device.createBuffer({ size: each.size, usage: COPY_DST | MAP_READ });
+    encoder.copyBufferToBuffer(each.buffer, 0, copy, 0, each.size);
+    return { ...each, copy };
+  });
+  device.queue.submit([encoder.finish()]);
+  const written = {};
+  for (const { binding, copy } of read) {
+    await copy.mapAsync(GPUMapMode.READ);
+    written[binding] = Buffer.from(copy.getMappedRange().slice(0)).toString("base64");
+    copy.destroy();
+  }
+  held.forEach(({ buffer }) => buffer.destroy());
+  return { written };
+}
+
+for await (const line of createInterface({ input: process.stdin })) {
+  const asked = JSON.parse(line);
+  try {
+    device.pushErrorScope("validation");
+    const found = asked.buffers ? await launched(asked) : (await built(asked), {});
+    const error = await device.popErrorScope();
+    say(error ? { error: error.message } : found);
+  } catch (error) {
+    say({ error: error.message });
+  }
+}
+process.exit(0);
+"""
+"""What Node runs: one device; each line asks for a kernel to be built, or built and run."""
+
+
+def _environment() -> dict[str, str]:
+    """Return the environment, with npm's global folder among those in which Node looks for packages."""
+    root, npm = "", shutil.which("npm")
+    if npm:
+        root = subprocess.run([npm, "root", "--global"], capture_output=True, text=True, check=False).stdout
+    paths = [os.environ.get("NODE_PATH", ""), root.strip()]
+    return {**os.environ, "NODE_PATH": os.pathsep.join(filter(None, paths))}
+
+
+class TintRunner(BufferRunner):
+    """A device of Dawn in a process of Node; `backend`: what it drives [`LEVELS`]."""
+
+    name = "wgsl"
+    homes = (BLOCK,)
+
+    def __init__(self, backend: str = "vulkan") -> None:
+        super().__init__()
+        node = shutil.which("node")
+        if node is None:
+            raise ExecutorUnavailable(f"node is not installed: apt-get install nodejs npm; {WAY_OUT}")
+        environment = _environment()
+        refused = self._open(node, backend, environment)
+        if refused and not set(TRIED[backend]) & set(environment):
+            refused = self._open(node, backend, {**environment, **TRIED[backend]}) and refused
+        if refused:
+            raise ExecutorUnavailable(f"Dawn has no device of {backend} ({refused}): {WAY_OUT}")
+
+    def _open(self, node: str, backend: str, environment: Mapping[str, str]) -> str:
+        """Start the process; return why it has no device, or nothing."""
+        self._said = tempfile.TemporaryFile("w+")  # noqa: SIM115 (closed with the process)
+        self._process = subprocess.Popen(
+            [node, "--input-type=module", "-e", SCRIPT, "--", backend, LEVELS[backend]],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._said,
+            text=True,
+            env=environment,
+        )
+        told = self._answer()
+        if "device" in told:
+            self.device = f"Dawn, {told['device']}, {told['described']}"
+            return ""
+        why = " ".join(f"{told.get('missing', told.get('error'))}; {self._warning()}".split())
+        self.close()
+        return why
+
+    def _warning(self) -> str:
+        """Return the last line of what Dawn said that is a warning."""
+        self._said.seek(0)
+        warnings = [line.strip() for line in self._said if line.startswith("Warning: ")]
+        return warnings[-1] if warnings else "no warning"
+
+    def _answer(self) -> dict[str, Any]:
+        """Return the next line of the process."""
+        line = self._process.stdout.readline() if self._process.stdout else ""
+        if not line:
+            return {"error": "Node has ended"}
+        found: dict[str, Any] = json.loads(line)
+        return found
+
+    def _ask(self, **asked: Any) -> dict[str, Any]:
+        """Return what the process answers; raise CompileError for what Dawn does not take."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps(asked) + "\n")
+            self._process.stdin.flush()
+            told = self._answer()
+        except BrokenPipeError:
+            told = {"error": "Node has ended"}
+        if "error" in told:
+            raise CompileError(f"{self.device} does not take the kernel: {' '.join(told['error'].split())}")
+        return told
+
+    def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+        built = {
+            "source": kernel.source,
+            "entry": kernel.entry_point,
+            "kinds": {str(number): kind for number, kind in declared(kernel.source).items()},
+        }
+        self._ask(**built)
+        return built
+
+    def _launch(self, built: Any, launch: Launch) -> None:
+        sizes = launch.integers.tobytes()
+        given = {"0": sizes + bytes(-len(sizes) % UNIFORM_BYTES)}
+        given |= {str(number): array.tobytes() for number, array in launch.buffers.items()}
+        buffers = {n: base64.b64encode(given[n]).decode() for n in built["kinds"]}
+        told = self._ask(**built, buffers=buffers, groups=launch.groups)
+        for number, text in told["written"].items():
+            array: NDArray[np.float32] = launch.buffers[int(number)]
+            array[...] = np.frombuffer(base64.b64decode(text), np.float32).reshape(array.shape)
+
+    def close(self) -> None:
+        """End the process."""
+        with self._process, self._said:
+            if self._process.stdin:
+                self._process.stdin.close()
+            try:
+                self._process.wait(CLOSE_S)
+            except subprocess.TimeoutExpired:
+                self._process.kill()

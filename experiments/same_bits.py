@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import argparse
+import ctypes.util
 import json
 import os
 import shutil
@@ -41,11 +42,13 @@ from wamnet.compiler.variants import parse, vary
 from wamnet.kernels import open_executor
 from wamnet.kernels.bench import peer_onnxruntime
 from wamnet.kernels.devices.executor import Executor
+from wamnet.kernels.export import tools
 from wamnet.kernels.export.check import digest_of
 from wamnet.kernels.export.compute_runner import ComputeRunner
 from wamnet.kernels.export.gl_runner import ESRunner
 from wamnet.kernels.export.host_pass_runner import GodotRunner
 from wamnet.kernels.export.host_runner import CRunner, CUDARunner, MetalRunner
+from wamnet.kernels.export.tint_runner import TintRunner
 from wamnet.kernels.export.wgpu_runner import WgpuRunner, hlsl_runner, vulkan_runner
 from wamnet.kernels.run.denoise_on import images_of
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
@@ -78,13 +81,36 @@ RELAXED = {
 FAST = ("-Ofast", "-ffp-contract=fast", "-march=native")
 """The same of compilers of C and C++."""
 
-DEBIAN = "/etc/OpenCL/vendors"
-"""Where Debian's drivers of OpenCL are named; the wheel has its own."""
+C_COMPILERS: Mapping[str, Sequence[str]] = {
+    "gcc": FAST,
+    "clang": ("-O3", "-ffast-math", *FAST[1:]),
+    "tcc": (),
+}
+"""Compilers of C and what lets each do most; tcc relaxes nothing."""
+
+VENDORS = "OCL_ICD_VENDORS"
+"""Environment variable with a folder that names drivers of OpenCL, or with one driver's library."""
+
+DRIVERS: Mapping[str, tuple[str, str, str]] = {
+    "PoCL of Debian": ("libpocl.so.2", "pocl", "apt-get install libpocl2"),
+    "Intel's runtime": (
+        f"{sys.prefix}/lib/libintelocl.so",
+        f"{sys.prefix}/lib/libintelocl.so",
+        "pip install intel-opencl-rt intel-cmplr-lib-rt",
+    ),
+    "OpenCL of the system": ("/etc/OpenCL/vendors", "/etc/OpenCL/vendors", "a driver that is named there"),
+}
+"""Drivers beside the wheel's: what is loaded, the path or library that must be there, and how it gets there.
+Debian's library without its package pocl-opencl-icd is named nowhere: other programs keep their driver."""
 
 
 @dataclass(frozen=True)
 class Way:
-    """How a picture is computed; `kind` groups ways for --only, `options` is what the table says."""
+    """How a picture is computed; `kind` groups ways for --only, `options` is what the table says.
+
+    `needs`: the path or library without which it is not here, and `way_out` how to get it. `slow`: further
+    schedules, whose kernels Mesa compiles for minutes: only --slow asks for them.
+    """
 
     kind: str
     name: str
@@ -92,7 +118,9 @@ class Way:
     schedules: tuple[str, ...] = ("plain",)
     options: str = ""
     environment: Mapping[str, str] | None = None
-    folder: str = ""
+    needs: str = ""
+    way_out: str = ""
+    slow: tuple[str, ...] = ()
 
 
 def on(opened: Callable[[], Executor]) -> Run:
@@ -126,6 +154,30 @@ def in_browser(flags: Sequence[str]) -> Run:
     return lambda model, images, schedule: browsers.denoise(model, images, flags)
 
 
+def in_firefox(model: Model, images: Images, schedule: str) -> tuple[str, Picture]:
+    """Denoise in WebGL 2 in Firefox."""
+    return browsers.denoise_in_firefox(model, images)
+
+
+def dxc_runner() -> WgpuRunner:
+    """Return a runner of HLSL that Microsoft's compiler makes SPIR-V of."""
+    if shutil.which(DXC[0]) is None:
+        raise ExecutorUnavailable(
+            "there is no dxc; where Debian has it: apt-get install directx-shader-compiler"
+        )
+
+    def translated(source: str) -> bytes:
+        with tempfile.TemporaryDirectory(prefix="wamnet-dxc-") as name:
+            made, written = Path(name) / "kernel.hlsl", Path(name) / "kernel.spv"
+            made.write_text(tools.hlsl(tools.spirv(source), "dxc"), encoding="utf-8")
+            done = subprocess.run([*DXC, "-Fo", written, made], capture_output=True, text=True, check=False)
+            if done.returncode:
+                raise CompileError(f"dxc refuses the kernel: {done.stderr}")
+            return written.read_bytes()
+
+    return WgpuRunner("glsl-vulkan", translated)
+
+
 def _executors() -> Iterator[Way]:
     """Yield NumPy, OpenCL and OpenGL."""
     yield Way("numpy", "NumPy", on(lambda: open_executor("numpy")))
@@ -133,21 +185,24 @@ def _executors() -> Iterator[Way]:
         on(lambda: open_executor("opencl")),
         ("plain", "group4", "vector16", "tile16", "dot16"),
     )
-    debian = {"OCL_ICD_VENDORS": DEBIAN}
     for environment in ({}, RELAXED):
         options = " ".join(environment.values())
         yield Way("opencl", "PoCL of the wheel", opencl, schedules, options, environment)
-        named = "OpenCL of the system"
-        yield Way("opencl", named, opencl, schedules, options, {**environment, **debian}, DEBIAN)
+        for named, (loaded, needs, way_out) in DRIVERS.items():
+            told = {**environment, VENDORS: loaded}
+            yield Way("opencl", named, opencl, schedules, options, told, needs, way_out)
     egl = on(lambda: open_executor("opengl", context="egl"))
     yield Way("opengl", "GLSL, fragments", egl)
     yield Way("opengl", "GLSL, fragments", egl, options="vectors of 4", environment=NARROW)
     yield Way("opengl", "GLSL, fragments", on(lambda: open_executor("opengl", context="osmesa")))
     yield Way("opengl", "GLSL, fragments", egl, options="softpipe", environment=SOFTPIPE)
-    yield Way("opengl", "GLSL, compute", on(ComputeRunner), ("plain", "group"))
+    yield Way("opengl", "GLSL, compute", on(ComputeRunner), (), slow=("plain", "group"))
     yield Way("opengl", "GLSL ES", on(ESRunner))
     yield Way("opengl", "Godot", on(GodotRunner))
 
+
+DXC = ("dxc", "-spirv", "-T", "cs_6_0", "-E", "main", "-O3")
+"""Microsoft's compiler of HLSL; without `precise` it may reorder."""
 
 NARROW = {"LP_NATIVE_VECTOR_WIDTH": "128"}
 """llvmpipe then takes other instructions, without fused multiply-add."""
@@ -159,8 +214,8 @@ SOFTPIPE = {"GALLIUM_DRIVER": "softpipe", "LIBGL_ALWAYS_SOFTWARE": "1"}
 def _compilers() -> Iterator[Way]:
     """Yield compilers of C and C++, strict and as fast as they can."""
     tiles = ("plain", "tile8", "dot16")
-    for compiler, fast in (("gcc", FAST), ("clang", (*FAST, "-ffast-math")), ("tcc", ())):
-        for options in dict.fromkeys(((), fast)):
+    for compiler, fast in C_COMPILERS.items():
+        for options in dict.fromkeys(((), tuple(fast))):
             environment, text = {"CC": compiler}, " ".join(options)
             yield Way("c", f"C, {compiler}", on(lambda o=options: CRunner(*o)), tiles, text, environment)
     for runner, language in ((CUDARunner, "CUDA C"), (MetalRunner, "Metal")):
@@ -172,16 +227,23 @@ def _compilers() -> Iterator[Way]:
 
 def _others() -> Iterator[Way]:
     """Yield Vulkan, WebGPU, ONNX and browsers."""
-    grouped = ("plain", "group", "group4")
-    yield Way("vulkan", "WGSL, naga", on(WgpuRunner), grouped)
-    yield Way("vulkan", "GLSL, SPIR-V, naga", on(vulkan_runner), grouped)
+    groups = ("group", "group4")
+    yield Way("vulkan", "WGSL, naga", on(WgpuRunner), slow=groups)
+    yield Way("vulkan", "WGSL, Tint, SPIR-V", on(TintRunner), ("plain", *groups))
+    tint_gles = on(lambda: TintRunner("opengles"))
+    yield Way("opengl", "WGSL, Tint, GLSL ES", tint_gles, (), slow=("plain", *groups))
+    yield Way("vulkan", "GLSL, SPIR-V, naga", on(vulkan_runner), slow=groups)
     for style in ("fxc", "dxc"):
-        yield Way("vulkan", f"HLSL for {style}, SPIR-V, naga", on(lambda s=style: hlsl_runner(s)), grouped)
+        yield Way(
+            "vulkan", f"HLSL for {style}, SPIR-V, naga", on(lambda s=style: hlsl_runner(s)), slow=groups
+        )
+    yield Way("vulkan", "HLSL, DXC, SPIR-V, naga", on(dxc_runner), options=" ".join(DXC), slow=groups)
     yield Way("onnx", "ONNX", by_graph, ("",))
     yield Way("onnx", "ONNX", by_evaluator, ("",))
     for angle in ("swiftshader", "gl-egl"):
         flags = (f"--use-angle={angle}",)
         yield Way("web", "WebGL 2, Chromium", in_browser(flags), ("packed",), " ".join(flags))
+    yield Way("web", "WebGL 2, Firefox", in_firefox, ("packed",))
 
 
 WAYS: tuple[Way, ...] = (*_executors(), *_compilers(), *_others())
@@ -245,14 +307,18 @@ def answer(way: Way, schedule: str, folder: Path) -> dict[str, Any]:
     return found
 
 
+def lacking(way: Way) -> str:
+    """Return what a way needs and is not here, or nothing."""
+    named = [(way.environment or {}).get(name) for name in ("CC", "CXX")]
+    if missing := [name for name in named if name and shutil.which(name) is None]:
+        return f"there is no {missing[0]}"
+    found = Path(way.needs).exists() if "/" in way.needs else ctypes.util.find_library(way.needs)
+    return f"there is no {way.needs}: {way.way_out}" if way.needs and not found else ""
+
+
 def asked(number: int, schedule: str, folder: Path) -> dict[str, Any]:
     """Return the answer of a process for one way and schedule."""
     way = WAYS[number]
-    named = [(way.environment or {}).get(name) for name in ("CC", "CXX")]
-    if missing := [name for name in named if name and shutil.which(name) is None]:
-        return {"missing": f"there is no {missing[0]}"}
-    if way.folder and not Path(way.folder).is_dir():
-        return {"missing": f"there is no {way.folder}"}
     command = [sys.executable, __file__, "--way", str(number), "--schedule", schedule, "--case", str(folder)]
     environment = {**os.environ, **(way.environment or {})}
     try:
@@ -269,26 +335,40 @@ def asked(number: int, schedule: str, folder: Path) -> dict[str, Any]:
     return found
 
 
+MOST_SAID = 160
+"""Most letters of a reason."""
+
 HEADS = ("compiler or device", "found", "options", "schedule", "SHA-256", "equal", "floats that differ")
 """Of the table."""
 
 
-def rows(only: Sequence[str], folder: Path, digest: str) -> Iterator[tuple[str, ...]]:
+def rows(only: Sequence[str], folder: Path, digest: str, slow: bool = False) -> Iterator[tuple[str, ...]]:
     """Yield the cells of each way and schedule."""
     for number, way in enumerate(WAYS):
-        for schedule in way.schedules:
-            if only and way.kind not in only:
-                continue
-            found = asked(number, schedule, folder)
+        if only and way.kind not in only:
+            continue
+        missing, asked_for = lacking(way), way.schedules + way.slow * slow
+        for schedule in [", ".join(asked_for)] if missing else asked_for:
+            found = {"missing": missing} if missing else asked(number, schedule, folder)
             head = (way.name, way.options or "-", schedule or "-")
             if WHOLE not in found:
-                missing = " ".join(found["missing"].split())[:120].replace("|", "/")
-                yield head[0], f"NOT HERE: {missing}", *head[1:], "-", "-", "-"
+                said = " ".join(found["missing"].split())[:MOST_SAID].replace("|", "/")
+                yield head[0], f"NOT HERE: {said}", *head[1:], "-", "-", "-"
                 continue
             of = found[WHOLE]
             equal = "yes" if of["digest"] == digest else f"NO: {of['first']}"
             floats = f"{found[FULL]['differ']:.1%}" if FULL in found else "refused"
             yield head[0], of["device"], *head[1:], of["digest"], equal, floats
+        if way.slow and not slow:
+            yield (
+                way.name,
+                "NOT RUN: takes minutes, add --slow",
+                way.options or "-",
+                ", ".join(way.slow),
+                "-",
+                "-",
+                "-",
+            )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -301,6 +381,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--variant", default="whole8", help="how it is rounded")
     parser.add_argument("--size", type=int, default=32, help="pixels of a side")
     parser.add_argument("--only", default="", help=f"kinds: {', '.join(dict.fromkeys(w.kind for w in WAYS))}")
+    parser.add_argument("--slow", action="store_true", help="also what Mesa compiles for minutes")
     for name in ("--way", "--schedule", "--case"):
         parser.add_argument(name, default="", help=argparse.SUPPRESS)
     given = parser.parse_args(arguments)
@@ -313,7 +394,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"{told}; the reference: {digest}\n")
         print(f"| {' | '.join(HEADS)} |\n|{'---|' * len(HEADS)}", flush=True)
         differ = 0
-        for cells in rows(list(filter(None, given.only.split(","))), Path(name), digest):
+        only = list(filter(None, given.only.split(",")))
+        for cells in rows(only, Path(name), digest, given.slow):
             print(f"| {' | '.join(cells)} |", flush=True)
             differ += cells[5].startswith("NO")
     if differ:

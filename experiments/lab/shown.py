@@ -19,7 +19,7 @@ from wamnet.cli.reports import bench_report
 from wamnet.cli.reports.plots import PAPER, trade_off_figure
 from wamnet.refimpl.errors import InputError
 
-from . import plots, printed, tables
+from . import plots, printed, same, tables
 from .intervals import paired
 from .plots import Plot
 from .records import Records, bench_of
@@ -554,7 +554,6 @@ FIGURES: Mapping[str, Callable[[Records], str]] = {
     "paper-hours": paper_hours,
 }
 """Figures in sentences that are computed from several values."""
-
 TABLES: Mapping[str, TableOf] = {
     "ablations": study("ablations", "all else as `short`"),
     "bench-paper": bench("bench-paper"),
@@ -584,6 +583,7 @@ TABLES: Mapping[str, TableOf] = {
     "quality-readme": quality("minicubes", only=README_ROWS),
     "quality-times": quality_times,
     "ranks": as_printed("ranks", without=TIMES),
+    "same-bits": same.summary,
     "savings": as_printed("savings"),
     "sines": sines,
     "sines-every": sines_every,

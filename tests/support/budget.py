@@ -27,7 +27,7 @@ BUDGET = {
     "kernels/run": 2600,
     "kernels/judge": 1450,
     "kernels/bench": 3150,
-    "kernels/export": 2650,
+    "kernels/export": 2900,
     "spec/conformance": 4950,
     "cli": 300,
     "cli/commands": 5000,

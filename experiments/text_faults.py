@@ -1,29 +1,46 @@
-"""Plant faults in the text of any kernel, one at a time, and ask the reader of texts whether it notices.
+"""Plant faults in the texts of kernels, one at a time, and ask the reader of texts whether it notices.
 
-    python experiments/text_faults.py FOLDER [--count 500] [--seed 0]
+    python experiments/text_faults.py
+    python experiments/text_faults.py FOLDER... --count 500
 
-FOLDER has a kernel with its manifest and certificate. A fault changes a digit of a constant, an integer by
-one, an operator, a name, or loses or repeats a statement. Printed are the faults that the reader accepts, to
-be looked at: an array with a spare number, say, changes nothing. Status 1 if there are any.
+Without a folder these are kernels of a small network, one for each language and schedule that is read; a
+folder has any kernel with its manifest and certificate. A fault changes a digit of a constant, an integer by
+one, an operator or a name, or loses or repeats a statement. A table is printed, and each fault that the
+reader accepts. An array with more room changes nothing: such faults are counted by themselves. Status 1 if
+the reader accepts any other.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import random
 import re
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
+from lab.tables import markdown
 
+from wamnet.compiler.artifact import CERTIFICATE_NAME, write
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.core.lower import lower
 from wamnet.compiler.proof.evidence import Refused, read
 from wamnet.compiler.reading.check import run_text
 from wamnet.compiler.reading.lanes import Unread
+from wamnet.compiler.reading.languages import LANGUAGES
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
+
+TILES = (("c", "tile8"), ("opencl", "tile8"))
+"""Targets and schedules of small kernels, in addition to the plain ones."""
+
+ROOM = re.compile(r" *(?:PRECISE )?(?:float|vector|union|var|wamnet_vector)\b[^=]*[\[<][^=]*;")
+"""A line that declares an array without a value."""
 
 OPERATORS = {
     "+": "-", "-": "+", "*": "+", "/": "*", "%": "/", "<": "<=", "<=": "<", ">": ">=", ">=": ">",
@@ -45,7 +62,10 @@ TOKEN = re.compile(
     re.S | re.M,
 )
 
-STATEMENT = re.compile(r"(?m)^ +(?!return|[}#])[^\n{}]*;$")
+NOTHING = re.compile(r" \(?0\)? \*")
+"""A product with zero behind an operator: whether it is added or taken away is the same."""
+
+STATEMENT = re.compile(r"(?m)^ +(?!return|\(void\)|[}#])[^\n{}]*;$")
 
 
 class Fault(NamedTuple):
@@ -68,7 +88,7 @@ def faults(source: str) -> Iterator[Fault]:
             yield Fault(*place, NAMES[m["name"]], "another name")
         elif m["name"] and (numbered := re.fullmatch(r"([a-z]+)(\d+)", m["name"])) and m["name"] != "float4":
             yield Fault(*place, f"{numbered[1]}{int(numbered[2]) - 1}", "another variable")
-        elif m["operator"] in OPERATORS:
+        elif m["operator"] in OPERATORS and not NOTHING.match(source, m.end()):
             yield Fault(*place, OPERATORS[m["operator"]], "another operator")
     for m in STATEMENT.finditer(source, start):
         yield Fault(m.start(), m.end(), "", "a statement lost")
@@ -90,42 +110,69 @@ def numbers(text: str) -> Iterator[tuple[str, str]]:
         yield f"{value - 1}{tail}", "an integer one less"
 
 
-def main() -> int:
-    """Plant faults as the command line says; return the exit status."""
-    parser = argparse.ArgumentParser(description="Plant faults in a kernel's text.")
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--count", type=int, default=500)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("-o", "--output", type=Path, help="write the counts as JSON")
-    options = parser.parse_args()
-    held, manifest, *_ = read(options.folder / "denoise.certificate.json")
-    weights = np.frombuffer((options.folder / "weights.bin").read_bytes(), "<f4")
+def spare(source: str, fault: Fault) -> bool:
+    """Return whether a fault gives an array more room, which changes nothing."""
+    line = source[source.rfind("\n", 0, fault.start) + 1 : source.find("\n", fault.start)]
+    return ROOM.match(line) is not None and fault.kind in ("an integer one more", "another operator")
+
+
+def small(folder: Path) -> Iterator[Path]:
+    """Write kernels of a small network: plain in every language that is read, and in tiles; yield folders."""
+    network = siren.init((3**2 * 6, 6, 5, 3), 1.0, 3.0, seed=5)
+    model = Model(network, ("color", "normal"), Window(3, "clamp"), Normalization())
+    for target, schedule in [*((target, "plain") for target in LANGUAGES), *TILES]:
+        made = folder / f"{target}-{schedule}"
+        write(compile_program(lower(model), target, schedule=schedule), made)
+        yield made
+
+
+def planted(folder: Path, count: int, seed: int) -> tuple[list[str], int]:
+    """Plant faults in a kernel; return a row of the table, and how many were accepted, spare room apart."""
+    held, manifest, *_ = read(folder / CERTIFICATE_NAME)
+    weights = np.frombuffer((folder / "weights.bin").read_bytes(), "<f4")
     (name,) = (name for name in manifest["files"] if name != "weights.bin")
-    source = (options.folder / name).read_text()
+    source = (folder / name).read_text()
     run_text(source, held, manifest, weights)  # the text itself must hold
     every = list(faults(source))
-    random.Random(options.seed).shuffle(every)
-    noticed: Counter[str] = Counter()
-    accepted = []
-    for fault in every[: options.count]:
+    random.Random(seed).shuffle(every)
+    done: Counter[str] = Counter()
+    for fault in every[:count]:
         try:
             run_text(source[: fault.start] + fault.new + source[fault.end :], held, manifest, weights)
         except (Refused, Unread):
-            noticed[fault.kind] += 1
-        else:
-            line = source.count("\n", 0, fault.start)
-            accepted.append((line + 1, fault.kind, source.splitlines()[line].strip(), fault.new))
-            print(f"accepted: line {line + 1}, {fault.kind}: {accepted[-1][2]} -> {fault.new!r}", flush=True)
-    found = {
-        "target": manifest["target"], "schedule": manifest["schedule"]["name"], "possible": len(every),
-        "planted": noticed.total() + len(accepted), "noticed": dict(noticed), "accepted": accepted,
-    }  # fmt: skip
-    print(
-        f"{noticed.total()} of {found['planted']} noticed, {len(every)} possible; accepted: {len(accepted)}"
+            done["noticed"] += 1
+            continue
+        harmless = spare(source, fault)
+        done["harmless" if harmless else "accepted"] += 1
+        line = source.count("\n", 0, fault.start)
+        sys.stderr.write(
+            f"{'harmless' if harmless else 'ACCEPTED'}: {folder.name}, line {line + 1}, {fault.kind}: "
+        )
+        sys.stderr.write(f"{source.splitlines()[line].strip()} -> {fault.new!r}\n")
+    counts = [len(every), done.total(), done["noticed"], done["harmless"], done["accepted"]]
+    return [manifest["target"], manifest["schedule"]["name"], *map(str, counts)], done["accepted"]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Plant faults as the command line says; return the exit status."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    if options.output:
-        options.output.write_text(json.dumps(found, indent=1) + "\n")
-    return int(bool(accepted))
+    parser.add_argument(
+        "folders", type=Path, nargs="*", help="kernels; default: small ones, of all languages"
+    )
+    parser.add_argument("--count", type=int, default=60, help="faults in each kernel")
+    parser.add_argument("--seed", type=int, default=0, help="which of all that are possible")
+    options = parser.parse_args(arguments)
+    rows, accepted = [], 0
+    with TemporaryDirectory() as scratch:
+        for folder in options.folders or small(Path(scratch)):
+            row, wrong = planted(folder, options.count, options.seed)
+            rows.append(row)
+            accepted += wrong
+    heads = ["target", "schedule", "possible faults", "planted", "noticed", "more room only", "accepted"]
+    print(markdown(heads, rows))
+    return int(accepted > 0)
 
 
 if __name__ == "__main__":

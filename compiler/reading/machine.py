@@ -344,7 +344,9 @@ class Machine:
         if op in ("<", ">", "<=", ">="):
             a, b = (a, b) if op[0] == "<" else (b, a)
             found = expression("less_equal" if "=" in op else "less", a, b, kind="bool")
-            return Number(found.value, found.shape, "bool", compared=(a, b))
+            # Of equal numbers a <= b ? a : b takes the other one, which may be the other zero.
+            compared = None if "=" in op else (a, b)
+            return Number(found.value, found.shape, "bool", compared=compared)
         if op in BITS:
             return bits(BITS[op][0], a, b)
         raise Unread(f"operator {op} of numbers")

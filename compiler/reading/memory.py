@@ -25,7 +25,9 @@ class Pointer:
     sizes: tuple[int | None, ...] = (None,)
 
     def at(self, index: Any) -> Pointer:
-        """Return the place of an element."""
+        """Return the place of an element, within the array's own size where that is known."""
+        if isinstance(index, int) and self.sizes[0] is not None and not 0 <= index < self.sizes[0]:
+            raise Wrong(f"element {index} of an array of {self.sizes[0]}")
         step = self.width
         for size in self.sizes[1:]:
             step *= size or 1

@@ -1,12 +1,10 @@
 """Reading kernels' texts: the compiler's own are accepted in each language, faults are not (spec/text.md)."""
 
-import importlib.util
 import json
-import random
-from pathlib import Path
 
 import numpy as np
 import pytest
+import text_faults
 
 from wamnet.compiler import artifact
 from wamnet.compiler.compile import compile_plan, compile_program
@@ -23,8 +21,6 @@ from wamnet.refimpl.network.denoise import Model
 
 pytest.importorskip("pcpp", reason="the preprocessor of texts is missing: pip install 'wamnet[cli]'")
 
-ROOT = Path(__file__).parents[2]
-FAULTS = importlib.util.spec_from_file_location("text_faults", ROOT / "experiments" / "text_faults.py")
 NAME = artifact.CERTIFICATE_NAME
 
 
@@ -119,28 +115,14 @@ def test_what_is_not_known_is_not_skipped(plain):
 
 
 @pytest.mark.parametrize(("target", "schedule", "count"), [("opencl", "plain", 60), ("c", "tile8", 12)])
-def test_planted_faults_are_noticed(target, schedule, count, tmp_path):
+def test_planted_faults_are_noticed(target, schedule, count, tmp_path, capsys):
     """TXT-8: what holds the reader."""
-    module = importlib.util.module_from_spec(FAULTS)
-    FAULTS.loader.exec_module(module)
-    source, *others = parts(kernel(tmp_path, target, schedule))
-    every = [f for f in module.faults(source) if not spare(source, f)]
-    random.Random(7).shuffle(every)
-    for fault in every[:count]:
-        assert not accepted(source[: fault.start] + fault.new + source[fault.end :], *others), fault
-
-
-def accepted(*given):
-    try:
-        return run_text(*given)
-    except (Refused, Unread):
-        return None
-
-
-def spare(source, fault):
-    """Return whether a fault makes an array larger, which changes nothing."""
-    before = source[: fault.start].rpartition("\n")[2]
-    return before.strip().startswith(("float", "union")) and "[" in before and "=" not in before
+    kernel(tmp_path, target, schedule)
+    row, accepted = text_faults.planted(tmp_path, count, seed=7)
+    assert accepted == 0, capsys.readouterr().err
+    assert row[:2] == [target, schedule]
+    assert int(row[3]) == count
+    assert int(row[4]) >= count - 3
 
 
 def test_numbers_that_cancel_are_seen():

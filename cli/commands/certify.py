@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ...refimpl.errors import InputError
+from ...refimpl.reading import read_file
 from ..common.packages import need
 from ..common.terminal import say, table
 
@@ -17,7 +18,7 @@ wamnet certify kernel-opencl/denoise.certificate.json
 
 wamnet certify kernel-opencl
 
-wamnet certify kernel-opencl --no-text"""
+wamnet certify kernel-c --source denoise-mine.h"""
 """Shown below the help of `wamnet certify`."""
 
 STATUS_REFUSED = 1
@@ -33,6 +34,12 @@ def certify(
             show_default=False,
         ),
     ],
+    source: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Read this text in place of the kernel's own: one that was changed by hand."
+        ),
+    ] = None,
     text: Annotated[
         bool, typer.Option(help="Read the kernel's text too: does it compute the certified program?")
     ] = True,
@@ -54,6 +61,12 @@ def certify(
         raise InputError(
             "certificate", str(path), rule, "kernels of profile ieee have one; see wamnet compile"
         )
+    if source is not None:
+        if not text:
+            raise InputError(
+                "option --source", str(source), "with --no-text nothing is read", "leave one out"
+            )
+        read_file(source, "kernel", "name a text in the kernel's language")
     try:
         held = check(path)
         if held["schema"] == INTEGERS:
@@ -64,20 +77,20 @@ def certify(
             bound = max(held["bound"]["output"])
             say(f"holds: |output - reference| <= {bound:g} for all images in their ranges, {steps_of(bound)}")
         if text:
-            say(text_of(path))
+            say(text_of(path, source))
     except Refused as step:
         say(f"refused: {step}")
         raise typer.Exit(STATUS_REFUSED) from None
 
 
-def text_of(path: Path) -> str:
-    """Say what the reader found of the text beside a certificate; `Refused` if it is another program's."""
+def text_of(path: Path, source: Path | None = None) -> str:
+    """Say what the reader found of the text beside a certificate, or of `source`; `Refused` if wrong."""
     from ...compiler.reading.check import check_text
     from ...compiler.reading.lanes import Unread
 
     need("pcpp", "to read the texts of kernels", "cli")
     try:
-        found = check_text(path)
+        found = check_text(path, source)
     except Unread as error:
         return f"text: not checked: this reader does not know {error}"
     return f"text: computes that program: {found['sums']} sums, at {found['lanes']} places that stand for all"

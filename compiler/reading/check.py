@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...refimpl.reading import read_file
 from ..proof.evidence import Refused, read
 from .builtins import BUILTINS
 from .claim import Claim
@@ -26,8 +27,8 @@ MEANINGLESS = (TypeError, ValueError, LookupError, AttributeError, ArithmeticErr
 """What Python raises where a text does with its values what no text of a kernel does."""
 
 
-def check_text(path: Path) -> dict[str, int]:
-    """Return how much of the text beside a certificate was held against it.
+def check_text(path: Path, source: Path | None = None) -> dict[str, int]:
+    """Return how much of the text beside a certificate was held against it, or of another one, `source`.
 
     Raises `Refused` for a text that does not compute the certificate's program, and `Unread` for one with
     constructs that this reader does not know, or in a language that it does not read.
@@ -37,7 +38,8 @@ def check_text(path: Path) -> dict[str, int]:
     if len(sources) != 1:
         raise Unread(f"kernels of {len(sources)} texts")
     weights = np.frombuffer((path.parent / "weights.bin").read_bytes(), "<f4")
-    return run_text((path.parent / sources[0]).read_text(), held, manifest, weights)
+    text = read_file(source or path.parent / sources[0], "kernel", "name a text in the kernel's language")
+    return run_text(text.decode(errors="replace"), held, manifest, weights)
 
 
 def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, int]:

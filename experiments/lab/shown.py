@@ -585,6 +585,7 @@ TABLES: Mapping[str, TableOf] = {
     "ranks": as_printed("ranks", without=TIMES),
     "same-bits": same.summary,
     "savings": as_printed("savings"),
+    "text-faults": as_printed("text-faults"),
     "sines": sines,
     "sines-every": sines_every,
     "sines-octaves": as_printed("sines", 2),

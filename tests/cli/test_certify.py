@@ -22,6 +22,38 @@ def test_a_certificate_holds(wamnet, kernel, name):
     assert "of half an 8-bit step" in outcome.out
 
 
+def test_the_text_is_read(wamnet, kernel):
+    assert "\ntext: computes that program: " in wamnet("certify", kernel).out
+    assert "text:" not in wamnet("certify", kernel, "--no-text").out
+
+
+def test_a_text_that_was_changed_is_read(wamnet, kernel, tmp_path):
+    mine = tmp_path / "mine.cl"
+    source = (kernel / "denoise.cl").read_text()
+    mine.write_text(source.replace("0.318309873f", "0.318309963f"))
+    outcome = wamnet("certify", kernel, "--source", mine)
+    assert outcome.status == 1
+    assert "refused: text: output 0 is not the program's" in outcome.out
+    mine.write_text(source.replace("++dx", "dx += 1"))
+    assert wamnet("certify", kernel, "--source", mine).status == 0
+
+
+def test_a_schedule_that_is_not_read_is_said(wamnet, samples, tmp_path):
+    made = wamnet(
+        "compile", samples / "model.safetensors", "--target", "opencl", "--schedule", "vector16", "-o", "v"
+    )
+    assert made.status == 0
+    outcome = wamnet("certify", tmp_path / "v")
+    assert outcome.status == 0
+    assert "text: " in outcome.out.splitlines()[-1]
+
+
+def test_a_text_that_is_not_there_is_a_bad_file(refused, kernel):
+    assert "no.cl" in refused("certify", kernel, "--source", "no.cl")
+    told = refused("certify", kernel, "--no-text", "--source", kernel / "denoise.cl")
+    assert "with --no-text nothing is read" in told
+
+
 def test_a_smaller_number_is_refused(wamnet, kernel):
     path = kernel / "denoise.certificate.json"
     held = json.loads(path.read_text())

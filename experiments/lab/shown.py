@@ -554,12 +554,15 @@ FIGURES: Mapping[str, Callable[[Records], str]] = {
     "paper-hours": paper_hours,
 }
 """Figures in sentences that are computed from several values."""
+AS_PRINTED = (
+    "bench-primitives", "bench-render", "bench-render-kernels", "certified", "exports", "savings",
+    "sines-speed", "text-faults", "whole",
+)  # fmt: skip
+"""Records that are shown as their command has printed them."""
 TABLES: Mapping[str, TableOf] = {
+    **{name: as_printed(name) for name in AS_PRINTED},
     "ablations": study("ablations", "all else as `short`"),
     "bench-paper": bench("bench-paper"),
-    "bench-primitives": as_printed("bench-primitives"),
-    "bench-render": as_printed("bench-render"),
-    "bench-render-kernels": as_printed("bench-render-kernels"),
     "bench-train-paper": as_printed("bench-train", 1),
     "bench-train-short": as_printed("bench-train", 2),
     "claims": claims("verdicts"),
@@ -567,7 +570,6 @@ TABLES: Mapping[str, TableOf] = {
     "demo-pictures": demo_pictures,
     "demo-runs": demo_runs,
     "departures": departures,
-    "exports": as_printed("exports"),
     "fig-prediction": study("fig_prediction"),
     "flicker": study("flicker"),
     "generalisation": generalisation,
@@ -584,12 +586,9 @@ TABLES: Mapping[str, TableOf] = {
     "quality-times": quality_times,
     "ranks": as_printed("ranks", without=TIMES),
     "same-bits": same.summary,
-    "savings": as_printed("savings"),
-    "text-faults": as_printed("text-faults"),
     "sines": sines,
     "sines-every": sines_every,
     "sines-octaves": as_printed("sines", 2),
-    "sines-speed": as_printed("sines-speed"),
     "speed-against-error": speed_against_error("bench-minicubes"),
     "speed-readme": speed_readme("bench-minicubes"),
     "speed-short": speed_short("bench-minicubes"),

@@ -72,7 +72,7 @@ def conversion(kind: str) -> Callable[..., Any]:
 
 def as_int(machine: Machine, a: Number) -> Number:
     """Return the bits of a float, of which only the magnitude's are known [`bits`]."""
-    return Number(a.value, hashed("bits", a.known), "int32", compared=(a, a))
+    return Number(None, hashed("bits", a.known), "int32", compared=(a, a))
 
 
 def as_float(machine: Machine, a: Number) -> Number:
@@ -87,7 +87,7 @@ def as_float(machine: Machine, a: Number) -> Number:
 def bits(name: str, a: Number, b: Number) -> Number:
     """Return what an operator of bits makes of two integers."""
     if name == "bitwise_and" and a.compared and b.literal == 0x7FFFFFFF:
-        return Number(a.value, hashed("magnitude", a.known), "int32", compared=a.compared)
+        return Number(None, hashed("magnitude", a.known), "int32", compared=a.compared)
     return expression(name, a, b, commutes=not name.endswith("shift"))
 
 
@@ -114,7 +114,7 @@ BUILTINS: dict[str, Callable[..., Any]] = {
     **dict.fromkeys(("int", "i32", "convert_int"), conversion("int32")),
     **dict.fromkeys(("uint", "u32", "convert_uint"), conversion("uint32")),
     **dict.fromkeys(("float", "f32", "convert_float"), conversion("float32")),
-    **dict.fromkeys(("ivec2", "vec4"), several),
+    **dict.fromkeys(("ivec2", "vec4", "float4"), several),
     **{f"as_int{n}": as_int for n in ("", 4, 8, 16)}, **{f"as_float{n}": as_float for n in ("", 4, 8, 16)},
 }  # fmt: skip
 """By name: called with the machine and the arguments."""

@@ -10,14 +10,16 @@ from typing import Any
 import numpy as np
 
 from ...refimpl.reading import read_file
-from ..proof.evidence import Refused, read
+from ..proof.evidence import INTEGERS, Refused, read
 from .builtins import BUILTINS
 from .claim import Claim
-from .lanes import Lanes, Place, Unread, Wrong, lanes_for
+from .field import add_up_lanes
+from .groups import FLAGS, Group, group_lanes
+from .lanes import Place, Unread, Wrong, lanes_for
 from .languages import LANGUAGES, Language, parsed
 from .machine import Machine
 from .memory import Image, Memory, Pointer, Result, Weights
-from .syntax import Text
+from .syntax import Text, Variable
 
 LANES_SEED = 20261123
 """Which borders meet in a lane; every run draws other unknowns [field.py]."""
@@ -44,17 +46,21 @@ def check_text(path: Path, source: Path | None = None) -> dict[str, int]:
 
 def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, int]:
     """Run a text in every lane, once for each kind of compiler that it makes a difference between."""
-    language = LANGUAGES.get(manifest["target"])
+    language, schedule = LANGUAGES.get(manifest["target"]), manifest["schedule"]
     if language is None:
         raise Unread(f"texts of target {manifest['target']}")
-    if "group" in manifest["schedule"]:
-        raise Unread("schedules of work groups")
-    pixels = int(manifest["schedule"].get("pixels", 1))
+    pixels, group = int(schedule.get("pixels", 1)), schedule.get("group")
+    if group and held["schema"] == INTEGERS:
+        raise Unread("schedules of bytes")
     window, centre = int(manifest["window"]["size"]), int(manifest["window"]["centre"])
-    cap = window + pixels if pixels > 1 else max(centre, window - centre) + 1
-    lanes = lanes_for(cap, pixels, beyond=not language.within, seed=LANES_SEED)
-    claim = Claim(held, manifest, weights, lanes, pixels)
+    if group:
+        lanes = group_lanes((group[0], group[1]), pixels, window, LANES_SEED)
+    else:
+        cap = window + pixels if pixels > 1 else max(centre, window - centre) + 1
+        lanes = lanes_for(cap, pixels, beyond=not language.within, seed=LANES_SEED)
+    add_up_lanes(lanes.count if group else None)
     try:
+        claim = Claim(held, manifest, weights, lanes, pixels, group[0] if group else 1)
         for compiler in language.compilers:
             claim.found.clear()
             lanes.active = np.ones(lanes.count, dtype=bool)
@@ -66,43 +72,63 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
         raise Refused(f"text: {error}") from error
     except MEANINGLESS as error:
         raise Refused(f"text: it has no meaning to this reader ({error})") from error
+    finally:
+        add_up_lanes(None)
     return {"sums": len(claim.tables), "lanes": lanes.count, "compilers": len(language.compilers)}
 
 
 def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> None:
     """Run a text, parsed: `Wrong` unless it writes the claim's outputs, and nothing else."""
-    lanes, channels = claim.lanes, int(manifest["output"]["channels"])
-    x, width, y, height = (lanes.place(axis) for axis in range(4))
+    lanes, channels, size = (
+        claim.lanes,
+        int(manifest["output"]["channels"]),
+        manifest["schedule"].get("group"),
+    )
     result, target = Result(claim, channels), Memory("result", 4)
-    images = {f"image_{name}": Image(name, int(n), (width, height)) for name, n in claim.images}
-    weights = Pointer(Weights(claim.weights), 0)
-    size = {"width": width, "height": height}
-    given: dict[str, Any] = {
-        **size,
-        "size": size,
-        "x": x,
-        "y": y,
-        "weights": weights,
-        "weight_texture": weights,
-    }
-    if language.fragment:
-        given |= {**images, "result": Pointer(target, 0, 4, ())}
+    given = arguments(claim, language.fragment, result, target)
+    group = Group(lanes, size[0] * size[1]) if size else None
+    if group:
+        known, calls = {**group.brings(), **FLAGS}, group.calls()
     else:
-        given |= {name: Pointer(image, 0) for name, image in images.items()}
-        given["result"] = Pointer(result, 0)
-    item = Place(lanes, x.values // claim.pixels, x.form / claim.pixels)
-    known = items(lanes, item, y)
-    given |= dict.fromkeys(("invocation", "thread_place"), known["gl_GlobalInvocationID"])
-    names = {name: given[name] for name in {v.name for v, _ in text.outside} & set(given)}
-    names |= {name: known[name] for name in language.brings}
-    builtins = {**BUILTINS, "get_global_id": lambda machine, axis: (item, y)[axis]}
-    machine = Machine(text, lanes, names, builtins, claim.added)
+        known, calls = items(claim)
+    names = {v.name: sized(given[v.name], v) for v, _ in text.outside if v.name in given}
+    names |= {name: known[name] for name in language.brings if name in known}
+    machine = Machine(text, lanes, names, {**BUILTINS, **calls}, claim.added, group)
+    if group and text.group and [machine.value(n) for n in text.group][:2] != size:
+        raise Wrong(f"its groups are not of {size[0]} x {size[1]} items")
     entry = manifest["entry_point"] if manifest["entry_point"] in text.functions else "main"
-    machine.call(entry, [given[v.name] for v in text.functions[entry].takes])
+    takes = text.functions[entry].takes
+    machine.call(entry, [known[v.role] if v.role in known else sized(given[v.name], v) for v in takes])
     if language.fragment:
         for channel in range(channels):
             result.hold(0, channel, target.load(channel, 1, machine), machine.running)
     result.complete()
+
+
+def arguments(claim: Claim, fragment: bool, result: Result, target: Memory) -> dict[str, Any]:
+    """Return what a kernel is given, by name."""
+    lanes = claim.lanes
+    x, width, y, height = (lanes.place(axis) for axis in range(4))
+    images = {f"image_{name}": Image(name, int(n), (width, height)) for name, n in claim.images}
+    weights = Pointer(Weights(claim.weights), 0)
+    size = {"width": width, "height": height}
+    given: dict[str, Any] = {
+        **size, "size": size, **dict.fromkeys(("weights", "weight_texture", "w"), weights),
+    }  # fmt: skip
+    if lanes.inside is None:
+        given |= {"x": x, "y": y}
+    if fragment:
+        return given | images | {"result": Pointer(target, 0, 4, ())}
+    return (
+        given | {name: Pointer(image, 0) for name, image in images.items()} | {"result": Pointer(result, 0)}
+    )
+
+
+def sized(value: Any, variable: Variable) -> Any:
+    """Return what a kernel is given, a buffer as one of the numbers or vectors that the text declares."""
+    if not isinstance(value, Pointer) or value.sizes != (None,):
+        return value
+    return Pointer(value.memory, 0, variable.type.width)
 
 
 def check_host(text: Text, host: str, kernel: str, claim: Claim) -> None:
@@ -120,14 +146,22 @@ def check_host(text: Text, host: str, kernel: str, claim: Claim) -> None:
             raise Wrong(f"{host} does not call {kernel} once for each work item")
 
 
-def items(lanes: Lanes, x: Place, y: Place) -> Mapping[str, Any]:
-    """Return the names by which languages call a work item's place; CUDA's blocks have 8 by 4 threads."""
+def items(claim: Claim) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """Return the names, and functions, by which languages call a work item's place.
+
+    CUDA's blocks have 8 by 4 threads.
+    """
+    lanes = claim.lanes
+    x, y = lanes.place(0), lanes.place(2)
+    x = Place(lanes, x.values // claim.pixels, x.form / claim.pixels)
     inside, block = {}, {}
     for name, place, n in (("x", x, 8), ("y", y, 4)):
         inside[name] = lanes.constant(place.values % n)
         block[name] = Place(lanes, place.values // n, place.form / n)
     pixel = {"x": x, "y": y}
-    return {
-        "gl_FragCoord": pixel, "gl_GlobalInvocationID": pixel,
+    whole = ("gl_FragCoord", "gl_GlobalInvocationID", "global_invocation_id", "thread_position_in_grid")
+    names = {
+        **dict.fromkeys(whole, pixel),
         "threadIdx": inside, "blockIdx": block, "blockDim": {"x": 8, "y": 4},
     }  # fmt: skip
+    return names, {"get_global_id": lambda machine, axis: (x, y)[axis]}

@@ -9,7 +9,7 @@ from there on [`Claim.added`]; all other operations must be those of the program
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..core.sine import exact_sine, sine
 from ..proof.evidence import INTEGERS, NODE
+from . import field
 from .field import (
     Number,
     P,
@@ -58,7 +59,7 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
             return Traced(OPERATIONS[name](*a))
         if name == "less_equal":
             found = expression(name, *a, kind="bool")
-            return Traced(Number(found.value, found.shape, "bool", compared=(a[0], a[1])))
+            return Traced(Number(found.given, found.shape, "bool", compared=(a[0], a[1])))
         return Traced(expression(name, *a))
 
     def __array_function__(self, function: Any, types: Any, given: Any, named: Any) -> Any:
@@ -66,10 +67,15 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
 
 
 class Claim:
-    """The program of a certificate, for each of the `pixels` of every lane; `outputs` has what these are."""
+    """The program of a certificate, for each of the `pixels` of every lane; `outputs` has what these are.
 
-    def __init__(self, held: Any, manifest: Any, raw: Any, lanes: Lanes, pixels: int) -> None:
-        self.text, self.lanes, self.pixels = str(held["program"]), lanes, pixels
+    A lane's pixels are `stride` columns apart.
+    """
+
+    def __init__(
+        self, held: Any, manifest: Any, raw: Any, lanes: Lanes, pixels: int, stride: int = 1
+    ) -> None:
+        self.text, self.lanes, self.pixels, self.stride = str(held["program"]), lanes, pixels, stride
         self.parameters = held["parameters"]
         self.exact = held["schema"] == INTEGERS
         self.sine = self._sine(held)
@@ -80,7 +86,7 @@ class Claim:
         self.images = re.findall(r"(?m)^  image (\w+): (\d+) ", self.text)
         (self.window,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", self.text)
         self.centre = int(manifest["window"]["centre"])
-        self.outputs = [self._pixel(p) for p in range(pixels)]
+        self.outputs = [self._pixel(p * stride) for p in range(pixels)]
 
     def _sine(self, held: Any) -> Any:
         """Return the sine that the certificate promises, as the spec defines it."""
@@ -113,30 +119,32 @@ class Claim:
         shape = self.weights.known[:, at]
         return Number(self.weights.value[:, :, at], shape, weight=True)
 
-    def tap(self, image: str, channels: int, column: Any, row: Any, width: Any) -> list[Number]:
-        """Return the numbers of an image's pixel in every lane."""
-        return [
-            leaf(hashed(f"image {image}", (row * width + column) * channels + c)) for c in range(channels)
-        ]
-
     def _input(self, at: int) -> Number:
-        """Return the window (2, lanes, n) of a pixel of each lane: tap by tap, all images' channels."""
-        x, width, y, height = self.lanes.known
-        taps, zero = [], self.window[2] == "zero"
+        """Return the window (2, lanes, n) of a pixel of each lane: tap by tap, all images' channels.
+
+        Where sums are added up over lanes, so are the numbers of the window: nothing but sums reads them.
+        """
+        if field.FACTORS:
+            return Number(np.stack([tap.term for tap in self._taps(at)], axis=-1))
+        taps = list(self._taps(at))
+        return Number(np.stack([t.value for t in taps], axis=-1), np.stack([t.known for t in taps], axis=-1))
+
+    def _taps(self, at: int) -> Iterator[Number]:
+        """Yield the numbers of a pixel's window in every lane."""
+        lanes, nothing = self.lanes, literal(0.0, "float32")
+        _, width, _, height = lanes.known
         for dy in range(int(self.window[0])):
             for dx in range(int(self.window[1])):
-                column, row = x + at + dx - self.centre, y + dy - self.centre
+                column, row = lanes.x + at + dx - self.centre, lanes.y + dy - self.centre
                 pixel = np.clip(row, 0, height - 1) * width + np.clip(column, 0, width - 1)
+                inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
                 for name, channels in self.images:
                     for c in range(int(channels)):
                         number = leaf(hashed(f"image {name}", pixel * int(channels) + c))
-                        if zero:
-                            inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-                            nothing = literal(0.0, "float32")
+                        if self.window[2] == "zero":
                             value = np.where(inside, number.value, nothing.value)
                             number = Number(value, np.where(inside, number.known, nothing.known))
-                        taps.append(number)
-        return Number(np.stack([t.value for t in taps], axis=-1), np.stack([t.known for t in taps], axis=-1))
+                        yield number
 
     # ---- the program ---------------------------------------------------------------------------------------
 
@@ -175,16 +183,27 @@ class Claim:
         matrix = weight.value[:, 0].reshape(2, outputs, -1)
         whole: Any = np.zeros((2, 1, 1), dtype=np.uint64)
         parts = self._parts(matrix.shape[2]) if is_window and not self.exact else []
+        terms = given.term % P
         for name, part in parts if len(parts) > 1 else []:
-            own = dot(given.value[..., part], matrix[..., part])
+            own = dot(terms[..., part], matrix[..., part])
             self._note(own, "part", f"the sum of %{node} over {name}")
             whole = (whole + renamed(own)) % P
         if len(parts) < 2:
-            whole = dot(given.value, matrix)
+            whole = dot(terms, matrix)
         if "bias" in named:
-            whole = (whole + self.parameter(named["bias"]).value) % P
+            whole = (whole + self.parameter(named["bias"]).term) % P
         self._note(whole, "sum", f"the sums of %{node}")
-        return Number(whole, hashed("found", *whole))
+        return self._number(whole)
+
+    def _number(self, value: Words) -> Number:
+        """Return the number of the program that a sum is: it is known by the sum's value.
+
+        Of values added up over lanes each lane has an unknown of its own.
+        """
+        if not field.FACTORS:
+            return Number(value, hashed("found", *value))
+        lane = np.arange(self.lanes.count).reshape((-1,) + (1,) * (value.ndim - 2))
+        return Number(None, hashed("found", *value, lane))
 
     def _parts(self, n: int) -> list[tuple[str, NDArray[np.intp]]]:
         """Return the partial sums of a window: of each image and row of taps."""
@@ -208,7 +227,7 @@ class Claim:
 
     def added(self, number: Number, running: Mask) -> Number:
         """Return a sum of a text: a number of the program, or a part, if it is one; else as it is."""
-        if number.shape is not None or number.value.shape[1] == 1:
+        if number.shape is not None or (number.value.shape[1] == 1 and not field.FACTORS):
             return number
         words = number.value[0, 0] % P
         if words.ndim == 0:
@@ -228,6 +247,8 @@ class Claim:
     def _is(self, value: Words, hit: tuple[int, int], running: Mask) -> bool:
         (table, j), value = hit, value % P
         wanted = self.tables[table][0][..., j]
+        if field.FACTORS:
+            return np.array_equal(value, wanted)
         return bool(running.all() and np.array_equal(value, wanted)) or np.array_equal(
             value[:, running], wanted[:, running]
         )
@@ -237,7 +258,8 @@ class Claim:
         value = value % P
         if self.tables[table][1] == "part":
             return Number(np.where(good, renamed(value), value))
-        return Number(value, np.where(good, hashed("found", *value), hashed("sum", *value)))
+        found = self._number(value)
+        return Number(found.given, np.where(good, found.known, hashed("sum", *value)))
 
     def missing(self) -> str | None:
         """Return the first sum of the program that a text has not made."""

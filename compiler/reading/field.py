@@ -7,44 +7,105 @@ which adds and takes away what cancels is another one. Neither depends on the or
 
 Whatever is not such a sum has a `shape`: a hash of its operation and its operands' shapes, the order of two
 operands of a sum or a product apart. Its two field elements are drawn from that hash.
+
+Where every lane runs every statement, sums are not kept for each lane but added up over all lanes, each times
+a random factor [`add_up_lanes`]: sums that differ in any lane then differ, but with a probability of 1 / P.
 """
 
 from __future__ import annotations
 
 import secrets
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .lanes import Unread
 
 P = np.uint64(2013265921)
 """15 * 2^27 + 1, a prime: products of two elements fit 64 bits."""
 
 Words = NDArray[np.uint64]
 
+HALF, MASK = np.uint64(16), np.uint64(0xFFFF)
+"""Half the bits of a field element, and which these are."""
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class Number:
     """What a text holds in one variable, in all lanes: `value` (2, lanes) or (2, lanes, width).
 
-    `shape` (lanes, ...) is None for sums under way, whose value is not reduced. `kind` is its type. `weight`:
-    it was read from the weights. `literal`: what a constant is. `held` (lanes,): where it has been written,
-    None for everywhere. `compared`: a and b of a < b.
+    `given` is that value, None where it is drawn from the shape. `shape` (lanes, ...) is None for sums under
+    way, whose value is not reduced. `kind` is its type. `weight`: it was read from the weights. `literal`:
+    what a constant is. `held` (lanes,): where it has been written, None for everywhere. `compared`: a and b
+    of a < b. `source`: the vector that it is a number of, and which.
     """
 
-    value: Words
+    given: Words | None
     shape: Words | None = None
     kind: str = "float32"
     weight: bool = False
     literal: float | None = None
     held: NDArray[np.bool_] | None = None
     compared: tuple[Number, Number] | None = None
+    source: tuple[Number, int] | None = None
+
+    @cached_property
+    def value(self) -> Words:
+        """Its field elements."""
+        if self.given is None:
+            assert self.shape is not None
+            return drawn(self.shape)
+        return self.given
+
+    @property
+    def axes(self) -> int:
+        """How many axes its value has: 3 for vectors."""
+        return self.value.ndim if self.shape is None else self.shape.ndim + 1
+
+    @cached_property
+    def term(self) -> Words:
+        """What goes into a sum: the value, added up over lanes where sums are."""
+        if self.shape is None or not FACTORS:
+            return self.value
+        if self.source:
+            vector, k = self.source
+            return vector.term[..., k]
+        return added_up(self.value, FACTORS["lanes"])
 
     @property
     def known(self) -> Words:
         """Its shape; of a sum under way, which is no number of the program, one that nothing else has."""
         return hashed("sum", *self.value % P) if self.shape is None else self.shape
+
+
+FACTORS: dict[str, Words] = {}
+"""The factors (lanes,) of "lanes" where sums are added up over them; empty where each lane has its own."""
+
+
+def add_up_lanes(count: int | None) -> None:
+    """Add up sums over so many lanes from now on; None for a sum of its own in each lane."""
+    FACTORS.clear()
+    if count is not None:
+        FACTORS["lanes"] = hashed("factor", secrets.randbits(63), np.arange(count)) % P
+
+
+def added_up(value: Words, factors: Words) -> Words:
+    """Return the sums (2, 1, ...) over lanes of values (2, lanes, ...) times factors, in the field.
+
+    Halves of 16 bits times 31: 2^16 of these stay below 2^63.
+    """
+    lanes = len(factors)
+    if value.shape[1] == 1:
+        return value % P * (factors.sum() % P) % P
+    found = np.zeros((2, 1, *value.shape[2:]), dtype=np.uint64)
+    for at in range(0, lanes, 2**16):
+        part, by = value[:, at : at + 2**16] % P, factors[at : at + 2**16]
+        low, high = (np.einsum("rl...,l->r...", h, by)[:, None] for h in (part & MASK, part >> HALF))
+        found += low % P + (high % P << HALF) % P
+    return found % P
 
 
 def mixed(words: Words) -> Words:
@@ -77,7 +138,7 @@ def drawn(shape: Words) -> Words:
 
 def leaf(shape: Words, kind: str = "float32", **other: Any) -> Number:
     """Return a number that is nothing but its shape."""
-    return Number(drawn(shape), shape, kind, **other)
+    return Number(None, shape, kind, **other)
 
 
 def literal(value: float, kind: str) -> Number:
@@ -104,7 +165,8 @@ def is_sum(a: Number) -> bool:
 def product(a: Number, b: Number) -> Number:
     """Return a * b: of a weight and anything a term of a sum, else an expression."""
     if (a.weight or b.weight) and a.kind == "float32":
-        va, vb = alike(*(n.value % P if n.shape is None else n.value for n in (a, b)))
+        weight, other = (a, b) if a.weight else (b, a)
+        va, vb = alike(weight.value, other.term % P if other.shape is None else other.term)
         return Number(va * vb % P)
     return expression("multiply", a, b, commutes=True)
 
@@ -113,9 +175,9 @@ def total(a: Number, b: Number) -> Number:
     """Return a + b: of a sum under way and anything a sum, else an expression."""
     if a.kind == "float32" and (is_sum(a) or is_sum(b)):
         for one, other in ((a, b), (b, a)):
-            if one.literal == 0.0 and other.value.ndim >= one.value.ndim:
+            if one.literal == 0.0 and other.axes >= one.axes:
                 return other
-        va, vb = alike(a.value, b.value)
+        va, vb = alike(a.term, b.term)
         return Number(va + vb)
     return expression("add", a, b, commutes=True)
 
@@ -123,7 +185,7 @@ def total(a: Number, b: Number) -> Number:
 def difference(a: Number, b: Number) -> Number:
     """Return a - b, whose magnitudes add up."""
     if a.kind == "float32" and (is_sum(a) or is_sum(b)):
-        va, vb = alike(a.value % P, b.value % P)
+        va, vb = alike(a.term % P, b.term % P)
         rows = va + (P - vb)
         rows[1] = va[1] + vb[1]
         return Number(rows)
@@ -160,9 +222,11 @@ def equal(a: Words, b: Words) -> bool:
 
 def blended(new: Number, old: Number | None, active: NDArray[np.bool_]) -> Number:
     """Return `new` where lanes are active, and what was there before elsewhere."""
+    if FACTORS and (new.shape is None or (old is not None and old.shape is None)):
+        raise Unread("sums that some items of a group make and others do not")
     if old is None:
         where = active if new.held is None else active & new.held
-        return Number(new.value, new.shape, held=where)
+        return Number(new.given, new.shape, held=where)
     va, vb = alike(new.value, old.value)
     value = np.where(active.reshape((-1,) + (1,) * (va.ndim - 2)), va, vb)
     shape = None
@@ -181,7 +245,9 @@ def blended(new: Number, old: Number | None, active: NDArray[np.bool_]) -> Numbe
 
 def wide(value: Any) -> int:
     """Return how many numbers a value has."""
-    return value.value.shape[2] if isinstance(value, Number) and value.value.ndim == 3 else 1
+    if not isinstance(value, Number) or value.axes < 3:
+        return 1
+    return value.value.shape[2] if value.shape is None else value.shape.shape[1]
 
 
 def part_of(value: Any, k: int | None) -> Any:
@@ -189,13 +255,23 @@ def part_of(value: Any, k: int | None) -> Any:
     if k is None or wide(value) == 1:
         return value
     shape = None if value.shape is None else value.shape[..., k]
-    return Number(value.value[..., k], shape, value.kind, value.weight, held=value.held)
+    given = None if value.given is None else value.given[..., k]
+    return Number(given, shape, value.kind, value.weight, held=value.held, source=(value, k))
 
 
 def stacked(parts: list[Number]) -> Number:
-    """Return a vector of numbers."""
-    size = max(part.value.shape[1] for part in parts)
+    """Return a vector of numbers.
+
+    Where sums are added up over lanes and one part is done, the others are: sums that nothing adds to.
+    """
+    if FACTORS and any(part.shape is not None and part.given is None for part in parts):
+        parts = [leaf(part.known) if part.shape is None else part for part in parts]
+    known = [part.shape for part in parts if part.shape is not None]
+    size = max(part.value.shape[1] if part.shape is None else len(part.shape) for part in parts)
+    shape = None
+    if len(known) == len(parts):
+        shape = np.stack([np.broadcast_to(one, (size,)) for one in known], axis=-1)
+        if all(part.given is None for part in parts):
+            return Number(None, shape, parts[0].kind)
     value = np.stack([np.broadcast_to(part.value, (2, size)) for part in parts], axis=-1)
-    shapes = [np.broadcast_to(part.shape, (size,)) for part in parts if part.shape is not None]
-    shape = np.stack(shapes, axis=-1) if len(shapes) == len(parts) else None
     return Number(value, shape, parts[0].kind, all(part.weight for part in parts))

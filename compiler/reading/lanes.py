@@ -37,17 +37,37 @@ class Unread(Exception):
 class Lanes:
     """Pixels under test: `known` (4, lanes) are x, width, y and height; `active` (lanes,) still run.
 
-    No constant beyond `cap` may be compared with them.
+    No constant beyond `caps`, of a row and of a column, may be compared with them. Of work groups `known` has
+    the first pixel's x and y, multiples of `steps`, and `inside` (2, lanes) are the items' places in their
+    group. `mask` (lanes,) are those that a branch runs in.
     """
 
     known: NDArray[np.int64]
-    cap: int
+    caps: tuple[int, int]
     active: Mask
+    inside: NDArray[np.int64] | None = None
+    steps: tuple[int, int] | None = None
+    mask: Mask | None = None
+
+    @property
+    def running(self) -> Mask:
+        """The lanes (lanes,) in which a statement has an effect now."""
+        return self.active if self.mask is None else self.mask & self.active
 
     @property
     def count(self) -> int:
         """How many there are."""
         return len(self.active)
+
+    @property
+    def x(self) -> NDArray[np.int64]:
+        """The column (lanes,) of each lane's first pixel."""
+        return self.known[0] if self.inside is None else self.known[0] + self.inside[0]
+
+    @property
+    def y(self) -> NDArray[np.int64]:
+        """The row (lanes,) of each lane's pixels."""
+        return self.known[2] if self.inside is None else self.known[2] + self.inside[1]
 
     def place(self, axis: int) -> Place:
         """Return x, width, y or height."""
@@ -84,16 +104,20 @@ class Place:
 
     def against(self, other: Any) -> NDArray[np.int64]:
         """Return the difference (lanes,) from another integer; `Wrong` unless lanes decide its sign."""
-        found, active = self.plus(other, -1), self.lanes.active
-        form = np.broadcast_to(found.form, (4, len(active)))[:, active]
+        found, running = self.plus(other, -1), self.lanes.running
+        form = np.broadcast_to(found.form, (4, len(running)))[:, running]
         (a, b), (c, d) = form[:2], form[2:]
         one_axis = (np.abs(a) + np.abs(b) == 0) | (np.abs(c) + np.abs(d) == 0)
         plain = np.isin(form, (-1, 0, 1)).all(axis=0) & (a * b <= 0) & (c * d <= 0)
         if not (one_axis & plain).all():
             raise Wrong("it compares coordinates in a way that no lane decides")
-        rest = found.values[active] - (form * self.lanes.known[:, active]).sum(axis=0)
-        if np.abs(rest[form.any(axis=0)]).max(initial=0) > self.lanes.cap:
-            raise Wrong(f"it compares a coordinate with a constant beyond {self.lanes.cap}")
+        rest = found.values[running] - (form * self.lanes.known[:, running]).sum(axis=0)
+        for axis, cap in enumerate(self.lanes.caps):
+            own, extent = form[2 * axis : 2 * axis + 2]
+            if np.abs(rest[(own != 0) | (extent != 0)]).max(initial=0) > cap:
+                raise Wrong(f"it compares a coordinate with a constant beyond {cap}")
+            if self.lanes.steps and ((rest * own)[extent == 0] <= -self.lanes.steps[axis]).any():
+                raise Wrong("it compares a group's place with a constant as large as a group")
         return found.values
 
 
@@ -127,7 +151,7 @@ def chosen(lanes: Lanes, where: Mask, a: Any, b: Any) -> Any:
     return Place(lanes, np.where(where, one.values, other.values), np.where(where, one.form, other.form))
 
 
-def _words(seed: int) -> Iterator[int]:
+def words(seed: int) -> Iterator[int]:
     """Yield words of 32 bits."""
     for n in itertools.count():
         yield int(pcg4d(*np.array([[n], [seed], [0], [0]], dtype=np.uint32))[0][0])
@@ -138,7 +162,7 @@ def lanes_for(cap: int, step: int, beyond: bool, seed: int) -> Lanes:
 
     The first is far from all borders.
     """
-    random = _words(seed)
+    random = words(seed)
 
     def pairs(step: int) -> list[tuple[int | None, int | None]]:
         return [(a, b) for a in (*range(0, cap + 1, step), None) for b in (*range(1, cap + 2), None)]
@@ -156,4 +180,4 @@ def lanes_for(cap: int, step: int, beyond: bool, seed: int) -> Lanes:
     if beyond:  # work items right of a picture, and below it
         found += [(step * n, step * n - k, 5, 9) for n, k in ((1, 0), (2, step), (700, 1))]
         found += [(0, 9, 7, 7), (0, 9, 4000, 3999)]
-    return Lanes(np.array(found, dtype=np.int64).T, cap, np.ones(len(found), dtype=bool))
+    return Lanes(np.array(found, dtype=np.int64).T, (cap, cap), np.ones(len(found), dtype=bool))

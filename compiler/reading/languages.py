@@ -32,7 +32,7 @@ class Language:
 
 
 LANGUAGES: Mapping[str, Language] = {
-    "opencl": Language(),
+    "opencl": Language(brings=("CLK_LOCAL_MEM_FENCE", "CLK_GLOBAL_MEM_FENCE")),
     "c": Language(
         compilers=(
             {"FLT_EVAL_METHOD": "0"},
@@ -45,9 +45,9 @@ LANGUAGES: Mapping[str, Language] = {
         compilers=({"GL_ARB_gpu_shader5": "1"},), within=True, fragment=True, brings=("gl_FragCoord",)
     ),
     "glsl-es": Language(within=True, fragment=True, brings=("gl_FragCoord",)),
-    "glsl-vulkan": Language(brings=("gl_GlobalInvocationID",)),
+    "glsl-vulkan": Language(brings=("gl_GlobalInvocationID", "gl_LocalInvocationID", "gl_WorkGroupID")),
     "wgsl": Language(WgslParser, preprocessed=False),
-    "metal": Language(),
+    "metal": Language(brings=tuple(f"mem_flags::mem_{a}" for a in ("none", "device", "threadgroup"))),
     "cuda": Language(brings=("threadIdx", "blockIdx", "blockDim")),
 }
 """By a manifest's target."""

@@ -13,7 +13,20 @@ from typing import Any
 import numpy as np
 
 from .builtins import bits, choose
-from .field import Number, blended, choice, difference, expression, literal, part_of, product, stacked, total
+from .field import (
+    Number,
+    blended,
+    choice,
+    difference,
+    expression,
+    literal,
+    part_of,
+    product,
+    stacked,
+    total,
+    wide,
+)
+from .groups import Group
 from .lanes import Lanes, Mask, Place, Unread, Wrong, plus, times
 from .memory import Memory, Pointer
 from .syntax import Text, Tree, Type, Variable
@@ -44,9 +57,11 @@ class Machine:
         outside: dict[str, Any],
         builtins: dict[str, Callable[..., Any]],
         added: Callable[[Number, Mask], Number],
+        group: Group | None = None,
     ) -> None:
         self.text, self.lanes, self.builtins, self.added = text, lanes, builtins, added
-        self.mask: Mask | None = None
+        self.group = group
+        self.mask = None
         self.entered: Mask | None = None
         self.base = 0
         self.frames: list[dict[str, Any]] = [dict(outside)]
@@ -70,7 +85,7 @@ class Machine:
         type_, given = variable.type, None if value is None else self.value(value, variable.type)
         if variable.sizes:
             sizes = tuple(int(self.value(size)) for size in variable.sizes)
-            memory = Memory(variable.name, int(np.prod(sizes)) * type_.width)
+            memory = self._memory(variable, int(np.prod(sizes)) * type_.width)
             held = Pointer(memory, 0, type_.width, sizes)
             for k, one in enumerate(given or []):
                 memory.store(k * type_.width, type_.width, one, self)
@@ -81,6 +96,14 @@ class Machine:
                 memory.store(0, type_.width, stacked(given) if numbers(given) else given, self)
             given = Pointer(memory, 0, type_.width, ())
         self.frames[-1][variable.name] = given
+
+    def _memory(self, variable: Variable, size: int) -> Any:
+        """Return an array of a text: each lane's, or its group's."""
+        if not variable.shared:
+            return Memory(variable.name, size)
+        if self.group is None:
+            raise Unread("memory that a group shares, without groups")
+        return self.group.share(variable.name, size)
 
     def written(self, value: Any, name: str) -> Any:
         """Return a value that every running lane has written."""
@@ -93,7 +116,16 @@ class Machine:
     @property
     def running(self) -> Mask:
         """The lanes (lanes,) in which a statement has an effect now."""
-        return self.lanes.active if self.mask is None else self.mask & self.lanes.active
+        return self.lanes.running
+
+    @property
+    def mask(self) -> Mask | None:
+        """The lanes of a branch; None for all."""
+        return self.lanes.mask
+
+    @mask.setter
+    def mask(self, lanes: Mask | None) -> None:
+        self.lanes.mask = lanes
 
     # ---- statements ----------------------------------------------------------------------------------------
 
@@ -175,7 +207,9 @@ class Machine:
                 if not self.running.any():
                     break
             ended = self.run(body)
-            mask, self.mask = self.mask, None
+            mask = self.mask
+            if start[0] == "declare" and step[2] == ("name", start[1].name):
+                self.mask = None  # no lane that has left the loop sees its variable: it may stay one integer
             self.value(step)
             self.mask = mask
         self.mask = outer
@@ -242,11 +276,19 @@ class Machine:
         name = callee[1]
         if name in self.text.functions:
             takes = self.text.functions[name].takes
-            given = [self.value(tree, v.type) for tree, v in zip(arguments, takes, strict=True)]
+            given = [self._argument(tree, v.type) for tree, v in zip(arguments, takes, strict=True)]
             return self.call(name, given)
         if name not in self.builtins:
             raise Unread(f"function {name}()")
         return self.builtins[name](self, *(self.value(tree) for tree in arguments))
+
+    def _argument(self, tree: Tree, type_: Type) -> Any:
+        if not type_.reference:
+            return self.value(tree, type_)
+        found = getattr(self, f"_value_{tree[0]}")(*tree[1:])
+        if not isinstance(found, Pointer):
+            raise Unread("a reference to what has no address")
+        return found
 
     def _value_at(self, array: Tree, index: Tree) -> Any:
         at, found = self.value(index), getattr(self, f"_value_{array[0]}")(*array[1:])
@@ -302,10 +344,15 @@ class Machine:
 
     def operate(self, op: str, a: Any, b: Any) -> Any:
         """Return what an operator makes of two values."""
+        if f"operator{op}" in self.text.functions and wide(a) > 1:
+            return self._call_operator(op, a, b)
         if isinstance(a, Number) or isinstance(b, Number):
             return self._operate_numbers(op, *self.both(a, b))
         if isinstance(a, Pointer):
             return Pointer(a.memory, plus(a.offset, times(b, a.width), -1 if op == "-" else 1), a.width)
+        return self._operate_integers(op, a, b)
+
+    def _operate_integers(self, op: str, a: Any, b: Any) -> Any:
         if op in COMPARES:
             if isinstance(a, Place):
                 return COMPARES[op](a.against(b))
@@ -316,6 +363,10 @@ class Machine:
             return plus(a, b, 1 if op == "+" else -1)
         if op == "*":
             return times(a, b)
+        if op in "/%" and isinstance(a, Place) and isinstance(b, int) and b > 0 and not a.form.any():
+            if (a.values < 0)[self.running].any():
+                raise Wrong("it divides a negative integer")
+            return self.lanes.constant(a.values // b if op == "/" else a.values % b)
         if isinstance(a, Place) or isinstance(b, Place):
             raise Unread(f"operator {op} of coordinates")
         if op in "/%" and b:
@@ -323,6 +374,14 @@ class Machine:
         if op in BITS:
             return BITS[op][1](a, b)
         raise Unread(f"operator {op}")
+
+    def _call_operator(self, op: str, a: Any, b: Any) -> Any:
+        """Return what a text's own operator makes of two values."""
+        takes = [v.type.width for v in self.text.functions[f"operator{op}"].takes]
+        widths = [v.width if isinstance(v, Pointer) else wide(v) for v in (a, b)]
+        if takes != widths:
+            raise Wrong(f"its operator {op} is of other vectors")
+        return self.call(f"operator{op}", [a, b])
 
     def both(self, a: Any, b: Any) -> tuple[Number, Number]:
         """Return two numbers of one kind: an integer of the text becomes one of the other's."""
@@ -372,6 +431,8 @@ class Machine:
                 return self._assign(frame, target[1], op, new)
         if not isinstance(place, Pointer) or place.sizes:
             raise Wrong("it assigns to what cannot be written")
+        if f"operator{op}=" in self.text.functions and place.width > 1:
+            return self._call_operator(f"{op}=", place, new)
         if op:
             new = self.operate(op, place.load(self), new)
         if isinstance(new, int) and not isinstance(new, bool):

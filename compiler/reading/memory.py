@@ -156,16 +156,18 @@ class Result:
         raise Wrong("the result is read")
 
     def _one(self, offset: Any, value: Any, machine: Machine) -> None:
-        x, width, y, height = self.claim.lanes.known
+        lanes, stride = self.claim.lanes, self.claim.stride
+        x, width, y, height = lanes.x, lanes.known[1], lanes.y, lanes.known[3]
         running = machine.running
         if not running.any():
             return
         values = offset.values if isinstance(offset, Place) else np.full(len(x), offset)
         at = set((values - (y * width + x) * self.channels)[running].tolist())
-        if len(at) != 1 or not 0 <= (place := at.pop()) < self.claim.pixels * self.channels:
+        column, channel = divmod(at.pop(), self.channels)
+        pixel = column // stride
+        if at or column % stride or not 0 <= pixel < self.claim.pixels:
             raise Wrong("it writes a result that is not its own")
-        pixel, channel = divmod(place, self.channels)
-        if ((x + pixel >= width) | (y >= height))[running].any():
+        if ((x + column >= width) | (y >= height))[running].any():
             raise Wrong("it writes a result beyond the picture")
         self.hold(pixel, channel, value, running)
 
@@ -181,7 +183,8 @@ class Result:
 
     def complete(self) -> None:
         """Refuse a text that leaves a pixel out."""
-        x, width, y, height = self.claim.lanes.known
+        lanes, stride = self.claim.lanes, self.claim.stride
+        x, width, y, height = lanes.x, lanes.known[1], lanes.y, lanes.known[3]
         for pixel, written in enumerate(self.written):
-            if not written[:, (x + pixel < width) & (y < height)].all():
+            if not written[:, (x + pixel * stride < width) & (y < height)].all():
                 raise Wrong("it leaves a pixel without a result")

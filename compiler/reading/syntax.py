@@ -84,16 +84,18 @@ class Type:
     kind: str
     width: int = 1
     pointer: bool = False
+    reference: bool = False
 
 
 @dataclass
 class Variable:
-    """A name with its type; `sizes` of an array, expressions; `shared` by a group."""
+    """A name with its type; `sizes` of an array, expressions; `shared` by a group; `role`: what brings it."""
 
     name: str
     type: Type
     sizes: list[Any] = field(default_factory=list)
     shared: bool = False
+    role: str = ""
 
 
 @dataclass
@@ -112,7 +114,7 @@ class Text:
     functions: dict[str, Function] = field(default_factory=dict)
     outside: list[tuple[Variable, Any]] = field(default_factory=list)
     structs: dict[str, list[Variable]] = field(default_factory=dict)
-    group: tuple[int, ...] | None = None
+    group: list[Tree] = field(default_factory=list)
 
 
 def tokens(text: str) -> list[tuple[str, str, int]]:
@@ -135,6 +137,7 @@ class Parser:
 
     def __init__(self, text: str) -> None:
         self.tokens, self.at, self.text = [*tokens(text), ("end", "", 0)], 0, Text()
+        self._role = ""
         self.types = {name: Type(kind) for name, kind in SCALARS.items()}
         for base, kind in (
             ("float", "float32"),
@@ -198,8 +201,9 @@ class Parser:
             self.at += 4
         elif self._now == "typedef":
             self._typedef()
-        elif self._now == "struct" and self._ahead(2) == "{":
+        elif self._now == "struct" and (self._ahead(2) == "{" or self._ahead() == "__align__"):
             self._take()
+            self._qualifiers()
             name = self._take()
             self._struct(name)
             self._take(";")
@@ -232,10 +236,12 @@ class Parser:
         self._take(";")
 
     def _struct(self, name: str) -> None:
-        """Read the members of a struct; one of a single array of numbers is a vector."""
+        """Read the members of a struct; one of a single array of numbers, or of x, y, z, w, is a vector."""
         members = self._members()
         if len(members) == 1 and len(members[0].sizes) == 1:
             self.types[name] = Type(members[0].type.kind, constant(members[0].sizes[0]))
+        elif [v.name for v in members] == list("xyzw") and {v.type for v in members} == {Type("float32")}:
+            self.types[name] = Type("float32", 4)
         else:
             self.types[name] = Type(name)
         self.text.structs[name] = members
@@ -264,18 +270,23 @@ class Parser:
                 self._skip_brackets("(", ")")
                 words = [token[1] for token in self.tokens[at : self.at]]
                 if "local_size_x" in words:
-                    sizes = [
-                        words[words.index(f"local_size_{a}") + 2] for a in "xyz" if f"local_size_{a}" in words
+                    self.text.group = [
+                        ("number", words[words.index(f"local_size_{a}") + 2])
+                        for a in "xyz"
+                        if f"local_size_{a}" in words
                     ]
-                    self.text.group = tuple(map(int, sizes))
+            elif self._now in ("__launch_bounds__", "__align__"):
+                self._take()
+                self._skip_brackets("(", ")")
             elif self._now == "__attribute__":
                 self._take()
                 at = self.at
                 self._skip_brackets("(", ")")
                 words = [token[1] for token in self.tokens[at : self.at]]
                 if "reqd_work_group_size" in words:
-                    self.text.group = tuple(int(w) for w in words if w.isdigit())
+                    self.text.group = [("number", w) for w in words if w.isdigit()]
             elif self._now == "[" and self._ahead() == "[":
+                self._role = self._ahead(2)
                 self._skip_brackets("[", "]")
             elif self._now in IGNORED:
                 self._take()
@@ -289,7 +300,8 @@ class Parser:
         while True:
             shared |= self._qualifiers()
             if self._now in ("*", "&"):
-                found = Type(found.kind, found.width, pointer=self._take() == "*")
+                pointer = self._take() == "*"
+                found = Type(found.kind, found.width, pointer, not pointer)
             else:
                 return shared, found
 
@@ -313,7 +325,9 @@ class Parser:
             self._take()
             found.sizes.append(None if self._now == "]" else self._expression())
             self._take("]")
+        self._role = ""
         self._qualifiers()
+        found.role = self._role
         return found
 
     def _declaration_outside(self) -> None:
@@ -329,6 +343,8 @@ class Parser:
             return
         also, type_ = self._qualified()
         name = self._take()
+        if name == "operator":
+            name += self._take()
         if self._now != "(":
             self.at -= 1
             self._variables(type_, shared or also, self.text.outside)
@@ -336,6 +352,8 @@ class Parser:
         takes = self._parameters()
         self._qualifiers()
         if not self._has(";"):
+            if name in self.text.functions:
+                raise Unread(f"two functions {name}()")
             self.text.functions[name] = Function(name, takes, self._block())
 
     def _parameters(self) -> list[Variable]:
@@ -507,7 +525,8 @@ class Parser:
         if kind == "number":
             return ("number", self._take())
         if kind == "name":
-            return ("name", self._take())
+            name = self._take()
+            return ("name", f"{name}::{self._take()}" if self._has("::") else name)
         if text == "(":
             self._take()
             found = self._expression()

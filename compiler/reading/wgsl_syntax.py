@@ -15,11 +15,10 @@ class WgslParser(Parser):
         while self._has("@"):
             name = self._take()
             if self._now == "(":
-                at = self.at
-                self._skip_brackets("(", ")")
+                self._take("(")
+                values = self._values(")")
                 if name == "workgroup_size":
-                    words = [t[1] for t in self.tokens[at : self.at] if t[0] == "number"]
-                    self.text.group = tuple(map(int, words))
+                    self.text.group = values
         word = self._take()
         if word == "struct":
             name = self._take()
@@ -39,8 +38,7 @@ class WgslParser(Parser):
         elif word == "fn":
             name = self._take()
             takes = self._members_of("(", ")")
-            if self._has("-"):
-                self._take(">")
+            if self._has("->"):
                 self._type()
             self.text.functions[name] = Function(name, takes, self._block())
         elif word != ";":
@@ -51,11 +49,14 @@ class WgslParser(Parser):
         self._take(opening)
         found = []
         while not self._has(closing):
+            role = ""
             while self._has("@"):
                 self._take()
                 if self._now == "(":
+                    role = self._ahead()
                     self._skip_brackets("(", ")")
             found.append(self._typed(self._take()))
+            found[-1].role = role
             self._has(",")
         return found
 
@@ -74,7 +75,7 @@ class WgslParser(Parser):
         inner: list[Any] = []
         element = self._sized(inner)
         sizes += [self._binary(8) if self._has(",") else None, *inner]
-        self._take(">")
+        self._close()
         return element
 
     def _type(self) -> Type:
@@ -84,17 +85,25 @@ class WgslParser(Parser):
             self._take()
             self._take(",")
             found = self._sized([])
-            self._take(">")
+            self._close()
             return Type(found.kind, found.width, pointer=True)
         if name[:3] == "vec" and name[3:4].isdigit() and self._has("<"):
             inner = self._type()
-            self._take(">")
+            self._close()
             return Type(inner.kind, int(name[3]))
         if name in SCALARS or name in self.types:
             return self.types[name]
         if name in self.text.structs:
             return Type(name)
         raise Unread(f"line {self.tokens[self.at - 1][2]}: type {name!r}")
+
+    def _close(self) -> None:
+        """Take `>`, of `>>` the first."""
+        kind, text, line = self.tokens[self.at]
+        if text == ">>":
+            self.tokens[self.at] = (kind, ">", line)
+        else:
+            self._take(">")
 
     def _declares(self) -> bool:
         return self._now in ("var", "let", "const")
@@ -112,3 +121,12 @@ class WgslParser(Parser):
 
     def _is_type(self) -> bool:
         return False
+
+    def _primary(self) -> Tree:
+        """Read `vec4<f32>` as the name of the function that makes one."""
+        if self._now == "vec4" and self._ahead() == "<":
+            line = self.tokens[self.at][2]
+            if self._type() != Type("float32", 4):
+                raise Unread(f"line {line}: vectors of other numbers")
+            return ("name", "vec4")
+        return super()._primary()

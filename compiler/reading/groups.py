@@ -1,0 +1,177 @@
+"""Work groups: which groups are run, the memory that their items share, and barriers.
+
+Lanes are the items of a few groups, one group behind the other. Two items race for an element of the shared
+memory where one writes it and another reads or writes it with no barrier between both.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .field import Number, part_of, stacked
+from .lanes import FAR, Lanes, Place, Unread, Wrong, plus, words
+
+if TYPE_CHECKING:
+    from .machine import Machine
+
+NOBODY, SEVERAL = -1, -2
+"""Who has read or written an element since the last barrier, where that is not one item."""
+
+MIXED = 12
+"""Groups near borders of both axes, at random."""
+
+LOCAL_FENCE = 1
+"""What a barrier's flags must have: that it orders the memory of a group."""
+
+FLAGS = {
+    "CLK_LOCAL_MEM_FENCE": 1, "CLK_GLOBAL_MEM_FENCE": 2, "mem_flags::mem_none": 0,
+    "mem_flags::mem_device": 2, "mem_flags::mem_threadgroup": 1, "mem_flags::mem_texture": 4,
+}  # fmt: skip
+"""Flags of barriers by name."""
+
+
+def group_lanes(group: tuple[int, int], pixels: int, window: int, seed: int) -> Lanes:
+    """Return the items of groups of all cases, `pixels` of a row to an item.
+
+    A group's first column is 0 or, where no constant is compared with it that reaches so far, anything; its
+    distance from the right border, and the picture's width, is each that the group's pixels and the window
+    reach, or beyond. So for rows, with the columns far from all borders.
+    """
+    random, steps = words(seed), (group[0] * pixels, group[1])
+    caps = steps[0] + window, steps[1] + window
+
+    def drawn(case: tuple[int | None, int | None], step: int) -> tuple[int, int]:
+        before, behind = case
+        at = (FAR + next(random) % FAR) // step * step if before is None else before
+        return at, at + (FAR + next(random) % FAR if behind is None else behind)
+
+    across, down = ([(b, n) for b in (None, 0) for n in (None, *range(1, cap + 2))] for cap in caps)
+    cases = [(a, down[0]) for a in across] + [(across[0], b) for b in down[1:]]
+    cases += [(across[next(random) % len(across)], down[next(random) % len(down)]) for _ in range(MIXED)]
+    known = np.array([(*drawn(a, steps[0]), *drawn(b, steps[1])) for a, b in cases], dtype=np.int64).T
+    y, x = np.divmod(np.arange(group[0] * group[1]), group[0])
+    count = len(x) * len(cases)
+    return Lanes(
+        np.repeat(known, len(x), axis=1), caps, np.ones(count, dtype=bool),
+        inside=np.tile([x, y], len(cases)), steps=steps,
+    )  # fmt: skip
+
+
+class Shared:
+    """An array that the items of a group share: its numbers, and who read and wrote them in this phase."""
+
+    def __init__(self, name: str, size: int, lanes: Lanes, items: int) -> None:
+        groups = lanes.count // items
+        self.name, self.size, self.kind = name, size, ""
+        self.value = np.zeros((2, groups, size), dtype=np.uint64)
+        self.shape = np.zeros((groups, size), dtype=np.uint64)
+        self.held = np.zeros((groups, size), dtype=bool)
+        self.writer, self.reader = (np.full((groups, size), NOBODY, dtype=np.int32) for _ in range(2))
+        self.group, self.item = np.divmod(np.arange(lanes.count), items)
+
+    def wait(self) -> None:
+        """Begin another phase."""
+        self.writer.fill(NOBODY)
+        self.reader.fill(NOBODY)
+
+    def load(self, offset: Any, width: int, machine: Machine) -> Number:
+        """Return numbers, each lane those of its group."""
+        parts = [self._load(plus(offset, k), machine) for k in range(width)]
+        return parts[0] if width == 1 else stacked(parts)
+
+    def store(self, offset: Any, width: int, value: Any, machine: Machine) -> None:
+        """Write numbers, each lane into its group's memory."""
+        for k in range(width):
+            self._store(plus(offset, k), part_of(value, k if width > 1 else None), machine)
+
+    def _index(self, offset: Any, machine: Machine) -> NDArray[np.int64]:
+        values = offset.values if isinstance(offset, Place) else np.full(len(self.item), offset)
+        beyond = (values < 0) | (values >= self.size)
+        if beyond.any():
+            if (beyond & machine.running).any():
+                raise Wrong(f"{self.name} is read or written beyond its {self.size} numbers")
+            values = np.where(beyond, 0, values)
+        return values
+
+    def _load(self, offset: Any, machine: Machine) -> Number:
+        every = self.group, self._index(offset, machine)
+        running = machine.running
+        at, item = (every[0][running], every[1][running]), self.item[running]
+        if not self.held[at].all():
+            raise Wrong(f"{self.name} is read before it is written")
+        writer, reader = self.writer[at], self.reader[at]
+        if ((writer != NOBODY) & (writer != item)).any():
+            raise Wrong(f"{self.name}: an item reads what another writes, without a barrier between")
+        self.reader[at] = item
+        several = (self.reader[at] != item) | ((reader != NOBODY) & (reader != item))
+        self.reader[at[0][several], at[1][several]] = SEVERAL
+        return Number(self.value[:, every[0], every[1]], self.shape[every], self.kind)
+
+    def _store(self, offset: Any, value: Any, machine: Machine) -> None:
+        if not isinstance(value, Number) or value.shape is None or value.kind != (self.kind or value.kind):
+            raise Unread(f"anything but numbers of one kind, or sums, in {self.name}")
+        machine.written(value, self.name)
+        running = machine.running
+        at, item = (self.group[running], self._index(offset, machine)[running]), self.item[running]
+        writer, reader = self.writer[at], self.reader[at]
+        if ((reader != NOBODY) & (reader != item)).any():
+            raise Wrong(f"{self.name}: an item writes what another reads, without a barrier between")
+        self.writer[at] = item
+        if (self.writer[at] != item).any() or ((writer != NOBODY) & (writer != item)).any():
+            raise Wrong(f"{self.name}: two items write one number")
+        self.kind = value.kind
+        self.value[:, at[0], at[1]] = np.broadcast_to(value.value, (2, len(running)))[:, running]
+        self.shape[at] = np.broadcast_to(value.shape, running.shape)[running]
+        self.held[at] = True
+
+
+class Group:
+    """What the items of a group have in common: `share` makes its memory, `wait` is a barrier."""
+
+    def __init__(self, lanes: Lanes, items: int) -> None:
+        self.lanes, self.items = lanes, items
+        self.memories: list[Shared] = []
+
+    def share(self, name: str, size: int) -> Shared:
+        """Return an array of so many numbers in each group."""
+        self.memories.append(Shared(name, size, self.lanes, self.items))
+        return self.memories[-1]
+
+    def wait(self, machine: Machine, flags: int = LOCAL_FENCE) -> None:
+        """Begin another phase of the shared memories; all items must be here."""
+        if machine.mask is not None or not machine.running.all():
+            raise Wrong("a barrier that not all items of a group reach")
+        if not flags & LOCAL_FENCE:
+            raise Wrong("a barrier that does not order the memory of a group")
+        for memory in self.memories:
+            memory.wait()
+
+    def brings(self) -> dict[str, Any]:
+        """Return the names by which languages call an item's place in its group, and the group's."""
+        lanes = self.lanes
+        assert lanes.inside is not None
+        assert lanes.steps is not None
+        inside, group = {}, {}
+        for k, name in enumerate("xy"):
+            first = lanes.place(2 * k)
+            inside[name] = lanes.constant(lanes.inside[k])
+            group[name] = Place(lanes, first.values // lanes.steps[k], first.form / lanes.steps[k])
+        return {
+            **dict.fromkeys(("threadIdx", "gl_LocalInvocationID", "local_invocation_id"), inside),
+            **dict.fromkeys(("blockIdx", "gl_WorkGroupID", "workgroup_id"), group),
+            "thread_position_in_threadgroup": inside, "threadgroup_position_in_grid": group,
+        }  # fmt: skip
+
+    def calls(self) -> dict[str, Any]:
+        """Return the functions by which languages call both, and barriers."""
+        names = self.brings()
+        inside, group = (list(names[name].values()) for name in ("threadIdx", "blockIdx"))
+        barriers = ("barrier", "workgroupBarrier", "__syncthreads", "threadgroup_barrier")
+        return {
+            **dict.fromkeys(barriers, self.wait),
+            "get_local_id": lambda machine, axis: inside[axis],
+            "get_group_id": lambda machine, axis: group[axis],
+        }

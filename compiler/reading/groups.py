@@ -66,11 +66,12 @@ class Shared:
     def __init__(self, name: str, size: int, lanes: Lanes, items: int) -> None:
         groups = lanes.count // items
         self.name, self.size, self.kind = name, size, ""
-        self.value = np.zeros((2, groups, size), dtype=np.uint64)
-        self.shape = np.zeros((groups, size), dtype=np.uint64)
-        self.held = np.zeros((groups, size), dtype=bool)
-        self.writer, self.reader = (np.full((groups, size), NOBODY, dtype=np.int32) for _ in range(2))
-        self.group, self.item = np.divmod(np.arange(lanes.count), items)
+        self.value = np.zeros((2, groups * size), dtype=np.uint64)
+        self.shape = np.zeros(groups * size, dtype=np.uint64)
+        self.held = np.zeros(groups * size, dtype=bool)
+        self.writer, self.reader = (np.full(groups * size, NOBODY, dtype=np.int32) for _ in range(2))
+        group, self.item = np.divmod(np.arange(lanes.count, dtype=np.int32), np.int32(items))
+        self.first = group.astype(np.int64) * size
 
     def wait(self) -> None:
         """Begin another phase."""
@@ -88,18 +89,19 @@ class Shared:
             self._store(plus(offset, k), part_of(value, k if width > 1 else None), machine)
 
     def _index(self, offset: Any, machine: Machine) -> NDArray[np.int64]:
+        """Return the place (lanes,) of an element in all groups' memory."""
         values = offset.values if isinstance(offset, Place) else np.full(len(self.item), offset)
         beyond = (values < 0) | (values >= self.size)
         if beyond.any():
             if (beyond & machine.running).any():
                 raise Wrong(f"{self.name} is read or written beyond its {self.size} numbers")
             values = np.where(beyond, 0, values)
-        return values
+        place: NDArray[np.int64] = self.first + values
+        return place
 
     def _load(self, offset: Any, machine: Machine) -> Number:
-        every = self.group, self._index(offset, machine)
-        running = machine.running
-        at, item = (every[0][running], every[1][running]), self.item[running]
+        every, running = self._index(offset, machine), machine.running
+        at, item = (every, self.item) if running.all() else (every[running], self.item[running])
         if not self.held[at].all():
             raise Wrong(f"{self.name} is read before it is written")
         writer, reader = self.writer[at], self.reader[at]
@@ -107,15 +109,15 @@ class Shared:
             raise Wrong(f"{self.name}: an item reads what another writes, without a barrier between")
         self.reader[at] = item
         several = (self.reader[at] != item) | ((reader != NOBODY) & (reader != item))
-        self.reader[at[0][several], at[1][several]] = SEVERAL
-        return Number(self.value[:, every[0], every[1]], self.shape[every], self.kind)
+        self.reader[at[several]] = SEVERAL
+        return Number(self.value.take(every, axis=1), self.shape[every], self.kind)
 
     def _store(self, offset: Any, value: Any, machine: Machine) -> None:
         if not isinstance(value, Number) or value.shape is None or value.kind != (self.kind or value.kind):
             raise Unread(f"anything but numbers of one kind, or sums, in {self.name}")
         machine.written(value, self.name)
         running = machine.running
-        at, item = (self.group[running], self._index(offset, machine)[running]), self.item[running]
+        at, item = self._index(offset, machine)[running], self.item[running]
         writer, reader = self.writer[at], self.reader[at]
         if ((reader != NOBODY) & (reader != item)).any():
             raise Wrong(f"{self.name}: an item writes what another reads, without a barrier between")
@@ -123,7 +125,7 @@ class Shared:
         if (self.writer[at] != item).any() or ((writer != NOBODY) & (writer != item)).any():
             raise Wrong(f"{self.name}: two items write one number")
         self.kind = value.kind
-        self.value[:, at[0], at[1]] = np.broadcast_to(value.value, (2, len(running)))[:, running]
+        self.value[:, at] = np.broadcast_to(value.value, (2, len(running)))[:, running]
         self.shape[at] = np.broadcast_to(value.shape, running.shape)[running]
         self.held[at] = True
 

@@ -264,27 +264,12 @@ class Parser:
             if self._now in SHARED:
                 shared = True
                 self._take()
-            elif self._now == "layout":
+            elif self._now in ("layout", "__attribute__"):
                 self._take()
-                at = self.at
-                self._skip_brackets("(", ")")
-                words = [token[1] for token in self.tokens[at : self.at]]
-                if "local_size_x" in words:
-                    self.text.group = [
-                        ("number", words[words.index(f"local_size_{a}") + 2])
-                        for a in "xyz"
-                        if f"local_size_{a}" in words
-                    ]
+                self._group_size()
             elif self._now in ("__launch_bounds__", "__align__"):
                 self._take()
                 self._skip_brackets("(", ")")
-            elif self._now == "__attribute__":
-                self._take()
-                at = self.at
-                self._skip_brackets("(", ")")
-                words = [token[1] for token in self.tokens[at : self.at]]
-                if "reqd_work_group_size" in words:
-                    self.text.group = [("number", w) for w in words if w.isdigit()]
             elif self._now == "[" and self._ahead() == "[":
                 self._role = self._ahead(2)
                 self._skip_brackets("[", "]")
@@ -292,6 +277,21 @@ class Parser:
                 self._take()
             else:
                 return shared
+
+    def _group_size(self) -> None:
+        """Skip what stands in brackets; note the size of work groups if it is there."""
+        first = self.at
+        self._skip_brackets("(", ")")
+        end = self.at
+        words = {token[1]: first + n for n, token in enumerate(self.tokens[first:end])}
+        if "reqd_work_group_size" in words:
+            self.at = words["reqd_work_group_size"] + 2
+            self.text.group = self._values(")")
+        for axis in "xyz":
+            if f"local_size_{axis}" in words:
+                self.at = words[f"local_size_{axis}"] + 2
+                self.text.group = [*self.text.group, self._choice()]
+        self.at = end
 
     def _qualified(self) -> tuple[bool, Type]:
         """Read a type with qualifiers before, between and behind."""

@@ -4,54 +4,23 @@ import json
 
 import numpy as np
 import pytest
-import text_faults
+from texts import NAME, changed, kernel, model, noticed, parts
 
 from wamnet.compiler import artifact
-from wamnet.compiler.compile import compile_plan, compile_program
-from wamnet.compiler.core.lower import lower
-from wamnet.compiler.proof.evidence import Refused, read
+from wamnet.compiler.compile import compile_plan
+from wamnet.compiler.proof.evidence import Refused
 from wamnet.compiler.reading import field
 from wamnet.compiler.reading.check import check_text, run_text
 from wamnet.compiler.reading.lanes import Place, Unread, Wrong, lanes_for
 from wamnet.compiler.reading.languages import LANGUAGES
 from wamnet.compiler.variants import plan_model
-from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
-from wamnet.refimpl.network.denoise import Model
 
 pytest.importorskip("pcpp", reason="the preprocessor of texts is missing: pip install 'wamnet[cli]'")
-
-NAME = artifact.CERTIFICATE_NAME
-
-
-def model(size=3, border="zero", activation="sine", seed=5):
-    network = siren.init((size**2 * 6, 6, 5, 3), 1.0, 3.0, seed, activation=activation)
-    return Model(network, ("color", "normal"), Window(size, border), Normalization())
-
-
-def kernel(folder, target, schedule="plain", **kwargs):
-    """Write a kernel; return its certificate's path."""
-    artifact.write(compile_program(lower(model(**kwargs)), target, schedule=schedule), folder)
-    return folder / NAME
-
-
-def parts(path):
-    """Return the text of a kernel, its certificate, manifest and weights."""
-    held, manifest, *_ = read(path)
-    (name,) = (name for name in manifest["files"] if name != "weights.bin")
-    weights = np.frombuffer((path.parent / "weights.bin").read_bytes(), "<f4")
-    return (path.parent / name).read_text(), held, manifest, weights
 
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
     return parts(kernel(tmp_path_factory.mktemp("plain"), "opencl"))
-
-
-def changed(given, old, new, count=1):
-    source, *others = given
-    assert source.count(old) >= count, f"the text has no {old!r}"
-    return (source.replace(old, new, count), *others)
 
 
 @pytest.mark.parametrize("target", sorted(LANGUAGES))
@@ -117,12 +86,7 @@ def test_what_is_not_known_is_not_skipped(plain):
 @pytest.mark.parametrize(("target", "schedule", "count"), [("opencl", "plain", 60), ("c", "tile8", 12)])
 def test_planted_faults_are_noticed(target, schedule, count, tmp_path, capsys):
     """TXT-8: what holds the reader."""
-    kernel(tmp_path, target, schedule)
-    row, accepted = text_faults.planted(tmp_path, count, seed=7)
-    assert accepted == 0, capsys.readouterr().err
-    assert row[:2] == [target, schedule]
-    assert int(row[3]) == count
-    assert int(row[4]) >= count - 3
+    noticed(parts(kernel(tmp_path, target, schedule)), count)
 
 
 def test_numbers_that_cancel_are_seen():

@@ -1,0 +1,147 @@
+"""Reading the texts of work groups: shared memory, barriers, and items that stand apart (spec/text.md)."""
+
+import json
+
+import numpy as np
+import pytest
+from texts import changed, kernel, noticed, parts
+
+from wamnet.compiler.proof.evidence import Refused
+from wamnet.compiler.reading import field
+from wamnet.compiler.reading.check import check_text, run_text
+from wamnet.compiler.reading.groups import group_lanes
+from wamnet.compiler.reading.lanes import Unread, Wrong
+
+pytest.importorskip("pcpp", reason="the preprocessor of texts is missing: pip install 'wamnet[cli]'")
+
+TARGETS = ("cuda", "glsl-vulkan", "metal", "opencl", "wgsl")
+
+
+@pytest.fixture(scope="module", params=["wgsl", "opencl"])
+def one(request, tmp_path_factory):
+    """Text of one pixel an item, in the language of the parameter."""
+    return parts(kernel(tmp_path_factory.mktemp("one"), request.param, "group"))
+
+
+@pytest.fixture(scope="module")
+def four(tmp_path_factory):
+    return parts(kernel(tmp_path_factory.mktemp("four"), "opencl", "group4"))
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("schedule", ["group", "group4"])
+@pytest.mark.parametrize(("border", "activation", "size"), [("zero", "sine", 3), ("clamp", "relu", 4)])
+def test_groups_compute_what_is_certified(target, schedule, border, activation, size, tmp_path):
+    path = kernel(tmp_path, target, schedule, border=border, activation=activation, size=size)
+    pixels = json.loads((tmp_path / "manifest.json").read_text())["schedule"]["pixels"]
+    assert pixels == (4 if schedule == "group4" else 1)
+    assert check_text(path)["sums"] == pixels * (2 * size + 3)
+
+
+def lost(source, n):
+    """Return a text without its barrier n."""
+    wait = next(w for w in ("workgroupBarrier();", "barrier(CLK_LOCAL_MEM_FENCE);") if w in source)
+    pieces = source.split(wait)
+    assert len(pieces) == 5
+    return wait.join(pieces[: n + 1]) + wait.join(pieces[n + 1 :])
+
+
+@pytest.mark.parametrize(("n", "why"), [(1, "reads what another writes"), (2, "writes what another reads")])
+def test_a_lost_barrier_is_a_race(one, n, why):
+    """The first barrier of a kernel keeps nothing apart, the others do."""
+    source, *others = one
+    assert run_text(lost(source, 0), *others)
+    with pytest.raises(Refused, match=why):
+        run_text(lost(source, n), *others)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ("    barrier(", "    if (x < width) barrier(", "not all items"),
+        ("    barrier(", "    if (local_x < 3) { return; }\n    barrier(", "not all items"),
+        ("for (int i = item;", "for (int i = item + 1;", "before it is written"),
+        ("i += GROUP_WIDTH * GROUP_HEIGHT", "i += GROUP_WIDTH", "two items write"),
+        ("i < PLANE;", "i < PLANE - 1;", "before it is written"),
+        ("i < PLANE;", "i < PLANE * 4;", "two items write"),
+        ("[2 * PLANE + i]", "[3 * PLANE + i]", "beyond its"),
+        ("TILE_WIDTH + local_x + dx", "TILE_WIDTH + local_x + dx + 1", "never made|written"),
+        ("2 * PLANE + at", "2 * PLANE + at + PLANE", "beyond its"),
+        ("top + i / TILE_WIDTH", "top + i / (TILE_WIDTH - 1)", "never made"),
+        ("at + 2 * GROUP_WIDTH", "at + 3 * GROUP_WIDTH", "never made"),
+        ("if (x + 3 * GROUP_WIDTH < width &&", "if (x + 3 * GROUP_WIDTH <= width &&", "beyond the picture"),
+        ("if (x + 3 * GROUP_WIDTH < width &&", "if (x + 3 * GROUP_WIDTH < width - 1 &&", "without a result"),
+        ("(y * width + x + 2 * GROUP_WIDTH)", "(y * width + x + 2)", "not its own"),
+        ("CLK_LOCAL_MEM_FENCE", "CLK_GLOBAL_MEM_FENCE", "does not order"),
+        ("__local float", "float", "differs between lanes"),
+        ("GROUP_HEIGHT, 1)", "GROUP_HEIGHT + 1, 1)", "not of 16 x 8 items"),
+        ("get_local_id(0)", "get_local_id(1)", "two items write|no meaning|never made"),
+        ("x + 0 * GROUP_WIDTH < width", "local_x < width", "beyond the picture"),
+    ],
+)
+def test_faults_of_groups_are_named(four, old, new, why):
+    with pytest.raises(Refused, match=why):
+        run_text(*changed(four, old, new))
+
+
+def test_constants_as_large_as_a_group_are_refused(four):
+    """No lane's group begins between 0 and far away: no constant may tell such groups apart."""
+    old = "tile[0 * PLANE + i] = inside ?"
+    assert run_text(*changed(four, old, "tile[0 * PLANE + i] = inside && left >= -1 ?"))
+    with pytest.raises(Refused, match="as large as a group"):
+        run_text(*changed(four, old, "tile[0 * PLANE + i] = inside && left - 64 >= 0 ?"))
+
+
+def test_a_sum_in_a_branch_is_not_read(four):
+    with pytest.raises(Unread, match="sums that some items"):
+        run_text(*changed(four, "v1_0_0 += part_0_0;", "if (local_x < 3) { v1_0_0 += part_0_0; }"))
+
+
+def test_an_item_of_its_own_sum_is_refused(four):
+    """Sums are compared over all lanes at once: one item that differs is enough."""
+    old = "int at = (local_y + dy) * TILE_WIDTH + local_x + dx;"
+    new = f"{old} at = item == 77 && left > 0 ? at + 1 : at;"
+    with pytest.raises(Refused, match="never made"):
+        run_text(*changed(four, old, new))
+
+
+def test_places_of_an_item_are_told_apart(tmp_path):
+    """They are known by what the text declares, not by the names it gives them."""
+    given = parts(kernel(tmp_path, "wgsl", "group"))
+    turned = changed(given, "(local_invocation_id)", "(workgroup_id)")
+    with pytest.raises(Refused):
+        run_text(*turned)
+    renamed = (given[0].replace("item_place", "invocation"), *given[1:])
+    assert run_text(*renamed)
+
+
+@pytest.mark.parametrize(("target", "schedule", "count"), [("wgsl", "group4", 16), ("opencl", "group", 24)])
+def test_planted_faults_in_groups_are_noticed(target, schedule, count, tmp_path):
+    """TXT-8: what holds the reader."""
+    noticed(parts(kernel(tmp_path, target, schedule)), count)
+
+
+def test_groups_have_every_case_of_a_row():
+    lanes = group_lanes((4, 2), 2, 3, seed=1)
+    x, width, y, height = lanes.known
+    far = (y > 5) & (height - y > 5)
+    cases = {(a > 0, min(b, 12)) for a, b in zip(x[far], (width - x)[far], strict=True)}
+    assert cases == {(a, b) for a in (False, True) for b in range(1, 13)}
+    assert set(zip(*lanes.inside.tolist(), strict=True)) == {(a, b) for a in range(4) for b in range(2)}
+
+
+def test_sums_over_lanes_differ_where_one_lane_does():
+    value = np.arange(2 * 70000, dtype=np.uint64).reshape(2, 70000)
+    other = value.copy()
+    other[:, 69999] += np.uint64(1)
+    factors = field.drawn(np.arange(70000, dtype=np.uint64))[0]
+    found = field.added_up(value, factors)
+    exact = [sum(int(a) * int(b) for a, b in zip(row, factors, strict=True)) % int(field.P) for row in value]
+    assert found[:, 0].tolist() == exact
+    assert not np.array_equal(found, field.added_up(other, factors))
+
+
+def test_constants_beyond_a_group_and_its_window_are_refused():
+    lanes = group_lanes((4, 2), 1, 3, seed=1)
+    with pytest.raises(Wrong, match="beyond"):
+        lanes.place(0).plus(8).against(lanes.place(1))

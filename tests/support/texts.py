@@ -1,0 +1,67 @@
+"""Kernels' texts for the tests of their reader: written, changed in a place, and with planted faults."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import text_faults
+
+from wamnet.compiler import artifact
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.proof.evidence import Refused, read
+from wamnet.compiler.reading.check import run_text
+from wamnet.compiler.reading.lanes import Unread
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
+
+NAME = artifact.CERTIFICATE_NAME
+
+
+def model(size=3, border="zero", activation="sine", seed=5):
+    network = siren.init((size**2 * 6, 6, 5, 3), 1.0, 3.0, seed, activation=activation)
+    return Model(network, ("color", "normal"), Window(size, border), Normalization())
+
+
+def kernel(folder, target, schedule="plain", **kwargs):
+    """Write a kernel; return its certificate's path."""
+    artifact.write(compile_program(lower(model(**kwargs)), target, schedule=schedule), folder)
+    return folder / NAME
+
+
+def parts(path):
+    """Return the text of a kernel, its certificate, manifest and weights."""
+    held, manifest, *_ = read(path)
+    (name,) = (name for name in manifest["files"] if name != "weights.bin")
+    weights = np.frombuffer((path.parent / "weights.bin").read_bytes(), "<f4")
+    return (path.parent / name).read_text(), held, manifest, weights
+
+
+def changed(given, old, new, count=1):
+    source, *others = given
+    assert source.count(old) >= count, f"the text has no {old!r}"
+    return (source.replace(old, new, count), *others)
+
+
+def noticed(given, count):
+    """Plant faults of a fixed seed in a text, one at a time: none may be accepted."""
+    source, *others = given
+    every = [f for f in text_faults.faults(source) if not spare(source, f)]
+    random.Random(7).shuffle(every)
+    for fault in every[:count]:
+        assert not accepted(source[: fault.start] + fault.new + source[fault.end :], *others), fault
+
+
+def accepted(*given):
+    try:
+        return run_text(*given)
+    except (Refused, Unread):
+        return None
+
+
+def spare(source, fault):
+    """Return whether a fault makes an array larger, which changes nothing."""
+    before = source[: fault.start].rpartition("\n")[2]
+    return before.strip().startswith(("float", "union")) and "[" in before and "=" not in before

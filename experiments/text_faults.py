@@ -62,8 +62,8 @@ TOKEN = re.compile(
     re.S | re.M,
 )
 
-NOTHING = re.compile(r" \(?0\)? \*")
-"""A product with zero behind an operator: whether it is added or taken away is the same."""
+NOTHING = re.compile(r" \(?0\)?(?![\w.])")
+"""An integer zero: whether it is added or taken away is the same."""
 
 STATEMENT = re.compile(r"(?m)^ +(?!return|\(void\)|[}#])[^\n{}]*;$")
 
@@ -78,7 +78,10 @@ class Fault(NamedTuple):
 
 
 def faults(source: str) -> Iterator[Fault]:
-    """Yield all faults of a text, those of its comments and of its preprocessor left out."""
+    """Yield all faults of a text, those of its comments and of its preprocessor left out.
+
+    Nor is it one to take a zero away where it was added.
+    """
     start = source.index("{", source.index("*/"))
     for m in TOKEN.finditer(source, start):
         place = m.start(), m.end()
@@ -88,7 +91,9 @@ def faults(source: str) -> Iterator[Fault]:
             yield Fault(*place, NAMES[m["name"]], "another name")
         elif m["name"] and (numbered := re.fullmatch(r"([a-z]+)(\d+)", m["name"])) and m["name"] != "float4":
             yield Fault(*place, f"{numbered[1]}{int(numbered[2]) - 1}", "another variable")
-        elif m["operator"] in OPERATORS and not NOTHING.match(source, m.end()):
+        elif m["operator"] == "+" and NOTHING.match(source, m.end()):
+            continue
+        elif m["operator"] in OPERATORS:
             yield Fault(*place, OPERATORS[m["operator"]], "another operator")
     for m in STATEMENT.finditer(source, start):
         yield Fault(m.start(), m.end(), "", "a statement lost")

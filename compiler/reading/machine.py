@@ -140,7 +140,11 @@ class Machine:
         self.run(function.body)
         del self.frames[self.base :]
         self.base, self.entered, self.lanes.active = outer
-        return self.returned.pop()
+        value, type_ = self.returned.pop(), function.type
+        many = len(value) if isinstance(value, list) else wide(value)
+        if many not in (1, type_.width):
+            raise Wrong(f"{name}() returns {many} numbers, not {type_.width}")
+        return self.converted(value, type_)
 
     def run(self, tree: Tree) -> bool:
         """Run a statement; return whether it ended the function."""

@@ -100,11 +100,12 @@ class Variable:
 
 @dataclass
 class Function:
-    """A function: what it takes, and its statements."""
+    """A function: what it takes, its statements, and the type that it returns."""
 
     name: str
     takes: list[Variable]
     body: Tree
+    type: Type
 
 
 @dataclass
@@ -354,7 +355,7 @@ class Parser:
         if not self._has(";"):
             if name in self.text.functions:
                 raise Unread(f"two functions {name}()")
-            self.text.functions[name] = Function(name, takes, self._block())
+            self.text.functions[name] = Function(name, takes, self._block(), type_)
 
     def _parameters(self) -> list[Variable]:
         self._take("(")

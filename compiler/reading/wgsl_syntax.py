@@ -38,9 +38,8 @@ class WgslParser(Parser):
         elif word == "fn":
             name = self._take()
             takes = self._members_of("(", ")")
-            if self._has("->"):
-                self._type()
-            self.text.functions[name] = Function(name, takes, self._block())
+            type_ = self._type() if self._has("->") else Type("void")
+            self.text.functions[name] = Function(name, takes, self._block(), type_)
         elif word != ";":
             raise Unread(f"line {self.tokens[self.at - 1][2]}: {word!r}")
 

@@ -6,6 +6,7 @@ memory where one writes it and another reads or writes it with no barrier betwee
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
 NOBODY, SEVERAL = -1, -2
 """Who has read or written an element since the last barrier, where that is not one item."""
 
-MIXED = 12
-"""Groups near borders of both axes, at random."""
-
 LOCAL_FENCE = 1
 """What a barrier's flags must have: that it orders the memory of a group."""
 
@@ -36,9 +34,9 @@ FLAGS = {
 def group_lanes(group: tuple[int, int], pixels: int, window: int, seed: int) -> Lanes:
     """Return the items of groups of all cases, `pixels` of a row to an item.
 
-    A group's first column is 0 or, where no constant is compared with it that reaches so far, anything; its
-    distance from the right border, and the picture's width, is each that the group's pixels and the window
-    reach, or beyond. So for rows, with the columns far from all borders.
+    A group's first column is 0 or far: the next, one group on, is as far as any from constants smaller than a
+    group [`Place.against`]. Its distance from the right border is each that the group's pixels and the window
+    reach, or far. So for rows, with the columns far from all borders. Last are groups at both axes' borders.
     """
     random, steps = words(seed), (group[0] * pixels, group[1])
     caps = steps[0] + window, steps[1] + window
@@ -50,7 +48,9 @@ def group_lanes(group: tuple[int, int], pixels: int, window: int, seed: int) -> 
 
     across, down = ([(b, n) for b in (None, 0) for n in (None, *range(1, cap + 2))] for cap in caps)
     cases = [(a, down[0]) for a in across] + [(across[0], b) for b in down[1:]]
-    cases += [(across[next(random) % len(across)], down[next(random) % len(down)]) for _ in range(MIXED)]
+    for a, b, c, d in itertools.product((None, 0), (False, True), (None, 0), (False, True)):
+        near = [1 + next(random) % (cap + 1) if at else None for at, cap in zip((b, d), caps, strict=True)]
+        cases.append(((a, near[0]), (c, near[1])))
     known = np.array([(*drawn(a, steps[0]), *drawn(b, steps[1])) for a, b in cases], dtype=np.int64).T
     y, x = np.divmod(np.arange(group[0] * group[1]), group[0])
     count = len(x) * len(cases)

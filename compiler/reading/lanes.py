@@ -116,8 +116,9 @@ class Place:
             own, extent = form[2 * axis : 2 * axis + 2]
             if np.abs(rest[(own != 0) | (extent != 0)]).max(initial=0) > cap:
                 raise Wrong(f"it compares a coordinate with a constant beyond {cap}")
-            if self.lanes.steps and ((rest * own)[extent == 0] <= -self.lanes.steps[axis]).any():
-                raise Wrong("it compares a group's place with a constant as large as a group")
+            alone = rest[own * extent == 0] * (own + extent)[own * extent == 0]
+            if self.lanes.steps and (alone <= -self.lanes.steps[axis]).any():
+                raise Wrong("it compares a coordinate with a constant as large as a group")
         return found.values
 
 

@@ -280,7 +280,7 @@ class Parser:
                 return shared
 
     def _group_size(self) -> None:
-        """Skip what stands in brackets; note the size of work groups if it is there."""
+        """Skip what is in brackets; note the size of work groups if it is there."""
         first = self.at
         self._skip_brackets("(", ")")
         end = self.at

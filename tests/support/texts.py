@@ -45,13 +45,13 @@ def changed(given, old, new, count=1):
     return (source.replace(old, new, count), *others)
 
 
-def noticed(given, count):
-    """Plant faults of a fixed seed in a text, one at a time: none may be accepted."""
+def unnoticed(given, count):
+    """Plant faults of a fixed seed in a text, one at a time; return those that its reader accepts."""
     source, *others = given
     every = [f for f in text_faults.faults(source) if not spare(source, f)]
     random.Random(7).shuffle(every)
-    for fault in every[:count]:
-        assert not accepted(source[: fault.start] + fault.new + source[fault.end :], *others), fault
+    assert len(every) >= count
+    return [f for f in every[:count] if accepted(source[: f.start] + f.new + source[f.end :], *others)]
 
 
 def accepted(*given):

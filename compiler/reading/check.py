@@ -87,6 +87,8 @@ def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> Non
     result, target = Result(claim, channels), Memory("result", 4)
     given = arguments(claim, language.fragment, result, target)
     group = Group(lanes, size[0] * size[1]) if size else None
+    known: Mapping[str, Any]
+    calls: Mapping[str, Any]
     if group:
         known, calls = {**group.brings(), **FLAGS}, group.calls()
     else:

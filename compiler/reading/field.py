@@ -99,7 +99,7 @@ def added_up(value: Words, factors: Words) -> Words:
     """
     lanes = len(factors)
     if value.shape[1] == 1:
-        return value % P * (factors.sum() % P) % P
+        return np.asarray(value % P * (factors.sum() % P) % P)
     found = np.zeros((2, 1, *value.shape[2:]), dtype=np.uint64)
     for at in range(0, lanes, 2**16):
         part, by = value[:, at : at + 2**16] % P, factors[at : at + 2**16]
@@ -247,7 +247,7 @@ def wide(value: Any) -> int:
     """Return how many numbers a value has."""
     if not isinstance(value, Number) or value.axes < 3:
         return 1
-    return value.value.shape[2] if value.shape is None else value.shape.shape[1]
+    return int(value.value.shape[2] if value.shape is None else value.shape.shape[1])
 
 
 def part_of(value: Any, k: int | None) -> Any:

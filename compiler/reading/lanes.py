@@ -62,12 +62,12 @@ class Lanes:
     @property
     def x(self) -> NDArray[np.int64]:
         """The column (lanes,) of each lane's first pixel."""
-        return self.known[0] if self.inside is None else self.known[0] + self.inside[0]
+        return np.asarray(self.known[0] if self.inside is None else self.known[0] + self.inside[0])
 
     @property
     def y(self) -> NDArray[np.int64]:
         """The row (lanes,) of each lane's pixels."""
-        return self.known[2] if self.inside is None else self.known[2] + self.inside[1]
+        return np.asarray(self.known[2] if self.inside is None else self.known[2] + self.inside[1])
 
     def place(self, axis: int) -> Place:
         """Return x, width, y or height."""

@@ -22,7 +22,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-import numpy as np
 from lab.tables import markdown
 
 from wamnet.compiler.artifact import CERTIFICATE_NAME, write
@@ -133,8 +132,7 @@ def small(folder: Path) -> Iterator[Path]:
 
 def planted(folder: Path, count: int, seed: int) -> tuple[list[str], int]:
     """Plant faults in a kernel; return a row of the table, and how many were accepted, spare room apart."""
-    held, manifest, *_ = read(folder / CERTIFICATE_NAME)
-    weights = np.frombuffer((folder / "weights.bin").read_bytes(), "<f4")
+    held, manifest, _, _, weights = read(folder / CERTIFICATE_NAME)
     (name,) = (name for name in manifest["files"] if name != "weights.bin")
     source = (folder / name).read_text()
     run_text(source, held, manifest, weights)  # the text itself must hold

@@ -348,8 +348,17 @@ def _places(common: Program, schedule: Schedule, emitted: Program) -> dict[str, 
         shape = list(array.shape)
         if (place >= 0).all() and (place == place[0, 0] + rows[:, None] + columns).all():
             found[name] = {"shape": shape, "offset": int(place[0, 0])}
-            found[name] |= {"rows": rows.tolist(), "columns": columns.tolist()}
+            found[name] |= {"rows": _listed(rows), "columns": _listed(columns)}
         else:
             held = np.ascontiguousarray(array, "<f4").tobytes()
             found[name] = {"shape": shape, "base64": base64.b64encode(held).decode()}
+    return found
+
+
+def _listed(places: NDArray[np.int64]) -> list[int] | dict[str, int]:
+    """Return places (n,), the first of which is 0: how far apart and how many, or a list of them."""
+    step = int(places[1]) if len(places) > 1 else 0
+    if (places == step * np.arange(len(places))).all():
+        return {"step": step, "count": len(places)}
+    found: list[int] = places.tolist()
     return found

@@ -31,10 +31,12 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
     texts = [read_file(p, "certificate") for p in (path, path.parent / "manifest.json")]
     held, manifest = (parse_json(text, "certificate", "restore it") for text in texts)
     same("schema", held["schema"], INTEGERS if held["schema"] == INTEGERS else FLOATS)
-    files = {}
+    files, folder = {}, manifest["weights"].get("folder", ".")
+    same("manifest: folder of weights.bin is . or ..", folder in (".", ".."), True)
     for name in (plain_name(name, "manifest: name of a file", "restore it") for name in manifest["files"]):
         stated = stated_bytes(manifest, name, "manifest", "restore it")
-        files[name] = read_file(path.parent / name, "file", "restore it", stated=stated)
+        place = path.parent / (folder if name == "weights.bin" else "") / name
+        files[name] = read_file(place, "file", "restore it", stated=stated)
     for name, data in files.items():
         same(f"digest of {name}", held["files"].get(name), hashlib.sha256(data).hexdigest())
     kernel = [manifest["digest"], manifest["profile"]["name"]]
@@ -45,9 +47,7 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
         if "base64" in place:
             array = np.frombuffer(base64.b64decode(place["base64"], validate=True), "<f4")
         else:
-            many = len(place["rows"]) * len(place["columns"]) > len(raw)
-            same(f"{name}: more numbers than weights.bin has", many, False)
-            at = place["offset"] + np.add.outer(place["rows"], place["columns"])
+            at = places(name, place, len(raw))
             array = raw[at if at.min() >= 0 else len(raw)]
         arrays[name] = array.reshape(place["shape"])
     pieces = b"".join(arrays[name].tobytes() for name in sorted(arrays))
@@ -56,6 +56,21 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
     same("digest of the program in the manifest", manifest["program"], digest)
     same("weights: all are finite", all(np.isfinite(array).all() for array in arrays.values()), True)
     return held, manifest, text, {name: a.astype(np.float64) for name, a in arrays.items()}, raw
+
+
+def places(name: str, place: Any, most: int) -> Any:
+    """Return where a parameter's numbers (rows, columns) lie in weights.bin, which has `most`.
+
+    Raises `Refused` for more of them, before any is listed. Formula: CER-5.
+    """
+    sides = [place["rows"], place["columns"]]
+    counts = [side["count"] if isinstance(side, dict) else len(side) for side in sides]
+    steps = [side["step"] for side in sides if isinstance(side, dict)]
+    known = all(type(n) is int and n >= 0 for n in counts) and all(type(step) is int for step in steps)
+    same(f"{name}: counts and steps are integers", known, True)
+    same(f"{name}: more numbers than weights.bin has", max(*counts, counts[0] * counts[1]) > most, False)
+    sides = [np.arange(s["count"]) * s["step"] if isinstance(s, dict) else s for s in sides]
+    return place["offset"] + np.add.outer(*sides)
 
 
 def same(step: str, stated: Any, wanted: Any) -> None:

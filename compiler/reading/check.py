@@ -35,11 +35,10 @@ def check_text(path: Path, source: Path | None = None) -> dict[str, int]:
     Raises `Refused` for a text that does not compute the certificate's program, and `Unread` for one with
     constructs that this reader does not know, or in a language that it does not read.
     """
-    held, manifest, *_ = read(path)
+    held, manifest, _, _, weights = read(path)
     sources = [name for name in manifest["files"] if name != "weights.bin"]
     if len(sources) != 1:
         raise Unread(f"kernels of {len(sources)} texts")
-    weights = np.frombuffer((path.parent / "weights.bin").read_bytes(), "<f4")
     text = read_file(source or path.parent / sources[0], "kernel", "name a text in the kernel's language")
     return run_text(text.decode(errors="replace"), held, manifest, weights)
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.sine import exact_sine, sine
-from ..proof.evidence import INTEGERS, NODE
+from ..proof.evidence import INTEGERS, NODE, places
 from . import field
 from .field import (
     Number,
@@ -103,10 +103,10 @@ class Claim:
         shape = hashed("weight", np.arange(len(raw)))
         value = drawn(shape)
         owned = np.zeros(len(raw), dtype=bool)
-        for place in self.parameters.values():
+        for name, place in self.parameters.items():
             if "base64" in place:
                 raise Unread("weights that the file does not hold")
-            owned[(place["offset"] + np.add.outer(place["rows"], place["columns"])).ravel()] = True
+            owned[places(name, place, len(raw)).ravel()] = True
         for number in np.unique(raw[~owned]):
             same = ~owned & (raw == number)
             value[:, same] = literal(float(number), "float32").value
@@ -114,8 +114,7 @@ class Claim:
 
     def parameter(self, name: str) -> Number:
         """Return a parameter's numbers, (2, 1, outputs * inputs) or (2, 1, outputs)."""
-        place = self.parameters[name]
-        at = (place["offset"] + np.add.outer(place["rows"], place["columns"])).ravel()
+        at = places(name, self.parameters[name], self.weights.value.shape[-1]).ravel()
         shape = self.weights.known[:, at]
         return Number(self.weights.value[:, :, at], shape, weight=True)
 

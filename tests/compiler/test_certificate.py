@@ -335,6 +335,74 @@ def test_a_changed_step_is_refused_by_name(path, changed, place, value, match):
         checker.check(changed(denoise_certificate_json=held))
 
 
+@pytest.mark.parametrize(
+    ("columns", "match"),
+    [
+        ({"step": 6, "count": 10**18}, "W0: more numbers than weights.bin has"),
+        ({"step": 6, "count": -1}, "W0: counts and steps are integers"),
+        ({"step": 6, "count": True}, "W0: counts and steps are integers"),
+        ({"step": 6, "count": 54.0}, "W0: counts and steps are integers"),
+        ({"step": 0.5, "count": 54}, "W0: counts and steps are integers"),
+        ({"step": "6", "count": 54}, "W0: counts and steps are integers"),
+        ({"step": 5, "count": 54}, "digest of the program in the certificate"),
+        ({"step": 6, "count": 0}, "it must be a whole certificate"),
+        ({"step": -6, "count": 54}, "it must be a whole certificate"),
+        ({"step": 10**40, "count": 54}, "it must be a whole certificate"),
+        ({"step": 6, "count": 53}, "it must be a whole certificate"),
+        ({"step": 6}, "it must be a whole certificate"),
+        (54, "it must be a whole certificate"),
+    ],
+)
+def test_places_of_no_weights_are_refused(path, changed, columns, match):
+    """CER-5: each with one error, before anything as long as a stated count is made."""
+    held = certificate_of(path)
+    assert held["parameters"]["W0"]["columns"] == {"step": 6, "count": 54}
+    held = put(held, ("parameters", "W0", "columns"), lambda _: columns)
+    with pytest.raises((checker.Refused, InputError), match=match):
+        checker.check(changed(denoise_certificate_json=held))
+
+
+def test_places_may_be_lists(path, changed):
+    """CER-5: what a progression says, number by number; certificates from before have no progressions."""
+    held = certificate_of(path)
+    for place in held["parameters"].values():
+        for side in ("rows", "columns"):
+            place[side] = [place[side]["step"] * i for i in range(place[side]["count"])]
+    jsonschema.validate(held, json.loads((SPEC / "certificate.schema.json").read_text()))
+    checker.check(changed(denoise_certificate_json=held))
+
+
+def shared(path, folder, stated):
+    """Copy a kernel, its weights one folder up; the manifest says that they are in the folder `stated`."""
+    (folder / "kernel").mkdir()
+    for file in path.parent.iterdir():
+        parent = folder if file.name == "weights.bin" else folder / "kernel"
+        (parent / file.name).write_bytes(file.read_bytes())
+    manifest = json.loads((path.parent / "manifest.json").read_text())
+    manifest["weights"] |= {} if stated is None else {"folder": stated}
+    (folder / "kernel/manifest.json").write_text(json.dumps(manifest))
+    return folder / "kernel" / NAME
+
+
+def test_weights_may_be_one_folder_up(path, tmp_path):
+    assert checker.check(shared(path, tmp_path, ".."))["bound"] == certificate_of(path)["bound"]
+    (tmp_path / "weights.bin").write_bytes(bytes((tmp_path / "weights.bin").stat().st_size))
+    with pytest.raises(checker.Refused, match=r"digest of weights.bin"):
+        checker.check(tmp_path / "kernel" / NAME)
+
+
+@pytest.mark.parametrize("stated", ["../..", "/", "../x", "", [".."], {}, 1, "..\0"])
+def test_weights_elsewhere_are_refused(path, tmp_path, stated):
+    with pytest.raises(checker.Refused, match=r"folder of weights.bin is \. or \.\."):
+        checker.check(shared(path, tmp_path, stated))
+
+
+@pytest.mark.parametrize("stated", [None, "."])
+def test_weights_above_are_not_found_unless_the_manifest_says_so(path, tmp_path, stated):
+    with pytest.raises(InputError, match=r"weights\.bin"):
+        checker.check(shared(path, tmp_path, stated))
+
+
 def test_scalings_whose_products_overflow_are_refused_and_lapack_is_not_asked(path, changed, monkeypatch):
     """It would print a complaint of its own about numbers that are not finite."""
     held = certificate_of(path)

@@ -100,6 +100,9 @@ OPENCL_SINE = SineContract(
 )
 """The only sine of a standard that is good enough for a proof: for its dialect and the checker."""
 
+CUDA_SINE = SineContract("sinf() of CUDA, 2 ulp on all arguments", 2 * 2 * UNIT_ROUNDOFF)
+"""The sine that CUDA's manual promises: for its dialect and the checker."""
+
 EXPAND_SINE = "expand_sine"
 """The pass that emits the sine of the degree in use; that of another degree has its number behind it."""
 

@@ -6,7 +6,7 @@ as IEEE 754 says unless an option relaxes them: do not pass -use_fast_math, -ftz
 
 from __future__ import annotations
 
-from ..core.profiles import UNIT_ROUNDOFF, SineContract
+from ..core.profiles import CUDA_SINE
 from .c import C
 from .dialect import Dialect, Parts
 from .interface import DENOISE, ENCODE, PATH, Interface
@@ -39,7 +39,7 @@ class CUDA(Arguments):
     target = "cuda"
     language = "CUDA C"
     suffix = ".cu"
-    native_sine = SineContract("sinf() of CUDA, 2 ulp on all arguments", 2 * 2 * UNIT_ROUNDOFF)
+    native_sine = CUDA_SINE
     assumes = ASSUMES
     heading = 'extern "C" __global__ void {entry}'
     reads = "const float *__restrict__ {name}"

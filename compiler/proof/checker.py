@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from ...refimpl.reading import refusing
-from ..core.profiles import OPENCL_SINE, emitted_sine
+from ..core.profiles import CUDA_SINE, EXACT_SINE, OPENCL_SINE, emitted_sine
 from ..core.sine import POLYNOMIALS
 from .evidence import INTEGERS, NODE, Refused, read, same
 from .integer_checker import check_integers
@@ -32,7 +32,8 @@ from .spectra_checker import Tables
 U, TINY, WIDER = 2.0**-24, 2.0**-126, 1 + 2.0**-34
 """float32's rounding and smallest normal number; a factor of more than float64 can be off in what follows."""
 
-PROMISES = {promise.text: promise for promise in (*map(emitted_sine, POLYNOMIALS), OPENCL_SINE)}
+SINES = (*map(emitted_sine, POLYNOMIALS), EXACT_SINE, OPENCL_SINE, CUDA_SINE)
+PROMISES = {promise.text: promise for promise in SINES}
 """What is known of sines, by the name that a certificate gives."""
 
 

@@ -19,7 +19,8 @@ class Language:
     `compilers` are sets of macros between which a text may make a difference: each is checked. `within`: the
     host calls the kernel for pixels of the picture only. `fragment`: one pixel's result is a variable.
     `brings`: names that the text does not declare. `host`: a function of the text that calls the kernel for
-    every work item.
+    every work item. `of_floats`, `of_integers`: what the names of schedules begin with that are read besides
+    plain, of networks of floats and of integers.
     """
 
     parser: type[Parser] = Parser
@@ -29,10 +30,14 @@ class Language:
     fragment: bool = False
     brings: tuple[str, ...] = ()
     host: str = ""
+    of_floats: tuple[str, ...] = ()
+    of_integers: tuple[str, ...] = ()
 
 
 LANGUAGES: Mapping[str, Language] = {
-    "opencl": Language(brings=("CLK_LOCAL_MEM_FENCE", "CLK_GLOBAL_MEM_FENCE")),
+    "opencl": Language(
+        brings=("CLK_LOCAL_MEM_FENCE", "CLK_GLOBAL_MEM_FENCE"), of_floats=("tile", "vector", "group")
+    ),
     "c": Language(
         compilers=(
             {"FLT_EVAL_METHOD": "0"},
@@ -40,17 +45,36 @@ LANGUAGES: Mapping[str, Language] = {
         ),
         within=True,
         host="wamnet_image",
+        of_floats=("tile",),
+        of_integers=("tile",),
     ),
     "opengl": Language(
         compilers=({"GL_ARB_gpu_shader5": "1"},), within=True, fragment=True, brings=("gl_FragCoord",)
     ),
     "glsl-es": Language(within=True, fragment=True, brings=("gl_FragCoord",)),
-    "glsl-vulkan": Language(brings=("gl_GlobalInvocationID", "gl_LocalInvocationID", "gl_WorkGroupID")),
-    "wgsl": Language(WgslParser, preprocessed=False),
-    "metal": Language(brings=tuple(f"mem_flags::mem_{a}" for a in ("none", "device", "threadgroup"))),
-    "cuda": Language(brings=("threadIdx", "blockIdx", "blockDim")),
+    "glsl-vulkan": Language(
+        brings=("gl_GlobalInvocationID", "gl_LocalInvocationID", "gl_WorkGroupID"), of_floats=("group",)
+    ),
+    "wgsl": Language(WgslParser, preprocessed=False, of_floats=("group",)),
+    "metal": Language(
+        brings=tuple(f"mem_flags::mem_{a}" for a in ("none", "device", "threadgroup")), of_floats=("group",)
+    ),
+    "cuda": Language(brings=("threadIdx", "blockIdx", "blockDim"), of_floats=("group",)),
 }
 """By a manifest's target."""
+
+READ_PROFILE = "ieee"
+"""The profile whose sines are read, of every degree."""
+
+
+def is_read(manifest: Mapping[str, Any]) -> bool:
+    """Return whether the text of a kernel is of a kind that is read, by its manifest (TXT-7)."""
+    language, schedule = LANGUAGES.get(manifest["target"]), manifest["schedule"]["name"]
+    known_sines = not manifest["sine_arguments"] or manifest["profile"]["name"].startswith(READ_PROFILE)
+    if language is None or not known_sines:
+        return False
+    begins = language.of_floats if any(manifest["bound"]["output"]) else language.of_integers
+    return bool(schedule == "plain" or schedule.startswith(begins))
 
 
 def parsed(source: str, language: Language, macros: Mapping[str, str]) -> Text:

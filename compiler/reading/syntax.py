@@ -122,6 +122,7 @@ def tokens(text: str) -> list[tuple[str, str, int]]:
     """Return (kind, text, line) of every token; comments and lines of a preprocessor are blanks."""
     text = re.sub(r"/\*.*?\*/|//[^\n]*", lambda m: re.sub(r"[^\n]", " ", m[0]), text, flags=re.S)
     text = re.sub(r"(?m)^[ \t]*#.*$", "", text)
+    text = re.sub(r"\bunsigned int\b", "uint", text)
     found, at = [], 0
     while at < len(text):
         m = TOKEN.match(text, at)

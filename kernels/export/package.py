@@ -170,7 +170,7 @@ def _finished(
 ) -> Export:
     """Return the export with its README and manifest, which has hashes and lengths of all other files."""
     facts = {"schema": SCHEMA, "target": request.target, "licence": LICENCE, "check": pair.facts(), **facts}
-    files = {**files, README_NAME: readme.readme(facts, sorted(files)).encode()}
+    files = {**files, README_NAME: readme.readme(facts, denoiser).encode()}
     hashes = {name: sha256(data) for name, data in sorted(files.items())}
     digest = sha256(*(value.encode() for value in hashes.values()))
     named = {"files": hashes, SIZES: {name: len(files[name]) for name in hashes}, "digest": digest}

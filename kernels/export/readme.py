@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from ...compiler.schedules.schedules import text
+from ...compiler.artifact import Artifact
+from ...compiler.reading.languages import is_read
+from ...compiler.schedules.schedules import PLAIN, text
 from .targets import ONNX, TARGETS
 
 ONNX_CODE = """\
@@ -33,8 +35,8 @@ IMAGE_LINES: Mapping[str, str] = {
 """How a line of the code binds an image, by the kind of slots."""
 
 
-def readme(facts: Mapping[str, Any], files: Sequence[str]) -> str:
-    """Return the text for what a manifest says."""
+def readme(facts: Mapping[str, Any], denoiser: Artifact | None) -> str:
+    """Return the text for what a manifest says; `denoiser`: the kernel, None where it is a graph."""
     lines = [
         f"# Denoiser for {facts['target']}",
         "",
@@ -52,6 +54,10 @@ def readme(facts: Mapping[str, Any], files: Sequence[str]) -> str:
         "```",
         "",
         "Rows: row 0 of every image is the picture's TOP row. Colour is encoded for the display already.",
+        "",
+        "## Proof",
+        "",
+        *_proof(facts, denoiser),
         "",
         "## Check",
         "",
@@ -110,6 +116,39 @@ def _rays(facts: Mapping[str, Any]) -> list[str]:
         f"again with samples = {rays}, divide all planes but the colour's by {rays}, and give the encoding "
         "those, with sample_count = 1; with features of one ray edges are worse."
     ]
+
+
+def _proof(facts: Mapping[str, Any], denoiser: Artifact | None) -> list[str]:
+    """Return the lines about the certificate, and about what reads the kernel's text (CER-1, TXT-7)."""
+    if denoiser is None:
+        return ["There is no certificate: a runtime makes kernels of its own from a graph."]
+    if denoiser.certificate is None:
+        found = [f"There is no certificate: {denoiser.plan.unproven}."]
+    else:
+        bound = max(denoiser.certificate["bound"]["output"])
+        size = f"a bound of {bound:g} for all images" if bound else "that no operation rounds"
+        found = [
+            f"`{facts['certificate']}` proves {size} in their ranges. This command checks it:",
+            *("", "```text", "wamnet certify denoise", "```", ""),
+            _text(facts, denoiser),
+        ]
+    if facts["scene"] is not None:
+        found += ["", "What traces paths or encodes features has no certificate."]
+    return found
+
+
+def _text(facts: Mapping[str, Any], denoiser: Artifact) -> str:
+    """Return what the command does with the text of a kernel that has a certificate."""
+    source, schedule = denoiser.source_name, denoiser.manifest["schedule"]["name"]
+    if not is_read(denoiser.manifest):
+        plainly = {**denoiser.manifest, "schedule": {"name": PLAIN}}
+        there = schedule != PLAIN and PLAIN in facts["schedules"] and is_read(plainly)
+        other = f"; it reads the one that `--schedule {PLAIN}` writes" if there else ""
+        kind = f"schedule {schedule}, profile {denoiser.profile}"
+        return f"It does not read `{source}`, whose kind ({kind}) it does not know{other}."
+    made = [name for name in facts["kernels"][-1]["files"] if name != f"denoise/{source}"]
+    besides = f" {', '.join(f'`{name}`' for name in made)}: translated from it, and not read." if made else ""
+    return f"It reads `denoise/{source}` too, and checks that this text computes what is certified.{besides}"
 
 
 def _check(check: Mapping[str, Any]) -> list[str]:

@@ -41,7 +41,7 @@ def test_register_tiles_compute_what_is_certified(target, schedule, activation, 
     assert check_text(path)["sums"] == pixels * 9
 
 
-@pytest.mark.parametrize("target", ["c", "opencl", "opengl", "wgsl"])
+@pytest.mark.parametrize("target", ["c", "cuda", "opencl", "opengl", "wgsl"])
 @pytest.mark.parametrize("size", [3, 4])
 def test_texts_of_integers_compute_what_is_certified(target, size, tmp_path):
     plan = plan_model(model(size=size, border="clamp"), target, variant="whole8")

@@ -2,11 +2,11 @@
 
 `python -m wamnet.kernels.export.shelf -o kernels/shelf MODEL.safetensors ...` writes it again; without
 models it is a small network of random weights. A test compares the files with what the command would write.
-The index says for each kernel its size, products a pixel, certified bound and, with `--measure`, how long a
-picture of so many pixels a side takes here, copies included, on what is nearest to its target [`measured`].
+The index says for each kernel its size, products a pixel, schedule, certified bound, and whether its text is
+one that `wamnet certify` reads, and as what language.
 
 The paper's network takes 600 kB of text where weights are inlined: the shelf has sources that read weights,
-which are one file a model, and leaves out what `wamnet export` adds.
+which are one file a model, and leaves out what `wamnet export` adds to kernel, manifest and certificate.
 """
 
 from __future__ import annotations
@@ -16,36 +16,32 @@ import os
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from ...compiler.artifact import Artifact
+from ...compiler.artifact import (
+    CERTIFICATE_NAME,
+    MANIFEST_NAME,
+    WEIGHTS_NAME,
+    Artifact,
+    manifest_text,
+    weight_bytes,
+)
 from ...compiler.core.writing import is_regular, write_together
 from ...compiler.model_file import load_model
+from ...compiler.reading.languages import is_read
 from ...compiler.schedules.schedules import PLAIN
-from ...refimpl.errors import ExecutorUnavailable, InputError, WamnetError
+from ...refimpl.errors import InputError, WamnetError
 from ...refimpl.network import siren
 from ...refimpl.network.dataset import Normalization, Window
 from ...refimpl.network.denoise import Model
 from ..bench.cost import products_of
-from ..devices.executor import Executor
-from ..devices.images import Images, black
-from ..measure import in_turns
-from .check import runner
-from .package import Export, Request, export
+from .package import Request, export
 
 KEPT = ("opencl", "glsl", "glsl-es", "wgsl", "c", "cuda", "metal", "glsl-vulkan")
 """Targets whose files need no translator, so that they are the same on every machine."""
-
-TIMED = ("opencl", "glsl", "glsl-es", "wgsl", "c", "glsl-vulkan")
-"""Those that run here as they are; Metal and CUDA C as C++ with a shim would say nothing of their speed."""
-
-TURNS = 3
-"""Measurements of each kernel."""
 
 READ = PLAIN
 """The schedule of all kernels here: the one that is made to be read."""
@@ -53,80 +49,68 @@ READ = PLAIN
 INDEX = "README.md"
 """The index page."""
 
-OWN = re.compile(rf"{re.escape(INDEX)}|[^/]+/weights\.bin|[^/]+/({'|'.join(KEPT)})/denoise\.[a-z]+")
+OWN = re.compile(
+    rf"{re.escape(INDEX)}|[^/]+/weights\.bin"
+    rf"|[^/]+/({'|'.join(KEPT)})/(denoise\.[a-z]+|denoise\.certificate\.json|manifest\.json)"
+)
 """Paths of the files of a shelf."""
+
+COLUMNS = ("model", "target", "source", "products a pixel", "schedule", "bound", "text checked")
+"""Heads of the index."""
 
 SMALL = "small"
 """Name of the network of random weights."""
 
 
-def contents(models: Mapping[str, Model], times: Mapping[str, str] | None = None) -> Mapping[str, bytes]:
-    """Return all files of the shelf by path, for models by name; `times` are texts by `model/target`."""
+def contents(models: Mapping[str, Model]) -> Mapping[str, bytes]:
+    """Return all files of the shelf by path, for models by name."""
     files: dict[str, bytes] = {}
     lines = [
         "# Kernels of the canonical models",
         "",
         "Written by `python -m wamnet.kernels.export.shelf`; a test keeps them equal to what the compiler",
-        "writes. `wamnet export` adds certificate, manifest, check pair and everything else. Weights are one",
-        "file a model: little-endian float32, in the order that each source's header states. Speed is that",
-        "of the plain kernel on what runs it without a GPU (PoCL, llvmpipe, a C compiler), copies included.",
+        "writes. Each kernel has its manifest and the certificate of its bound for all images in their",
+        "ranges. `wamnet certify kernels/shelf/minicubes/wgsl` checks it, and whether the text computes the",
+        "certified program; a test runs it on every row. Weights are one file a model, one folder above its",
+        "kernels: little-endian float32, in the order that each source's header states. `wamnet export`",
+        "adds a check pair and everything else. [How fast they are](../../docs/speed.md).",
         "",
-        "| model | target | source | products a pixel | certified bound | speed |",
-        "|---|---|---|---|---|---|",
+        f"| {' | '.join(COLUMNS)} |",
+        "|" + "---|" * len(COLUMNS),
     ]
     for name, model in models.items():
         for target in KEPT:
             made = export(Request(model, target, schedule=READ))
-            source = _source(made)
-            files[f"{name}/{target}/{Path(source).name}"] = made.files[source]
-            files[f"{name}/weights.bin"] = made.files["denoise/weights.bin"]
-            lines.append(_row(name, target, made, source, times or {}))
+            assert made.denoiser is not None, "every target of the shelf has a kernel"
+            files |= _files(f"{name}/{target}", made.denoiser)
+            files[f"{name}/{WEIGHTS_NAME}"] = weight_bytes(made.denoiser)
+            lines.append(_row(name, target, made.denoiser))
     files[INDEX] = ("\n".join([*lines, ""])).encode()
     return files
 
 
-def _source(made: Export) -> str:
-    """Return the path of the denoiser's source."""
-    return str(made.manifest["kernels"][-1]["files"][0])
+def _files(folder: str, made: Artifact) -> dict[str, bytes]:
+    """Return a kernel's files by path; the manifest says that the weights are one folder up (CER-5)."""
+    own = {name: data for name, data in made.contents().items() if name != WEIGHTS_NAME}
+    manifest = {**made.manifest, "weights": {**made.manifest["weights"], "folder": ".."}}
+    own[MANIFEST_NAME] = manifest_text(replace(made, manifest=manifest)).encode()
+    return {f"{folder}/{name}": data for name, data in own.items()}
 
 
-def _row(name: str, target: str, made: Export, source: str, times: Mapping[str, str]) -> str:
+def _row(name: str, target: str, made: Artifact) -> str:
     """Return the line of one kernel."""
-    bound = made.manifest["bound"]["output"]
-    assert made.denoiser is not None, "every target of the shelf has a kernel"
+    assert made.certificate is not None, "every kernel of the shelf has a certificate"
+    schedule = made.manifest["schedule"]["name"]
     cells = (
         name,
-        f"[{target}]({name}/{target}/{Path(source).name})",
-        f"{len(made.files[source]) / 1000:.1f} kB",
-        f"{products_of(made.denoiser.program):,}",
-        f"{max(bound):.2g}" if bound else "-",
-        times.get(f"{name}/{target}", "not measured"),
+        f"[{target}]({name}/{target}/{made.source_name})",
+        f"{len(made.source.encode()) / 1000:.1f} kB",
+        f"{products_of(made.program):,}",
+        schedule,
+        f"[{max(made.certificate['bound']['output']):g}]({name}/{target}/{CERTIFICATE_NAME})",
+        f"yes, as {made.manifest['language'].partition(',')[0]}" if is_read(made.manifest) else "no",
     )
     return f"| {' | '.join(cells)} |"
-
-
-def measured(models: Mapping[str, Model], size: int) -> dict[str, str]:
-    """Return the median time of a picture of size x size pixels, in words, by `model/target`."""
-    found = {}
-    for name, model in models.items():
-        with ExitStack() as stack:
-            ways = {}
-            for target in TIMED:
-                kernel = export(Request(model, target, schedule=READ)).denoiser
-                assert kernel is not None, "every target of the shelf has a kernel"
-                try:
-                    opened = stack.enter_context(runner(target, kernel.target))
-                except ExecutorUnavailable:
-                    continue
-                ways[target] = partial(_ran, opened, kernel, black(kernel, (size, size)))
-            for target, times in in_turns(ways, TURNS).items():
-                found[f"{name}/{target}"] = f"{1000 * times.median:.0f} ms, {size}x{size}"
-    return found
-
-
-def _ran(opened: Executor, kernel: Artifact, images: Images) -> None:
-    """Run a kernel once, from images in memory to a picture in memory."""
-    opened.run(kernel, images)
 
 
 def random_model() -> Model:
@@ -174,12 +158,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("models", nargs="*", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--measure", type=int, metavar="SIZE", help="time pictures of SIZE x SIZE pixels")
     options = parser.parse_args(arguments)
     try:
         models = {path.stem: load_model(path) for path in options.models} or {SMALL: random_model()}
-        times = measured(models, options.measure) if options.measure else None
-        write(options.output, contents(models, times))
+        write(options.output, contents(models))
     except WamnetError as error:
         sys.exit(f"shelf: error: {error}")
 

@@ -1,4 +1,4 @@
-"""The shelf is what its command writes: golden text of each language, and an index that names every file."""
+"""The shelf is what its command writes."""
 
 from __future__ import annotations
 
@@ -6,12 +6,20 @@ from pathlib import Path
 
 import pytest
 
+from wamnet.compiler.artifact import CERTIFICATE_NAME
 from wamnet.compiler.model_file import load_model
+from wamnet.compiler.proof.checker import check
 from wamnet.kernels.export import shelf
 from wamnet.refimpl.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[3]
 """The repository's root folder."""
+
+SHELF = ROOT / "kernels/shelf"
+"""The shelf of the repository."""
+
+LARGEST_PROOFS = 500_000
+"""Most bytes of all certificates and manifests of the shelf: whoever clones the repository has them."""
 
 WAY_OUT = "run python -m wamnet.kernels.export.shelf -o kernels/shelf MODELS, read git diff, and commit it"
 """What to do when a kernel has changed on purpose."""
@@ -30,34 +38,30 @@ def models(folder):
 
 
 def test_the_shelf_is_what_the_compiler_writes():
-    """Except for the speeds in the index, which are measurements."""
+    """Golden text of each language, with manifest, certificate and index."""
     folder = ROOT / "kernels/shelf"
     wanted = shelf.contents(models(folder))
     paths = [path for path in folder.rglob("*") if path.is_file()]
     held = {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
     assert set(held) == set(wanted), WAY_OUT
-    changed = [name for name in wanted if name != shelf.INDEX and held[name] != wanted[name]]
-    assert changed == [], WAY_OUT
-    both = (files[shelf.INDEX].decode().splitlines() for files in (held, wanted))
-    lines = zip(*both, strict=True)
-    assert all(a.rpartition(" | ")[0] == b.rpartition(" | ")[0] for a, b in lines), WAY_OUT
+    assert [name for name in wanted if held[name] != wanted[name]] == [], WAY_OUT
+    proofs = sum(len(data) for name, data in held.items() if name.endswith(".json"))
+    assert proofs <= LARGEST_PROOFS
 
 
-@pytest.mark.needs("devices")
 def test_the_command_replaces_a_shelf(tmp_path):
     out = tmp_path / "shelf"
     shelf.write(out, {"old/weights.bin": b"x", "old/c/denoise.h": b"y"})
-    shelf.main(["-o", str(out), "--measure", "8"])
+    shelf.main(["-o", str(out)])
     assert not (out / "old").exists()
     index = (out / "README.md").read_text()
     assert all(f"{target}](small/{target}/" in index for target in shelf.KEPT)
-    lines = {target: line for line in index.splitlines() for target in shelf.KEPT if f"[{target}]" in line}
-    assert all(line.endswith("| not measured |") for t, line in lines.items() if t not in shelf.TIMED)
-    assert any(line.endswith(" ms, 8x8 |") for line in lines.values())
+    assert all(check(out / f"small/{target}" / CERTIFICATE_NAME) for target in shelf.KEPT)
 
 
 @pytest.mark.parametrize(
-    "name", ["thesis.txt", "small/thesis.txt", "small/c/notes.h", "linked", "small/linked"]
+    "name",
+    ["thesis.txt", "small/thesis.txt", "small/c/notes.h", "small/c/notes.json", "linked", "small/linked"],
 )
 def test_a_folder_with_anything_else_is_refused_and_stays(tmp_path, name):
     """The whole folder that -o named was removed, whatever lay in it."""

@@ -24,9 +24,8 @@ from .intervals import paired
 from .plots import Plot
 from .records import Records, bench_of
 from .results import PER_FRAME, Results, number
+from .speeds import TableOf, speed_against_error, speed_readme, speed_short
 from .tables import Column
-
-TableOf = Callable[[Records], str]
 
 
 def study(name: str, first: str = "", columns: str = "COLUMNS") -> TableOf:
@@ -298,64 +297,6 @@ def bench(record: str) -> TableOf:
         return tables.markdown(["by", *heads], cells)
 
     return made
-
-
-def speed_against_error(record: str) -> TableOf:
-    """Return time, quality, errors and bounds of all kernels and of Open Image Denoise."""
-    return lambda records: bench_report.table(bench_of(records[record]))
-
-
-def speed_readme(record: str) -> TableOf:
-    """Return the rows of [`speed_against_error`] for a first reader: front, whole networks, peers."""
-    whole, slow = {"whole", "exact", "native"}, ("opengl", "numpy", "group", "tile4", "tile8", "vector")
-
-    def table(records: Records) -> str:
-        heads, line, *rows = speed_against_error(record)(records).splitlines()
-        cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in rows]
-        kept = [
-            row
-            for row, (form, way, *_) in zip(rows, cells, strict=True)
-            if form.endswith("*") or way == "–" or (form in whole and not any(name in way for name in slow))
-        ]
-        return "\n".join([heads, line, *kept])
-
-    return table
-
-
-SPEED_SHORT = {
-    ("window6+rank12", "opencl tile16"): "wamnet, window of 6 pixels and rank 12",
-    ("window8+rank16", "opencl tile16"): "wamnet, window of 8 pixels and rank 16",
-    ("whole", "opencl fft32"): "wamnet, first layer from spectra (`fft32`)",
-    ("whole", "c fft32"): "wamnet, the same in C, by GCC",
-    ("whole", "opencl tile16"): "wamnet, register tiles (`tile16`)",
-    ("exact", "opencl tile16"): "wamnet, the same bits everywhere (profile `exact`)",
-    ("whole", "opencl plain"): "wamnet, the kernel that is made to be read (`plain`)",
-    ("torch.compile", "–"): "the same network in `torch.compile`",
-    ("onnxruntime", "–"): "the same network in ONNX Runtime",
-    ("oidn:fast", "–"): "Open Image Denoise, fast",
-    ("oidn:high", "–"): "Open Image Denoise, high",
-}
-"""Rows of [`speed_against_error`] that the README shows, by form and schedule, with their names there."""
-
-SPEED_COLUMNS = ("ms", "PSNR, dB", "largest error", "bound, this frame", "bound, all frames")
-"""Columns of [`speed_against_error`] that the README shows."""
-
-
-def speed_short(record: str) -> TableOf:
-    """Return the few rows and columns of [`speed_against_error`] that fit on the first page."""
-
-    def table(records: Records) -> str:
-        found = speed_against_error(record)(records).splitlines()
-        heads, _, *rows = ([cell.strip() for cell in row.split("|")[1:-1]] for row in found)
-        shown = []
-        for row in rows:
-            cells = dict(zip(heads, row, strict=True))
-            name = SPEED_SHORT.get((cells["form"].removesuffix(" *"), cells["executor, schedule"]))
-            if name:
-                shown.append([name, *(cells[column] for column in SPEED_COLUMNS)])
-        return tables.markdown(["by", *SPEED_COLUMNS], shown)
-
-    return table
 
 
 def draw_speed(record: str) -> Callable[[Records], Any]:

@@ -1,0 +1,55 @@
+"""The first page's table of speeds: what it says of texts is what the reader does."""
+
+from __future__ import annotations
+
+import pytest
+from lab import speeds
+from lab.records import Records
+
+from wamnet.compiler import artifact
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.proof.checker import check
+from wamnet.compiler.reading.check import check_text
+from wamnet.compiler.reading.lanes import Unread
+from wamnet.kernels.export.shelf import random_model
+
+pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+pytest.importorskip("pcpp", reason="the preprocessor of texts is missing: pip install 'wamnet[cli]'")
+
+CERTIFIED = [("whole", "opencl tile16"), ("exact", "opencl tile16"), ("whole", "opencl plain")]
+"""Forms and ways of the rows of wamnet's kernels that have a certificate in the record."""
+
+
+def reads(path):
+    """Return whether the reader takes the text beside a certificate."""
+    try:
+        return check_text(path)["sums"] > 0
+    except Unread:
+        return False
+
+
+@pytest.mark.parametrize(("form", "way"), CERTIFIED)
+def test_what_is_said_of_a_text_is_what_the_reader_does(form, way, tmp_path):
+    target, schedule = way.split()
+    profile = "ieee" if form == "whole" else form
+    artifact.write(compile_program(lower(random_model()), target, profile, schedule), tmp_path)
+    path = tmp_path / artifact.CERTIFICATE_NAME
+    assert check(path)
+    assert speeds.text_checked(form, way, "1e-3 †") == ("yes" if reads(path) else "no")
+
+
+def test_only_a_certified_kernel_s_text_is_checked():
+    assert speeds.text_checked("whole", "opencl plain", "1e-3") == "no"
+    assert speeds.text_checked("oidn:high", "–", "–") == "–"
+
+
+def test_the_first_page_names_every_certified_row():
+    table = speeds.speed_short("bench-minicubes")(Records())
+    heads, _, *rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines())
+    found = [dict(zip(heads, row, strict=True)) for row in rows]
+    names = {name: key for key, name in speeds.SPEED_SHORT.items()}
+    certified = [names[row["by"]] for row in found if row["bound, all frames"].endswith("†")]
+    assert sorted(certified) == sorted(CERTIFIED)
+    assert all(row["schedule"] == names[row["by"]][1] for row in found)
+    assert {names[row["by"]] for row in found if row["text checked"] == "yes"} < set(CERTIFIED)

@@ -32,8 +32,10 @@ from .spectra_checker import Tables
 U, TINY, WIDER = 2.0**-24, 2.0**-126, 1 + 2.0**-34
 """float32's rounding and smallest normal number; a factor of more than float64 can be off in what follows."""
 
-SINES = (*map(emitted_sine, POLYNOMIALS), EXACT_SINE, OPENCL_SINE, CUDA_SINE)
-PROMISES = {promise.text: promise for promise in SINES}
+OWN_SINES = (EXACT_SINE, OPENCL_SINE, CUDA_SINE)
+"""Sines of profile exact, and of languages that promise enough for a proof."""
+
+PROMISES = {promise.text: promise for promise in (*map(emitted_sine, POLYNOMIALS), *OWN_SINES)}
 """What is known of sines, by the name that a certificate gives."""
 
 

@@ -19,8 +19,8 @@ class Language:
     `compilers` are sets of macros between which a text may make a difference: each is checked. `within`: the
     host calls the kernel for pixels of the picture only. `fragment`: one pixel's result is a variable.
     `brings`: names that the text does not declare. `host`: a function of the text that calls the kernel for
-    every work item. `of_floats`, `of_integers`: what the names of schedules begin with that are read besides
-    plain, of networks of floats and of integers.
+    every work item. `of_floats`, `of_integers`: what the names of other schedules than plain begin
+    with that are read, of networks of floats and of integers.
     """
 
     parser: type[Parser] = Parser

@@ -93,6 +93,8 @@ def bits(name: str, a: Number, b: Number) -> Number:
 
 def fetch(machine: Machine, image: Any, place: Any, level: Any) -> Any:
     """Return a texel: of an image, or of the weights."""
+    if level != 0:
+        raise Wrong(f"it reads level {level} of a texture")
     if not isinstance(image, Pointer):
         return Texel(image, *place)
     if not 0 <= place[0] < Weights.TEXELS:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -99,11 +99,28 @@ def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> Non
         raise Wrong(f"its groups are not of {size[0]} x {size[1]} items")
     entry = manifest["entry_point"] if manifest["entry_point"] in text.functions else "main"
     takes = text.functions[entry].takes
+    check_interface(text, [v.name for v in takes if v.role not in known], claim)
     machine.call(entry, [known[v.role] if v.role in known else sized(given[v.name], v) for v in takes])
     if language.fragment:
         for channel in range(channels):
             result.hold(0, channel, target.load(channel, 1, machine), machine.running)
     result.complete()
+
+
+CALLED = {"w": "weights", "width": "size", "height": "size"}
+"""What a binding's names are for, where they are others."""
+
+
+def check_interface(text: Text, takes: Sequence[str], claim: Claim) -> None:
+    """Refuse a text whose bindings, or whose arguments' places, are not those that hosts fill."""
+    images = [f"image_{name}" for name, _ in claim.images]
+    wanted = {name: n for n, name in enumerate(("size", "weights", "result", *images))}
+    bound = {CALLED.get(name, name): n for name, n in text.bindings.items()}
+    if bound and bound != wanted:
+        raise Wrong("its bindings are not the size, the weights, the result and the images, from 0")
+    places = [*images, "weights", "result", "width", "height"]
+    if takes and not bound and list(takes)[: len(places)] != places:
+        raise Wrong("its arguments are not the images, the weights, the result, width and height")
 
 
 def arguments(claim: Claim, fragment: bool, result: Result, target: Memory) -> dict[str, Any]:

@@ -19,8 +19,8 @@ class Language:
     `compilers` are sets of macros between which a text may make a difference: each is checked. `within`: the
     host calls the kernel for pixels of the picture only. `fragment`: one pixel's result is a variable.
     `brings`: names that the text does not declare. `host`: a function of the text that calls the kernel for
-    every work item. `of_floats`, `of_integers`: what the names of other schedules than plain begin
-    with that are read, of networks of floats and of integers.
+    every work item. `doubles`: a constant without a suffix is one. `of_floats`, `of_integers`: what the names
+    of other schedules than plain begin with that are read, of networks of floats and of integers.
     """
 
     parser: type[Parser] = Parser
@@ -30,13 +30,16 @@ class Language:
     fragment: bool = False
     brings: tuple[str, ...] = ()
     host: str = ""
+    doubles: bool = False
     of_floats: tuple[str, ...] = ()
     of_integers: tuple[str, ...] = ()
 
 
 LANGUAGES: Mapping[str, Language] = {
     "opencl": Language(
-        brings=("CLK_LOCAL_MEM_FENCE", "CLK_GLOBAL_MEM_FENCE"), of_floats=("tile", "vector", "group")
+        doubles=True,
+        brings=("CLK_LOCAL_MEM_FENCE", "CLK_GLOBAL_MEM_FENCE"),
+        of_floats=("tile", "vector", "group"),
     ),
     "c": Language(
         compilers=(
@@ -45,6 +48,7 @@ LANGUAGES: Mapping[str, Language] = {
         ),
         within=True,
         host="wamnet_image",
+        doubles=True,
         of_floats=("tile",),
         of_integers=("tile",),
     ),
@@ -59,7 +63,7 @@ LANGUAGES: Mapping[str, Language] = {
     "metal": Language(
         brings=tuple(f"mem_flags::mem_{a}" for a in ("none", "device", "threadgroup")), of_floats=("group",)
     ),
-    "cuda": Language(brings=("threadIdx", "blockIdx", "blockDim"), of_floats=("group",)),
+    "cuda": Language(doubles=True, brings=("threadIdx", "blockIdx", "blockDim"), of_floats=("group",)),
 }
 """By a manifest's target."""
 
@@ -79,7 +83,9 @@ def is_read(manifest: Mapping[str, Any]) -> bool:
 
 def parsed(source: str, language: Language, macros: Mapping[str, str]) -> Text:
     """Return a text, parsed."""
-    return language.parser(preprocessed(source, macros) if language.preprocessed else source).parse()
+    parser = language.parser(preprocessed(source, macros) if language.preprocessed else source)
+    parser.doubles = language.doubles
+    return parser.parse()
 
 
 def preprocessed(source: str, macros: Mapping[str, str]) -> str:

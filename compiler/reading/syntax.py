@@ -116,6 +116,7 @@ class Text:
     outside: list[tuple[Variable, Any]] = field(default_factory=list)
     structs: dict[str, list[Variable]] = field(default_factory=dict)
     group: list[Tree] = field(default_factory=list)
+    bindings: dict[str, int] = field(default_factory=dict)
 
 
 def tokens(text: str) -> list[tuple[str, str, int]]:
@@ -139,7 +140,7 @@ class Parser:
 
     def __init__(self, text: str) -> None:
         self.tokens, self.at, self.text = [*tokens(text), ("end", "", 0)], 0, Text()
-        self._role = ""
+        self._role, self._binding, self.doubles = "", -1, False
         self.types = {name: Type(kind) for name, kind in SCALARS.items()}
         for base, kind in (
             ("float", "float32"),
@@ -200,7 +201,10 @@ class Parser:
         elif self._now == "extern" and self._ahead().startswith('"'):
             self.at += 2
         elif self._now == "precision":
-            self.at += 4
+            self._take()
+            self._take("highp")
+            self._take()
+            self._take(";")
         elif self._now == "typedef":
             self._typedef()
         elif self._now == "struct" and (self._ahead(2) == "{" or self._ahead() == "__align__"):
@@ -274,6 +278,8 @@ class Parser:
                 self._skip_brackets("(", ")")
             elif self._now == "[" and self._ahead() == "[":
                 self._role = self._ahead(2)
+                if self._role == "buffer":
+                    self._binding = int(self._ahead(4))
                 self._skip_brackets("[", "]")
             elif self._now in IGNORED:
                 self._take()
@@ -289,6 +295,8 @@ class Parser:
         if "reqd_work_group_size" in words:
             self.at = words["reqd_work_group_size"] + 2
             self.text.group = self._values(")")
+        if "binding" in words:
+            self._binding = int(self.tokens[words["binding"] + 2][1])
         for axis in "xyz":
             if f"local_size_{axis}" in words:
                 self.at = words[f"local_size_{axis}"] + 2
@@ -338,7 +346,9 @@ class Parser:
             return
         if self._ahead() == "{":  # a block of GLSL: its members are names of the text
             self._take()
-            self.text.outside += [(member, None) for member in self._members()]
+            binding, members = self._binding, self._members()
+            self.text.outside += [(member, None) for member in members]
+            self.text.bindings |= {member.name: binding for member in members}
             if self._now != ";":
                 self._take()
             self._take(";")
@@ -366,6 +376,8 @@ class Parser:
             if type_.kind == "void" and self._now == ")":
                 continue
             found.append(self._variable(type_, shared))
+            if found[-1].role == "buffer":
+                self.text.bindings[found[-1].name] = self._binding
             self._has(",")
         return found
 
@@ -525,6 +537,8 @@ class Parser:
     def _primary(self) -> Tree:
         kind, text, line = self.tokens[self.at]
         if kind == "number":
+            if self.doubles and re.fullmatch(r"[\d.]*(\.|\d[eE])[\d.eE+-]*", text):
+                raise Unread(f"line {line}: {text} of type double")
             return ("number", self._take())
         if kind == "name":
             name = self._take()

@@ -5,20 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from .lanes import Unread
-from .syntax import SCALARS, Function, Parser, Tree, Type, Variable
+from .syntax import SCALARS, Function, Parser, Tree, Type, Variable, constant
 
 
 class WgslParser(Parser):
     """Reads one text of WGSL."""
 
     def _outside(self) -> None:
-        while self._has("@"):
-            name = self._take()
-            if self._now == "(":
-                self._take("(")
-                values = self._values(")")
-                if name == "workgroup_size":
-                    self.text.group = values
+        binding = self._attributes()
         word = self._take()
         if word == "struct":
             name = self._take()
@@ -27,6 +21,8 @@ class WgslParser(Parser):
         elif word in ("var", "const", "override"):
             self.at -= 1
             self.text.outside.append(self._declare()[1:])
+            if binding >= 0:
+                self.text.bindings[self.text.outside[-1][0].name] = binding
         elif word == "alias":
             name = self._take()
             self._take("=")
@@ -42,6 +38,19 @@ class WgslParser(Parser):
             self.text.functions[name] = Function(name, takes, self._block(), type_)
         elif word != ";":
             raise Unread(f"line {self.tokens[self.at - 1][2]}: {word!r}")
+
+    def _attributes(self) -> int:
+        """Read the attributes of a declaration; return its binding, -1 without one."""
+        binding = -1
+        while self._has("@"):
+            name = self._take()
+            if self._has("("):
+                values = self._values(")")
+                if name == "workgroup_size":
+                    self.text.group = values
+                if name == "binding":
+                    binding = constant(values[0])
+        return binding
 
     def _members_of(self, opening: str, closing: str) -> list[Variable]:
         """Read names with types between brackets."""

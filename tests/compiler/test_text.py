@@ -133,3 +133,33 @@ def test_lanes_have_every_case_of_a_row():
     far = (y > 3) & (height - 1 - y > 3)
     cases = {(min(a, 4), min(b, 4)) for a, b in zip(x[far], (width - 1 - x)[far], strict=True)}
     assert cases == {(a, b) for a in range(5) for b in range(5)}
+
+
+def test_constants_of_type_double_are_not_read(plain):
+    """C takes 0.5 for a double; GLSL takes it for a float."""
+    with pytest.raises(Unread, match="of type double"):
+        run_text(*changed(plain, "+ 0.5f", "+ 0.5"))
+
+
+@pytest.mark.parametrize(
+    ("target", "old", "new", "why"),
+    [
+        ("glsl-es", "precision highp float", "precision mediump float", "mediump"),
+        ("glsl-es", "ivec2(column, row), 0)", "ivec2(column, row), 1)", "level 1"),
+        ("wgsl", "@binding(3)", "@binding(5)", "bindings"),
+        ("glsl-vulkan", "binding = 3)", "binding = 5)", "bindings"),
+        ("metal", "[[buffer(3)]]", "[[buffer(5)]]", "bindings"),
+        ("cuda", "image_color,", "image_swapped,", "arguments|not declared"),
+    ],
+)
+def test_what_a_host_relies_on_is_read(target, old, new, why, tmp_path):
+    """TXT-6, TXT-8: precision, levels of textures, bindings and places of arguments."""
+    with pytest.raises((Refused, Unread), match=why):
+        run_text(*changed(parts(kernel(tmp_path, target)), old, new))
+
+
+def test_arguments_in_another_order_are_refused(plain):
+    source, *others = plain
+    turned = source.replace("image_color,", "image_x,", 1).replace("image_normal,", "image_color,", 1)
+    with pytest.raises(Refused, match="arguments"):
+        run_text(turned.replace("image_x,", "image_normal,", 1), *others)

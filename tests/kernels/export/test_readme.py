@@ -127,7 +127,7 @@ def test_it_says_which_file_is_a_translation_that_nobody_reads():
         (
             "wgsl",
             {"variant": "whole8", "schedule": "groupdot"},
-            "(schedule groupdot, profile ieee) it does not know; it reads the one that `--schedule plain` writes.",
+            "(schedule groupdot, profile ieee) it does not know; it reads the one that `--schedule plain`",
         ),
         ("opencl", {"weights": "uniform"}, "whose kind (schedule plain, profile ieee) it does not know."),
     ],

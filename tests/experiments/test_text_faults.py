@@ -1,0 +1,35 @@
+"""Experiments about what is proven: the table of kernels, and faults that are planted in texts."""
+
+import certified
+import pytest
+import text_faults
+
+pytest.importorskip("pcpp", reason="the preprocessor of texts is missing: pip install 'wamnet[cli]'")
+
+
+def test_a_kernel_is_a_row(capsys):
+    certified.main(["--models", "cornell", "--only", "wgsl:plain:whole8,opencl:dot16:whole8"])
+    plain, dot16 = capsys.readouterr().out.splitlines()[2:4]
+    assert plain.startswith("| cornell | wgsl | plain | whole8 | 0: the same bits | 0.00 | ")
+    assert "| computes it: 5 sums |" in plain
+    assert "| not checked: " in dot16
+
+
+def test_faults_are_kept_apart(tmp_path, capsys):
+    """Spare room is not a fault; what the reader accepts is, and ends with status 1."""
+    source = "/* */ void f() {\n    float v[4];\n    x = v[0] + 0.5f;\n}\n"
+    found = list(text_faults.faults(source))
+    assert {f.kind for f in found} >= {"an integer one more", "another operator", "a statement lost"}
+    (room,) = (f for f in found if f.kind == "an integer one more" and f.new == "5")
+    assert text_faults.spare(source, room)
+    (sign,) = (f for f in found if f.new == "-")
+    assert not text_faults.spare(source, sign)
+
+
+def test_what_is_accepted_ends_with_status_1(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(text_faults, "TILES", ())
+    monkeypatch.setattr(text_faults, "LANGUAGES", ("opencl",))
+    assert text_faults.main(["--count", "3"]) == 0
+    assert "| opencl | plain |" in capsys.readouterr().out
+    monkeypatch.setattr(text_faults, "run_text", lambda *given: {"sums": 1})
+    assert text_faults.main(["--count", "3"]) == 1

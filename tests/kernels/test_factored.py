@@ -14,7 +14,7 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import factor
-from wamnet.compiler.schedules.emit_dot import Dot
+from wamnet.compiler.schedules.emit_dot import Dot, GroupDot
 from wamnet.compiler.schedules.emit_fourier import Fourier
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import Pipeline, denoise_on
@@ -28,7 +28,12 @@ from wamnet.refimpl.network.denoise import Model
 EXAMPLES = max(settings.default.max_examples // 20, 1)
 """Each example compiles two kernels, up to a second: a twentieth of what other tests draw."""
 
-WAYS = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules if not isinstance(s, Fourier | Dot)]
+WAYS = [
+    (t.name, s.name)
+    for t in DENOISERS.values()
+    for s in t.schedules
+    if not isinstance(s, Fourier | Dot | GroupDot)
+]
 """All targets and schedules that hold a first layer in two passes: spectra are of windows along both axes,
 and bytes hold integers."""
 

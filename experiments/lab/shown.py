@@ -279,6 +279,11 @@ BENCH = {
     "onnxruntime": "ONNX Runtime",
     "oidn:fast": "Open Image Denoise, fast; another denoiser",
     "oidn:high": "Open Image Denoise, high",
+    "c:tile16": "C, GCC, `tile16`",
+    "opencl:dot16:whole8": "OpenCL, PoCL, integers, `dot16`: products of bytes",
+    "c:dot16:whole8": "C, GCC, integers, `dot16`",
+    "onnxruntime:int8": "ONNX Runtime, 8 bits",
+    "openvino:int8": "OpenVINO, 8 bits",
 }  # contenders of `wamnet bench` that a page shows, with their names there
 
 
@@ -503,7 +508,7 @@ AS_PRINTED = (
 TABLES: Mapping[str, TableOf] = {
     **{name: as_printed(name) for name in AS_PRINTED},
     "ablations": study("ablations", "all else as `short`"),
-    "bench-paper": bench("bench-paper"),
+    **{name: bench(name) for name in ("bench-integers", "bench-paper")},
     "bench-train-paper": as_printed("bench-train", 1),
     "bench-train-short": as_printed("bench-train", 2),
     "claims": claims("verdicts"),

@@ -295,6 +295,8 @@ class Parser:
         if "reqd_work_group_size" in words:
             self.at = words["reqd_work_group_size"] + 2
             self.text.group = self._values(")")
+        if "origin_upper_left" in words or "pixel_center_integer" in words:
+            raise Unread(f"line {self.tokens[first][2]}: a layout of gl_FragCoord")
         if "binding" in words:
             self._binding = int(self.tokens[words["binding"] + 2][1])
         for axis in "xyz":

@@ -145,6 +145,12 @@ def test_constants_of_type_double_are_not_read(plain):
     ("target", "old", "new", "why"),
     [
         ("glsl-es", "precision highp float", "precision mediump float", "mediump"),
+        (
+            "opengl",
+            "void main()",
+            "layout(origin_upper_left) in vec4 gl_FragCoord; void main()",
+            "gl_FragCoord",
+        ),
         ("glsl-es", "ivec2(column, row), 0)", "ivec2(column, row), 1)", "level 1"),
         ("wgsl", "@binding(3)", "@binding(5)", "bindings"),
         ("glsl-vulkan", "binding = 3)", "binding = 5)", "bindings"),

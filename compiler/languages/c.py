@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from ..core.profiles import SineContract
 from .dialect import Dialect, Parts
-from .interface import DENOISE, ENCODE, PATH, SUMS, UNSIGNED, Interface
+from .interface import DENOISE, ENCODE, PATH, UNSIGNED, Interface
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
 
 PRAGMAS = """\
@@ -92,6 +92,7 @@ class C(Arguments):
     pixel = "image_{image}[(row * width + column) * {channels} + c]"
     weight = "weights[{index}]"
     store = "result[(y * width + x) * {channels} + {i}] = {value};"
+    painted = "image_{image}[((size_t)y * (size_t)part->width + x) * {channels} + {channel}]"
     said = {
         DENOISE: (
             f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height: fewer than 2^31 numbers an image.\n"
@@ -164,8 +165,8 @@ class C(Arguments):
 
     def _of_paths(self, kernel: Interface) -> list[str]:
         """Return the functions of a path kernel up to the statements of a pixel."""
-        name = self.entries[PATH]
-        listed = f"const wamnet_part *part, {self.writes.format(name=SUMS)}"
+        name, arrays = self.entries[PATH], [array.name for array in kernel.arrays]
+        listed = ", ".join(["const wamnet_part *part", *map(self.array_argument, kernel.arrays)])
         one = f"{self.heading.format(entry=name)}({listed}, int column, int row)"
         return [
             "/* One pixel, in column `column` of row first_row + `row`. */",
@@ -178,7 +179,7 @@ class C(Arguments):
                 ("column", "row"),
                 ("part->width", "part->rows"),
                 ("++column", "++row"),
-                f"{name}(part, sums, column, row);",
+                f"{name}(part, {', '.join(arrays)}, column, row);",
             ),
             "}",
             "",

@@ -55,7 +55,8 @@ class Dialect:
     channel. A path kernel follows `lanes` paths at once; where that is more than one, a value has a component
     for each, and `single` declares what is the same for all. `helpers`: functions that an operation calls, by
     operation. `scene_number` reads a number of the scene that is an input; a language without it takes no
-    moving scene. `integers_top`: lines that integers in vectors need at a kernel's top. `types` are those of
+    moving scene. `painted`: a channel of an image in a path kernel; a language without it writes sums.
+    `integers_top`: lines that integers in vectors need at a kernel's top. `types` are those of
     values; `scalars` those of single numbers, where values are vectors.
     """
 
@@ -98,6 +99,7 @@ class Dialect:
     sum_store: str = "sums[{plane} * plane + at] = {value};"
     load: str = "float {name} = sums[{plane} * plane + at];"
     image_store: str = "image_{image}[at * {channels} + {channel}] = {value};"
+    painted: str = ""
     operations: Mapping[str, str] = {
         "add": "{0} + {1}",
         "subtract": "{0} - {1}",
@@ -177,6 +179,18 @@ class Dialect:
         shared = self.shared(kernel)
         texts = {"x": f"{shared['column']} + {self.lane_numbers}", "y": shared["row"], "seed": shared["seed"]}
         return [f"    {self.let('uint32', name, text)}" for name, text in texts.items()]
+
+    def image_helpers(self, kernel: Interface) -> list[str]:
+        """Return the functions that `images_end` calls."""
+        return []
+
+    def images_end(self, kernel: Interface, values: Mapping[str, Sequence[str]]) -> list[str]:
+        """Return the last statements of a path kernel: the channels of each image's pixel, by name."""
+        return [
+            f"    {self.painted.format(image=name, channels=len(texts), channel=channel)} = {text};"
+            for name, texts in values.items()
+            for channel, text in enumerate(texts)
+        ]
 
     def results(self, channels: int) -> list[str]:
         """Return what is written into, in order; a language with one result for all channels has one."""

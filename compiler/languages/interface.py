@@ -116,9 +116,11 @@ def denoiser(
     return Interface(DENOISE, tuple(found), tuple(integers))
 
 
-def paths(planes: int, integers: Sequence[str]) -> Interface:
-    """Return what a path kernel is given: planes of sums."""
-    return Interface(PATH, (Array(SUMS, WRITE, (planes, "rows", "width")),), tuple(integers))
+def paths(planes: int, integers: Sequence[str], images: Sequence[Image] = ()) -> Interface:
+    """Return what a path kernel is given: planes of sums, or the encoded images that it makes of them."""
+    written = [Array(f"{IMAGE}{image.name}", WRITE, ("rows", "width", image.channels)) for image in images]
+    sums = Array(SUMS, WRITE, (planes, "rows", "width"))
+    return Interface(PATH, tuple(written) or (sums,), tuple(integers))
 
 
 def encoding(planes: int, images: Sequence[Image], integers: Sequence[str]) -> Interface:

@@ -6,6 +6,8 @@ so that a path kernel is not given their number; an encoding reads planes of any
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from ..core.profiles import OPENCL_SINE
 from .dialect import Dialect, Parts
 from .interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
@@ -31,6 +33,7 @@ class OpenCL(Arguments):
     weight = "weights[{index}]"
     store = "result[(y * width + x) * {channels} + {i}] = {value};"
     image_store = "image_{image}[pixel * {channels} + {channel}] = {value};"
+    painted = "image_{image}[place * {channels} + {channel}]"
     said = {
         DENOISE: f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height.\nGlobal size: at least (width, height)",
         PATH: (
@@ -100,6 +103,20 @@ class OpenCL(Arguments):
             "    size_t pixel = (size_t)y * (size_t)width + (size_t)x;",
             f"    {self.samples(kernel)}",
         ]
+
+    def images_end(self, kernel: Interface, values: Mapping[str, Sequence[str]]) -> list[str]:
+        """Return the last statements of a path kernel: whole groups are larger than the picture."""
+        return [
+            "    int left = width - (int)column; /* pixels of the row from here on */",
+            "    if ((int)row + first_row < height && left > 0) {",
+            "        size_t place = (size_t)((int)row + first_row) * (size_t)width + column;",
+            *(f"    {line}" for line in self.painting(kernel, values)),
+            "    }",
+        ]
+
+    def painting(self, kernel: Interface, values: Mapping[str, Sequence[str]]) -> list[str]:
+        """Return the statements that write the pixels of an item inside the picture."""
+        return super().images_end(kernel, values)
 
     def place(self, kernel: Interface) -> tuple[str, str]:
         """Return the texts of an item's column and row."""

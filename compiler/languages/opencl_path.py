@@ -11,10 +11,12 @@ the time.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from numpy.typing import NDArray
 
+from .interface import Interface
 from .opencl import OpenCL
 
 LANES = (1, 4, 8, 16)
@@ -87,6 +89,41 @@ class OpenCLVectorPath(OpenCLPath):
         dtype = str(array.dtype)
         values = ", ".join(self._element(value, dtype) for value in array)
         return self.table.format(type=self.elements[dtype], name=name, count=len(array), values=values)
+
+    def image_helpers(self, kernel: Interface) -> list[str]:
+        """Return a function for each number of channels: pixels of a row, channels interleaved."""
+        return [self._painter(channels) for channels in sorted({int(i.shape[2]) for i in kernel.images})]
+
+    def _painter(self, channels: int) -> str:
+        """Return the function that writes the pixels of one image, or those that are left of its row."""
+        lanes, vector = self.lanes, self.types["float32"]
+        numbers = [f"c{n % channels}.s{n // channels:x}" for n in range(lanes * channels)]
+        parts = [", ".join(numbers[lanes * k : lanes * (k + 1)]) for k in range(channels)]
+        taken = ", ".join(f"{vector} c{channel}" for channel in range(channels))
+        return "\n".join(
+            [
+                f"void paint_{channels}(__global float *restrict to, {taken}, int left)",
+                "{",
+                *(f"    {vector} part_{k} = ({vector})({part});" for k, part in enumerate(parts)),
+                "    if (left >= LANES) {",
+                *(f"        vstore{lanes}(part_{k}, {k}, to);" for k in range(channels)),
+                "        return;",
+                "    }",
+                f"    float all[{lanes * channels}];",
+                *(f"    vstore{lanes}(part_{k}, {k}, all);" for k in range(channels)),
+                f"    for (int i = 0; i < {channels} * left; ++i) {{",
+                "        to[i] = all[i];",
+                "    }",
+                "}",
+            ]
+        )
+
+    def painting(self, kernel: Interface, values: Mapping[str, Sequence[str]]) -> list[str]:
+        """Return the statements that write the pixels of an item inside the picture."""
+        return [
+            f"    paint_{len(texts)}(image_{name} + place * {len(texts)}, {', '.join(texts)}, left);"
+            for name, texts in values.items()
+        ]
 
     def _element(self, value: Any, dtype: str) -> str:
         """Return the text of a number in one lane."""

@@ -13,7 +13,8 @@
    [`_Kernel.block`]; its outputs are assigned at the block's end. A loop over the rows of tables is a loop
    on a counter that all paths share, so that a row is read once for all of them [`_Kernel._loop`].
 2. What is added up over the samples are planes, in groups [`GROUPS`]; a kernel writes the requested ones.
-3. A path that has ended is computed on with the others of its work item, and changes nothing: radiance is
+3. With an encoding, sums stay variables, and become channels of images at the end [`_Kernel._images`].
+4. A path that has ended is computed on with the others of its work item, and changes nothing: radiance is
    assigned where it is alive.
 """
 
@@ -26,12 +27,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError
-from ..core.ir import Node, Program, Type, attributes
+from ..core.ir import Image, Node, Program, Type, attributes
 from ..core.lines import Lines
 from ..core.loops import Loop, loops
 from ..core.weights import tables
 from ..languages import interface
 from ..languages.dialect import Dialect, Parts
+from ..languages.interface import ENCODE
 from ..schedules.emit import framed
 from .lower_scene import LAYERS, PATH, SURFACE, PathPrograms, Values, kinds, names
 
@@ -73,9 +75,23 @@ def planes(groups: Sequence[str]) -> list[str]:
     return [plane for group in groups for plane in GROUPS[group]]
 
 
-def emit_path(programs: PathPrograms, dialect: Dialect, groups: Sequence[str], header: Sequence[str]) -> str:
+@dataclass(frozen=True)
+class Encoding:
+    """What turns the sums of a pixel into the channels of images [lower_encode.py]."""
+
+    program: Program
+    images: tuple[Image, ...]
+
+
+def emit_path(
+    programs: PathPrograms,
+    dialect: Dialect,
+    groups: Sequence[str],
+    header: Sequence[str],
+    encoding: Encoding | None = None,
+) -> str:
     """Return the kernel's source; `header` are the lines of the comment at its top."""
-    return _Kernel(programs, dialect, groups).text(header)
+    return _Kernel(programs, dialect, groups, encoding).text(header)
 
 
 def renamed_tables(programs: PathPrograms) -> Mapping[tuple[str, str], str]:
@@ -96,6 +112,7 @@ class _Kernel(Lines):
     programs: PathPrograms
     dialect: Dialect
     groups: Sequence[str]
+    encoding: Encoding | None
     lines: list[str] = field(default_factory=list)
     depth: int = 1
 
@@ -103,7 +120,8 @@ class _Kernel(Lines):
         """Return the whole source."""
         self.tables = renamed_tables(self.programs)
         self.planes = planes(self.groups)
-        self.kernel = interface.paths(len(self.planes), self.dialect.integers[interface.PATH])
+        images = self.encoding.images if self.encoding else ()
+        self.kernel = interface.paths(len(self.planes), self.dialect.integers[interface.PATH], images)
         self.shared = self.dialect.shared(self.kernel)
         if len(self.planes) > self.dialect.max_planes:
             raise CompileError(
@@ -115,9 +133,15 @@ class _Kernel(Lines):
                 f"{self.dialect.language}: its path kernels take no numbers of the scene; only those of web "
                 "pages do: compile the scene at one time"
             )
+        if images and not self.dialect.painted:
+            raise CompileError(
+                f"{self.dialect.language}: its path kernels write sums, not encoded images: compile the "
+                "encoding as a kernel of its own"
+            )
         self._sums()
         self._samples()
         self._stores()
+        self._images()
         return framed(self.dialect, self.kernel, self._parts(), header, self.lines)
 
     # ---- the skeleton ------------------------------------------------------------------------------------
@@ -130,14 +154,15 @@ class _Kernel(Lines):
         constants = [self.dialect.table_declaration(name, array) for name, array in declared.items()]
         helpers = [text for op, text in self.dialect.helpers.items() if op in self._operations()]
         return Parts(
-            top="\n".join([*constants, *helpers]),
+            top="\n".join([*constants, *helpers, *self.dialect.image_helpers(self.kernel)]),
             max_depth=self.programs.settings.max_depth,
             scene_vectors=-(-len(self.programs.inputs) // 4),
         )
 
     def _operations(self) -> set[str]:
         """Return the names of all operations of the programs."""
-        return {node.op for program in self.programs.parts().values() for node in program.nodes}
+        programs = [*self.programs.parts().values(), *([self.encoding.program] if self.encoding else [])]
+        return {node.op for program in programs for node in program.nodes}
 
     def _sums(self) -> None:
         """Declare the image's size in lanes, and the sums."""
@@ -211,12 +236,34 @@ class _Kernel(Lines):
         return self.dialect.expression(node, kind, [name])
 
     def _stores(self) -> None:
-        """Write the sums out."""
+        """Write the sums out, unless images are made of them."""
         self.lines.append("")
+        if self.encoding:
+            return
         for number, plane in enumerate(self.planes):
             buffer, component = divmod(number, self.dialect.planes_per_buffer)
             store = self.dialect.sum_store
             self._line(store.format(plane=number, buffer=buffer, component=component, value=f"sum_{plane}"))
+
+    def _images(self) -> None:
+        """Write the encoding of the sums, and its channels out."""
+        if self.encoding is None:
+            return
+        program = self.encoding.program
+        self._line("/* the features, encoded */")
+        self._line(self.dialect.let("float32", "encoded_samples", self._as_lanes("samples")))
+        named = {plane: f"sum_{plane}" for plane in self.planes} | {"samples": "encoded_samples"}
+        outputs = dict(program.outputs)
+        texts = self._statements(ENCODE, program, named)
+        values = {
+            image.name: [texts[outputs[f"{image.name}_{channel}"]] for channel in range(image.channels)]
+            for image in self.encoding.images
+        }
+        self.lines += self.dialect.images_end(self.kernel, values)
+
+    def _as_lanes(self, integer: str) -> str:
+        """Return an integer that all paths share as a float in all lanes."""
+        return self.dialect.splat(self.dialect.cast("float32", integer), "float32")
 
     def _scene_numbers(self) -> dict[str, str]:
         """Return the text of each of the scene's numbers that are inputs."""

@@ -33,6 +33,7 @@ from ..plan import sine_contract
 from ..proof import bounds
 from ..schedules.emit import framed
 from ..targets import integers_of, target_named
+from .emit_path import Encoding
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
 
 SCHEMA = "wamnet-encode-kernel-1"
@@ -74,7 +75,8 @@ def compile_encode(
     images are those of a network of integers.
     """
     chosen, promised = target_named(target), profiles.unpinned(profile, "encodings of features")
-    program = pipeline.run(lower_encode(features, normalization, whole), promised.passes)
+    encoding = encoding_of(features, normalization, profile, whole)
+    program, images = encoding.program, encoding.images
     planes = tuple(planes or planes_of(features))
     lacking = set(planes_of(features)) - set(planes)
     if lacking:
@@ -82,7 +84,6 @@ def compile_encode(
             f"the sums have no planes {', '.join(sorted(lacking))}: the features {', '.join(features)} are "
             "made of them; let the path kernel add them up"
         )
-    images = images_of(features, normalization, whole)
     if not chosen.encodes:
         raise CompileError(
             f"target {target} has no kernels that encode features: compile for one that has, as opencl"
@@ -116,6 +117,15 @@ def compile_encode(
         SIZES: {name: len(text.encode())},
     }
     return EncodeArtifact(target, profile, entry, text, name, program, planes, images, manifest)
+
+
+def encoding_of(
+    features: Sequence[str], normalization: Normalization, profile: str = "ieee", whole: bool = False
+) -> Encoding:
+    """Return the encoding of features after the passes of a profile, and the images that it makes."""
+    passes = profiles.profile_named(profile).passes
+    program = pipeline.run(lower_encode(features, normalization, whole), passes)
+    return Encoding(program, images_of(features, normalization, whole))
 
 
 def error_at(
@@ -193,11 +203,9 @@ def encode_source(
     whole: bool = False,
 ) -> str:
     """Return only the statements, for a kernel that has the sums of these features in variables."""
-    program = pipeline.run(
-        lower_encode(features, normalization, whole), profiles.profile_named(profile).passes
-    )
-    images = images_of(features, normalization, whole)
-    return "\n".join(f"    {line}" for line in _body(program, dialect, planes_of(features), images))
+    found = encoding_of(features, normalization, profile, whole)
+    body = _body(found.program, dialect, planes_of(features), found.images)
+    return "\n".join(f"    {line}" for line in body)
 
 
 def _statements(program: Program, dialect: Dialect, lines: list[str]) -> list[str]:

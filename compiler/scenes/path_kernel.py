@@ -22,13 +22,16 @@ from ...refimpl.reading import SIZES
 from ..artifact import OneSource
 from ..compile import asdict_finite
 from ..core import ir, profiles
+from ..core.ir import Image
 from ..core.passes import pipeline
 from ..core.profiles import Profile
 from ..languages import interface
 from ..languages.interface import Interface
+from ..languages.openings import IMAGES
 from ..plan import sine_contract
 from ..targets import integers_of, target_named
 from . import emit_path
+from .emit_path import Encoding
 from .lower_scene import PASSES, PathPrograms
 
 SCHEMA = "wamnet-path-kernel-1"
@@ -47,7 +50,10 @@ SUMS = (
 
 @dataclass(frozen=True)
 class PathArtifact(OneSource):
-    """A compiled path kernel; `programs` are what was emitted, `planes` what it adds up, in order."""
+    """A compiled path kernel; `programs` are what was emitted, `planes` what it adds up, in order.
+
+    With `images` it writes these, encoded, in place of the sums.
+    """
 
     target: str
     profile: str
@@ -58,11 +64,12 @@ class PathArtifact(OneSource):
     programs: PathPrograms
     planes: tuple[str, ...]
     manifest: Mapping[str, Any]
+    images: tuple[Image, ...] = ()
 
     @property
     def interface(self) -> Interface:
         """Return what the kernel is bound to, in its language."""
-        return interface.paths(len(self.planes), integers_of(self.target, interface.PATH))
+        return interface.paths(len(self.planes), integers_of(self.target, interface.PATH), self.images)
 
 
 def most_unrolled(target: str) -> int:
@@ -76,8 +83,12 @@ def compile_path(
     profile: str = "ieee",
     lanes: int = 1,
     groups: Sequence[str] = emit_path.FRAME_GROUPS,
+    encoding: Encoding | None = None,
 ) -> PathArtifact:
-    """Return the kernel that follows the paths of a scene, `lanes` at once, and adds up groups of planes."""
+    """Return the kernel that follows the paths of a scene, `lanes` at once, and adds up groups of planes.
+
+    With an encoding of these planes it writes its images, at their places in the whole picture.
+    """
     chosen, promised = target_named(target), profiles.unpinned(profile, "paths")
     if not chosen.paths:
         raise CompileError(f"target {target} has no path kernels: compile for one that has, as opencl")
@@ -86,15 +97,19 @@ def compile_path(
         raise CompileError(f"target {target} does not follow {lanes} paths at once; it can do {known}")
     emitted, dialect = _passed(programs, promised.passes), chosen.paths[lanes]
     planes = tuple(emit_path.planes(groups))
-    header = _header(programs, dialect.language if dialect else chosen.language, promised, lanes)
+    images = encoding.images if encoding else ()
+    written = _written(images) if images else SUMS
+    header = _header(programs, dialect.language if dialect else chosen.language, promised, lanes, written)
     arguments = dialect.said[interface.PATH] if dialect else chosen.schedules[0].arguments
+    if images:
+        arguments = f"{IMAGES};\n{arguments.partition('{planes};' + chr(10))[2]}"
     arguments = arguments.format(lanes=lanes, planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
     if dialect is None:
         text, suffix, entry = _printed(emitted, header), chosen.suffix, chosen.entry
     else:
         first, *others = arguments.split("\n")
         header += [f"arguments {first}", *(f"          {line}" for line in others)]
-        text = emit_path.emit_path(emitted, dialect, groups, header)
+        text = emit_path.emit_path(emitted, dialect, groups, header, encoding)
         suffix, entry = dialect.suffix, dialect.entries[interface.PATH]
     facts = {
         "target": target,
@@ -104,13 +119,13 @@ def compile_path(
         "profile": {"name": promised.name, "text": promised.text},
         "sine": asdict_finite(sine_contract(profile, target)),
         "passes": [*PASSES, *promised.passes],
-        "planes": list(planes),
-        "sums": "; ".join(SUMS),
+        **({"images": [image.facts for image in images]} if images else {"planes": list(planes)}),
+        "sums": "; ".join(written),
         "arguments": arguments,
     }
     name = f"path{suffix}"
     manifest = {**facts, **_identity(emitted, name, text)}
-    return PathArtifact(target, profile, lanes, entry, text, name, emitted, planes, manifest)
+    return PathArtifact(target, profile, lanes, entry, text, name, emitted, planes, manifest, images)
 
 
 NAME_SHOWN = 60
@@ -122,8 +137,19 @@ def _harmless(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_. +-]", "_", name[:NAME_SHOWN])
 
 
-def _header(programs: PathPrograms, language: str, profile: Profile, lanes: int) -> list[str]:
-    """Return the lines of the comment at the top of the source, up to the arguments."""
+def _written(images: Sequence[Image]) -> tuple[str, ...]:
+    """Return what the numbers of encoded images mean."""
+    described = (f"{i.name}: {i.channels} channels in {i.range_text}, {i.encoding}" for i in images)
+    return (SUMS[0], "encoded features, means over the samples of one launch:", *described)
+
+
+def _header(
+    programs: PathPrograms, language: str, profile: Profile, lanes: int, written: Sequence[str]
+) -> list[str]:
+    """Return the lines of the comment at the top of the source, up to the arguments.
+
+    `written` says what the numbers mean that are the result.
+    """
     settings = [f"{key} {value}" for key, value in programs.settings.facts().items()]
     return [
         f"wamnet path tracer, {language}. Generated: change the compiler, not this text.",
@@ -133,7 +159,7 @@ def _header(programs: PathPrograms, language: str, profile: Profile, lanes: int)
         f"profile   {profile.name}: {profile.text}",
         "bound     none: a path's decisions may fall differently near an edge",
         "fixed     camera, time and all of the scene: another moment is another kernel",
-        *(f"{'sums' if i == 0 else '':10}{line}" for i, line in enumerate(SUMS)),
+        *(f"{'sums' if i == 0 else '':10}{line}" for i, line in enumerate(written)),
     ]
 
 

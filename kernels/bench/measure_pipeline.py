@@ -56,8 +56,13 @@ def measured(
         frame = render_on(executor, scene, job).frame
         executor.run(denoiser, images_of(model, frame))
 
-    with Pipeline(executor, scene, model, (size, size)) as pipeline:
+    with (
+        Pipeline(executor, scene, model, (size, size)) as pipeline,
+        Pipeline(executor, scene, model, (size, size), sums=True) as apart,
+    ):
         ways: dict[str, Callable[[], Any]] = {"separate": separate, "one pipeline": pipeline.run}
+        if pipeline.path.images:
+            ways["with an encoding of its own"] = apart.run
         ways |= _parts(pipeline)
         for function in ways.values():
             function()  # whatever a driver does at first
@@ -87,9 +92,10 @@ def _parts(pipeline: Pipeline) -> dict[str, Callable[[], Any]]:
 
         return both
 
+    encoded = " and encoding" if pipeline.path.images else ""
     return {
-        "of it: paths": waited(lambda: passes.trace(pipeline.path, part)),
-        "of it: encoding": waited(lambda: passes.encode(1)),
+        f"of it: paths{encoded}": waited(lambda: passes.trace(pipeline.path, part)),
+        **({} if encoded else {"of it: encoding": waited(lambda: passes.encode(1))}),
         "of it: denoising": waited(passes.denoise),
         "of it: reading back": lambda: passes.read(PICTURE),
     }

@@ -195,6 +195,7 @@ class CExecutor(Executor):
     """The system's C compiler; what it has built stays loaded as long as the process."""
 
     name = "c"
+    paints = True
 
     def __init__(self) -> None:
         super().__init__()

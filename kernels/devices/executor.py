@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
+from ...compiler.core.ir import Image
 from ...compiler.languages.interface import IMAGE, RESULT, SUMS, UNSIGNED, Interface
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
@@ -109,7 +110,7 @@ class Executor(ABC):
     `byte_schedule`: that of networks of integers, where the device multiplies bytes. `driver` is the driver's
     version, where `device` does not name it. `trains` says whether it has a compiled trainer. `homes` are the
     homes of weights, apart from the target's usual one, whose kernels it runs
-    [compiler/languages/interface.py].
+    [compiler/languages/interface.py]. `paints`: it runs path kernels that write encoded images.
     """
 
     name: str
@@ -122,6 +123,7 @@ class Executor(ABC):
     driver: str = ""
     trains: bool = False
     homes: tuple[str, ...] = ()
+    paints: bool = False
 
     def __init__(self) -> None:
         self._built: dict[str, Built] = {}
@@ -228,7 +230,9 @@ class Executor(ABC):
     def _run_once(self, kernel: Kernel, size: Size) -> None:
         """Run a kernel once on black images."""
         if isinstance(kernel, PathArtifact):
-            self._trace(kernel, Part(size[1], size[0], 0, size[0], 0, 1, 0))
+            (self._paint if kernel.images else self._trace)(
+                kernel, Part(size[1], size[0], 0, size[0], 0, 1, 0)
+            )
         elif isinstance(kernel, EncodeArtifact):
             self._encode(kernel, np.zeros((len(kernel.planes), *size), np.float32), 1)
         else:
@@ -296,12 +300,38 @@ class Executor(ABC):
         with self._session((part.rows, part.width)), ExitStack() as made:
             sums = self._memory(SUMS, self.sums_shape(kernel, part))
             made.callback(self._release, sums)
-            self._follow(kernel, part, sums)
+            self._follow(kernel, part, {SUMS: sums})
             return self._fetch(SUMS, sums)[:, : part.rows, : part.width]
 
-    def _follow(self, kernel: PathArtifact, part: Part, sums: Memory) -> None:
-        """Start a built kernel, whose sums go to memory of [`sums_shape`]."""
-        self._start(kernel, self._built[kernel.digest].prepared, {SUMS: sums}, part.integers)
+    def paint(self, kernel: PathArtifact, part: Part) -> Images:
+        """Return the encoded images (H, W, C) of a part that is the whole picture, by name."""
+        self._check_target(kernel)
+        if (part.first_row, part.rows) != (0, part.height):
+            rows = f"{part.first_row} to {part.first_row + part.rows} of {part.height}"
+            rule = "a kernel that writes encoded images does the whole picture"
+            raise InputError("rows of the picture", rows, rule, "trace the part by a kernel of sums")
+        self.build(kernel)
+        return self._paint(kernel, part)
+
+    def _paint(self, kernel: PathArtifact, part: Part) -> Images:
+        """Run a built kernel that writes images."""
+        size = part.rows, part.width
+        with self._session(size), ExitStack() as made:
+            written = self._images(kernel.images, size, made)
+            self._follow(kernel, part, {f"{IMAGE}{name}": memory for name, memory in written.items()})
+            return {name: self._fetch(f"{IMAGE}{name}", memory) for name, memory in written.items()}
+
+    def _images(self, images: Sequence[Image], size: Size, made: ExitStack) -> dict[str, Memory]:
+        """Return memory for images by name, which `made` gives back."""
+        written = {}
+        for image in images:
+            written[image.name] = self._memory(f"{IMAGE}{image.name}", (*size, image.channels))
+            made.callback(self._release, written[image.name])
+        return written
+
+    def _follow(self, kernel: PathArtifact, part: Part, written: Mapping[str, Memory]) -> None:
+        """Start a built kernel, whose sums go to memory of [`sums_shape`], or its images to theirs."""
+        self._start(kernel, self._built[kernel.digest].prepared, written, part.integers)
 
     def encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
         """Return the encoded images (H, W, C) of sums (planes, H, W) over so many samples, by name."""
@@ -321,10 +351,8 @@ class Executor(ABC):
         """Run a built kernel."""
         size = sums.shape[1:]
         with self._session((size[0], size[1])), ExitStack() as made:
-            given, written = self._stored(SUMS, sums, made), dict[str, Memory]()
-            for image in kernel.images:
-                written[image.name] = self._memory(f"{IMAGE}{image.name}", (*size, image.channels))
-                made.callback(self._release, written[image.name])
+            given = self._stored(SUMS, sums, made)
+            written = self._images(kernel.images, (size[0], size[1]), made)
             self._turn(kernel, given, written, samples)
             return {name: self._fetch(f"{IMAGE}{name}", memory) for name, memory in written.items()}
 

@@ -92,6 +92,7 @@ class OpenCLExecutor(Executor):
     """One OpenCL device with its queue."""
 
     name = "opencl"
+    paints = True
     homes = (BLOCK,)  # constant memory is a buffer to whoever calls
 
     def __init__(self, device: str | None = None) -> None:

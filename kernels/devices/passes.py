@@ -32,10 +32,7 @@ class Passes:
         self.encoder, self.denoiser, self.size = encode, denoise, size
         self._executor, self._sums = executor, Memory((), None)
         with executor._session(size), ExitStack() as made:
-            self._images = {
-                image.name: self._made(f"{IMAGE}{image.name}", (*size, image.channels), made)
-                for image in encode.images
-            }
+            self._images = executor._images(encode.images, size, made)
             self._written = [self._made(RESULT, shape, made) for shape in shapes(denoise, size)]
             self._giving_back = made.pop_all()
 
@@ -46,15 +43,23 @@ class Passes:
         return memory
 
     def trace(self, kernel: PathArtifact, part: Part) -> None:
-        """Start the paths of a part that is the whole picture, by a kernel with the encoder's planes."""
+        """Start the paths of a part that is the whole picture, by a kernel with the encoder's planes.
+
+        One that writes encoded images leaves nothing to encode.
+        """
         executor = self._executor
         executor.build(kernel)
+        if kernel.images:
+            written = {f"{IMAGE}{image.name}": self._images[image.name] for image in kernel.images}
+            with executor._session(self.size):
+                executor._follow(kernel, part, written)
+            return
         shape = executor.sums_shape(kernel, part)
         with executor._session(self.size):
             if shape != self._sums.shape:
                 self._drop_sums()
                 self._sums = executor._memory(SUMS, shape)
-            executor._follow(kernel, part, self._sums)
+            executor._follow(kernel, part, {SUMS: self._sums})
 
     def encode(self, samples: int) -> None:
         """Start the encoding of sums over so many samples."""

@@ -2,7 +2,7 @@
 
 1. Three kernels of one executor: the scene's paths, which add up the planes that the features need; the
    encoding of the features, traced from the reference (compiler/scenes/lower_encode.py); the model's denoiser
-   [`Pipeline`].
+   [`Pipeline`]. On a processor the encoding is the end of the paths' kernel.
 2. [`Pipeline.draw`] starts them one after another. Sums, feature images and the result stay on the device
    (kernels/devices/passes.py).
 3. The result is read back, and other images only on request [`Pipeline.picture`], [`Pipeline.image`].
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.compile import compile_plan
-from ...compiler.scenes.encode_kernel import compile_encode
+from ...compiler.scenes.encode_kernel import compile_encode, encoding_of
 from ...compiler.scenes.lower_encode import layers_of
 from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
@@ -45,7 +45,7 @@ class Pipeline:
     by the kernel of render_on.py, which writes more than is needed: one to compile where both are used. A
     `variant` of the model has fewer operations [variants.py]. So many `pictures` are to come: what compiles
     long may pay [tune.py]. The kernels are `path`, `encode` and `denoise`; `passes` runs
-    them one by one.
+    them one by one. With `sums` the encoding is a kernel of its own on all devices.
     """
 
     def __init__(
@@ -61,6 +61,7 @@ class Pipeline:
         whole: bool = False,
         variant: str = FULL,
         pictures: int = 1,
+        sums: bool = False,
     ) -> None:
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
@@ -72,9 +73,14 @@ class Pipeline:
         self._settings = settings or Settings()
         self._features = tuple(dict.fromkeys((*model.features, *show)))
         check_features(self._features)
+        self._in_integers = model.is_whole
+        # A kernel of whole frames leaves sums, which are read in another way too.
+        painted = executor.paints and not whole and not sums
+        self._encoding = (
+            encoding_of(self._features, model.normalization, profile, model.is_whole) if painted else None
+        )
         self._whole = whole
         self.path = self._compiled(scene)
-        self._in_integers = model.is_whole
         self.encode = compile_encode(
             self._features, model.normalization, executor.name, profile, self.path.planes, model.is_whole
         )
@@ -90,7 +96,7 @@ class Pipeline:
         else:
             programs = lower_scene(scene, self._settings, most_unrolled(executor.name))
             groups = layers_of(self._features)
-            kernel = compile_path(programs, executor.name, profile, executor.lanes, groups)
+            kernel = compile_path(programs, executor.name, profile, executor.lanes, groups, self._encoding)
         executor.build(kernel)
         return kernel
 
@@ -106,7 +112,8 @@ class Pipeline:
             rule = f"a pipeline adds up in float32: at most {SAMPLES_AT_ONCE} paths per pixel"
             raise InputError("spp", spp, rule, "use fewer, or render_on and denoise_on")
         self.passes.trace(self.path, self.part(seed, spp, first_sample))
-        self.passes.encode(spp)
+        if not self.path.images:
+            self.passes.encode(spp)
         self.passes.denoise()
         self._drawn = True
 

@@ -12,11 +12,14 @@ from wamnet.compiler.core import ir
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
-from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
+from wamnet.compiler.scenes.encode_kernel import compile_encode, encoding_of, error_at
+from wamnet.compiler.scenes.lower_encode import layers_of
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.variants import FULL, with_rank
 from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
 from wamnet.kernels.devices.executor import Part
-from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.render import Job
@@ -56,10 +59,13 @@ def model_of(kit):
     return make
 
 
-def traced(executor, pipeline, size, samples, seed):
-    """Return the sums (H, W) by plane that the pipeline's own path kernel leaves."""
+def traced(executor, model, name, case, seed):
+    """Return the sums (H, W) by plane that the path kernel leaves which writes them, and the encoding."""
+    size, samples = case
     part = Part(size[1], size[0], 0, size[0], 0, samples, seed)
-    return dict(zip(pipeline.path.planes, executor.trace(pipeline.path, part), strict=True))
+    with Pipeline(executor, scene(name), model, size, settings=SETTINGS, sums=True) as pipeline:
+        sums = executor.trace(pipeline.path, part)
+        return dict(zip(pipeline.path.planes, sums, strict=True)), pipeline.encode
 
 
 def frame_of(sums, samples, features):
@@ -89,8 +95,9 @@ def difference_bound(model, executor, images, errors):
     return found[index].high - found[index].low + 2 * found[index].read
 
 
+@pytest.mark.parametrize("sums", [False, True])
 @pytest.mark.parametrize("case", CASES)
-def test_the_pipeline_is_the_separate_way(executor, model_of, case):
+def test_the_pipeline_is_the_separate_way(executor, model_of, case, sums):
     """Feature images within the encoding's bound of the float64 ones, and the picture within what that costs.
 
     The float64 ones are made from means that were rounded to float32, and are rounded: twice the bound, which
@@ -98,11 +105,12 @@ def test_the_pipeline_is_the_separate_way(executor, model_of, case):
     """
     name, features, window, border, size, samples = CASES[case]
     model = model_of(features, window, border)
-    with Pipeline(executor, scene(name), model, size, settings=SETTINGS) as pipeline:
+    with Pipeline(executor, scene(name), model, size, settings=SETTINGS, sums=sums) as pipeline:
+        assert bool(pipeline.path.images) == (executor.paints and not sums)
         found = pipeline.run(seed=3, spp=samples)
         images = {feature: pipeline.image(feature) for feature in features}
-        sums = traced(executor, pipeline, size, samples, 3)
-        errors = error_at(pipeline.encode, sums, samples)
+    sums, encode = traced(executor, model, name, (size, samples), 3)
+    errors = error_at(encode, sums, samples)
     assert found.shape == (*size, 3)
     assert found.dtype == np.float32
     frame = frame_of(sums, samples, features)
@@ -124,8 +132,8 @@ def test_the_whole_separate_way(executor, model_of, case):
     model, job = model_of(features, size, border), Job(*shape[::-1], samples, 3, SETTINGS)
     with Pipeline(executor, scene(name), model, shape, settings=SETTINGS) as pipeline:
         found = pipeline.run(seed=3, spp=samples)
-        sums = traced(executor, pipeline, shape, samples, 3)
-        errors = error_at(pipeline.encode, sums, samples)
+    sums, encode = traced(executor, model, name, (shape, samples), 3)
+    errors = error_at(encode, sums, samples)
     frame = render_on(executor, scene(name), job).frame
     separate = denoise_on(executor, model, frame).image.astype(np.float64)
     wanted = {n: dataset.feature_image(frame, (n,), SCALES) for n in features}
@@ -136,6 +144,38 @@ def test_the_whole_separate_way(executor, model_of, case):
     assert whole.mean() >= 0.9  # on processors all are the same
     errors = {n: 2 * errors[n] + 2.0**-24 * np.abs(wanted[n]) for n in features}
     assert np.all((np.abs(found - separate) <= difference_bound(model, executor, wanted, errors))[whole])
+
+
+@pytest.mark.parametrize("lanes", [1, 4, 8, 16])
+@pytest.mark.parametrize("size", [(1, 1), (5, 15), (4, 16), (3, 17), (9, 33)])
+def test_images_at_the_end_of_paths_are_those_of_the_encoding(executor_named, lanes, size):
+    """PPL-12: within what both are off; C, whose functions are the same in both kernels, to the bit."""
+    part, features = Part(size[1], size[0], 0, size[0], 0, 2, 7), ("depth", "color", "normal")
+    programs = lower_scene(scene("minicubes"), SETTINGS)
+    for name in ("opencl", "c")[: 2 if lanes == 1 else 1]:
+        executor = executor_named(name)
+        sums_kernel = compile_path(programs, name, lanes=lanes, groups=layers_of(features))
+        sums = executor.trace(sums_kernel, part)
+        encode = compile_encode(features, SCALES, name, planes=sums_kernel.planes)
+        wanted = executor.encode(encode, sums, 2)
+        kernel = compile_path(
+            programs, name, "ieee", lanes, layers_of(features), encoding_of(features, SCALES)
+        )
+        found = executor.paint(kernel, part)
+        errors = error_at(encode, dict(zip(sums_kernel.planes, sums, strict=True)), 2)
+        for feature in features:
+            apart = np.abs(found[feature].astype(np.float64) - wanted[feature])
+            assert np.all(apart <= (0 if name == "c" else 2 * errors[feature]))
+
+
+def test_what_writes_encoded_images_is_refused_elsewhere(executor_named):
+    programs = lower_scene(scene("empty"), SETTINGS)
+    given = layers_of(("color",)), encoding_of(("color",), SCALES)
+    with pytest.raises(CompileError, match="write sums, not encoded images"):
+        compile_path(programs, "opengl", "ieee", 1, *given)
+    kernel = compile_path(programs, "opencl", "ieee", 1, *given)
+    with pytest.raises(InputError, match="rows of the picture is 0 to 3 of 4: a kernel"):
+        executor_named("opencl").paint(kernel, Part(4, 4, 0, 3, 0, 1, 0))
 
 
 def test_the_definition_is_the_composition(executor_named, model_of):
@@ -163,9 +203,9 @@ FAULTS = {
 def test_a_wrong_encoding_is_caught(executor_named, model_of, fault):
     executor, (name, features, size, border, shape, samples) = executor_named("opencl"), CASES[list(CASES)[1]]
     model = model_of(features, size, border)
-    with Pipeline(executor, scene(name), model, shape, settings=SETTINGS) as pipeline:
+    sums, _ = traced(executor, model, name, (shape, samples), 3)
+    with Pipeline(executor, scene(name), model, shape, settings=SETTINGS, sums=True) as pipeline:
         right = pipeline.run(3, samples)
-        sums = traced(executor, pipeline, shape, samples, 3)
         wanted = {n: pipeline.image(n) for n in features}
         errors = {n: 2 * e for n, e in error_at(pipeline.encode, sums, samples).items()}
         old, new = FAULTS[fault]

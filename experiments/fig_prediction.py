@@ -37,7 +37,7 @@ from lab.results import Results, Values
 from lab.tables import Column
 
 from wamnet.cli.files.images import read_png
-from wamnet.kernels.bench import peer_oidn
+from wamnet.kernels.bench.peers import peer_oidn
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats
 from wamnet.refimpl.network.denoise import Model

@@ -31,7 +31,7 @@ from lab.ground import Ground, judged, start, write_table
 from lab.results import Results, Values, fill
 from lab.tables import Column
 
-from wamnet.kernels.bench import peer_oidn
+from wamnet.kernels.bench.peers import peer_oidn
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats, Frame
 from wamnet.refimpl.network.train import PAPER, SHORT, Recipe

@@ -38,7 +38,7 @@ from wamnet.cli.files.outputs import write_text
 from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import open_executor
-from wamnet.kernels.bench.peer_oidn import filtered, prefiltered
+from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
 from wamnet.kernels.measure import in_turns
 from wamnet.kernels.run import tune
 from wamnet.kernels.run.denoise_on import images_of

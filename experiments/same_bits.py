@@ -40,7 +40,7 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.model_file import save_model
 from wamnet.compiler.variants import parse, vary
 from wamnet.kernels import open_executor
-from wamnet.kernels.bench import peer_onnxruntime
+from wamnet.kernels.bench.peers import peer_onnxruntime
 from wamnet.kernels.devices.executor import Executor
 from wamnet.kernels.export import tools
 from wamnet.kernels.export.check import digest_of

@@ -22,9 +22,9 @@ from ...compiler.targets import DENOISERS, TARGETS, schedule_named, target_named
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.network.denoise import Model
 from ..devices.images import Images
-from . import peer_oidn, peer_onnxruntime, peer_openvino, peer_tinygrad, peer_torch
 from .contender import FULL, IEEE, NO_CACHE, Contender, Opened, Tools, Variant
 from .cost import fused, sines_of
+from .peers import peer_oidn, peer_onnxruntime, peer_openvino, peer_tinygrad, peer_torch
 from .workload import Given
 
 EXACT = "exact"

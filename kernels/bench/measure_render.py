@@ -32,7 +32,7 @@ from ..devices.registry import open_executor
 from ..measure import environment
 from ..run.render_on import render_on
 from ..run.render_pool import render_parallel
-from . import peer_mitsuba
+from .peers import peer_mitsuba
 
 Frames = Callable[[int], Any]
 """From a seed to the colours (H, W, 3) of a frame."""

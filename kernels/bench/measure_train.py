@@ -23,7 +23,8 @@ from ...refimpl.frame import Frame
 from ...refimpl.network import dataset, train
 from ...refimpl.network.train import Recipe
 from ..devices.registry import open_executor
-from . import peer_torch, workload
+from . import workload
+from .peers import peer_torch
 
 SGEMM_SIZE = 2048
 """Rows and columns of the two matrices whose product is the measure: large enough for BLAS's full rate."""

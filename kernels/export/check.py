@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...compiler.core.ir import sha256
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from ..bench import peer_onnxruntime
+from ..bench.peers import peer_onnxruntime
 from ..devices.executor import Executor, Part
 from . import tools
 from .check_pair import SEED

@@ -11,7 +11,7 @@ from ...compiler.compile import AGAINST_WHOLE
 from ...refimpl.errors import ExecutorUnavailable
 from ...refimpl.network.dataset import FEATURES
 from ...refimpl.network.denoise import Model
-from ..bench import peer_onnxruntime
+from ..bench.peers import peer_onnxruntime
 
 TEXT = f"ONNX, operators {peer_onnxruntime.OPERATORS}: Conv and Sin nodes, dynamic height and width"
 """What a manifest says about the language."""

@@ -11,13 +11,13 @@ import budget
 import pytest
 
 PEERS = {
-    "torch": "kernels/bench/peer_torch.py",
-    "onnx": "kernels/bench/peer_onnxruntime.py",
-    "onnxruntime": "kernels/bench/peer_onnxruntime.py",
-    "openvino": "kernels/bench/peer_openvino.py",
-    "tinygrad": "kernels/bench/peer_tinygrad.py",
-    "pyoidn": "kernels/bench/peer_oidn.py",
-    "mitsuba": "kernels/bench/peer_mitsuba.py",
+    "torch": "kernels/bench/peers/peer_torch.py",
+    "onnx": "kernels/bench/peers/peer_onnxruntime.py",
+    "onnxruntime": "kernels/bench/peers/peer_onnxruntime.py",
+    "openvino": "kernels/bench/peers/peer_openvino.py",
+    "tinygrad": "kernels/bench/peers/peer_tinygrad.py",
+    "pyoidn": "kernels/bench/peers/peer_oidn.py",
+    "mitsuba": "kernels/bench/peers/peer_mitsuba.py",
 }
 """Packages that the benchmark compares with, and the only file of each."""
 

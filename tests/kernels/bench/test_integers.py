@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.variants import parse, vary
-from wamnet.kernels.bench import contenders, peer_onnxruntime, peer_openvino, workload
+from wamnet.kernels.bench import contenders, workload
 from wamnet.kernels.bench.accuracy import Crop
 from wamnet.kernels.bench.contender import Tools
+from wamnet.kernels.bench.peers import peer_onnxruntime, peer_openvino
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.denoise import Model, denoise
 

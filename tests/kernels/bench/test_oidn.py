@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from packages import needed
 
-from wamnet.kernels.bench.peer_oidn import prefiltered
+from wamnet.kernels.bench.peers.peer_oidn import prefiltered
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 

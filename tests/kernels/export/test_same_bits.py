@@ -9,7 +9,7 @@ import pytest
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.variants import parse, vary
-from wamnet.kernels.bench import peer_onnxruntime
+from wamnet.kernels.bench.peers import peer_onnxruntime
 from wamnet.kernels.export import check, targets
 from wamnet.kernels.export.host_runner import CRunner, CUDARunner, MetalRunner
 from wamnet.kernels.export.package import Request, export

@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.errors import ExecutorUnavailable
-from ...refimpl.network.activation import RELU, SINE
-from ...refimpl.network.dataset import FEATURES
-from ...refimpl.network.denoise import Model
-from ...refimpl.network.whole import COLOUR_STEPS, SINES, TURN, Whole
-from .contender import Contender, Opened, Tools, activation_in, told_as_missing
-from .cost import layered
-from .workload import Given
+from ....refimpl.errors import ExecutorUnavailable
+from ....refimpl.network.activation import RELU, SINE
+from ....refimpl.network.dataset import FEATURES
+from ....refimpl.network.denoise import Model
+from ....refimpl.network.whole import COLOUR_STEPS, SINES, TURN, Whole
+from ..contender import Contender, Opened, Tools, activation_in, told_as_missing
+from ..cost import layered
+from ..workload import Given
 
 OPERATORS = 17
 """Version of the operators: the graph uses none that is newer."""

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.network.activation import RELU, SINE
-from ...refimpl.network.denoise import Model
-from ...refimpl.network.siren import Siren
-from ...refimpl.network.train import Recipe
-from .contender import Contender, Opened, Tools, activation_in, told_as_missing
-from .cost import layered
-from .workload import Given
+from ....refimpl.network.activation import RELU, SINE
+from ....refimpl.network.denoise import Model
+from ....refimpl.network.siren import Siren
+from ....refimpl.network.train import Recipe
+from ..contender import Contender, Opened, Tools, activation_in, told_as_missing
+from ..cost import layered
+from ..workload import Given
 
 MODES = {"clamp": "replicate", "zero": "constant"}
 """Border rules as modes of `torch.nn.functional.pad`."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from ...refimpl.network.denoise import Model
-from .contender import Contender, Opened, Tools, told_as_missing
-from .cost import layered
+from ....refimpl.network.denoise import Model
+from ..contender import Contender, Opened, Tools, told_as_missing
+from ..cost import layered
+from ..workload import Given
 from .peer_onnxruntime import Run, at_first, quantised
-from .workload import Given
 
 
 def _open(tools: Tools, model: Model, size: int) -> Opened:

@@ -23,10 +23,10 @@ from typing import Any
 
 import numpy as np
 
-from ...refimpl.errors import ExecutorUnavailable, InputError
-from ...refimpl.light.scene import Box, Light, Quad, Room, Scene, Sphere
-from ...refimpl.light.shapes.quad import light_radiance
-from ...refimpl.light.transport import Settings
+from ....refimpl.errors import ExecutorUnavailable, InputError
+from ....refimpl.light.scene import Box, Light, Quad, Room, Scene, Sphere
+from ....refimpl.light.shapes.quad import light_radiance
+from ....refimpl.light.transport import Settings
 
 LEAST_LLVM = 16
 """First version of LLVM that compiles Dr.Jit's code for AVX-512; earlier ones end the process."""

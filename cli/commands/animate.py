@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -34,6 +35,7 @@ from ..reports import machine
 
 if TYPE_CHECKING:
     from ...kernels.devices.executor import Executor
+    from ...kernels.run.pipeline import Drawn
     from ...refimpl.frame import Frame
     from ...refimpl.light.render import Job
     from ...refimpl.light.scene import Scene
@@ -287,15 +289,18 @@ def draw_apart(
     """Render, denoise and write pictures, rendering and denoising on different devices."""
     from ...kernels import denoise_on
     from ...kernels.run.render_frame import render_frame
+    from ...kernels.run.render_on import Frames
     from ...refimpl.encoding import to_display
 
+    frames = Frames([shot.scene for shot in shots])
     for shot in shots:
-        frame = render_frame(renderer, shot.scene, shot.noisy, workers=None).frame
+        frame = render_frame(renderer, shot.scene, shot.noisy, workers=None, frames=frames).frame
         noisy = to_display(frame["color"], model.normalization.exposure_stops)
         denoised = denoise_on(executor, model, frame, variant=variant, pictures=len(shots)).image
         reference = None
         if shot.reference is not None:
-            reference = render_frame(renderer, shot.scene, shot.reference, workers=None).frame
+            job = shot.reference
+            reference = render_frame(renderer, shot.scene, job, workers=None, frames=frames).frame
         write_shot(shot, model, noisy, denoised, reference)
         yield
 
@@ -304,33 +309,44 @@ def draw_frames(
     shots: Sequence[Shot], model: Model, executor: Executor, renderer: str, variant: str
 ) -> Iterator[None]:
     """Render, denoise and write pictures by one pipeline, on the device that does both."""
-    from contextlib import ExitStack
-
     from ...kernels import Pipeline, render_on
 
-    with ExitStack() as stack:
-        pipeline = None
+    if not shots:
+        return
+    first = shots[0]
+    with Pipeline(
+        executor,
+        first.scene,
+        model,
+        (first.noisy.height, first.noisy.width),
+        settings=first.noisy.settings,
+        show=("color",),
+        whole=first.reference is not None,
+        variant=variant,
+        pictures=len(shots),
+        moving=[shot.scene for shot in shots],
+    ) as pipeline:
+        before: Callable[[], None] | None = None
         for shot in shots:
-            if pipeline is None:
-                size, whole = (shot.noisy.height, shot.noisy.width), shot.reference is not None
-                made = Pipeline(
-                    executor,
-                    shot.scene,
-                    model,
-                    size,
-                    settings=shot.noisy.settings,
-                    show=("color",),
-                    whole=whole,
-                    variant=variant,
-                    pictures=len(shots),
-                )
-                pipeline = stack.enter_context(made)
-            else:
-                pipeline.set_scene(shot.scene)
-            denoised = pipeline.run(shot.noisy.seed)
-            reference = render_on(executor, shot.scene, shot.reference).frame if shot.reference else None
-            write_shot(shot, model, pipeline.image("color"), denoised, reference)
+            pipeline.set_scene(shot.scene)
+            pipeline.draw(shot.noisy.seed)
+            drawn, frame = pipeline.later("color"), None
+            if shot.reference:
+                frame = render_on(executor, shot.scene, shot.reference, moment=pipeline.moment).frame
+            # The picture before is written while the device draws this one.
+            if before is not None:
+                before()
+                yield
+            before = partial(_write_drawn, shot, model, drawn, frame)
+        if before is not None:
+            before()
             yield
+
+
+def _write_drawn(shot: Shot, model: Model, drawn: Callable[[], Drawn], reference: Frame | None) -> None:
+    """Write a picture that a pipeline has drawn, when it is there."""
+    found = drawn()
+    write_shot(shot, model, found.images["color"], found.picture, reference)
 
 
 def write_shot(shot: Shot, model: Model, noisy: Any, denoised: Any, reference: Frame | None) -> None:

@@ -165,8 +165,9 @@ class C(Arguments):
 
     def _of_paths(self, kernel: Interface) -> list[str]:
         """Return the functions of a path kernel up to the statements of a pixel."""
-        name, arrays = self.entries[PATH], [array.name for array in kernel.arrays]
+        name = self.entries[PATH]
         listed = ", ".join(["const wamnet_part *part", *map(self.array_argument, kernel.arrays)])
+        given = ", ".join(["part", *(array.name for array in kernel.arrays), "column", "row"])
         one = f"{self.heading.format(entry=name)}({listed}, int column, int row)"
         return [
             "/* One pixel, in column `column` of row first_row + `row`. */",
@@ -179,7 +180,7 @@ class C(Arguments):
                 ("column", "row"),
                 ("part->width", "part->rows"),
                 ("++column", "++row"),
-                f"{name}(part, {', '.join(arrays)}, column, row);",
+                f"{name}({given});",
             ),
             "}",
             "",

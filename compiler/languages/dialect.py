@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ..core.ir import LEAST, Node
 from ..core.profiles import SineContract
-from .interface import BUFFER, DENOISE, ENCODE, INTEGERS, PATH, Interface
+from .interface import BUFFER, DENOISE, ENCODE, INTEGERS, PATH, SCENE_NUMBERS, Interface
 
 LONG_TABLE, TABLE_ROW = 200, 8
 """Length above which a constant table is written in rows, and the numbers of a row."""
@@ -35,14 +35,12 @@ class Parts:
     """What a kernel's first lines hold in addition to its interface.
 
     `top`: definitions and constant tables; `bounded`: an error bound is stated, and the language must keep
-    the order of operations; `max_depth`: scatterings of a path; `scene_vectors`: vectors of four that hold
-    the scene's numbers which are inputs.
+    the order of operations; `max_depth`: scatterings of a path.
     """
 
     top: str = ""
     bounded: bool = False
     max_depth: int = 0
-    scene_vectors: int = 0
 
 
 class Dialect:
@@ -54,8 +52,9 @@ class Dialect:
     `channels_per_result` go into several results; `indexes_results`: a variable may choose a result's
     channel. A path kernel follows `lanes` paths at once; where that is more than one, a value has a component
     for each, and `single` declares what is the same for all. `helpers`: functions that an operation calls, by
-    operation. `scene_number` reads a number of the scene that is an input; a language without it takes no
-    moving scene. `painted`: a channel of an image in a path kernel; a language without it writes sums.
+    operation. `scene_number` reads a number of the scene that is an input, by its `number`, or the `vector`
+    of four and the `component`; a kernel takes `most_numbers`, and callers read `said_numbers`. `painted`: a
+    channel of an image in a path kernel; a language without it writes sums.
     `integers_top`: lines that integers in vectors need at a kernel's top. `types` are those of
     values; `scalars` those of single numbers, where values are vectors.
     """
@@ -92,7 +91,9 @@ class Dialect:
     lane_numbers: str = "0u"
     any_lane: str = "{mask}"
     helpers: Mapping[str, str] = {}
-    scene_number: str = ""
+    said_numbers: str = f"{SCENE_NUMBERS}: {{count}} floats, after the sums in the list of arguments"
+    most_numbers: int = 2**16
+    scene_number: str = f"{SCENE_NUMBERS}[{{number}}]"
     integers_top: tuple[str, ...] = ()
     planes_per_buffer: int = 1
     max_planes: int = 2**16

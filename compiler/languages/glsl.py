@@ -10,13 +10,27 @@ from __future__ import annotations
 
 from ..core.profiles import SineContract
 from .dialect import Dialect, Parts
-from .interface import BLOCK, DENOISE, ENCODE, PATH, RESULT, UNSIGNED, WEIGHTS, WRITE, Interface
+from .interface import (
+    BLOCK,
+    DENOISE,
+    ENCODE,
+    PATH,
+    RESULT,
+    SCENE_NUMBERS,
+    UNSIGNED,
+    WEIGHTS,
+    WRITE,
+    Interface,
+)
 
 WEIGHT_TEXTURE_WIDTH = 1024
 """Texels in a row of the weight texture: every implementation takes 1024 rows of 1024, a million weights."""
 
 MOST_RESULTS = 8
 """Colour buffers that every implementation of OpenGL 3.3 draws into at once (MAX_DRAW_BUFFERS)."""
+
+MOST_UNIFORMS = 200
+"""Vectors of four uniforms for a scene's numbers: 224 are there everywhere (MAX_FRAGMENT_UNIFORM_VECTORS)."""
 
 ORDER_EXTENSION = "GL_ARB_gpu_shader5"
 """The extension of OpenGL 3.3 that brings `precise`."""
@@ -101,6 +115,9 @@ class GLSL(Dialect):
     channels_per_result = 4
     planes_per_buffer = 4
     max_planes = 4 * MOST_RESULTS
+    most_numbers = 4 * MOST_UNIFORMS
+    said_numbers = f"uniform vec4 {SCENE_NUMBERS}[]: {{count}} floats, four to a vector, the last one padded"
+    scene_number = f"{SCENE_NUMBERS}[{{vector}}].{{component}}"
     sum_store = "sums_{buffer}[{component}] = {value};"
     load = "PRECISE float {name} = texelFetch(sums_{buffer}, at, 0)[{component}];"
     image_store = "image_{image}[{channel}] = {value};"
@@ -170,9 +187,9 @@ class GLSL(Dialect):
 
     def path_begin(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return what follows the first lines of a path kernel."""
-        planes = int(kernel.arrays[0].shape[0])
+        planes, moving = int(kernel.arrays[0].shape[0]), kernel.named(SCENE_NUMBERS)
         outputs = range(-(-planes // self.planes_per_buffer))
-        scene = [f"uniform vec4 scene_numbers[{parts.scene_vectors}];"] if parts.scene_vectors else []
+        scene = [f"uniform vec4 {SCENE_NUMBERS}[{moving.quads}];"] if moving else []
         return [
             self.depth(parts),
             parts.top,

@@ -13,7 +13,7 @@ from ..core.profiles import SineContract
 from .c import C
 from .dialect import Parts
 from .glsl import GLSL
-from .interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Interface
+from .interface import BLOCK, DENOISE, ENCODE, PATH, SCENE_NUMBERS, WRITE, Array, Interface
 from .openings import Buffers
 
 GROUP = (8, 8)
@@ -50,6 +50,10 @@ SAID = {
 """How a kernel of each role is called."""
 
 
+NUMBERS_SAID = f"1 {SCENE_NUMBERS}: {{count}} floats"
+"""How the numbers of a scene are given."""
+
+
 class Declared(Buffers):
     """Languages whose buffers are declared with numbers, above a function without arguments."""
 
@@ -57,6 +61,7 @@ class Declared(Buffers):
     max_output_channels = 2**16
     pixel, weight, store = C.pixel, C.weight, C.store
     said = SAID
+    said_numbers = NUMBERS_SAID
 
     @abstractmethod
     def declared(self, kernel: Interface) -> list[str]:

@@ -58,7 +58,6 @@ class _ES(GLSL):
     indexes_results = False
     max_output_channels = 4 * MOST_BUFFERS
     max_planes = 4 * MOST_BUFFERS
-    scene_number = "scene_numbers[{vector}].{component}"
 
 
 class GLSLES(_ES):

@@ -23,6 +23,9 @@ BUFFER, BLOCK, TABLE = "buffer", "uniform", "inline"
 WEIGHTS, RESULT, SUMS, IMAGE = "weights", "result", "sums", "image_"
 """Names of arrays; an image's name follows the last one."""
 
+SCENE_NUMBERS = "scene_numbers"
+"""Name of the array of the numbers of a scene that are inputs of its path kernel."""
+
 UNSIGNED = ("first_sample", "seed_number")
 """Integers of 32 bits without a sign; all others have one."""
 
@@ -116,11 +119,15 @@ def denoiser(
     return Interface(DENOISE, tuple(found), tuple(integers))
 
 
-def paths(planes: int, integers: Sequence[str], images: Sequence[Image] = ()) -> Interface:
-    """Return what a path kernel is given: planes of sums, or the encoded images that it makes of them."""
+def paths(planes: int, integers: Sequence[str], numbers: int = 0, images: Sequence[Image] = ()) -> Interface:
+    """Return what a path kernel is given: what it writes, and numbers of the scene if any move.
+
+    It writes planes of sums, or the encoded images that it makes of them.
+    """
     written = [Array(f"{IMAGE}{image.name}", WRITE, ("rows", "width", image.channels)) for image in images]
     sums = Array(SUMS, WRITE, (planes, "rows", "width"))
-    return Interface(PATH, tuple(written) or (sums,), tuple(integers))
+    moving = [Array(SCENE_NUMBERS, READ, (numbers,))] if numbers else []
+    return Interface(PATH, (*(written or [sums]), *moving), tuple(integers))
 
 
 def encoding(planes: int, images: Sequence[Image], integers: Sequence[str]) -> Interface:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from ..core.profiles import SineContract
 from .c import C
 from .dialect import Parts
+from .glsl_buffers import NUMBERS_SAID
 from .interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Interface
 from .openings import Buffers
 
@@ -49,6 +50,7 @@ class Metal(Buffers):
     early = dict.fromkeys((DENOISE, PATH, ENCODE), ("width",))
     late = {DENOISE: ("height",), PATH: ("samples",)}
     max_output_channels = 2**16
+    said_numbers = NUMBERS_SAID
     table = "constant {type} {name}[{count}] = {{{values}}};"
     operations = {
         **C.operations,

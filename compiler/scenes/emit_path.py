@@ -120,18 +120,19 @@ class _Kernel(Lines):
         """Return the whole source."""
         self.tables = renamed_tables(self.programs)
         self.planes = planes(self.groups)
+        integers, numbers = self.dialect.integers[interface.PATH], len(self.programs.inputs)
         images = self.encoding.images if self.encoding else ()
-        self.kernel = interface.paths(len(self.planes), self.dialect.integers[interface.PATH], images)
+        self.kernel = interface.paths(len(self.planes), integers, numbers, images)
         self.shared = self.dialect.shared(self.kernel)
         if len(self.planes) > self.dialect.max_planes:
             raise CompileError(
                 f"the kernel adds up {len(self.planes)} planes: {self.dialect.language} writes at most "
                 f"{self.dialect.max_planes}; ask for fewer groups"
             )
-        if self.programs.inputs and not self.dialect.scene_number:
+        if len(self.programs.inputs) > self.dialect.most_numbers:
             raise CompileError(
-                f"{self.dialect.language}: its path kernels take no numbers of the scene; only those of web "
-                "pages do: compile the scene at one time"
+                f"{self.dialect.language}: its path kernels take at most {self.dialect.most_numbers} numbers "
+                f"of the scene, and {len(self.programs.inputs)} move: compile fewer moments of it, or one"
             )
         if images and not self.dialect.painted:
             raise CompileError(
@@ -156,7 +157,6 @@ class _Kernel(Lines):
         return Parts(
             top="\n".join([*constants, *helpers, *self.dialect.image_helpers(self.kernel)]),
             max_depth=self.programs.settings.max_depth,
-            scene_vectors=-(-len(self.programs.inputs) // 4),
         )
 
     def _operations(self) -> set[str]:
@@ -266,11 +266,12 @@ class _Kernel(Lines):
         return self.dialect.splat(self.dialect.cast("float32", integer), "float32")
 
     def _scene_numbers(self) -> dict[str, str]:
-        """Return the text of each of the scene's numbers that are inputs."""
-        return {
-            name: self.dialect.scene_number.format(vector=number // 4, component="xyzw"[number % 4])
-            for number, name in enumerate(self.programs.inputs)
-        }
+        """Return the text of each of the scene's numbers that are inputs, in all lanes."""
+        dialect, found = self.dialect, {}
+        for number, name in enumerate(self.programs.inputs):
+            place = {"number": number, "vector": number // 4, "component": "xyzw"[number % 4]}
+            found[name] = dialect.splat(dialect.scene_number.format(**place), "float32")
+        return found
 
     # ---- one program -------------------------------------------------------------------------------------
 

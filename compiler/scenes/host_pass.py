@@ -28,7 +28,7 @@ class _ShadertoyPath(GLSLES):
     first: tuple[str, ...] = ()
     preamble = NO_PRECISE
     max_planes = 4
-    scene_number = ""
+    most_numbers = 0
     said = {PATH: "{planes}"}
     load = "float {name} = sums_0[{component}];"
     image_store = "image[{channel}] = {value};"

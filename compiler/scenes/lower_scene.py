@@ -31,7 +31,7 @@ from ..core.loops import MOST_UNROLLED
 from ..core.passes import pipeline
 from ..core.trace import Traced, trace
 from ..core.verify import verify
-from .scene_inputs import SceneInputs, lay_out
+from .scene_inputs import Places, SceneInputs, flattened, lay_out
 
 XYZ, RGB, NUMBER = ("_x", "_y", "_z"), ("_r", "_g", "_b"), ("",)
 """Endings of the names of a vector's, a colour's and a number's components."""
@@ -81,7 +81,8 @@ PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "elimina
 class PathPrograms:
     """The programs of one path in one scene; `alive`, `scatter`'s boolean, says whether it continues.
 
-    `inputs` are the names of the scene's numbers that all four are given [scene_inputs.py].
+    `inputs` are the names of the scene's numbers that all four are given [scene_inputs.py], `places` where
+    they are in its tables, `values` those of this scene.
     """
 
     scene: str
@@ -92,6 +93,8 @@ class PathPrograms:
     look: Program
     scatter: Program
     inputs: tuple[str, ...] = ()
+    places: tuple[Places, ...] = ()
+    values: tuple[float, ...] = ()
 
     def parts(self) -> Mapping[str, Program]:
         """Return the programs by name."""
@@ -109,21 +112,19 @@ def lower_scene(
     """Return the programs of a path through a scene, in float32.
 
     The primitives of a scene that has more than `most_unrolled` of them are tables and loops, else statements
-    for each; None unrolls any scene. A table of one row needs no loop. `keep_places`: nodes know
-    the lines of the reference that they came from, for listings. The numbers that are `moving` are inputs,
-    not constants.
+    for each; None unrolls any scene. A table of one row needs no loop. Numbers that are `moving` are inputs.
+    `keep_places`: nodes know the lines of the reference that they came from, for listings.
     """
-    laid = lay_out(scene, settings)
+    laid, moving = lay_out(scene, settings), moving or SceneInputs(settings, ())
     world_of = partial(_world, laid, moving)
 
     def start(given: Mapping[str, Any]) -> dict[str, Any]:
         # A pixel's counter, as in refimpl/light/render.py: pixel_counter.
         pixel = given["x"] + np.uint32(render.MAX_IMAGE_SIDE_PX) * given["y"]
         counters = Counters(given["seed"], pixel, given["sample_number"])
-        x, y = given["x"].astype(np.float32), given["y"].astype(np.float32)
-        size = given["width"], given["height"]
-        basis = (moving.opened(laid, given) if moving else laid)["camera"]
-        path = render.start(basis, x, y, *size, counters, np.float32, settings.sampler)
+        place = [*(given[n].astype(np.float32) for n in "xy"), given["width"], given["height"]]
+        basis = moving.opened(laid, given)["camera"]
+        path = render.start(basis, *place, counters, np.float32, settings.sampler)
         return {**_taken(PATH, path), "pixel": pixel}
 
     def arrive(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -131,8 +132,8 @@ def lower_scene(
         return {**_taken({"radiance": PATH["radiance"]}, path), **_taken(SURFACE, surface, hit)}
 
     def look(given: Mapping[str, Any]) -> dict[str, Any]:
-        surface, hit = _surface(given)
-        layers = render.first_hit_layers(world_of(given), surface, hit, _vector(given, "direction", XYZ))
+        toward = _vector(given, "direction", XYZ)
+        layers = render.first_hit_layers(world_of(given), *_surface(given), toward)
         return {
             name: value for layer, (ends, _) in LAYERS.items() for name, value in _split(layer, ends, layers)
         }
@@ -143,9 +144,9 @@ def lower_scene(
         path, alive = transport.scatter(world_of(given), _path(given), surface, hit, given["depth"], counters)
         return {**_taken(PATH, path), "alive": alive}
 
-    numbers = {**dict.fromkeys(("x", "y", "seed", "sample_number"), (NUMBER, COUNTER))}
+    numbers = dict.fromkeys(("x", "y", "seed", "sample_number"), (NUMBER, COUNTER))
     size, depth = dict.fromkeys(("width", "height"), (NUMBER, FLOAT)), {"depth": (NUMBER, COUNTER)}
-    scene_numbers = dict.fromkeys(moving.names if moving else (), (NUMBER, FLOAT))
+    scene_numbers = dict.fromkeys(moving.names, (NUMBER, FLOAT))
     few = most_unrolled is None or primitives(scene) <= most_unrolled
     lowered = partial(_lowered, most_unrolled=None if few else 1, keep_places=keep_places)
     return PathPrograms(
@@ -156,13 +157,15 @@ def lower_scene(
         lowered("arrive", arrive, {**PATH, **scene_numbers}),
         lowered("look", look, {**SURFACE, "direction": PATH["direction"], **scene_numbers}),
         lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, **depth, **scene_numbers}),
-        moving.names if moving else (),
+        moving.names,
+        moving.places,
+        tuple(map(float, moving.read(flattened(laid)))),
     )
 
 
-def _world(laid: dict[str, Any], moving: SceneInputs | None, given: Mapping[str, Any]) -> World:
+def _world(laid: dict[str, Any], moving: SceneInputs, given: Mapping[str, Any]) -> World:
     """Return the world, with those of its numbers that are inputs as they are given."""
-    world: World = (moving.opened(laid, given) if moving else laid)["world"]
+    world: World = moving.opened(laid, given)["world"]
     return world
 
 

@@ -17,7 +17,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...refimpl.errors import CompileError
+from ...refimpl.light.scene import Scene, primitives
 from ...refimpl.reading import SIZES
 from ..artifact import OneSource
 from ..compile import asdict_finite
@@ -33,6 +37,7 @@ from ..targets import integers_of, target_named
 from . import emit_path
 from .emit_path import Encoding
 from .lower_scene import PASSES, PathPrograms
+from .scene_inputs import SceneInputs, Tables
 
 SCHEMA = "wamnet-path-kernel-1"
 """Name and version of the manifest's form; described in spec/path_kernel.md."""
@@ -69,12 +74,30 @@ class PathArtifact(OneSource):
     @property
     def interface(self) -> Interface:
         """Return what the kernel is bound to, in its language."""
-        return interface.paths(len(self.planes), integers_of(self.target, interface.PATH), self.images)
+        integers, numbers = integers_of(self.target, interface.PATH), len(self.programs.inputs)
+        return interface.paths(len(self.planes), integers, numbers, self.images)
+
+    @property
+    def scene_numbers(self) -> NDArray[np.float32]:
+        """Return the numbers (n,) of the scene that was compiled, which are inputs."""
+        return np.array(self.programs.values, np.float32)
 
 
 def most_unrolled(target: str) -> int:
     """Return the number of primitives above which a scene becomes tables and loops on a target."""
     return target_named(target).unrolled
+
+
+def can_move(target: str, scene: Scene, tables: Tables, inputs: SceneInputs) -> bool:
+    """Tell whether one kernel of a target should take so many numbers of a scene that is laid out.
+
+    A language takes so many, and tables with inputs are not loops: where a target would make loops of a
+    scene's primitives, these do not move.
+    """
+    chosen = target_named(target)
+    if any(dialect and len(inputs.places) > dialect.most_numbers for dialect in chosen.paths.values()):
+        return False
+    return primitives(scene) <= chosen.unrolled or not inputs.move_rows(tables)
 
 
 def compile_path(
@@ -104,6 +127,8 @@ def compile_path(
     if images:
         arguments = f"{IMAGES};\n{arguments.partition('{planes};' + chr(10))[2]}"
     arguments = arguments.format(lanes=lanes, planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
+    if dialect and programs.inputs:
+        arguments += f".\n{dialect.said_numbers.format(count=len(programs.inputs))}"
     if dialect is None:
         text, suffix, entry = _printed(emitted, header), chosen.suffix, chosen.entry
     else:
@@ -122,10 +147,19 @@ def compile_path(
         **({"images": [image.facts for image in images]} if images else {"planes": list(planes)}),
         "sums": "; ".join(written),
         "arguments": arguments,
+        **({"numbers": numbers_of(programs)} if programs.inputs else {}),
     }
     name = f"path{suffix}"
     manifest = {**facts, **_identity(emitted, name, text)}
     return PathArtifact(target, profile, lanes, entry, text, name, emitted, planes, manifest, images)
+
+
+def numbers_of(programs: PathPrograms) -> list[dict[str, Any]]:
+    """Return what a manifest says of each number that is an input: its index, value and places in tables."""
+    return [
+        {"index": index, "value": value, "places": [{"table": t, "index": i} for t, i in places]}
+        for index, (value, places) in enumerate(zip(programs.values, programs.places, strict=True))
+    ]
 
 
 NAME_SHOWN = 60
@@ -151,6 +185,9 @@ def _header(
     `written` says what the numbers mean that are the result.
     """
     settings = [f"{key} {value}" for key, value in programs.settings.facts().items()]
+    fixed = "camera, time and all of the scene: another moment is another kernel"
+    if programs.inputs:
+        fixed = f"all of the scene but {len(programs.inputs)} numbers: {interface.SCENE_NUMBERS}"
     return [
         f"wamnet path tracer, {language}. Generated: change the compiler, not this text.",
         f"scene     {_harmless(programs.scene)}, digest {programs.scene_digest[:32]}",
@@ -158,7 +195,7 @@ def _header(
         f"schedule  {lanes} {'path' if lanes == 1 else 'paths'} at once",
         f"profile   {profile.name}: {profile.text}",
         "bound     none: a path's decisions may fall differently near an edge",
-        "fixed     camera, time and all of the scene: another moment is another kernel",
+        f"fixed     {fixed}",
         *(f"{'sums' if i == 0 else '':10}{line}" for i, line in enumerate(written)),
     ]
 

@@ -9,9 +9,11 @@ traced. Here some of their numbers are inputs:
 2. [`SceneInputs.opened`] puts traced inputs into their places before a program is traced.
 3. [`SceneInputs.values`] reads the numbers of a scene: in float64 computed, rounded once, as constants are.
    By definition, programs with these numbers as constants are those of the scene.
+4. A scene that is the first one with its own numbers in the inputs' places has the same programs
+   [`SceneInputs.fits`]; one that differs in more numbers takes more inputs [`SceneInputs.widened`].
 
-Scenes that differ in anything else (a primitive more, a box that is turned and one that is not) have
-different programs, and are refused.
+Scenes that differ in anything else (a primitive more, a box that is turned and one that is not) have another
+layout [`layout_of`] and different programs, and are refused.
 """
 
 from __future__ import annotations
@@ -32,18 +34,25 @@ from ...refimpl.light.transport import Settings
 PREFIX = "scene_"
 """How the inputs' names begin in programs: `scene_0`, `scene_1`, ..."""
 
+ROWS, SHARED = "world.geometry.groups.", ".rotation"
+"""How the paths of the tables of primitives begin, and how that of a rotation ends that a group shares."""
+
 Laid = TypeVar("Laid")
+
+Tables = Mapping[str, NDArray[Any]]
+"""The tables of a scene by path."""
+
+
+Places = tuple[tuple[str, int], ...]
+"""Places of one number: a table's path, `world.lights.radiance` or `camera.position`, and a flat index."""
 
 
 @dataclass(frozen=True)
 class SceneInputs:
-    """Which numbers are inputs: by input, the places that it has.
-
-    A place is a table's path, `world.lights.radiance` or `camera.position`, and an index into it, flat.
-    """
+    """Which numbers are inputs: by input, the places that it has."""
 
     settings: Settings
-    places: tuple[tuple[tuple[str, int], ...], ...]
+    places: tuple[Places, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -52,8 +61,45 @@ class SceneInputs:
 
     def values(self, scene: Scene) -> NDArray[np.float32]:
         """Return the numbers (n,) of a scene."""
-        tables = dict(_tables(lay_out(scene, self.settings)))
+        return self.read(tables_of(scene, self.settings))
+
+    def read(self, tables: Tables) -> NDArray[np.float32]:
+        """Return the numbers (n,) of a scene that is laid out."""
         return np.array([tables[path].reshape(-1)[index] for (path, index), *_ in self.places], np.float32)
+
+    def fits(self, first: Tables, other: Tables) -> bool:
+        """Tell whether a scene is the first one with its own numbers in the places of the inputs."""
+        if layout_of(first) != layout_of(other):
+            return False
+        filled = {path: np.array(table).reshape(-1) for path, table in first.items()}
+        for places, number in zip(self.places, self.read(other), strict=True):
+            for path, index in places:
+                filled[path][index] = number
+        return all(table.tobytes() == other[path].tobytes() for path, table in filled.items())
+
+    def move_rows(self, tables: Tables) -> bool:
+        """Tell whether an input is in a table that has a row for each of a group's primitives."""
+        paths = {path for places in self.places for path, _ in places if path.startswith(ROWS)}
+        return any(not (path.endswith(SHARED) and tables[path].ndim == 2) for path in paths)
+
+    def widened(self, rows: Sequence[Tables]) -> SceneInputs:
+        """Return inputs for scenes of one layout too, the first of which these inputs were found with.
+
+        Places that shared an input share one still if they are equal in all the scenes.
+        """
+        known = {place: number for number, places in enumerate(self.places) for place in places}
+        columns: dict[tuple[int, bytes], list[tuple[str, int]]] = {}
+        for path, table in rows[0].items():
+            if table.dtype != np.float32:
+                continue
+            together = np.stack([row[path].reshape(-1) for row in rows])
+            bits = together.view(np.uint32)
+            moves = np.any(bits != bits[0], axis=0)
+            for index, column in enumerate(together.T):
+                number = known.get((path, index), -1)
+                if moves[index] or number >= 0:
+                    columns.setdefault((number, column.tobytes()), []).append((path, index))
+        return SceneInputs(self.settings, tuple(tuple(places) for places in columns.values()))
 
     def opened(self, laid: Laid, given: Mapping[str, Any]) -> Laid:
         """Return a world and camera with the given traced inputs in their places."""
@@ -72,25 +118,32 @@ def lay_out(scene: Scene, settings: Settings) -> dict[str, Any]:
     }
 
 
+def tables_of(scene: Scene, settings: Settings) -> Tables:
+    """Return the tables of a scene by path; what is not a table is one whose bytes are its text."""
+    return flattened(lay_out(scene, settings))
+
+
+def flattened(laid: Mapping[str, Any]) -> Tables:
+    """Return the tables of what [`lay_out`] returns by path."""
+    return dict(_tables(laid))
+
+
+def layout_of(tables: Tables) -> tuple[Any, ...]:
+    """Return what scenes must have in common to be of one kernel: all but their floats."""
+    return tuple((path, *_kept(table)) for path, table in tables.items())
+
+
 def varying(scenes: Sequence[Scene], settings: Settings) -> SceneInputs:
     """Return the inputs of scenes that differ only in numbers."""
-    rows = [dict(_tables(lay_out(scene, settings))) for scene in scenes]
-    facts = [[(path, *_kept(table)) for path, table in row.items()] for row in rows]
-    for scene, fact in zip(scenes, facts, strict=True):
-        if fact != facts[0]:
+    rows = [tables_of(scene, settings) for scene in scenes]
+    layout = layout_of(rows[0])
+    for scene, row in zip(scenes, rows, strict=True):
+        if layout_of(row) != layout:
             raise CompileError(
                 f"scene {scene.name}: it is laid out in another way at some of the times or colours that one "
                 "kernel is to show: a kernel takes other numbers, not another layout; leave these out"
             )
-    columns: dict[bytes, list[tuple[str, int]]] = {}
-    for path, table in rows[0].items():
-        if table.dtype != np.float32:
-            continue
-        together = np.stack([row[path].reshape(-1) for row in rows])
-        for index, column in enumerate(together.T):
-            if not np.array_equal(column.view(np.uint32), np.full(len(rows), column[:1].view(np.uint32))):
-                columns.setdefault(column.tobytes(), []).append((path, index))
-    return SceneInputs(settings, tuple(tuple(places) for places in columns.values()))
+    return SceneInputs(settings, ()).widened(rows)
 
 
 def _kept(table: NDArray[Any]) -> tuple[Any, ...]:

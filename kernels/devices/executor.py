@@ -17,7 +17,7 @@ and copies the result back; the times that wamnet reports mean these two [`denoi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from types import TracebackType
@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.core.ir import Image
-from ...compiler.languages.interface import IMAGE, RESULT, SUMS, UNSIGNED, Interface
+from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS, UNSIGNED, Interface
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.schedules.emit import output_channels
@@ -167,6 +167,11 @@ class Executor(ABC):
     def _release(self, memory: Memory) -> None:
         """Give memory back."""
 
+    def _fetch_later(self, name: str, memory: Memory) -> Callable[[], NDArray[np.float32]]:
+        """Begin to copy a memory's content, and return what waits for it; the device may work on."""
+        content = self._fetch(name, memory)
+        return lambda: content
+
     def _finish(self) -> None:
         """Wait for what was started."""
 
@@ -289,21 +294,29 @@ class Executor(ABC):
             self._start(kernel, prepared, {**arrays, RESULT: result}, integers)
             images = {image.name: result for image in gather_of(artifact).images}
 
-    def trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
-        """Return the sums (planes, rows, width) over the samples of a part of an image."""
+    def trace(
+        self, kernel: PathArtifact, part: Part, numbers: NDArray[np.float32] | None = None
+    ) -> NDArray[np.float32]:
+        """Return the sums (planes, rows, width) over the samples of a part of an image.
+
+        `numbers` (n,) are those of the scene that are inputs of the kernel; None: those that it was compiled
+        with.
+        """
         self._check_target(kernel)
         self.build(kernel)
-        return self._trace(kernel, part)
+        return self._trace(kernel, part, numbers)
 
-    def _trace(self, kernel: PathArtifact, part: Part) -> NDArray[np.float32]:
+    def _trace(
+        self, kernel: PathArtifact, part: Part, numbers: NDArray[np.float32] | None = None
+    ) -> NDArray[np.float32]:
         """Run a built kernel."""
         with self._session((part.rows, part.width)), ExitStack() as made:
             sums = self._memory(SUMS, self.sums_shape(kernel, part))
             made.callback(self._release, sums)
-            self._follow(kernel, part, {SUMS: sums})
+            self._follow(kernel, part, {SUMS: sums, **self._moving(kernel, numbers, made)})
             return self._fetch(SUMS, sums)[:, : part.rows, : part.width]
 
-    def paint(self, kernel: PathArtifact, part: Part) -> Images:
+    def paint(self, kernel: PathArtifact, part: Part, numbers: NDArray[np.float32] | None = None) -> Images:
         """Return the encoded images (H, W, C) of a part that is the whole picture, by name."""
         self._check_target(kernel)
         if (part.first_row, part.rows) != (0, part.height):
@@ -311,15 +324,24 @@ class Executor(ABC):
             rule = "a kernel that writes encoded images does the whole picture"
             raise InputError("rows of the picture", rows, rule, "trace the part by a kernel of sums")
         self.build(kernel)
-        return self._paint(kernel, part)
+        return self._paint(kernel, part, numbers)
 
-    def _paint(self, kernel: PathArtifact, part: Part) -> Images:
+    def _paint(self, kernel: PathArtifact, part: Part, numbers: NDArray[np.float32] | None = None) -> Images:
         """Run a built kernel that writes images."""
         size = part.rows, part.width
         with self._session(size), ExitStack() as made:
             written = self._images(kernel.images, size, made)
-            self._follow(kernel, part, {f"{IMAGE}{name}": memory for name, memory in written.items()})
+            arrays = {f"{IMAGE}{name}": memory for name, memory in written.items()}
+            self._follow(kernel, part, {**arrays, **self._moving(kernel, numbers, made)})
             return {name: self._fetch(f"{IMAGE}{name}", memory) for name, memory in written.items()}
+
+    def _moving(
+        self, kernel: PathArtifact, numbers: NDArray[np.float32] | None, made: ExitStack
+    ) -> dict[str, Memory]:
+        """Return the memory of the scene's numbers, where they are inputs, which `made` gives back."""
+        if not kernel.programs.inputs:
+            return {}
+        return {SCENE_NUMBERS: self._stored(SCENE_NUMBERS, numbers_for(kernel, numbers), made)}
 
     def _images(self, images: Sequence[Image], size: Size, made: ExitStack) -> dict[str, Memory]:
         """Return memory for images by name, which `made` gives back."""
@@ -329,9 +351,9 @@ class Executor(ABC):
             made.callback(self._release, written[image.name])
         return written
 
-    def _follow(self, kernel: PathArtifact, part: Part, written: Mapping[str, Memory]) -> None:
+    def _follow(self, kernel: PathArtifact, part: Part, arrays: Mapping[str, Memory]) -> None:
         """Start a built kernel, whose sums go to memory of [`sums_shape`], or its images to theirs."""
-        self._start(kernel, self._built[kernel.digest].prepared, written, part.integers)
+        self._start(kernel, self._built[kernel.digest].prepared, arrays, part.integers)
 
     def encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
         """Return the encoded images (H, W, C) of sums (planes, H, W) over so many samples, by name."""
@@ -393,6 +415,21 @@ class Executor(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def numbers_for(kernel: PathArtifact, numbers: NDArray[np.float32] | None) -> NDArray[np.float32]:
+    """Return the numbers (n,) of a scene for a path kernel, those of its own scene by default."""
+    if numbers is None:
+        return kernel.scene_numbers
+    wanted = len(kernel.programs.inputs)
+    if numbers.dtype != np.float32 or numbers.shape != (wanted,):
+        raise InputError(
+            "numbers of the scene",
+            f"{numbers.dtype} of shape {numbers.shape}",
+            f"must be float32 of shape ({wanted},)",
+            "read them by the inputs that the kernel was compiled with",
+        )
+    return numbers.copy()
 
 
 def shapes(artifact: Artifact, size: Size) -> list[tuple[int, ...]]:

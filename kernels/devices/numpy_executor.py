@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.core.interpret import interpret
-from ...compiler.languages.interface import IMAGE, RESULT, SUMS
+from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.lower_encode import SAMPLES, channel_name
 from ...compiler.scenes.lower_scene import PathPrograms
@@ -25,6 +25,10 @@ from .images import Images, gather_of
 
 BLOCK_NUMBERS = 2**22
 """Numbers in the windows of one block of rows: 16 MiB in float32, for images of any height."""
+
+
+NONE = np.zeros(0, np.float32)
+"""The numbers of a scene that does not move."""
 
 
 class NumpyExecutor(Executor):
@@ -44,7 +48,7 @@ class NumpyExecutor(Executor):
     ) -> None:
         held = {name: memory.held for name, memory in arrays.items()}
         if isinstance(kernel, PathArtifact):
-            held[SUMS][:] = _traced(kernel, integers)
+            held[SUMS][:] = _traced(kernel, integers, held.get(SCENE_NUMBERS, NONE))
         elif isinstance(kernel, EncodeArtifact):
             for name, image in _encoded(kernel, held[SUMS], integers["sample_count"]).items():
                 held[f"{IMAGE}{name}"][:] = image
@@ -53,8 +57,10 @@ class NumpyExecutor(Executor):
             _denoised(kernel, np.concatenate(images, axis=-1), held[RESULT])
 
 
-def _traced(kernel: PathArtifact, integers: Mapping[str, int]) -> NDArray[np.float32]:
-    """Return the sums (planes, rows, width) of a part."""
+def _traced(
+    kernel: PathArtifact, integers: Mapping[str, int], numbers: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Return the sums (planes, rows, width) of a part, with these numbers of the scene."""
     shape = (integers["rows"], integers["width"])
     y, x = (a.astype(np.uint32) for a in np.indices(shape))
     state: dict[str, Any] = {
@@ -63,6 +69,7 @@ def _traced(kernel: PathArtifact, integers: Mapping[str, int]) -> NDArray[np.flo
         "seed": np.full(shape, integers["seed_number"], np.uint32),
         "width": np.float32(integers["width"]),
         "height": np.float32(integers["height"]),
+        **dict(zip(kernel.programs.inputs, numbers, strict=True)),
     }
     sums = {plane: np.zeros(shape, np.float32) for plane in kernel.planes}
     # Paths that have ended are computed on, and may leave the range of numbers.
@@ -102,7 +109,8 @@ def _denoised(artifact: Artifact, image: NDArray[np.float32], result: NDArray[np
 def follow(programs: PathPrograms, given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Follow paths; return the features of their first surfaces and their state in the end.
 
-    given holds the inputs of `start`: x, y, seed, sample_number (...), width and height.
+    given holds the inputs of `start`: x, y, seed, sample_number (...), width and height; and the scene's
+    numbers that are inputs of all programs.
     """
     state: dict[str, Any] = {**given, **interpret(programs.start, given)}
     state["alive"] = np.ones(state["x"].shape, bool)

@@ -21,7 +21,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.languages.interface import BLOCK, RESULT, WEIGHTS, Interface
+from ...compiler.languages.interface import BLOCK, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.training.step_kernel import StepKernel
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
@@ -233,7 +233,8 @@ class OpenCLExecutor(Executor):
 
     def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
         """Return a device buffer with the array's content; on a processor, the array's own memory."""
-        if not self._shares:
+        # A scene's numbers are the caller's to change while a kernel reads those of the last picture.
+        if not self._shares or name == SCENE_NUMBERS:
             return Memory(array.shape, self._copied(array))
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
         return Memory(array.shape, cl.Buffer(self._context, flags, hostbuf=np.ascontiguousarray(array)))
@@ -267,6 +268,18 @@ class OpenCLExecutor(Executor):
         )
         done.wait()
         return array
+
+    def _fetch_later(self, name: str, memory: Memory) -> Callable[[], NDArray[np.float32]]:
+        """Copy behind what was started before, and in front of what will be: the queue keeps its order."""
+        array = np.empty(memory.shape, np.float32)
+        copied = cl.enqueue_copy(self._queue, array, memory.held, is_blocking=False)
+        self._queue.flush()
+
+        def content() -> NDArray[np.float32]:
+            copied.wait()
+            return array
+
+        return content
 
     def _finish(self) -> None:
         self._queue.finish()

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.languages.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
-from ...compiler.languages.interface import SUMS, WEIGHTS, WRITE, Interface
+from ...compiler.languages.interface import SCENE_NUMBERS, SUMS, WEIGHTS, WRITE, Interface
 from ...compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
 from ...compiler.schedules.glsl_compute import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
@@ -88,6 +88,21 @@ class _Prepared:
     weights: Any
     interface: Interface
     tile: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True)
+class _Uniforms:
+    """Numbers that are uniforms, four to a vector: they reach the device when a kernel is drawn."""
+
+    numbers: NDArray[np.float32]
+
+    @property
+    def vectors(self) -> NDArray[np.float32]:
+        """Return the numbers (n, 4)."""
+        return self.numbers.reshape(-1, 4)
+
+    def release(self) -> None:
+        """Do nothing."""
 
 
 class OpenGLExecutor(Executor):
@@ -199,7 +214,9 @@ class OpenGLExecutor(Executor):
         return self._texture("weights", padded)
 
     def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
-        """Return an image as one texture, sums as textures of four planes each."""
+        """Return an image as one texture, sums as textures of four planes, a scene's numbers as they are."""
+        if name == SCENE_NUMBERS:
+            return Memory(array.shape, [_Uniforms(np.pad(array, (0, -len(array) % 4)))])
         if name != SUMS:
             return Memory(array.shape, [self._texture(name, array)])
         planes, made = np.pad(array, ((0, -len(array) % 4), (0, 0), (0, 0))), ExitStack()
@@ -251,7 +268,10 @@ class OpenGLExecutor(Executor):
             return
         if prepared.weights is not None:
             textures["weight_texture"] = prepared.weights
-        self._draw(prepared.program, prepared.triangle, targets, textures, self._values(integers))
+        values = dict(self._values(integers))
+        if SCENE_NUMBERS in arrays:
+            values[SCENE_NUMBERS] = arrays[SCENE_NUMBERS].held[0].vectors
+        self._draw(prepared.program, prepared.triangle, targets, textures, values)
 
     def _draw(
         self,
@@ -275,7 +295,7 @@ class OpenGLExecutor(Executor):
         left = {id(memory): list(memory.held) for memory in arrays.values()}
         named: dict[str, Any] = {}
         for array in taken.arrays:
-            if array.access == WRITE or array.name == WEIGHTS:
+            if array.access == WRITE or array.name in (WEIGHTS, SCENE_NUMBERS):
                 continue
             textures = left[id(arrays[array.name])]
             if array.name == SUMS:
@@ -305,7 +325,10 @@ class OpenGLExecutor(Executor):
             texture.use(units[name])
         for name, value in {**units, **values}.items():
             # A driver removes what the shader does not read, and its name with it.
-            if name in program:
+            if name in program and isinstance(value, np.ndarray):
+                # It may keep only the vectors up to the last one that is read.
+                program[name].write(value[: program[name].array_length].tobytes())
+            elif name in program:
                 program[name].value = value
 
     def _texture(self, name: str, array: NDArray[np.float32]) -> Any:

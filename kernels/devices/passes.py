@@ -8,6 +8,7 @@ anything to the host. Passes are ordered: each sees what the one before it has w
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
 
@@ -15,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.languages.interface import IMAGE, RESULT, SUMS
+from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
-from .executor import Executor, Memory, Part, Size, shapes
+from .executor import Executor, Memory, Part, Size, numbers_for, shapes
 from .images import images_of
 
 PICTURE = "picture"
@@ -31,6 +32,7 @@ class Passes:
     def __init__(self, executor: Executor, encode: EncodeArtifact, denoise: Artifact, size: Size) -> None:
         self.encoder, self.denoiser, self.size = encode, denoise, size
         self._executor, self._sums = executor, Memory((), None)
+        self._numbers, self._given = Memory((), None), np.zeros(0, np.float32)
         with executor._session(size), ExitStack() as made:
             self._images = executor._images(encode.images, size, made)
             self._written = [self._made(RESULT, shape, made) for shape in shapes(denoise, size)]
@@ -42,24 +44,35 @@ class Passes:
         made.callback(self._executor._release, memory)
         return memory
 
-    def trace(self, kernel: PathArtifact, part: Part) -> None:
+    def trace(self, kernel: PathArtifact, part: Part, numbers: NDArray[np.float32] | None = None) -> None:
         """Start the paths of a part that is the whole picture, by a kernel with the encoder's planes.
 
-        One that writes encoded images leaves nothing to encode.
+        One that writes encoded images leaves nothing to encode. `numbers` (n,): those of the scene that are
+        the kernel's inputs, by default those of its own scene.
         """
         executor = self._executor
         executor.build(kernel)
         if kernel.images:
             written = {f"{IMAGE}{image.name}": self._images[image.name] for image in kernel.images}
             with executor._session(self.size):
-                executor._follow(kernel, part, written)
+                executor._follow(kernel, part, {**written, **self._moving(kernel, numbers)})
             return
         shape = executor.sums_shape(kernel, part)
         with executor._session(self.size):
             if shape != self._sums.shape:
-                self._drop_sums()
+                self._sums = self._dropped(self._sums)
                 self._sums = executor._memory(SUMS, shape)
-            executor._follow(kernel, part, {SUMS: self._sums})
+            executor._follow(kernel, part, {SUMS: self._sums, **self._moving(kernel, numbers)})
+
+    def _moving(self, kernel: PathArtifact, numbers: NDArray[np.float32] | None) -> dict[str, Memory]:
+        """Return the memory of the scene's numbers, where they are inputs; the same are not written again."""
+        if not kernel.programs.inputs:
+            return {}
+        found = numbers_for(kernel, numbers)
+        if found.tobytes() != self._given.tobytes():
+            self._numbers = self._dropped(self._numbers)
+            self._numbers, self._given = self._executor._store(SCENE_NUMBERS, found), found
+        return {SCENE_NUMBERS: self._numbers}
 
     def encode(self, samples: int) -> None:
         """Start the encoding of sums over so many samples."""
@@ -84,6 +97,14 @@ class Passes:
                 return executor._fetch(RESULT, self._written[-1])
             return executor._fetch(f"{IMAGE}{name}", self._images[name])
 
+    def read_later(self, name: str) -> Callable[[], NDArray[np.float32]]:
+        """Begin to copy an image to the host, and return what waits for it: passes may start meanwhile."""
+        executor = self._executor
+        with executor._session(self.size):
+            if name == PICTURE:
+                return executor._fetch_later(RESULT, self._written[-1])
+            return executor._fetch_later(f"{IMAGE}{name}", self._images[name])
+
     def finish(self) -> None:
         """Wait until all passes that were started have ended; reading waits by itself."""
         with self._executor._session(self.size):
@@ -92,15 +113,15 @@ class Passes:
     def close(self) -> None:
         """Give the images back."""
         with self._executor._session():
-            self._drop_sums()
+            self._sums, self._numbers = self._dropped(self._sums), self._dropped(self._numbers)
             self._giving_back.close()
         self._images, self._written = {}, []
 
-    def _drop_sums(self) -> None:
-        """Give the sums back, if there are any."""
-        old, self._sums = self._sums, Memory((), None)
+    def _dropped(self, old: Memory) -> Memory:
+        """Give memory back, if there is any, and return none."""
         if old.shape:
             self._executor._release(old)
+        return Memory((), None)
 
     def __enter__(self) -> Any:
         return self

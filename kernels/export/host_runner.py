@@ -212,7 +212,7 @@ class CRunner(HostRunner):
         call = f"{function.get(kernel.entry_point, kernel.entry_point)}({', '.join([*arrays, *integers])});"
         if kernel.interface.role == PATH:
             part = f"const wamnet_part part = {{{', '.join(integers)}}};"
-            call = f"{part}\n    wamnet_trace(&part, {arrays[0]});"
+            call = f"{part}\n    wamnet_trace(&part, {', '.join(arrays)});"
         head = "void wamnet_call(const int *sizes, float *const *buffers, int columns, int rows)"
         return (
             f'#include "kernel.txt"\n{head};\n{head}\n{{\n    (void)columns;\n    (void)rows;\n'

@@ -27,6 +27,7 @@ from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_plan
 from ...compiler.core.ir import digest, sha256
 from ...compiler.core.lower import lower
+from ...compiler.languages.glsl import MOST_UNIFORMS
 from ...compiler.languages.glsl_es import MOST_BUFFERS
 from ...compiler.plan import plan_program
 from ...compiler.scenes.encode_kernel import compile_encode
@@ -81,9 +82,6 @@ COMPUTED = ("camera.", "world.lights.")
 
 TOLD = ("trained_on_scene", "steps_done")
 """What of a model's info a page repeats."""
-
-MOST_UNIFORMS = 200
-"""Vectors of four uniforms for the scene: 224 are there everywhere (MAX_FRAGMENT_UNIFORM_VECTORS)."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,9 @@
    [`Pipeline`]. On a processor the encoding is the end of the paths' kernel.
 2. [`Pipeline.draw`] starts them one after another. Sums, feature images and the result stay on the device
    (kernels/devices/passes.py).
-3. The result is read back, and other images only on request [`Pipeline.picture`], [`Pipeline.image`].
+3. The result is read back, and other images only on request [`Pipeline.picture`], [`Pipeline.image`]. Of an
+   animation one picture is copied while the device draws the next one [`Pipeline.later`, `Pipeline.stream`].
+4. A scene that moves is other numbers for the same path kernel, and compiles nothing (moving.py).
 
 The definition is the composition of the three on the executor `numpy`. The separate way (render_on.py, then
 denoise_on.py) gives the same picture up to rounding: it encodes in float64 on the host. It refuses pictures
@@ -14,16 +16,19 @@ with a NaN or an infinity; here the encoding clips what can be clipped.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.compile import compile_plan
+from ...compiler.scenes.emit_path import FRAME_GROUPS
 from ...compiler.scenes.encode_kernel import compile_encode, encoding_of
 from ...compiler.scenes.lower_encode import layers_of
 from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
+from ...compiler.scenes.scene_inputs import SceneInputs
 from ...compiler.variants import FULL, plan_model
 from ...refimpl.errors import InputError
 from ...refimpl.light.render import Job
@@ -34,17 +39,28 @@ from ...refimpl.network.denoise import Model, check_model
 from ...refimpl.network.whole import INPUT_LEVELS
 from ..devices.executor import Executor, Part
 from ..devices.passes import PICTURE
-from .render_on import SAMPLES_AT_ONCE, compile_scene
+from .moving import MovingPaths
+from .render_on import SAMPLES_AT_ONCE
 from .tune import choose
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A denoised picture (H, W, 3), display-encoded, and feature images (H, W, C) of it by name."""
+
+    picture: NDArray[np.float32]
+    images: Mapping[str, NDArray[np.float32]]
 
 
 class Pipeline:
     """A scene and a model on an open executor, for pictures of one size; a context manager.
 
     `show` names features that are to be readable in addition to the model's. With `whole`, paths are traced
-    by the kernel of render_on.py, which writes more than is needed: one to compile where both are used. A
-    `variant` of the model has fewer operations [variants.py]. So many `pictures` are to come: what compiles
-    long may pay [tune.py]. The kernels are `path`, `encode` and `denoise`; `passes` runs
+    by the kernel of render_on.py, which writes more than is needed: one to compile where both are used.
+    `moving` are scenes that [`set_scene`] will be given, or the numbers that are inputs: the path kernel is
+    then compiled once for all of them. A `variant` of the model has fewer operations [variants.py]. So many
+    `pictures` are to come: what compiles long may pay [tune.py]. The kernels are `path`, `encode` and
+    `denoise`; `moment` is the path kernel with the scene's numbers; `passes` runs
     them one by one. With `sums` the encoding is a kernel of its own on all devices.
     """
 
@@ -62,6 +78,7 @@ class Pipeline:
         variant: str = FULL,
         pictures: int = 1,
         sums: bool = False,
+        moving: Sequence[Scene] | SceneInputs = (),
     ) -> None:
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
@@ -80,7 +97,8 @@ class Pipeline:
             encoding_of(self._features, model.normalization, profile, model.is_whole) if painted else None
         )
         self._whole = whole
-        self.path = self._compiled(scene)
+        self._paths = MovingPaths(executor.name, self._compiled, self._settings, moving)
+        self.set_scene(scene)
         self.encode = compile_encode(
             self._features, model.normalization, executor.name, profile, self.path.planes, model.is_whole
         )
@@ -88,21 +106,28 @@ class Pipeline:
         self._drawn = self._closed = False
         self.passes = executor.passes(self.encode, self.denoise, size)
 
-    def _compiled(self, scene: Scene) -> PathArtifact:
-        """Return the path kernel of a scene, built."""
+    def _compiled(self, scene: Scene, inputs: SceneInputs) -> PathArtifact:
+        """Return the path kernel of a scene, built; numbers of the scene are inputs of it."""
         executor, profile = self._executor, self._profile
-        if self._whole:
-            kernel = compile_scene(executor, scene, Job(1, 1, settings=self._settings), profile)
-        else:
-            programs = lower_scene(scene, self._settings, most_unrolled(executor.name))
-            groups = layers_of(self._features)
-            kernel = compile_path(programs, executor.name, profile, executor.lanes, groups, self._encoding)
+        programs = lower_scene(scene, self._settings, most_unrolled(executor.name), inputs)
+        groups = FRAME_GROUPS if self._whole else layers_of(self._features)
+        kernel = compile_path(programs, executor.name, profile, executor.lanes, groups, self._encoding)
         executor.build(kernel)
         return kernel
 
     def set_scene(self, scene: Scene) -> None:
-        """Continue with another scene, or another time of it: compiles its path kernel, the others stay."""
-        self.path = self._compiled(scene)
+        """Continue with another scene, or another time of it.
+
+        If it differs from those before in inputs of the path kernel, only these are new. If it differs in
+        more numbers they become inputs too, and the kernel is compiled once more; if it is laid out in
+        another way, its own kernel is compiled. Encoding and denoiser stay.
+        """
+        self.moment = self._paths.of(scene)
+
+    @property
+    def path(self) -> PathArtifact:
+        """Return the path kernel."""
+        return self.moment.kernel
 
     def draw(self, seed: int = 0, spp: int = 1, first_sample: int = 0) -> None:
         """Trace, encode and denoise a picture, on the device."""
@@ -111,7 +136,7 @@ class Pipeline:
         if spp > SAMPLES_AT_ONCE:
             rule = f"a pipeline adds up in float32: at most {SAMPLES_AT_ONCE} paths per pixel"
             raise InputError("spp", spp, rule, "use fewer, or render_on and denoise_on")
-        self.passes.trace(self.path, self.part(seed, spp, first_sample))
+        self.passes.trace(self.path, self.part(seed, spp, first_sample), self.moment.numbers)
         if not self.path.images:
             self.passes.encode(spp)
         self.passes.denoise()
@@ -130,23 +155,59 @@ class Pipeline:
 
         Of a network of integers it is what they stand for, steps of 1 / 127.
         """
-        if feature not in self._features:
-            known = ", ".join(self._features)
-            raise InputError("feature image", feature, f"there are {known}", "name it in show=")
-        found = self._read(feature)
-        return found / np.float32(INPUT_LEVELS) if self._in_integers else found
+        self._check_shown(feature)
+        return self._meant(self._read(feature))
+
+    def _meant(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return what a feature image stands for."""
+        return image / np.float32(INPUT_LEVELS) if self._in_integers else image
 
     def _read(self, name: str) -> NDArray[np.float32]:
         """Copy an image to the host."""
-        self._check_open()
-        if not self._drawn:
-            raise InputError("pipeline", "nothing drawn", "an image is read after it was drawn", "draw first")
+        self._check_drawn()
         return self.passes.read(name)
+
+    def later(self, *features: str) -> Callable[[], Drawn]:
+        """Begin to copy what was drawn last, with feature images; return what waits for it.
+
+        The next picture can be drawn before that is called: a device with a queue computes it meanwhile.
+        """
+        self._check_drawn()
+        for feature in features:
+            self._check_shown(feature)
+        picture = self.passes.read_later(PICTURE)
+        images = {feature: self.passes.read_later(feature) for feature in features}
+        return lambda: Drawn(picture(), {name: self._meant(image()) for name, image in images.items()})
+
+    def stream(self, scenes: Iterable[Scene], seeds: Iterable[int], spp: int = 1) -> Iterator[Drawn]:
+        """Yield the picture of each scene with its seed, in order; one more is being drawn meanwhile."""
+        before: Callable[[], Drawn] | None = None
+        for scene, seed in zip(scenes, seeds, strict=True):
+            self.set_scene(scene)
+            self.draw(seed, spp)
+            now = self.later()
+            if before is not None:
+                yield before()
+            before = now
+        if before is not None:
+            yield before()
 
     def run(self, seed: int = 0, spp: int = 1, first_sample: int = 0) -> NDArray[np.float32]:
         """Draw a picture and return it (H, W, 3)."""
         self.draw(seed, spp, first_sample)
         return self.picture()
+
+    def _check_shown(self, feature: str) -> None:
+        """Refuse a feature without an image."""
+        if feature not in self._features:
+            known = ", ".join(self._features)
+            raise InputError("feature image", feature, f"there are {known}", "name it in show=")
+
+    def _check_drawn(self) -> None:
+        """Refuse to read what was not drawn."""
+        self._check_open()
+        if not self._drawn:
+            raise InputError("pipeline", "nothing drawn", "an image is read after it was drawn", "draw first")
 
     def _check_open(self) -> None:
         """Refuse work without images."""

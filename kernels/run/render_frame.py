@@ -19,7 +19,7 @@ from ...refimpl.light.scene import Scene
 from ..devices.executor import Executor
 from ..devices.registry import open_executor
 from ..memory import keep_freed_memory
-from .render_on import render_on
+from .render_on import Frames, render_on
 from .render_pool import render_parallel
 
 Rows = tuple[int, int]
@@ -33,7 +33,13 @@ class RenderRows(Protocol):
     """Renders the rows of a job, on so many processes if it knows how."""
 
     def __call__(
-        self, scene: Scene, job: Job, rows: Rows, workers: int | None, on_progress: Progress | None
+        self,
+        scene: Scene,
+        job: Job,
+        rows: Rows,
+        workers: int | None,
+        on_progress: Progress | None,
+        frames: Frames | None,
     ) -> Render:
         """Return the rows [first, last) of the frame."""
 
@@ -47,9 +53,14 @@ class Renderer:
 
 
 def _reference(
-    scene: Scene, job: Job, rows: Rows, workers: int | None, on_progress: Progress | None
+    scene: Scene,
+    job: Job,
+    rows: Rows,
+    workers: int | None,
+    on_progress: Progress | None,
+    frames: Frames | None,
 ) -> Render:
-    """Render by the definition; only all rows together are shared among processes."""
+    """Render by the definition, which compiles nothing; only all rows together are shared among processes."""
     if rows == (0, job.height) and workers != 1:
         return render_parallel(scene, job, workers=workers, on_progress=on_progress)
     keep_freed_memory()
@@ -72,9 +83,14 @@ def _by_kernel(name: str) -> RenderRows:
     """Return how a device renders."""
 
     def render_rows(
-        scene: Scene, job: Job, rows: Rows, workers: int | None, on_progress: Progress | None
+        scene: Scene,
+        job: Job,
+        rows: Rows,
+        workers: int | None,
+        on_progress: Progress | None,
+        frames: Frames | None,
     ) -> Render:
-        return render_on(_device(name), scene, job, rows=rows, on_progress=on_progress)
+        return render_on(_device(name), scene, job, rows=rows, on_progress=on_progress, frames=frames)
 
     return render_rows
 
@@ -102,10 +118,12 @@ def render_frame(
     rows: Rows | None = None,
     workers: int | None = 1,
     on_progress: Progress | None = None,
+    frames: Frames | None = None,
 ) -> Render:
-    """Render a scene on an executor: all rows, or the band [first, last).
+    """Render a scene on an executor: all rows, or the band [first, last); `frames` may have its kernel.
 
     `workers` is the number of processes that may share the work, None one per processor; it changes no bit. A
     device shares the work by itself, with none.
     """
-    return renderer(executor).render_rows(scene, job, rows or (0, job.height), workers, on_progress)
+    band = rows or (0, job.height)
+    return renderer(executor).render_rows(scene, job, band, workers, on_progress, frames)

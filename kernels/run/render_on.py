@@ -1,6 +1,7 @@
 """Render a scene on an executor: trace, compile, follow the paths part by part, and add up.
 
-1. The scene's programs become a kernel for the executor's schedule [`compile_scene`].
+1. The scene's programs become a kernel for the executor's schedule [`compile_scene`]; scenes that are known
+   to come share one, if they differ only in numbers [`Frames`].
 2. A kernel adds up at most [`SAMPLES_AT_ONCE`] samples in float32; parts hold about [`PATHS_AT_ONCE`] paths,
    so that progress is seen and no driver takes a kernel for hanging.
 3. Sums of parts are added in float64, squared deviations by the formula of Chan, Golub and LeVeque,
@@ -12,7 +13,7 @@ rounding, and to paths whose decision fell differently by it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 from ...compiler.scenes.emit_path import GROUPS
 from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
+from ...compiler.scenes.scene_inputs import SceneInputs
 from ...refimpl.errors import InputError
 from ...refimpl.frame import LAYERS, Frame
 from ...refimpl.light.render import Job, Render, checked_rows, feature_job, render_info, with_own_features
@@ -30,6 +32,7 @@ from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 from ..devices.executor import Executor, Part
 from ..memory import keep_freed_memory
+from .moving import Moment, MovingPaths
 
 SAMPLES_AT_ONCE = 16
 """Most samples that are added up in float32: 15 roundings, a relative error below 1e-6."""
@@ -54,6 +57,27 @@ def _compiled(scene: Scene, settings: Settings, target: str, profile: str, lanes
     return compile_path(programs, target, profile, lanes)
 
 
+class Frames:
+    """The kernels of frames of some scenes: one for all that differ only in numbers [moving.py]."""
+
+    def __init__(self, scenes: Sequence[Scene]) -> None:
+        self._scenes = tuple(scenes)
+        self._paths: dict[tuple[str, int, str, Settings], MovingPaths] = {}
+
+    def of(self, executor: Executor, scene: Scene, settings: Settings, profile: str = "ieee") -> Moment:
+        """Return the kernel that renders a scene on an executor, and the scene's numbers."""
+        key = (executor.name, executor.lanes, profile, settings)
+        if key not in self._paths:
+            target, lanes = executor.name, executor.lanes
+
+            def compiled(scene: Scene, inputs: SceneInputs) -> PathArtifact:
+                programs = lower_scene(scene, settings, most_unrolled(target), inputs)
+                return compile_path(programs, target, profile, lanes)
+
+            self._paths[key] = MovingPaths(target, compiled, settings, self._scenes)
+        return self._paths[key].of(scene)
+
+
 def render_on(
     executor: Executor,
     scene: Scene,
@@ -62,25 +86,31 @@ def render_on(
     rows: tuple[int, int] | None = None,
     on_progress: Callable[[int], None] | None = None,
     profile: str = "ieee",
+    moment: Moment | None = None,
+    frames: Frames | None = None,
 ) -> Render:
     """Render the rows [first, last) of a scene on an executor, all by default, in float32.
 
-    on_progress is called with the number of samples that were just finished.
+    on_progress is called with the number of samples that were just finished. `moment`: the scene's kernel
+    with all planes of a frame, and its numbers, or `frames` that have it; by default it is compiled.
     """
     if job.dtype != "float32":
         raise InputError("dtype", job.dtype, "kernels compute in float32", "render with --executor numpy")
     if feature_job(job) is not None:
-        apart = partial(render_on, executor, scene, rows=rows, on_progress=on_progress, profile=profile)
-        return with_own_features(scene, job, apart)
+        options: dict[str, Any] = {"rows": rows, "on_progress": on_progress, "profile": profile}
+        return with_own_features(scene, job, partial(render_on, executor, scene, **options, frames=frames))
     first, last = checked_rows(job, rows)
-    kernel = compile_scene(executor, scene, job, profile)
+    if moment is None and frames is not None:
+        moment = frames.of(executor, scene, job.settings, profile)
+    kernel = compile_scene(executor, scene, job, profile) if moment is None else moment.kernel
+    numbers = None if moment is None else moment.numbers
     executor.build(kernel)
     keep_freed_memory()
     totals = Totals(0, np.zeros((len(kernel.planes), last - first, job.width)))
     for parts in sample_ranges(job, (first, last)):
         sums = []
         for part in parts:
-            sums.append(executor.trace(kernel, part))
+            sums.append(executor.trace(kernel, part, numbers))
             if on_progress is not None:
                 on_progress(part.rows * part.width * part.samples)
         totals = merge(

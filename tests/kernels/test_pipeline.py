@@ -149,7 +149,7 @@ def test_the_whole_separate_way(executor, model_of, case):
 @pytest.mark.parametrize("lanes", [1, 4, 8, 16])
 @pytest.mark.parametrize("size", [(1, 1), (5, 15), (4, 16), (3, 17), (9, 33)])
 def test_images_at_the_end_of_paths_are_those_of_the_encoding(executor_named, lanes, size):
-    """PPL-12: within what both are off; C, whose functions are the same in both kernels, to the bit."""
+    """PPL-13: within what both are off; C, whose functions are the same in both kernels, to the bit."""
     part, features = Part(size[1], size[0], 0, size[0], 0, 2, 7), ("depth", "color", "normal")
     programs = lower_scene(scene("minicubes"), SETTINGS)
     for name in ("opencl", "c")[: 2 if lanes == 1 else 1]:

@@ -178,6 +178,8 @@ class Machine:
             self.returned[-1] = self.value(value)
         if self.mask is self.entered:
             return True
+        if len(self.returned) > 1:
+            raise Unread("a function that some lanes leave before others")
         assert self.mask is not None
         self.lanes.active = self.lanes.active & ~self.mask
         return False
@@ -330,7 +332,8 @@ class Machine:
                 return literal(-found.literal, found.kind) if known else expression("negative", found)  # type: ignore[operator]
             return times(found, -1)
         if op == "!":
-            return ~found if isinstance(found, np.ndarray) else not found
+            found = self._truth(found)
+            return not found if isinstance(found, bool) else ~found
         if op == "+":
             return found
         raise Unread(f"operator {op}")
@@ -416,6 +419,8 @@ class Machine:
 
     def _value_choice(self, condition: Tree, then: Tree, otherwise: Tree) -> Any:
         found = self.value(condition)
+        if not isinstance(found, Number):
+            found = self._truth(found)
         if isinstance(found, bool):
             return self.value(then if found else otherwise)
         a, b = self.value(then), self.value(otherwise)

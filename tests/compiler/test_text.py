@@ -1,6 +1,7 @@
 """Reading kernels' texts: the compiler's own are accepted in each language, faults are not (spec/text.md)."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -133,6 +134,32 @@ def test_lanes_have_every_case_of_a_row():
     far = (y > 3) & (height - 1 - y > 3)
     cases = {(min(a, 4), min(b, 4)) for a, b in zip(x[far], (width - 1 - x)[far], strict=True)}
     assert cases == {(a, b) for a in range(5) for b in range(5)}
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("result[(y", "v5[0] = !(v5[0] < v5[1]) ? v5[1] : v5[0]; result[(y"),
+        ("result[(y", "v5[0] = !x ? v5[1] : v5[0]; result[(y"),
+        ("i < 3; ++i) {\n        result", "i < (x ? 3 : 2); ++i) {\n        result"),
+    ],
+)
+def test_the_opposite_of_a_number_is_no_constant(plain, old, new):
+    """A number of a picture, or a coordinate, was taken for true."""
+    name = re.findall(r"float (v\d+)\[3\];", plain[0])[-1]
+    with pytest.raises(Refused, match="branches on a number"):
+        run_text(*changed(plain, old, new.replace("v5", name)))
+
+
+def test_a_function_that_some_lanes_leave_is_not_read(plain):
+    """What it writes after that is written in the lanes that stay, and was taken for written in all."""
+    source, *others = plain
+    name = re.findall(r"float (v\d+)\[3\];", source)[-1]
+    helper = "void set(float *to, int x, float all) { if (x < 1) { return; } *to = all; }\n__kernel"
+    lost = f"float kept = {name}[0]; {name}[0] = 0.0f; set({name}, x, kept); result[(y"
+    source = source.replace("__kernel", helper, 1).replace("result[(y", lost, 1)
+    with pytest.raises(Unread, match="leave before others"):
+        run_text(source, *others)
 
 
 def test_constants_of_type_double_are_not_read(plain):

@@ -33,7 +33,7 @@ HALF, MASK = np.uint64(16), np.uint64(0xFFFF)
 """Half the bits of a field element, and which these are."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Number:
     """What a text holds in one variable, in all lanes: `value` (2, lanes) or (2, lanes, width).
 
@@ -85,11 +85,32 @@ FACTORS: dict[str, Words] = {}
 """The factors (lanes,) of "lanes" where sums are added up over them; empty where each lane has its own."""
 
 
+FOLDED: dict[str, NDArray[np.bool_]] = {}
+"""The "lanes" (lanes,) that count, where the numbers of all of them are kept as one; else empty."""
+
+
 def add_up_lanes(count: int | None) -> None:
     """Add up sums over so many lanes from now on; None for a sum of its own in each lane."""
     FACTORS.clear()
+    FOLDED.clear()
     if count is not None:
         FACTORS["lanes"] = hashed("factor", secrets.randbits(63), np.arange(count)) % P
+
+
+def fold_lanes(count: NDArray[np.bool_]) -> None:
+    """Keep what all lanes that count have in an array's element as one number from now on [`folded`]."""
+    add_up_lanes(1)
+    FOLDED["lanes"] = count
+
+
+def folded(known: Words) -> Words:
+    """Return one shape (...) for the shapes (lanes, ...) of a number in all lanes that count.
+
+    Numbers that differ in any lane have different ones, but with a probability of 2^-64.
+    """
+    at = np.flatnonzero(FOLDED["lanes"])
+    found: Words = hashed("lane", known[at], at.reshape((-1,) + (1,) * (known.ndim - 1))).sum(axis=0)
+    return found
 
 
 def added_up(value: Words, factors: Words) -> Words:
@@ -108,11 +129,22 @@ def added_up(value: Words, factors: Words) -> Words:
     return found % P
 
 
+SHIFTS, FACTOR, OTHER = (
+    tuple(np.array([30, 27, 31], dtype=np.uint64)),
+    np.uint64(0xBF58476D1CE4E5B9),
+    np.uint64(0x94D049BB133111EB),
+)
+"""The numbers of `mixed`."""
+
+
 def mixed(words: Words) -> Words:
     """Scramble 64 bits (Stafford's thirteenth variant of the finaliser of MurmurHash3)."""
-    words = (words ^ (words >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    words = (words ^ (words >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return words ^ (words >> np.uint64(31))
+    words = words ^ (words >> SHIFTS[0])
+    words *= FACTOR
+    words ^= words >> SHIFTS[1]
+    words *= OTHER
+    words ^= words >> SHIFTS[2]
+    return words
 
 
 SALT: dict[str, Any] = {}
@@ -194,12 +226,17 @@ def difference(a: Number, b: Number) -> Number:
 
 def expression(name: str, *operands: Number, commutes: bool = False, kind: str | None = None) -> Number:
     """Return what an operation makes of numbers: equal where name, kinds and operands are."""
-    kinds = {operand.kind for operand in operands}
-    parts = alike(*(operand.known for operand in operands))
-    if commutes:
-        parts = [np.minimum(*parts), np.maximum(*parts)]
-    name = f"{name} {'/'.join(sorted(kinds))}"
-    return leaf(hashed(name, *parts), kind or operands[-1].kind)
+    kinds = tuple([operand.kind for operand in operands])
+    parts = alike(*[operand.known for operand in operands])
+    key = f"{name} {kinds}"
+    if key not in SALT:
+        SALT[key] = hashed(f"{name} {'/'.join(sorted(set(kinds)))}", np.arange(2, dtype=np.uint64))
+    first, second = SALT[key]
+    # The sum of two shapes is that of no two others, but with a probability of 2^-64.
+    found = sum(parts[1:], parts[0]) if commutes else parts[0]
+    for part in [] if commutes else parts[1:]:
+        found = mixed(found + first) + part
+    return leaf(mixed(found ^ second), kind or operands[-1].kind)
 
 
 def choice(condition: Number, a: Number, b: Number) -> Number:
@@ -259,19 +296,34 @@ def part_of(value: Any, k: int | None) -> Any:
     return Number(given, shape, value.kind, value.weight, held=value.held, source=(value, k))
 
 
+def repeated(number: Number, width: int) -> Number:
+    """Return a vector that has a number `width` times."""
+    shape, given = (
+        None if part is None else np.repeat(part[..., None], width, axis=-1)
+        for part in (number.shape, number.given)
+    )
+    return Number(given, shape, number.kind, held=number.held)
+
+
 def stacked(parts: list[Number]) -> Number:
-    """Return a vector of numbers.
+    """Return a vector of numbers, and of vectors' numbers.
 
     Where sums are added up over lanes and one part is done, the others are: sums that nothing adds to.
     """
     if FACTORS and any(part.shape is not None and part.given is None for part in parts):
         parts = [leaf(part.known) if part.shape is None else part for part in parts]
-    known = [part.shape for part in parts if part.shape is not None]
-    size = max(part.value.shape[1] if part.shape is None else len(part.shape) for part in parts)
-    shape = None
-    if len(known) == len(parts):
-        shape = np.stack([np.broadcast_to(one, (size,)) for one in known], axis=-1)
+    shape, done = None, all(part.shape is not None for part in parts)
+    if done:
+        shape = _joined([np.asarray(part.shape)[None] for part in parts])[0]
         if all(part.given is None for part in parts):
             return Number(None, shape, parts[0].kind)
-    value = np.stack([np.broadcast_to(part.value, (2, size)) for part in parts], axis=-1)
-    return Number(value, shape, parts[0].kind, all(part.weight for part in parts))
+    return Number(_joined([part.value for part in parts]), shape, parts[0].kind, all(p.weight for p in parts))
+
+
+def _joined(parts: list[Words]) -> Words:
+    """Return arrays (rows, lanes) and (rows, lanes, n) behind each other, as many lanes as any has."""
+    lanes = max(part.shape[1] for part in parts)
+    wider = [part if part.ndim == 3 else part[..., None] for part in parts]
+    if any(part.shape[1] != lanes for part in wider):
+        wider = [np.broadcast_to(part, (len(part), lanes, part.shape[2])) for part in wider]
+    return np.concatenate(wider, axis=-1)

@@ -38,8 +38,37 @@ def group_lanes(group: tuple[int, int], pixels: int, window: int, seed: int) -> 
     group [`Place.against`]. Its distance from the right border is each that the group's pixels and the window
     reach, or far. So for rows, with the columns far from all borders. Last are groups at both axes' borders.
     """
-    random, steps = words(seed), (group[0] * pixels, group[1])
-    caps = steps[0] + window, steps[1] + window
+    steps = group[0] * pixels, group[1]
+    known, caps = _cases(steps, window, seed)
+    y, x = np.divmod(np.arange(group[0] * group[1]), group[0])
+    count = len(x) * len(known[0])
+    return Lanes(
+        np.repeat(known, len(x), axis=1), caps, np.ones(count, dtype=bool),
+        inside=np.tile([x, y], len(known[0])), steps=steps,
+    )  # fmt: skip
+
+
+def tile_lanes(steps: tuple[int, int], window: int, beyond: bool, seed: int) -> Lanes:
+    """Return work items of all cases, of so many columns and rows of pixels; `beyond` the picture too.
+
+    The cases are those of groups of as many pixels [`group_lanes`].
+    """
+    known, caps = _cases(steps, window, seed)
+    if beyond:
+        x, y = steps
+        more = [
+            (x, x, 5 * y, 9 * y),
+            (7 * x, 6 * x + 1, 0, 9),
+            (0, 9, y, y),
+            (5 * x, 9 * x, 3 * y, 2 * y + 1),
+        ]
+        known = np.concatenate([known, np.array(more).T], axis=1)
+    return Lanes(known, caps, np.ones(len(known[0]), dtype=bool), steps=steps)
+
+
+def _cases(steps: tuple[int, int], window: int, seed: int) -> tuple[NDArray[np.int64], tuple[int, int]]:
+    """Return x, width, y and height (4, cases) of all cases, and the largest constants for both axes."""
+    random, caps = words(seed), (steps[0] + window, steps[1] + window)
 
     def drawn(case: tuple[int | None, int | None], step: int) -> tuple[int, int]:
         before, behind = case
@@ -51,13 +80,7 @@ def group_lanes(group: tuple[int, int], pixels: int, window: int, seed: int) -> 
     for a, b, c, d in itertools.product((None, 0), (False, True), (None, 0), (False, True)):
         near = [1 + next(random) % (cap + 1) if at else None for at, cap in zip((b, d), caps, strict=True)]
         cases.append(((a, near[0]), (c, near[1])))
-    known = np.array([(*drawn(a, steps[0]), *drawn(b, steps[1])) for a, b in cases], dtype=np.int64).T
-    y, x = np.divmod(np.arange(group[0] * group[1]), group[0])
-    count = len(x) * len(cases)
-    return Lanes(
-        np.repeat(known, len(x), axis=1), caps, np.ones(count, dtype=bool),
-        inside=np.tile([x, y], len(cases)), steps=steps,
-    )  # fmt: skip
+    return np.array([(*drawn(a, steps[0]), *drawn(b, steps[1])) for a, b in cases], dtype=np.int64).T, caps
 
 
 class Shared:

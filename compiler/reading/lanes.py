@@ -96,7 +96,8 @@ class Place:
     def times(self, other: Any) -> Place:
         """Return the product with an integer."""
         if not isinstance(other, Place):
-            return Place(self.lanes, self.values * other, np.round(self.form * other, 9))
+            form, near = self.form * other, np.round(self.form * other)
+            return Place(self.lanes, self.values * other, np.where(np.abs(form - near) < 1e-9, near, form))
         for one, by in ((self, other), (other, self)):
             if not one.form.any() and len(set(one.values.tolist())) == 1:
                 return by.times(int(one.values[0]))

@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from . import together
 from .builtins import bits, choose
 from .field import (
+    FOLDED,
     Number,
     blended,
     choice,
@@ -28,7 +30,7 @@ from .field import (
 )
 from .groups import Group
 from .lanes import Lanes, Mask, Place, Unread, Wrong, plus, times
-from .memory import Memory, Pointer
+from .memory import Every, Memory, Pointer
 from .syntax import Text, Tree, Type, Variable
 
 COMPARES: dict[str, Callable[[Any], Any]] = {
@@ -47,6 +49,10 @@ BITS: dict[str, tuple[str, Callable[[int, int], int]]] = {
 """Operators of bits: a program's name of each, and what it makes of Python's integers."""
 
 
+MASK = ""
+"""Where a frame keeps the lanes that declare its variables, which no other lane sees: no name is empty."""
+
+
 class Machine:
     """Runs one text: `call(name, arguments)`; `outside` are the names that the text does not declare."""
 
@@ -61,6 +67,13 @@ class Machine:
     ) -> None:
         self.text, self.lanes, self.builtins, self.added = text, lanes, builtins, added
         self.group = group
+        names = [(name.split("_", 2), name) for name in dir(self) if name.startswith(("_run_", "_value_"))]
+        self.statements, self.forms = (
+            {form: getattr(self, name) for (_, group, form), name in names if group == kind}
+            for kind in ("run", "value")
+        )
+        self.constants: dict[str, Any] = {}
+        self.loops: dict[int, together.Loop | None] = {}
         self.mask = None
         self.entered: Mask | None = None
         self.base = 0
@@ -91,7 +104,7 @@ class Machine:
                 memory.store(k * type_.width, type_.width, one, self)
             given = held
         elif type_.width > 1 and not type_.pointer and not (isinstance(given, list) and not numbers(given)):
-            memory = Memory(variable.name, type_.width)
+            memory = Memory(variable.name, type_.width, self.mask)
             if given is not None:
                 memory.store(0, type_.width, stacked(given) if numbers(given) else given, self)
             given = Pointer(memory, 0, type_.width, ())
@@ -100,7 +113,7 @@ class Machine:
     def _memory(self, variable: Variable, size: int) -> Any:
         """Return an array of a text: each lane's, or its group's."""
         if not variable.shared:
-            return Memory(variable.name, size)
+            return Memory(variable.name, size, self.mask)
         if self.group is None:
             raise Unread("memory that a group shares, without groups")
         return self.group.share(variable.name, size)
@@ -133,6 +146,7 @@ class Machine:
         """Run a function of the text, and return its value."""
         function = self.text.functions[name]
         frame = {v.name: value for v, value in zip(function.takes, given, strict=True)}
+        frame[MASK] = self.mask
         outer = self.base, self.entered, self.lanes.active
         self.base, self.entered = len(self.frames), self.mask
         self.frames.append(frame)
@@ -148,11 +162,15 @@ class Machine:
 
     def run(self, tree: Tree) -> bool:
         """Run a statement; return whether it ended the function."""
-        return bool(getattr(self, f"_run_{tree[0]}")(*tree[1:]))
+        return bool(self.statements[tree[0]](*tree[1:]))
 
     def _run_block(self, statements: list[Tree]) -> bool:
-        self.frames.append({})
-        ended = any(self.run(statement) for statement in statements)
+        self.frames.append({MASK: self.mask})
+        ended = False
+        for statement in statements:
+            if self.run(statement):
+                ended = True
+                break
         self.frames.pop()
         return ended
 
@@ -165,7 +183,7 @@ class Machine:
 
     def _run_union(self, name: str, members: list[Variable]) -> None:
         sizes = {v.name: int(self.value(v.sizes[0])) for v in members}
-        memory = Memory(name, max(sizes[v.name] * v.type.width for v in members))
+        memory = Memory(name, max(sizes[v.name] * v.type.width for v in members), self.mask)
         self.frames[-1][name] = {v.name: Pointer(memory, 0, v.type.width, (sizes[v.name],)) for v in members}
 
     def _run_do(self, tree: Tree) -> None:
@@ -197,7 +215,14 @@ class Machine:
         return False
 
     def _run_for(self, start: Tree, condition: Tree, step: Tree, body: Tree) -> bool:
-        self.frames.append({})
+        if FOLDED:
+            if id(body) not in self.loops:
+                self.loops[id(body)] = together.read_loop(start, condition, step, body)
+            loop = self.loops[id(body)]
+            if loop and (turns := loop.apart(self)):
+                self._run_turns(loop, turns)
+                return False
+        self.frames.append({MASK: self.mask})
         self.run(start)
         outer, ended, turns = self.mask, False, 0
         while not ended:
@@ -222,6 +247,16 @@ class Machine:
         self.frames.pop()
         return ended
 
+    def _run_turns(self, loop: together.Loop, turns: int) -> None:
+        """Run all turns of a loop at once."""
+        self.frames.append({MASK: self.mask, loop.variable: Every(turns)})
+        for statement in loop.statements:
+            if statement[0] == "declare":
+                self.frames[-1][statement[1].name] = self.value(statement[2], statement[1].type)
+            else:
+                self.run(statement)
+        self.frames.pop()
+
     def _truth(self, value: Any) -> Any:
         if isinstance(value, (bool, int)):
             return bool(value)
@@ -233,7 +268,7 @@ class Machine:
 
     def value(self, tree: Tree, type_: Type | None = None) -> Any:
         """Return the value of an expression, as a type if one is given."""
-        found = getattr(self, f"_value_{tree[0]}")(*tree[1:])
+        found = self.forms[tree[0]](*tree[1:])
         if isinstance(found, Pointer) and found.sizes == ():
             found = found.load(self)
         return found if type_ is None else self.converted(found, type_)
@@ -264,6 +299,11 @@ class Machine:
         )
 
     def _value_number(self, text: str) -> Any:
+        if text not in self.constants:
+            self.constants[text] = self._constant(text)
+        return self.constants[text]
+
+    def _constant(self, text: str) -> Any:
         if text.startswith(("0x", "0X")) or not any(c in text for c in ".eEf"):
             return int(text.rstrip("uUi"), 0)
         return literal(float(text.rstrip("fF")), "float32")
@@ -291,13 +331,13 @@ class Machine:
     def _argument(self, tree: Tree, type_: Type) -> Any:
         if not type_.reference:
             return self.value(tree, type_)
-        found = getattr(self, f"_value_{tree[0]}")(*tree[1:])
+        found = self.forms[tree[0]](*tree[1:])
         if not isinstance(found, Pointer):
             raise Unread("a reference to what has no address")
         return found
 
     def _value_at(self, array: Tree, index: Tree) -> Any:
-        at, found = self.value(index), getattr(self, f"_value_{array[0]}")(*array[1:])
+        at, found = self.value(index), self.forms[array[0]](*array[1:])
         if isinstance(found, Pointer) and found.sizes:
             return found.at(at)
         if isinstance(found, Pointer):
@@ -305,7 +345,7 @@ class Machine:
         return found.component(at, self) if hasattr(found, "component") else part_of(found, at)
 
     def _value_of(self, whole: Tree, member: str) -> Any:
-        found = getattr(self, f"_value_{whole[0]}")(*whole[1:])
+        found = self.forms[whole[0]](*whole[1:])
         if isinstance(found, dict):
             return found[member]
         if isinstance(found, Pointer) and found.sizes in ((), (None,)) and member not in "xyzwrgba":
@@ -319,7 +359,7 @@ class Machine:
 
     def _value_unary(self, op: str, tree: Tree) -> Any:
         if op == "&":
-            found = getattr(self, f"_value_{tree[0]}")(*tree[1:])
+            found = self.forms[tree[0]](*tree[1:])
             if not isinstance(found, Pointer):
                 raise Wrong("it takes the address of what has none")
             return Pointer(found.memory, found.offset, found.width)
@@ -429,7 +469,7 @@ class Machine:
         return choose(self, found, a, b)
 
     def _value_assign(self, op: str, target: Tree, value: Tree) -> Any:
-        place = getattr(self, f"_value_{target[0]}")(*target[1:]) if target[0] != "name" else None
+        place = self.forms[target[0]](*target[1:]) if target[0] != "name" else None
         new = self.value(value)
         if numbers(new):
             new = new[0] if len(new) == 1 else stacked(new)
@@ -456,7 +496,7 @@ class Machine:
             new = self.operate(op, self.written(held, name), new)
         if isinstance(held, Number) and isinstance(new, (int, Number)):
             new = self.converted(new, Type(held.kind))
-        if self.mask is not None:
+        if self.mask is not None and self.mask is not frame.get(MASK):
             new = (
                 blended(new, held, self.mask)
                 if isinstance(new, Number)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .field import Number, blended, hashed, leaf, part_of, stacked, wide
-from .lanes import Place, Wrong, plus, times
+from .field import FOLDED, Number, blended, folded, hashed, leaf, part_of, repeated, stacked, wide
+from .lanes import Mask, Place, Wrong, plus, times
 
 if TYPE_CHECKING:
     from .claim import Claim
@@ -16,6 +16,13 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class Every:
+    """The index of a loop whose `turns` are run at once [together.py]."""
+
+    turns: int
+
+
+@dataclass(slots=True)
 class Pointer:
     """A place of `width` numbers in a memory; `sizes` of an array, (None,) of a pointer, () of a variable."""
 
@@ -26,6 +33,8 @@ class Pointer:
 
     def at(self, index: Any) -> Pointer:
         """Return the place of an element, within the array's own size where that is known."""
+        if isinstance(index, Every):
+            return Pointer(self.memory, self.offset, self.width * index.turns, ())
         if isinstance(index, int) and self.sizes[0] is not None and not 0 <= index < self.sizes[0]:
             raise Wrong(f"element {index} of an array of {self.sizes[0]}")
         step = self.width
@@ -43,11 +52,16 @@ class Pointer:
 
 
 class Memory:
-    """An array of a text: what was written, by offset; a vector is several numbers."""
+    """An array of a text: what was written, by offset; a vector is several numbers.
 
-    def __init__(self, name: str, size: int) -> None:
-        self.name, self.size = name, size
+    `vectors` are those at multiples of their width `unit` that have been written as a whole. `mask`:
+    the lanes that declare it; no other lane sees it.
+    """
+
+    def __init__(self, name: str, size: int, mask: Mask | None = None) -> None:
+        self.name, self.size, self.mask, self.unit = name, size, mask, 0
         self.cells: dict[int, tuple[Any, int | None]] = {}
+        self.vectors: dict[int, Number] = {}
 
     def _checked(self, offset: Any, width: int) -> int:
         if not isinstance(offset, int):
@@ -59,22 +73,57 @@ class Memory:
     def load(self, offset: Any, width: int, machine: Machine) -> Any:
         """Return `width` numbers that have been written."""
         offset = self._checked(offset, width)
+        if self.unit:
+            k = offset % self.unit
+            vector = self.vectors.get(offset - k)
+            if vector is not None and (width == 1 or (k == 0 and width == self.unit)):
+                return machine.written(part_of(vector, k) if width == 1 else vector, self.name)
+            whole = [self.vectors.get(at) for at in range(offset, offset + width, self.unit)]
+            if k == 0 and width % self.unit == 0 and all(whole):
+                return stacked([machine.written(vector, self.name) for vector in whole])
+            self._split(offset, width)
         cells = [self.cells.get(offset + k, (None, None)) for k in range(width)]
-        first = cells[0][0]
-        if width > 1 and wide(first) == width and all(cell == (first, k) for k, cell in enumerate(cells)):
-            return machine.written(first, self.name)
         parts = [machine.written(part_of(*cell), self.name) for cell in cells]
         return parts[0] if width == 1 else stacked(parts)
 
     def store(self, offset: Any, width: int, value: Any, machine: Machine) -> None:
         """Write `width` numbers, in the lanes that run."""
-        offset = self._checked(offset, width)
+        offset, mask = self._checked(offset, width), machine.mask
+        if mask is self.mask:
+            mask = None
+        if wide(value) not in (1, width):
+            raise Wrong(f"{self.name} is given {wide(value)} numbers for {width}")
+        number = isinstance(value, Number)
+        if FOLDED and number:
+            value, mask = self._folded(value, mask), None
+        if number and width > 1 and mask is None and offset % width == 0 and self.unit in (0, width):
+            self.unit = width
+            self.vectors[offset] = value if wide(value) == width else repeated(value, width)
+            return
+        if self.unit:
+            self._split(offset, width)
         for k in range(width):
             new: tuple[Any, int | None] = (value, k if width > 1 else None)
-            if machine.mask is not None:
+            if mask is not None:
                 old = self.cells.get(offset + k, (None, None))
-                new = (blended(part_of(*new), part_of(*old), machine.mask), None)
+                new = (blended(part_of(*new), part_of(*old), mask), None)
             self.cells[offset + k] = new
+
+    def _split(self, offset: int, width: int) -> None:
+        """Keep the vectors of these places as numbers."""
+        for at in range(offset - offset % self.unit, offset + width, self.unit):
+            vector = self.vectors.pop(at, None)
+            if vector is not None:
+                self.cells |= {at + k: (vector, k) for k in range(self.unit)}
+
+    @staticmethod
+    def _folded(value: Number, mask: Mask | None) -> Number:
+        """Return a number of all lanes as one; where some lanes only write it, others must not read it."""
+        if value.shape is not None and len(value.shape) > 1:
+            value = leaf(folded(value.shape)[None], value.kind, held=value.held)
+        if mask is None:
+            return value
+        return replace(value, held=mask if value.held is None else mask & value.held)
 
 
 class Image:
@@ -119,12 +168,12 @@ class Texel:
 
 
 class Weights:
-    """The weights, as a buffer; a texture of them has rows of `TEXELS`."""
+    """The weights, as a buffer; a texture of them has rows of `TEXELS`. Of `spectra` no sums are made."""
 
     TEXELS = 1024
 
-    def __init__(self, numbers: Number) -> None:
-        self.numbers = numbers
+    def __init__(self, numbers: Number, spectra: range = range(0)) -> None:
+        self.numbers, self.spectra = numbers, spectra
 
     def load(self, offset: Any, width: int, machine: Machine) -> Number:
         """Return numbers of the file."""
@@ -132,7 +181,8 @@ class Weights:
         if not isinstance(offset, int) or not 0 <= offset <= count - width:
             raise Wrong(f"the weights are read at {offset}: there are {count}")
         part = slice(offset, offset + width) if width > 1 else offset
-        return Number(self.numbers.value[..., part], self.numbers.known[..., part], weight=True)
+        weight = offset + width <= self.spectra.start or offset >= self.spectra.stop
+        return Number(self.numbers.value[..., part], self.numbers.known[..., part], weight=weight)
 
     def store(self, *given: Any) -> None:
         """Refuse."""

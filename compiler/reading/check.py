@@ -13,12 +13,13 @@ from ...refimpl.reading import read_file
 from ..proof.evidence import INTEGERS, Refused, read
 from .builtins import BUILTINS
 from .claim import Claim
-from .field import add_up_lanes
-from .groups import FLAGS, Group, group_lanes
+from .field import add_up_lanes, fold_lanes
+from .groups import FLAGS, Group, group_lanes, tile_lanes
 from .lanes import Place, Unread, Wrong, lanes_for
-from .languages import LANGUAGES, Language, parsed
+from .languages import LANGUAGES, Language, Stopped, parsed
 from .machine import Machine
 from .memory import Image, Memory, Pointer, Result, Weights
+from .spectra import Tiles
 from .syntax import Text, Variable
 
 LANES_SEED = 20261123
@@ -48,22 +49,27 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
     language, schedule = LANGUAGES.get(manifest["target"]), manifest["schedule"]
     if language is None:
         raise Unread(f"texts of target {manifest['target']}")
-    pixels, group = int(schedule.get("pixels", 1)), schedule.get("group")
+    pixels, rows, group = int(schedule.get("pixels", 1)), int(schedule.get("rows", 1)), schedule.get("group")
     if group and held["schema"] == INTEGERS:
         raise Unread("schedules of bytes")
     window, centre = int(manifest["window"]["size"]), int(manifest["window"]["centre"])
-    if group:
-        lanes = group_lanes((group[0], group[1]), pixels, window, LANES_SEED)
-    else:
-        cap = window + pixels if pixels > 1 else max(centre, window - centre) + 1
-        lanes = lanes_for(cap, pixels, beyond=not language.within, seed=LANES_SEED)
-    add_up_lanes(lanes.count if group else None)
     try:
-        claim = Claim(held, manifest, weights, lanes, pixels, group[0] if group else 1)
-        for compiler in language.compilers:
+        tiles = Tiles(held["spectra"], pixels, rows, window) if "spectra" in held else None
+        if tiles:
+            lanes = tile_lanes((pixels, rows), window, beyond=not language.within, seed=LANES_SEED)
+            fold_lanes((lanes.x < lanes.known[1]) & (lanes.y < lanes.known[3]))
+        elif group:
+            lanes = group_lanes((group[0], group[1]), pixels, window, LANES_SEED)
+            add_up_lanes(lanes.count)
+        else:
+            cap = window + pixels if pixels > 1 else max(centre, window - centre) + 1
+            lanes = lanes_for(cap, pixels, beyond=not language.within, seed=LANES_SEED)
+            add_up_lanes(None)
+        claim = Claim(held, manifest, weights, lanes, pixels, group[0] if group else 1, tiles)
+        texts = different(source, language)
+        for text in texts:
             claim.found.clear()
             lanes.active = np.ones(lanes.count, dtype=bool)
-            text = parsed(source, language, compiler)
             run_once(text, claim, manifest, language)
             if language.host:
                 check_host(text, language.host, manifest["entry_point"], claim)
@@ -73,7 +79,23 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
         raise Refused(f"text: it has no meaning to this reader ({error})") from error
     finally:
         add_up_lanes(None)
-    return {"sums": len(claim.tables), "lanes": lanes.count, "compilers": len(language.compilers)}
+    return {"sums": len(claim.tables) * claim.together, "lanes": lanes.count, "compilers": len(texts)}
+
+
+def different(source: str, language: Language) -> list[Text]:
+    """Return what a text is for a language's compilers, each once; those that stop at an error left out."""
+    found: list[Text] = []
+    for macros in language.compilers:
+        try:
+            text = parsed(source, language, macros)
+        except Stopped as error:
+            stopped = error
+            continue
+        if text not in found:
+            found.append(text)
+    if not found:
+        raise stopped
+    return found
 
 
 def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> None:
@@ -128,13 +150,13 @@ def arguments(claim: Claim, fragment: bool, result: Result, target: Memory) -> d
     lanes = claim.lanes
     x, width, y, height = (lanes.place(axis) for axis in range(4))
     images = {f"image_{name}": Image(name, int(n), (width, height)) for name, n in claim.images}
-    weights = Pointer(Weights(claim.weights), 0)
+    weights = Pointer(Weights(claim.weights, claim.tiles.range if claim.tiles else range(0)), 0)
     size = {"width": width, "height": height}
     given: dict[str, Any] = {
         **size, "size": size, **dict.fromkeys(("weights", "weight_texture", "w"), weights),
     }  # fmt: skip
     if lanes.inside is None:
-        given |= {"x": x, "y": y}
+        given |= {"x": x, "y": y, "tile_x": x, "tile_y": y}
     if fragment:
         return given | images | {"result": Pointer(target, 0, 4, ())}
     return (
@@ -152,14 +174,15 @@ def sized(value: Any, variable: Variable) -> Any:
 def check_host(text: Text, host: str, kernel: str, claim: Claim) -> None:
     """Refuse a text whose loops do not call the kernel once for each work item, with what they are given."""
     takes = [v.name for v in text.functions[host].takes]
-    for width, height in ((1, 1), (claim.pixels, 2), (claim.pixels + 1, 1), (3 * claim.pixels - 1, 3)):
+    n, m = claim.pixels, claim.rows
+    for width, height in ((1, 1), (n, 2 * m), (n + 1, m), (3 * n - 1, 2 * m + 1)):
         given: dict[str, Any] = {name: Pointer(Memory(name, 0), 0) for name in takes}
         given |= {"width": width, "height": height}
         calls: list[tuple[Any, ...]] = []
         rest = replace(text, functions={k: v for k, v in text.functions.items() if k != kernel}, outside=[])
         note = {kernel: lambda machine, *values, calls=calls: calls.append(values)}
         Machine(rest, claim.lanes, {}, {**BUILTINS, **note}, claim.added).call(host, list(given.values()))
-        places = [(x, y) for y in range(height) for x in range(0, width, claim.pixels)]
+        places = [(x, y) for y in range(0, height, m) for x in range(0, width, n)]
         if calls != [(*given.values(), x, y) for x, y in places]:
             raise Wrong(f"{host} does not call {kernel} once for each work item")
 
@@ -172,6 +195,7 @@ def items(claim: Claim) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
     lanes = claim.lanes
     x, y = lanes.place(0), lanes.place(2)
     x = Place(lanes, x.values // claim.pixels, x.form / claim.pixels)
+    y = Place(lanes, y.values // claim.rows, y.form / claim.rows)
     inside, block = {}, {}
     for name, place, n in (("x", x, 8), ("y", y, 4)):
         inside[name] = lanes.constant(place.values % n)

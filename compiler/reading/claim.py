@@ -34,6 +34,7 @@ from .field import (
     total,
 )
 from .lanes import Lanes, Mask, Unread
+from .spectra import Tiles
 
 COMMUTE = ("minimum", "maximum", "bitwise_and", "bitwise_xor", "bitwise_or")
 """Operations whose operands may be exchanged, sums and products apart."""
@@ -69,14 +70,21 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
 class Claim:
     """The program of a certificate, for each of the `pixels` of every lane; `outputs` has what these are.
 
-    A lane's pixels are `stride` columns apart.
+    A lane's pixels are `stride` columns apart; of `tiles` they are those of `rows` rows too, all at once.
     """
 
     def __init__(
-        self, held: Any, manifest: Any, raw: Any, lanes: Lanes, pixels: int, stride: int = 1
+        self,
+        held: Any,
+        manifest: Any,
+        raw: Any,
+        lanes: Lanes,
+        pixels: int,
+        stride: int = 1,
+        tiles: Tiles | None = None,
     ) -> None:
         self.text, self.lanes, self.pixels, self.stride = str(held["program"]), lanes, pixels, stride
-        self.parameters = held["parameters"]
+        self.parameters, self.tiles, self.rows = held["parameters"], tiles, tiles.rows if tiles else 1
         self.exact = held["schema"] == INTEGERS
         self.sine = self._sine(held)
         self.weights = self._weights(raw)
@@ -86,7 +94,12 @@ class Claim:
         self.images = re.findall(r"(?m)^  image (\w+): (\d+) ", self.text)
         (self.window,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", self.text)
         self.centre = int(manifest["window"]["centre"])
-        self.outputs = [self._pixel(p * stride) for p in range(pixels)]
+        self.together = pixels * self.rows if tiles else 1
+        if tiles:
+            numbers = self._pixel(0).known.reshape(1, self.together, -1)
+            self.outputs = [leaf(numbers[:, p]) for p in range(self.together)]
+        else:
+            self.outputs = [self._pixel(p * stride) for p in range(pixels)]
 
     def _sine(self, held: Any) -> Any:
         """Return the sine that the certificate promises, as the spec defines it."""
@@ -105,8 +118,13 @@ class Claim:
         owned = np.zeros(len(raw), dtype=bool)
         for name, place in self.parameters.items():
             if "base64" in place:
-                raise Unread("weights that the file does not hold")
+                if self.tiles is None:
+                    raise Unread("weights that the file does not hold")
+                continue
             owned[places(name, place, len(raw)).ravel()] = True
+        if self.tiles:
+            owned[self.tiles.owned.ravel()] = True
+            owned[self.tiles.bias if self.tiles.bias is not None else []] = True
         for number in np.unique(raw[~owned]):
             same = ~owned & (raw == number)
             value[:, same] = literal(float(number), "float32").value
@@ -114,6 +132,8 @@ class Claim:
 
     def parameter(self, name: str) -> Number:
         """Return a parameter's numbers, (2, 1, outputs * inputs) or (2, 1, outputs)."""
+        if "base64" in self.parameters[name]:
+            raise Unread("weights that the file does not hold")
         at = places(name, self.parameters[name], self.weights.value.shape[-1]).ravel()
         shape = self.weights.known[:, at]
         return Number(self.weights.value[:, :, at], shape, weight=True)
@@ -149,19 +169,19 @@ class Claim:
 
     def _pixel(self, pixel: int) -> Number:
         """Return the outputs of a pixel of each lane, and make a table of its sums."""
-        values: dict[str, Number] = {}
+        values: dict[str, Any] = {}
         for m in filter(None, map(NODE.fullmatch, self.text.splitlines())):
             number, op, named = m[1], m[2], dict(p.split("=") for p in (m[4] or "").split(", ") if p)
             given = [values[i] for i in re.findall(r"%(\d+)", m[3])]
             kind = m[0].rpartition(" : ")[2].partition("[")[0]
             if op == "input":
-                values[number] = self._input(pixel)
+                values[number] = None if self.tiles else self._input(pixel)  # which only spectra read
             elif op == "affine":
                 values[number] = self._affine(number, given[0], named, is_window=values["0"] is given[0])
             elif op == "constant":
                 values[number] = literal(float(named["value"]), kind)
             elif op == "parameter":
-                values[number] = self.parameter(named["name"])
+                values[number] = self._each(self.parameter(named["name"]))
             elif op == "convert":
                 values[number] = (
                     expression("convert", given[0], kind=kind) if given[0].kind != kind else given[0]
@@ -173,16 +193,19 @@ class Claim:
             else:
                 raise Unread(f"operation {op} of %{number}")
         (output,) = re.findall(r"(?m)^  output \w+ = %(\d+)$", self.text)
-        return values[output]
+        found: Number = values[output]
+        return found
 
     def _affine(self, node: str, given: Number, named: Any, is_window: bool) -> Number:
         """Return W x + b, and note its value and those of its parts."""
+        if is_window and self.tiles:
+            return self._from_spectra(node, "bias" in named)
         weight = self.parameter(named["weight"])
         outputs = self.parameters[named["weight"]]["shape"][0]
         matrix = weight.value[:, 0].reshape(2, outputs, -1)
         whole: Any = np.zeros((2, 1, 1), dtype=np.uint64)
         parts = self._parts(matrix.shape[2]) if is_window and not self.exact else []
-        terms = given.term % P
+        terms = (given.term % P).reshape(2, -1, matrix.shape[2])
         for name, part in parts if len(parts) > 1 else []:
             own = dot(terms[..., part], matrix[..., part])
             self._note(own, "part", f"the sum of %{node} over {name}")
@@ -191,6 +214,28 @@ class Claim:
             whole = dot(terms, matrix)
         if "bias" in named:
             whole = (whole + self.parameter(named["bias"]).term) % P
+        whole = whole.reshape(2, -1, self.together * outputs)
+        self._note(whole, "sum", f"the sums of %{node}")
+        return self._number(whole)
+
+    def _each(self, number: Number) -> Number:
+        """Return a number of every pixel (2, 1, n) as those of all that are computed at once."""
+        if self.together == 1:
+            return number
+        return Number(np.tile(number.value, self.together), np.tile(number.known, self.together), weight=True)
+
+    def _from_spectra(self, node: str, biased: bool) -> Number:
+        """Return the sums of the window with their bias, all pixels': those before it are known by shape."""
+        assert self.tiles is not None
+        if biased != (self.tiles.bias is not None) or len(re.findall(r"= affine %0\b", self.text)) != 1:
+            raise Unread("spectra of a layer that is not the only one to read the window, or of another bias")
+        channels = self.tiles.channels(self.lanes, self.images, self.centre, self.window[2])
+        found = leaf(self.tiles.sums(channels))
+        if not biased:
+            return found
+        at = self.tiles.bias
+        bias = Number(self.weights.value[:, :, at], self.weights.known[:, at], weight=True)
+        whole = (found.term + np.tile(bias.term, self.together)) % P
         self._note(whole, "sum", f"the sums of %{node}")
         return self._number(whole)
 
@@ -201,7 +246,7 @@ class Claim:
         """
         if not field.FACTORS:
             return Number(value, hashed("found", *value))
-        lane = np.arange(self.lanes.count).reshape((-1,) + (1,) * (value.ndim - 2))
+        lane = np.arange(len(field.FACTORS["lanes"])).reshape((-1,) + (1,) * (value.ndim - 2))
         return Number(None, hashed("found", *value, lane))
 
     def _parts(self, n: int) -> list[tuple[str, NDArray[np.intp]]]:
@@ -217,8 +262,8 @@ class Claim:
         ]
 
     def _note(self, value: Words, kind: str, name: str) -> None:
-        """Keep sums (2, lanes, n), to be found by the first lane's numbers."""
-        for j, word in enumerate(value[0, 0].tolist()):
+        """Keep sums (2, lanes, n), to be found by the first lane's pairs of numbers."""
+        for j, word in enumerate(_word(value).tolist()):
             self.first.setdefault(word, (len(self.tables), j))
         self.tables.append((value.astype(np.uint32), kind, name))
 
@@ -228,7 +273,7 @@ class Claim:
         """Return a sum of a text: a number of the program, or a part, if it is one; else as it is."""
         if number.shape is not None or (number.value.shape[1] == 1 and not field.FACTORS):
             return number
-        words = number.value[0, 0] % P
+        words = _word(number.value % P)
         if words.ndim == 0:
             hit = self.first.get(int(words))
             if hit is None or not self._is(number.value, hit, running):
@@ -263,6 +308,12 @@ class Claim:
     def missing(self) -> str | None:
         """Return the first sum of the program that a text has not made."""
         return next((name for k, (_, _, name) in enumerate(self.tables) if k not in self.found), None)
+
+
+def _word(value: Words) -> Words:
+    """Return both numbers (2, lanes, ...) of the first lane as one: of many sums two share a first one."""
+    word: Words = value[0, 0] << np.uint64(32) | value[1, 0]
+    return word
 
 
 def renamed(value: Words) -> Words:

@@ -39,7 +39,7 @@ LANGUAGES: Mapping[str, Language] = {
     "opencl": Language(
         doubles=True,
         brings=("CLK_LOCAL_MEM_FENCE", "CLK_GLOBAL_MEM_FENCE"),
-        of_floats=("tile", "vector", "group"),
+        of_floats=("tile", "vector", "group", "fft"),
     ),
     "c": Language(
         compilers=(
@@ -49,7 +49,7 @@ LANGUAGES: Mapping[str, Language] = {
         within=True,
         host="wamnet_image",
         doubles=True,
-        of_floats=("tile",),
+        of_floats=("tile", "fft"),
         of_integers=("tile",),
     ),
     "opengl": Language(
@@ -66,6 +66,11 @@ LANGUAGES: Mapping[str, Language] = {
     "cuda": Language(doubles=True, brings=("threadIdx", "blockIdx", "blockDim"), of_floats=("group",)),
 }
 """By a manifest's target."""
+
+
+class Stopped(Unread):
+    """A text that is an error for a compiler: it computes nothing there."""
+
 
 READ_PROFILE = "ieee"
 """The profile whose sines are read, of every degree."""
@@ -102,7 +107,8 @@ def preprocessed(source: str, macros: Mapping[str, str]) -> str:
             return super().on_directive_handle(directive, *given)
 
         def on_directive_unknown(self, directive: Any, *given: Any) -> Any:
-            raise Unread(f"a compiler for which line {directive.lineno} is #{directive.value}")
+            kind = Stopped if directive.value == "error" else Unread
+            raise kind(f"a compiler for which line {directive.lineno} is #{directive.value}")
 
     reader = Reader()
     reader.line_directive = None

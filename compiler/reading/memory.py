@@ -194,7 +194,7 @@ class Result:
 
     def __init__(self, claim: Claim, channels: int) -> None:
         self.claim, self.channels = claim, channels
-        self.written = np.zeros((claim.pixels, channels, claim.lanes.count), dtype=bool)
+        self.written = np.zeros((len(claim.outputs), channels, claim.lanes.count), dtype=bool)
 
     def store(self, offset: Any, width: int, value: Any, machine: Machine) -> None:
         """Check numbers that are written."""
@@ -212,20 +212,27 @@ class Result:
         if not running.any():
             return
         values = offset.values if isinstance(offset, Place) else np.full(len(x), offset)
-        at = set((values - (y * width + x) * self.channels)[running].tolist())
-        column, channel = divmod(at.pop(), self.channels)
+        at, row = values - (y * width + x) * self.channels, 0
+        if self.claim.rows > 1:  # a row's columns are below the width, or written beyond the picture
+            rows, at = np.divmod(at, width * self.channels)
+            row = int(rows[running][0])
+            at = np.where(rows == row, at, -1)
+        found = set(at[running].tolist())
+        column, channel = divmod(found.pop(), self.channels)
         pixel = column // stride
-        if at or column % stride or not 0 <= pixel < self.claim.pixels:
+        if found or column % stride or not (0 <= pixel < self.claim.pixels and 0 <= row < self.claim.rows):
             raise Wrong("it writes a result that is not its own")
-        if ((x + column >= width) | (y >= height))[running].any():
+        if ((x + column >= width) | (y + row >= height))[running].any():
             raise Wrong("it writes a result beyond the picture")
+        pixel += row * self.claim.pixels
         self.hold(pixel, channel, value, running)
 
     def hold(self, pixel: int, channel: int, value: Any, running: Any) -> None:
         """Check the number of one channel of one pixel, in the lanes that run."""
         wanted = self.claim.outputs[pixel].known[..., channel]
         known = value.known if isinstance(value, Number) else np.zeros(1, dtype=np.uint64)
-        if not np.array_equal(np.broadcast_to(known, wanted.shape)[running], wanted[running]):
+        found, due = (np.broadcast_to(one, running.shape)[running] for one in (known, wanted))
+        if not np.array_equal(found, due):
             missing = self.claim.missing()
             why = f": {missing} are never made" if missing else ", though all its sums are made"
             raise Wrong(f"output {channel} is not the program's{why}")
@@ -236,5 +243,6 @@ class Result:
         lanes, stride = self.claim.lanes, self.claim.stride
         x, width, y, height = lanes.x, lanes.known[1], lanes.y, lanes.known[3]
         for pixel, written in enumerate(self.written):
-            if not written[:, (x + pixel * stride < width) & (y < height)].all():
+            row, column = divmod(pixel, self.claim.pixels)
+            if not written[:, (x + column * stride < width) & (y + row < height)].all():
                 raise Wrong("it leaves a pixel without a result")

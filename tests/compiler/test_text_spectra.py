@@ -1,0 +1,249 @@
+"""Reading the texts of spectra: transforms, products and tiles, operation by operation (spec/text.md)."""
+
+import operator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from texts import NAME, changed, parts, unnoticed
+
+from wamnet.compiler import artifact, targets
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.proof import checker, spectra_checker
+from wamnet.compiler.proof.evidence import Refused
+from wamnet.compiler.reading.check import check_text, run_text
+from wamnet.compiler.reading.lanes import Unread
+from wamnet.compiler.reading.spectra import Arithmetic, sums, transform
+from wamnet.compiler.schedules import emit_fourier
+from wamnet.compiler.schedules.c_fourier import CFourier
+from wamnet.compiler.schedules.opencl_fourier import OpenCLFourier
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
+
+pytest.importorskip("pcpp", reason="the preprocessor of texts is missing: pip install 'wamnet[cli]'")
+
+FLOATS = Arithmetic(operator.add, operator.sub, operator.mul, float)
+
+
+def model(border="zero", activation="sine", images=("color", "normal", "albedo", "position"), neurons=6):
+    channels = 3 * len(images)
+    network = siren.init((9 * channels, neurons, 5, 3), 1.0, 3.0, 5, activation=activation)
+    network = replace(network, biases=tuple(b + np.float32(0.25) for b in network.biases))
+    return Model(network, images, Window(3, border), Normalization())
+
+
+def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):
+    """Write a kernel of small tiles, by vectors of 4 numbers and blocks of 6 pixels."""
+    dialect = OpenCLFourier(4) if target == "opencl" else CFourier(4)
+    tiny = emit_fourier.Fourier("fft8", emit_fourier.IDEA, dialect, 4, 6, points, tiles)
+    whole = targets.DENOISERS[target]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(emit_fourier, "COST", 0.0)
+        patch.setitem(targets.DENOISERS, target, replace(whole, schedules=(*whole.schedules, tiny)))
+        made = compile_program(lower(model(**kwargs)), target, schedule="fft8")
+    assert made.manifest["schedule"]["name"] == "fft8"
+    artifact.write(made, folder)
+    return folder / NAME
+
+
+@pytest.fixture(scope="module")
+def opencl(tmp_path_factory):
+    """Text, certificate, manifest and weights of OpenCL C."""
+    return parts(kernel(tmp_path_factory.mktemp("opencl")))
+
+
+@pytest.fixture(scope="module")
+def c(tmp_path_factory):
+    return parts(kernel(tmp_path_factory.mktemp("c"), "c"))
+
+
+# ---- what a text must compute ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("n", [2, 4, 8, 16, 32])
+def test_the_transform_that_is_required_is_fouriers(n, sign):
+    given = np.random.default_rng(1).standard_normal((n, 2))
+    found = [a + 1j * b for a, b in transform(FLOATS, [tuple(row) for row in given], sign)]
+    numbers = given[:, 0] + 1j * given[:, 1]
+    exact = np.fft.fft(numbers) if sign < 0 else np.fft.ifft(numbers) * n
+    # Below a hundred operations on each of n numbers, of magnitudes around 1, each off by half an eps.
+    assert np.abs(found - exact).max() < 50 * n * np.finfo(float).eps
+
+
+@pytest.mark.parametrize("n", [4, 8, 16, 32])
+def test_its_operations_are_those_that_the_bound_counts(n):
+    """FOU-5: a coefficient of 1 is a sum, one above 2 a product with a factor, two operations."""
+    deepest = Arithmetic(
+        lambda a, b: np.maximum(a, b) + 1, lambda a, b: np.maximum(a, b) + 1, lambda a, _: a + 1, lambda _: 0
+    )
+    none = np.full(n, -np.inf)
+    inputs = [(np.where(np.arange(n) == i, 0.0, none), none) for i in range(n)]
+    depths = np.array([part for number in transform(deepest, inputs, 1) for part in number]).max(axis=0)
+    coefficients = np.sqrt(spectra_checker._layers(n))
+    assert depths.tolist() == np.where(coefficients > 2, 2, np.round(coefficients)).sum(axis=0).tolist()
+
+
+@pytest.mark.parametrize(("channels", "block"), [(6, 3), (7, 2), (1, 1)])
+def test_the_sums_that_are_required_are_those_of_the_window(channels, block):
+    """With the spectra of FOU-4, in float64, in the order of CER-7."""
+    rng, n, size, count, lanes, pairs = np.random.default_rng(2), 8, 3, 6, 2, -(-channels // 2)
+    tile, weight = rng.standard_normal((n, n, channels)), rng.standard_normal((count, size, size, channels))
+    spectrum = np.conj(np.fft.fft2(weight, (n, n), axes=(1, 2))) / (2 * n**2)
+    table = np.zeros((n // 2 + 1, 2, n, pairs, 2, 2, 2 * lanes))
+    patch = np.zeros((2, n, n, 1, pairs))
+    for channel in range(channels):
+        half, pair = divmod(channel, pairs)
+        patch[half, :, :, 0, pair] = tile[..., channel]
+        for j in range(count):
+            own = spectrum[j, :, : n // 2 + 1, channel].T
+            at = np.s_[:, j // (2 * lanes), :, pair, half]
+            table[at][..., 0, j % (2 * lanes)], table[at][..., 1, j % (2 * lanes)] = own.real, own.imag
+    out = n - size + 1
+    found = sums(FLOATS, tuple(patch), table, out, block).reshape(out, out, -1)[..., :count]
+    exact = [
+        [[(tile[y : y + 3, x : x + 3] * w).sum() for w in weight] for x in range(out)] for y in range(out)
+    ]
+    # 448 numbers of magnitudes below 10, a hundred operations each: off by half an eps.
+    assert np.abs(found - exact).max() < 448 * 10 * 50 * np.finfo(float).eps
+
+
+# ---- texts -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("target", ["opencl", "c"])
+@pytest.mark.parametrize(
+    ("tiles", "kwargs"),
+    [
+        (2, {}),
+        (1, {"border": "clamp", "activation": "relu"}),
+        (2, {"images": ("color", "normal", "albedo"), "neurons": 10}),
+    ],
+)
+def test_texts_of_spectra_compute_what_is_certified(target, tiles, kwargs, tmp_path):
+    """TXT-9: blocks of pairs, a channel without a partner, two groups of neurons."""
+    path = kernel(tmp_path, target, tiles=tiles, **kwargs)
+    assert checker.check(path)
+    assert check_text(path)["sums"] == 3 * 36 * tiles
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft32"), ("c", "fft32x8")])
+def test_texts_of_the_schedules_compute_what_is_certified(target, schedule, tmp_path):
+    network = siren.init((81 * 12, 21, 6, 3), 2.0, 3.0, 5)
+    given = Model(network, ("color", "normal", "albedo", "position"), Window(9, "zero"), Normalization())
+    made = compile_program(lower(given), target, schedule=schedule)
+    assert made.manifest["schedule"]["name"] == schedule
+    artifact.write(made, tmp_path)
+    assert check_text(tmp_path / NAME)["sums"] == 3 * 48 * 24
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ("* 0.707106769f", "* 0.70710683f", "never made"),
+        ("vector t18 = t0 - t8;", "vector t18 = t8 - t0;", "never made"),
+        ("to[0] = a + c;", "to[0] = a + d;", "never made"),
+        ("real[t][0] -= w2 * b;", "real[t][0] += w2 * b;", "never made"),
+        ("real[t][0] += w0 * a;", "real[t][0] += w0 * a; real[t][0] += w0 * a;", "never made"),
+        ("real[t][0] += w0 * a;", "real[t][0] += w1 * a;", "never made"),
+        ("block * BLOCK + pair", "pair", "never made"),
+        ("whole_real[t][1] += real[t][1];", "whole_real[t][1] = real[t][1];", "never made"),
+        ("int apart = opposite != k;", "int apart = 0;", "read before it is written|never made"),
+        ("for (int k = 0; k <= POINTS / 2", "for (int k = 0; k < POINTS / 2", "read before it is written"),
+        (") - 0.5f;", ") - 0.25f;", "never made"),
+        ("clamp(left, 0, width - 1)", "clamp(left, 0, width)", "never made|beyond its ends"),
+        ("int top = tile_y + dy", "int top = tile_y + 1 + dy", "never made"),
+        ("inside ? ", "row_y == top ? ", "never made"),
+        ("tile_y + line < height", "tile_y + line < height - 1", "without a result"),
+        ("line < OUT && tile_y + line < height", "line < OUT", "beyond the picture"),
+        ("min(tile_x + TILES * OUT, width)", "tile_x + TILES * OUT", "not its own|beyond the picture"),
+        ("(y * width + x + p)", "(line * width + x + p)", "not its own"),
+        ("(int)get_global_id(1) * OUT", "(int)get_global_id(1) * POINTS", "no lane decides|not its own"),
+        ("x + p < last", "x + p <= last", "not its own|beyond the picture"),
+        ("#define STRIDE (2 * (POINTS + 1))", "#define STRIDE (2 * POINTS)", "never made|no number"),
+    ],
+)  # fmt: skip
+def test_faults_of_spectra_are_named(opencl, old, new, why):
+    with pytest.raises(Refused, match=why):
+        run_text(*changed(opencl, old, new))
+
+
+def test_the_loops_of_a_host_are_read(c):
+    for old, new in (
+        ("y += OUT", "y += 1"),
+        ("x += TILES * OUT", "x += OUT"),
+        ("y < height", "y < height - 1"),
+    ):
+        with pytest.raises(Refused, match="does not call wamnet_pixel once"):
+            run_text(*changed(c, old, new))
+
+
+def test_products_in_another_order_are_refused(opencl):
+    """The bound is one of partial sums in this order."""
+    source, *others = opencl
+    pieces = source.split("real[t][0] += w0 * a;"), source.split("real[t][0] += w4 * c;")
+    assert [len(p) for p in pieces] == [2, 2]
+    turned = source.replace("real[t][0] += w0 * a;", "@").replace(
+        "real[t][0] += w4 * c;", "real[t][0] += w0 * a;"
+    )
+    with pytest.raises(Refused, match="never made"):
+        run_text(turned.replace("@", "real[t][0] += w4 * c;"), *others)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        (" = sin %1 ", " = sin %0 ", "no meaning"),
+        (
+            "  %2 = constant",
+            "  %99 = affine %0 {bias=b0, weight=W0} : float32[6]\n  %2 = constant",
+            "not the only one",
+        ),
+        ("  %1 = affine %0 {bias=b0, weight=W0}", "  %1 = affine %0 {weight=W0}", "another bias"),
+    ],
+)
+def test_programs_that_read_the_window_otherwise_are_not_read(opencl, old, new, why):
+    source, held, *others = opencl
+    assert old in held["program"]
+    with pytest.raises((Refused, Unread), match=why):
+        run_text(source, {**held, "program": held["program"].replace(old, new)}, *others)
+
+
+def test_tiles_of_other_sizes_are_not_read(opencl):
+    source, held, manifest, weights = opencl
+    with pytest.raises(Unread, match="6 x 6"):
+        run_text(source, held, {**manifest, "schedule": {**manifest["schedule"], "rows": 5}}, weights)
+
+
+def test_the_operands_of_a_sum_may_be_exchanged(opencl):
+    assert run_text(*changed(opencl, "to[0] = a + c;", "to[0] = c + a;"))
+    assert run_text(*changed(opencl, "real[t][0] += w0 * a;", "real[t][0] = a * w0 + real[t][0];"))
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("bias",), 0), (("order",), [1, 0, 2, 3, 4, 5]), (("block",), 1), (("centres", 0), 0.25),
+        (("table", "offset"), 4),
+    ],
+)  # fmt: skip
+def test_a_text_is_held_against_what_its_certificate_says(opencl, place, value):
+    source, held, *others = opencl
+    spectra = {**held["spectra"], "table": dict(held["spectra"]["table"])}
+    spectra["centres"] = list(spectra["centres"])
+    at = spectra
+    for key in place[:-1]:
+        at = at[key]
+    assert at[place[-1]] != value
+    at[place[-1]] = value
+    with pytest.raises(Refused, match="never made"):
+        run_text(source, {**held, "spectra": spectra}, *others)
+
+
+@pytest.mark.parametrize(("target", "count"), [("opencl", 24), ("c", 8)])
+def test_planted_faults_in_spectra_are_noticed(target, count, request):
+    """TXT-8: what holds the reader."""
+    assert unnoticed(request.getfixturevalue(target), count) == []

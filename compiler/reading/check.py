@@ -62,8 +62,9 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
             lanes = group_lanes((group[0], group[1]), pixels, window, LANES_SEED)
             add_up_lanes(lanes.count)
         else:
-            cap = window + pixels if pixels > 1 else max(centre, window - centre) + 1
-            lanes = lanes_for(cap, pixels, beyond=not language.within, seed=LANES_SEED)
+            reach = max(centre, window - centre) + 1
+            caps = (reach + pixels - 1, reach)
+            lanes = lanes_for(caps, pixels, beyond=not language.within, seed=LANES_SEED)
             add_up_lanes(None)
         claim = Claim(held, manifest, weights, lanes, pixels, group[0] if group else 1, tiles)
         texts = different(source, language)

@@ -159,14 +159,14 @@ def words(seed: int) -> Iterator[int]:
         yield int(pcg4d(*np.array([[n], [seed], [0], [0]], dtype=np.uint32))[0][0])
 
 
-def lanes_for(cap: int, step: int, beyond: bool, seed: int) -> Lanes:
-    """Return lanes of all cases: x a multiple of `step`, constants up to `cap`; `beyond` the picture too.
+def lanes_for(caps: tuple[int, int], step: int, beyond: bool, seed: int) -> Lanes:
+    """Return lanes of all cases: x a multiple of `step`, constants up to `caps`; `beyond` the picture too.
 
-    The first is far from all borders.
+    The first is far from all borders. An axis has the cases of its own cap: no comparison is of both axes.
     """
     random = words(seed)
 
-    def pairs(step: int) -> list[tuple[int | None, int | None]]:
+    def pairs(cap: int, step: int) -> list[tuple[int | None, int | None]]:
         return [(a, b) for a in (*range(0, cap + 1, step), None) for b in (*range(1, cap + 2), None)]
 
     def drawn(pair: tuple[int | None, int | None], step: int) -> tuple[int, int]:
@@ -174,7 +174,7 @@ def lanes_for(cap: int, step: int, beyond: bool, seed: int) -> Lanes:
         at = (FAR + next(random) % FAR) // step * step if before is None else before
         return at, at + (FAR + next(random) % FAR if behind is None else behind)
 
-    across, down, far = pairs(step), pairs(1), (None, None)
+    across, down, far = pairs(caps[0], step), pairs(caps[1], 1), (None, None)
     cases = [(far, far), *((p, far) for p in across), *((far, p) for p in down)]
     cases += [(p, down[next(random) % len(down)]) for p in across]
     cases += [(across[next(random) % len(across)], p) for p in down]
@@ -182,4 +182,4 @@ def lanes_for(cap: int, step: int, beyond: bool, seed: int) -> Lanes:
     if beyond:  # work items right of a picture, and below it
         found += [(step * n, step * n - k, 5, 9) for n, k in ((1, 0), (2, step), (700, 1))]
         found += [(0, 9, 7, 7), (0, 9, 4000, 3999)]
-    return Lanes(np.array(found, dtype=np.int64).T, (cap, cap), np.ones(len(found), dtype=bool))
+    return Lanes(np.array(found, dtype=np.int64).T, caps, np.ones(len(found), dtype=bool))

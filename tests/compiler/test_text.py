@@ -115,25 +115,29 @@ def test_sums_do_not_depend_on_their_order():
 
 
 def test_lanes_decide_what_may_be_compared():
-    lanes = lanes_for(4, 1, beyond=False, seed=1)
+    lanes = lanes_for((4, 2), 1, beyond=False, seed=1)
     x, width, y = (lanes.place(axis) for axis in (0, 1, 2))
     assert isinstance(x, Place)
     assert (x.plus(4).against(width) < 0).any()
     with pytest.raises(Wrong, match="beyond 4"):
         x.plus(5).against(0)
+    with pytest.raises(Wrong, match="beyond 2"):
+        y.plus(3).against(0)
     with pytest.raises(Wrong, match="no lane decides"):
         x.against(y)
     with pytest.raises(Wrong, match="no lane decides"):
         x.times(width).against(3)
 
 
-def test_lanes_have_every_case_of_a_row():
-    """Each distance to both borders up to the cap, and beyond it, with the other axis far away."""
-    lanes = lanes_for(3, 1, beyond=False, seed=1)
+def test_lanes_have_every_case_of_an_axis():
+    """TXT-5: each distance to both borders up to the axis' cap, and beyond it, the other axis far away."""
+    lanes = lanes_for((3, 2), 1, beyond=False, seed=1)
     x, width, y, height = lanes.known
-    far = (y > 3) & (height - 1 - y > 3)
-    cases = {(min(a, 4), min(b, 4)) for a, b in zip(x[far], (width - 1 - x)[far], strict=True)}
-    assert cases == {(a, b) for a in range(5) for b in range(5)}
+    for at, size, others, extent, cap in ((x, width, y, height, 3), (y, height, x, width, 2)):
+        far = (others > 3) & (extent - 1 - others > 3)
+        known = zip(at[far], (size - 1 - at)[far], strict=True)
+        cases = {(min(a, cap + 1), min(b, cap + 1)) for a, b in known}
+        assert cases == {(a, b) for a in range(cap + 2) for b in range(cap + 2)}
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +17,7 @@ from ..files.outputs import check_new_folder, making_folder
 from ..reports import webpage
 
 if TYPE_CHECKING:
+    from ...kernels.export.motion import Motion
     from ...kernels.export.package import Export
 
 EXAMPLES = """Examples:
@@ -30,6 +31,8 @@ wamnet export model.safetensors --target c --weights inline --check -o header
 wamnet export model.safetensors --target cuda --schedule plain -o to-read
 
 wamnet export model.safetensors --target hlsl --variant window8+rank16 -o for-direct3d
+
+wamnet export model.safetensors --scene minicubes --moving time,camera --target c -o turning
 
 wamnet export model.safetensors --scene minicubes --target html -o page"""
 """Shown below the help of `wamnet export`."""
@@ -45,6 +48,9 @@ HTML, PAGE_NAME = "html", "index.html"
 
 DEPTH = 5
 """Bounces of a path, if nobody asks for another number."""
+
+SECONDS, FPS = 8.0, 10.0
+"""Length of a table of times, and times a second, if nobody asks for others."""
 
 STATUS_WRONG = 1
 """Exit status when an export was written, and what runs it here finds it off, or refuses it."""
@@ -70,6 +76,56 @@ ScheduleName = Annotated[
 ]
 
 
+Moving = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LIST",
+        help="What of the scene the path kernel is given as numbers: time, camera, lights, positions.",
+        show_default="nothing: the scene is constant",
+    ),
+]
+
+
+Seconds = Annotated[
+    float | None, typer.Option(help="Length of the table of times.", show_default=f"{SECONDS:g}")
+]
+Fps = Annotated[float | None, typer.Option(help="Times per second in the table.", show_default=f"{FPS:g}")]
+SceneToo = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SCENE",
+        help="The path tracer too, of this scene: a canonical one or a file (.json).",
+        show_default="only the denoiser",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Span:
+    """What moves, and the length and the density of the table of times, if they are given."""
+
+    kinds: tuple[str, ...]
+    seconds: float | None
+    fps: float | None
+
+    def motion(self, scene: str, start: float | None, parameters: list[str]) -> Motion:
+        """Return the scene at the times of the table: half a step beside multiples, as a page has them.
+
+        Some scenes are laid out in another way at time 0, where their boxes are parallel to the axes.
+        """
+        from ...kernels.export.motion import TIME, Motion
+        from ...kernels.run.frame_plan import animation_times
+
+        if TIME not in self.kinds:
+            given = {"--seconds": self.seconds, "--fps": self.fps}
+            _refuse(given, "time does not move", "add it to --moving, or leave it out")
+            return Motion((start or 0.0,), (load_scene(scene, start, parameters),), self.kinds)
+        seconds = SECONDS if self.seconds is None else self.seconds
+        fps = FPS if self.fps is None else self.fps
+        times = [time + 0.5 / fps for time in animation_times(start or 0.0, seconds, fps)]
+        return Motion(tuple(times), tuple(load_scene(scene, time, parameters) for time in times), self.kinds)
+
+
 def export(
     model: options.ModelFile,
     target: Annotated[
@@ -81,14 +137,7 @@ def export(
             "-o", "--output", metavar="FOLDER", help="New folder for the files.", show_default="TARGET"
         ),
     ] = None,
-    scene: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SCENE",
-            help="The path tracer too, of this scene: a canonical one or a file (.json).",
-            show_default="only the denoiser",
-        ),
-    ] = None,
+    scene: SceneToo = None,
     time: options.Time = None,
     parameters: options.Parameters = None,
     max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = DEPTH,
@@ -97,6 +146,9 @@ def export(
     variant: options.Variant = None,
     weights: Place = None,
     schedule: ScheduleName = None,
+    moving: Moving = None,
+    seconds: Seconds = None,
+    fps: Fps = None,
     check: Annotated[
         bool,
         typer.Option("--check", help="Compile and run it here, and compare with the reference's picture."),
@@ -111,7 +163,7 @@ def export(
     folder = output or Path(target)
     if target == HTML:
         of_kernels = {"--weights": weights, "--variant": variant, "--check": check or None, "--time": time}
-        of_kernels["--schedule"] = schedule
+        of_kernels |= {"--schedule": schedule, "--moving": moving, "--seconds": seconds, "--fps": fps}
         _refuse(of_kernels, "a web page has its own", "leave it out")
         _write(folder, {PAGE_NAME: webpage.page_of(model, scene, parameters or [], None).encode()})
         return
@@ -120,10 +172,14 @@ def export(
         turned = None if sampler is Sampler.pcg4d else sampler.value
         depth = None if max_depth == DEPTH else max_depth
         given = {"--time": time, "--set": parameters, "--sampler": turned, "--max-depth": depth}
+        given["--moving"] = moving
         _refuse(given, "there is no scene", "name one with --scene, or leave it out")
+    if moving is None:
+        _refuse({"--seconds": seconds, "--fps": fps}, "nothing moves", "add --moving time, or leave it out")
     moment, paths = (time, parameters or []), (max_depth, sampler)
+    span = None if moving is None else Span(tuple(moving.split(",")), seconds, fps)
     asked = (variant, weights, schedule)
-    made = _export(model, target, scene, moment, paths, profile, asked)
+    made = _export(model, target, scene, moment, paths, profile, asked, span)
     _write(folder, made.contents())
     _tell(made)
     if check:
@@ -145,6 +201,7 @@ def _export(
     paths: tuple[int, Sampler],
     profile: str,
     asked: tuple[str | None, str | None, str | None],
+    span: Span | None,
 ) -> Export:
     """Return the export that the options ask for: `asked` are variant, place of the weights and schedule."""
     from ...compiler.variants import FULL
@@ -153,9 +210,10 @@ def _export(
     from ...refimpl.light.transport import Settings
 
     settings = replace(Settings(max_depth=paths[0]), sampler=paths[1].value)
-    loaded = load_scene(scene, *moment) if scene else None
+    motion = span.motion(scene, *moment) if scene and span else None
+    loaded = motion.scenes[0] if motion else load_scene(scene, *moment) if scene else None
     variant, weights, schedule = (text or "" for text in asked)
-    options_of = (weights, variant or FULL, settings, schedule)
+    options_of = (weights, variant or FULL, settings, schedule, motion)
     return exported(Request(load_model(model), target, loaded, profile, *options_of))
 
 

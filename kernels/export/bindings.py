@@ -8,7 +8,7 @@ from typing import Any
 from ...compiler.artifact import Artifact
 from ...compiler.core.ir import OUTPUT_ENCODING
 from ...compiler.core.lower import lower
-from ...compiler.languages.interface import BLOCK, PATH, READ, SUMS, WEIGHTS, WRITE, Interface
+from ...compiler.languages.interface import BLOCK, PATH, READ, SCENE_NUMBERS, SUMS, WEIGHTS, WRITE, Interface
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...refimpl.network.denoise import Model
@@ -136,6 +136,8 @@ def _names(interface: Interface) -> list[Binding]:
             slots = f"colour buffers {location} to {location + count - 1}"
             found.append({**each, "slot": slots if count > 1 else f"colour buffer {location}"})
             location += count
+        elif each["name"] == SCENE_NUMBERS:
+            found.append({**each, "type": "float32, four to a vec4", "slot": f"uniform {SCENE_NUMBERS}"})
         elif each["name"] == SUMS:
             found.append({**each, "slot": "textures sums_0, sums_1, ...: four planes each"})
         else:

@@ -265,6 +265,10 @@ def _paths(export: Export, opened: Any) -> float | None:
         return float(np.mean([x.mean() for x in near]))
     if export.path is None or export.pair.sums is None:
         return None
-    found = opened.trace(export.path, Part(width, height, 0, height, 0, 1, SEED))
-    near = np.abs(found - export.pair.sums) <= PATHS_WITHIN * np.maximum(1, np.abs(export.pair.sums))
-    return float(near.mean())
+    part = Part(width, height, 0, height, 0, 1, SEED)
+    wanted = [(None, export.pair.sums), *((moment.numbers, moment.sums) for moment in export.pair.moments)]
+    alike = []
+    for numbers, sums in wanted:
+        off = np.abs(opened.trace(export.path, part, numbers) - sums)
+        alike.append(float((off <= PATHS_WITHIN * np.maximum(1, np.abs(sums))).mean()))
+    return min(alike)

@@ -16,6 +16,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 from ...compiler.core.interpret import interpret
 from ...compiler.core.ir import Gather, Program
 from ...compiler.core.lower import lower
+from ...compiler.languages.interface import SCENE_NUMBERS
 from ...compiler.plan import Plan, plan_program
 from ...compiler.scenes import emit_path
 from ...compiler.scenes.lower_encode import layers_of
@@ -50,10 +52,18 @@ GOLDEN = (5.0**0.5 - 1) / 2
 
 
 @dataclass(frozen=True)
+class Moment:
+    """Numbers (n,) of a scene that moves, and the sums (planes, H, W) of the picture that they give."""
+
+    numbers: NDArray[np.float32]
+    sums: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
 class Pair:
     """Images (H, W, C) by name, the output and its bound (H, W, 3); sums (planes, H, W) of a scene.
 
-    `promised`: whether the kernel promises the bound.
+    `promised`: whether the kernel promises the bound. `moments`: other sums, of a scene that moves.
     """
 
     images: Mapping[str, NDArray[np.float32]]
@@ -62,6 +72,7 @@ class Pair:
     promised: bool
     sums: NDArray[np.float32] | None = None
     planes: tuple[str, ...] = ()
+    moments: tuple[Moment, ...] = ()
 
     def facts(self) -> dict[str, Any]:
         """Return what check.json says."""
@@ -84,6 +95,11 @@ class Pair:
                 "seed": SEED,
                 "format": "one plane of height * width numbers after another",
             }
+            if self.moments:
+                found["sums"]["moments"] = [
+                    {"file": f"sums.{index}.f32", SCENE_NUMBERS: [float(x) for x in moment.numbers]}
+                    for index, moment in enumerate(self.moments)
+                ]
         return found
 
     def files(self) -> dict[str, bytes]:
@@ -92,6 +108,7 @@ class Pair:
         arrays |= {"output.f32": self.output, "bound.f32": self.bound}
         if self.sums is not None:
             arrays["sums.f32"] = self.sums
+        arrays |= {f"sums.{index}.f32": moment.sums for index, moment in enumerate(self.moments)}
         text = json.dumps(self.facts(), indent=2, sort_keys=True) + "\n"
         return {
             **{name: np.ascontiguousarray(array).astype("<f4").tobytes() for name, array in arrays.items()},
@@ -99,24 +116,33 @@ class Pair:
         }
 
 
-def pair(plan: Plan, model: Model, promised: bool, programs: PathPrograms | None = None) -> Pair:
+def pair(
+    plan: Plan,
+    model: Model,
+    promised: bool,
+    programs: PathPrograms | None = None,
+    rows: Sequence[NDArray[np.float32]] = (),
+) -> Pair:
     """Return the pair of a plan's kernel, or of both of its passes; with a scene's programs, of its picture.
 
     `model` is what the plan compiles; `promised`: whether the kernel keeps the plan's bound. Otherwise the
-    bound is what the emitted sine would have.
+    bound is what the emitted sine would have. `rows` (n,): numbers of the scene for other sums.
     """
     gather = kernel_gather(plan.analysed)
     size = (gather.rows + SIDES[0], gather.columns + SIDES[1])
     sums: NDArray[np.float32] | None = None
     planes: tuple[str, ...] = ()
+    moments: tuple[Moment, ...] = ()
     if programs is None:
         images = _livelier(plan.analysed, size)
     else:
         planes, sums = _sums(programs, model.features, plan.profile.name, size)
         images = _encoded(model, dict(zip(planes, sums, strict=True)))
+        summed = partial(_sums, programs, model.features, plan.profile.name, size)
+        moments = tuple(Moment(row, summed(row)[1]) for row in rows)
     held = (plan if promised else plan_program(lower(model), "numpy")).expected(images)
     output = held.value.astype(np.float32)
-    return Pair(images, output, held.most_from(output), promised, sums, planes)
+    return Pair(images, output, held.most_from(output), promised, sums, planes, moments)
 
 
 def _livelier(program: Program, size: tuple[int, int]) -> dict[str, NDArray[np.float32]]:
@@ -145,12 +171,19 @@ def _spread(gather: Gather, size: tuple[int, int], contrast: float) -> dict[str,
 
 
 def _sums(
-    programs: PathPrograms, features: Sequence[str], profile: str, size: tuple[int, int]
+    programs: PathPrograms,
+    features: Sequence[str],
+    profile: str,
+    size: tuple[int, int],
+    numbers: NDArray[np.float32] | None = None,
 ) -> tuple[tuple[str, ...], NDArray[np.float32]]:
-    """Return the planes of features, and the interpreter's sums (planes, H, W) over one sample."""
+    """Return the planes of features, and the interpreter's sums (planes, H, W) over one sample.
+
+    `numbers` (n,) are those of the scene that move, by default of the scene that was compiled.
+    """
     kernel = compile_path(programs, "numpy", profile, groups=tuple(dict.fromkeys(layers_of(features))))
     with open_executor("numpy") as executor:
-        return kernel.planes, executor.trace(kernel, Part(size[1], size[0], 0, size[0], 0, 1, SEED))
+        return kernel.planes, executor.trace(kernel, Part(size[1], size[0], 0, size[0], 0, 1, SEED), numbers)
 
 
 def _encoded(model: Model, sums: Mapping[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:

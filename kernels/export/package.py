@@ -39,6 +39,7 @@ from ...refimpl.network.denoise import Model, learned_feature_spp
 from ...refimpl.network.whole import Whole
 from ...refimpl.reading import SIZES
 from . import bindings, check_pair, onnx_export, readme
+from .motion import ROWS_NAME, Motion
 from .targets import NAMES, ONNX, TARGETS, Limit, Place, Row
 
 SCHEMA = "wamnet-export-1"
@@ -56,7 +57,10 @@ MANIFEST_NAME, README_NAME = "manifest.json", "README.md"
 
 @dataclass(frozen=True)
 class Request:
-    """What is wanted. `weights`: a place, `schedule`: one that has them there; the usual ones where empty."""
+    """What is wanted. `weights`: a place, `schedule`: one that has them there; the usual ones where empty.
+
+    `motion`: what moves in the scene, which is that of its first moment.
+    """
 
     model: Model
     target: str
@@ -66,6 +70,7 @@ class Request:
     variant: str = FULL
     settings: Settings = field(default_factory=Settings)
     schedule: str = ""
+    motion: Motion | None = None
 
 
 @dataclass(frozen=True)
@@ -120,9 +125,14 @@ def export(request: Request) -> Export:
         files |= {f"features/{n}": data for n, data in found.items()}
         _check(row.source, max(map(len, found.values())), row.name)
     model, promised = vary(parse(request.variant), request.model).model, plan.bound.output is not None
-    pair = check_pair.pair(plan, model, promised, programs)
+    others = []
+    if request.motion:
+        files[f"path/{ROWS_NAME}"] = request.motion.rows(request.settings).astype("<f4").tobytes()
+        others = [request.motion.other(request.settings)]
+    pair = check_pair.pair(plan, model, promised, programs, others)
     files |= {f"check/{name}": data for name, data in pair.files().items()}
     facts = _facts(request, row, how, denoiser, limits) | {"schedules": list(place.schedules)}
+    facts["scene"] = _scene(request, programs)
     facts["kernels"] = bindings.kernels(row, denoiser, path, encoder, passes)
     return _finished(request, facts, files, denoiser, path, encoder, passes, pair)
 
@@ -189,9 +199,6 @@ def _facts(
         "language": row.text,
         "profile": held["profile"],
         "model": _model(request),
-        "scene": None
-        if request.scene is None
-        else {"name": request.scene.name, "settings": request.settings.facts()},
         "images": first["images"],
         "window": {"size": size, "border": first["window"]["border"]},
         "output": held["output"],
@@ -206,6 +213,14 @@ def _facts(
         },
         "limits": list(limits),
     }
+
+
+def _scene(request: Request, programs: PathPrograms | None) -> dict[str, Any] | None:
+    """Return what a manifest says about the scene, and about the numbers of it that move."""
+    if request.scene is None or programs is None:
+        return None
+    numbers = {"numbers": request.motion.facts(programs)} if request.motion else {}
+    return {"name": request.scene.name, "settings": request.settings.facts(), **numbers}
 
 
 def _model(request: Request) -> dict[str, Any]:
@@ -292,7 +307,11 @@ def _programs(request: Request, row: Row) -> PathPrograms | None:
     """Return the programs of a scene's paths, as the target unrolls them."""
     if request.scene is None:
         return None
-    return lower_scene(request.scene, request.settings, most_unrolled(_usual(row)))
+    if request.motion and row.single:
+        rule = f"the passes of target {row.name} have no place for numbers of a scene"
+        raise InputError("--moving", ", ".join(request.motion.kinds), rule, "leave it out")
+    moving = request.motion.inputs(request.settings) if request.motion else None
+    return lower_scene(request.scene, request.settings, most_unrolled(_usual(row)), moving)
 
 
 def _usual(row: Row) -> str:

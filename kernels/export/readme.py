@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...compiler.artifact import Artifact
+from ...compiler.languages.interface import SCENE_NUMBERS
 from ...compiler.reading.languages import is_read
 from ...compiler.schedules.schedules import PLAIN, text
 from .targets import ONNX, TARGETS
@@ -55,6 +56,7 @@ def readme(facts: Mapping[str, Any], denoiser: Artifact | None) -> str:
         "",
         "Rows: row 0 of every image is the picture's TOP row. Colour is encoded for the display already.",
         "",
+        *_moving(facts),
         "## Proof",
         "",
         *_proof(facts, denoiser),
@@ -104,6 +106,50 @@ def _schedule(facts: Mapping[str, Any]) -> list[str]:
     others = [name for name in facts["schedules"] if name != picked["name"]]
     besides = f" Others, by `--schedule`: {', '.join(others)}." if others else ""
     return [f"* Schedule: {text(picked)}.{besides}"]
+
+
+WRITTEN = "write_buffer(scene_numbers, rows + {count} * moment); /* {slot} of the path kernel */"
+"""How a buffer of numbers is filled."""
+
+TOLD: Mapping[str, str] = {
+    "numbered": WRITTEN,
+    "registers": WRITTEN,
+    "arguments": WRITTEN,
+    "header": "wamnet_trace(&part, sums, rows + {count} * moment);",
+    "names": "float vectors[{vectors}][4] = {{{{0}}}}; /* {count} numbers, then zeros */\n"
+    "memcpy(vectors, rows + {count} * moment, {count} * sizeof(float));\n"
+    'glUniform4fv(glGetUniformLocation(path, "scene_numbers"), {vectors}, vectors[0]);',
+}
+"""Lines that give the path kernel the numbers of a moment, by the kind of slots."""
+
+
+def _moving(facts: Mapping[str, Any]) -> list[str]:
+    """Return the section about a scene that moves."""
+    numbers = (facts["scene"] or {}).get("numbers")
+    if numbers is None:
+        return []
+    path = next(kernel for kernel in facts["kernels"] if kernel["role"] == "path")
+    slot = next(b["slot"] for b in path["bindings"] if b["name"] == SCENE_NUMBERS)
+    (moments, count), rows = numbers["rows"]["shape"], numbers["rows"]
+    lines = TOLD[TARGETS[facts["target"]].slots].format(count=count, vectors=-(-count // 4), slot=slot)
+    formulas = {each["places"][0]["table"]: each["formula"] for each in numbers["list"]}
+    return [
+        "## What moves",
+        "",
+        f"{', '.join(numbers['moving']).capitalize()}: {count} numbers, which the path kernel is given as",
+        f"`{SCENE_NUMBERS}`; all else of the scene is constant in it. `{rows['file']}` has a row of numbers",
+        f"for each of {moments} times (`times` in `manifest.json`), {rows['format']}:",
+        "",
+        "```text",
+        lines,
+        "```",
+        "",
+        "`manifest.json` says of each number where it is in the scene's tables (`list`). A host computes",
+        "others in 64 bits, and rounds once:",
+        "",
+        *(f"* `{table}`: {formula or 'by the rows only'}." for table, formula in formulas.items()),
+        "",
+    ]
 
 
 def _rays(facts: Mapping[str, Any]) -> list[str]:
@@ -164,6 +210,8 @@ def _check(check: Mapping[str, Any]) -> list[str]:
             f"`sums.f32` are the paths' sums of this picture, seed {check['sums']['seed']}; a path",
             "that passes an edge within rounding may differ.",
         ]
+    for moment in (check["sums"] or {}).get("moments", []):
+        found.append(f"`{moment['file']}` are those of another moment, whose numbers are in `check.json`.")
     return found
 
 

@@ -350,7 +350,7 @@ def unshadowed(world: World, surface: Surface) -> Radiance:
         factor = area * along_surface * along_light / near
         return tuple(value + factor * radiance[..., i] for i, value in enumerate(values))
 
-    tables = middle.astype(world.geometry.dtype), lights.normal, lights.radiance, lights.area
+    tables = middle, lights.normal, lights.radiance, lights.area
     irradiance = vectors.fold_rows(add, tables, (black, black, black))
     light: Radiance = surface.reflectance * vectors.vector(*irradiance) * world.geometry.dtype.type(1 / np.pi)
     return light

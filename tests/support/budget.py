@@ -27,7 +27,7 @@ BUDGET = {
     "kernels/run": 2850,
     "kernels/judge": 1450,
     "kernels/bench": 3150,
-    "kernels/export": 2900,
+    "kernels/export": 3200,
     "spec/conformance": 4950,
     "cli": 300,
     "cli/commands": 5100,

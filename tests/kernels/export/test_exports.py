@@ -12,8 +12,11 @@ import jsonschema
 import numpy as np
 import pytest
 
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.scene_inputs import tables_of
 from wamnet.compiler.variants import parse, vary
 from wamnet.kernels.export import check, runners, targets, tools
+from wamnet.kernels.export.motion import FORMULAS, KINDS, Motion, drawn
 from wamnet.kernels.export.package import Request, export
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.light.scenes import canonical
@@ -68,6 +71,99 @@ def test_an_export_keeps_its_bound_where_it_is_run(exported):
     assert verdict.share <= 1
     assert verdict.error > 0, "clipped outputs would hide errors"
     assert exported.target == "onnx" or verdict.paths >= check.PATHS_ALIKE
+
+
+MOVING = Motion(
+    (0.3, 0.9, 1.4), tuple(canonical("cornell", time=t) for t in (0.3, 0.9, 1.4)), ("time", "camera")
+)
+"""Two turning blocks, seen from anywhere."""
+
+
+def moving(target):
+    """Return an export of a scene that moves."""
+    settings = Settings(max_depth=1)
+    return export(Request(model(), target, MOVING.scenes[0], settings=settings, motion=MOVING))
+
+
+PATHS = [name for name, row in targets.TARGETS.items() if not row.single]
+"""Targets whose scenes can move."""
+
+
+@pytest.mark.parametrize("target", PATHS)
+def test_a_scene_that_moves_is_exported_for_all_moments(target):
+    """EXP-13: table, formulas and bindings of the numbers; two moments are run, and are not the same."""
+    try:
+        made = moving(target)
+    except ExecutorUnavailable as error:
+        pytest.skip(str(error))
+    schema = json.loads((ROOT / "spec/export.schema.json").read_text())
+    jsonschema.Draft202012Validator(schema).validate(made.manifest)
+    numbers, (path, *_) = made.manifest["scene"]["numbers"], made.manifest["kernels"]
+    moments, count = numbers["rows"]["shape"]
+    rows = np.frombuffer(made.files[numbers["rows"]["file"]], "<f4").reshape(moments, count)
+    assert (moments, numbers["times"]) == (3, [0.3, 0.9, 1.4])
+    assert rows[0].tolist() == [each["value"] for each in numbers["list"]]
+    assert np.ptp(rows, axis=0).any()
+    assert {each["formula"] for each in numbers["list"]} >= {
+        FORMULAS["camera.up"],
+        FORMULAS["camera.position"],
+    }
+    (bound,) = (each for each in path["bindings"] if each["name"] == "scene_numbers")
+    assert (bound["access"], bound["shape"]) == ("read", [count])
+    told = json.loads(made.files["check/check.json"])["sums"]
+    (moment,) = told["moments"]
+    assert moment["scene_numbers"] == rows[1].tolist()
+    first, other = (
+        np.frombuffer(made.files[f"check/{name}"], "<f4") for name in (told["file"], moment["file"])
+    )
+    assert first.size == other.size
+    assert np.abs(first - other).max() > 0.1
+    readme = made.files["README.md"].decode()
+    assert "## What moves" in readme
+    assert "`sums.0.f32` are those of another moment" in readme
+    verdict = check.check(made)
+    assert verdict.holds, verdict.wrong
+    if "missing" in verdict.executed:
+        pytest.skip(verdict.executed)
+    assert verdict.paths >= check.PATHS_ALIKE
+
+
+def test_a_moment_that_is_not_given_is_found():
+    """A kernel that reads the first number in place of the second draws neither moment."""
+    whole = moving("c")
+    source = whole.path.source.replace("scene_numbers[1]", "scene_numbers[0]")
+    assert source != whole.path.source
+    manifest = {**whole.path.manifest, "digest": "1" * 64}
+    verdict = check.check(replace(whole, path=replace(whole.path, source=source, manifest=manifest)))
+    assert "paths' sums agree" in verdict.wrong
+
+
+def test_what_moves_is_refused_where_it_cannot():
+    with pytest.raises(InputError, match=r"what moves is doors: it must be one of time, camera, lights, pos"):
+        Motion((0.0,), (SCENE,), ("doors",))
+    still = Motion((0.0, 1.0), (SCENE, SCENE))
+    with pytest.raises(InputError, match=r"what moves is time: nothing of scene lone_light moves with it"):
+        export(Request(model(), "c", SCENE, motion=still))
+    with pytest.raises(
+        InputError, match=r"--moving is time, camera: the passes of target godot have no place"
+    ):
+        moving("godot")
+
+
+@pytest.mark.parametrize("kind", KINDS[1:])
+def test_what_is_drawn_shows_which_numbers_move(kind):
+    """EXP-13: the formulas give the numbers of a scene that was not among those drawn, rounded once."""
+    scene, settings = canonical("minicubes", time=0.3), Settings()
+    motion = Motion((0.3,), (scene,), (kind,))
+    inputs, new = motion.inputs(settings), drawn(scene, (kind,), 99)
+    tables = {path for places in inputs.places for path, _ in places}
+    begins = {"camera": ("camera.",), "lights": ("world.lights.", "world.geometry.emission")}
+    wanted = begins.get(kind, ("world.geometry.groups.", "world.lights.corner"))
+    assert all(path.startswith(wanted) for path in tables)
+    programs = lower_scene(scene, settings, moving=inputs)
+    assert all(each["formula"] for each in motion.facts(programs)["list"])
+    assert inputs.fits(tables_of(scene, settings), tables_of(new, settings))
+    assert not np.array_equal(motion.other(settings), inputs.values(scene))
 
 
 def test_the_manifest_is_of_the_schema_and_names_every_file(exported):

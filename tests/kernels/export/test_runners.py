@@ -19,6 +19,7 @@ from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
 from wamnet.compiler.scenes.lower_encode import layers_of
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.kernels.devices.executor import Part
 from wamnet.kernels.export import check, runners, tools
@@ -184,6 +185,31 @@ def test_paths_are_the_interpreter_s(runner, traced):
     assert np.abs(found - sums).max() <= 8000 * 2.0**-24
 
 
+def test_paths_of_two_moments(runner):
+    """PTK-18: each language reads the numbers of the moment that it is given, by one kernel."""
+    if runner.name == "godot":
+        pytest.skip("its passes have no place for numbers of a scene")
+    programs, rows, part, wanted = moments()
+    kernel = compile_path(programs, runner.name, groups=layers_of(FEATURES))
+    for row, sums in zip(rows, wanted, strict=True):
+        assert np.abs(runner.trace(kernel, part, row) - sums).max() <= 8000 * 2.0**-24
+    assert np.array_equal(runner.trace(kernel, part), runner.trace(kernel, part, rows[0]))
+
+
+def moments():
+    """Return programs of a scene that moves, numbers of two moments, a part, and the interpreter's sums."""
+    settings, part = Settings(max_depth=2), Part(12, 9, 1, 8, 0, 1, 7)
+    shots = [canonical("minicubes", time=time) for time in (1.05, 2.6)]
+    inputs = varying(shots, settings)
+    programs = lower_scene(shots[0], settings, moving=inputs)
+    rows = [inputs.values(scene) for scene in shots]
+    with kernels.open_executor("numpy") as executor:
+        kernel = compile_path(programs, "numpy", groups=layers_of(FEATURES))
+        sums = [executor.trace(kernel, part, row) for row in rows]
+    assert np.abs(sums[0] - sums[1]).max() > 0.1
+    return programs, rows, part, sums
+
+
 def test_encoding_keeps_its_bound(runner, traced):
     if runner.name == "godot":
         pytest.skip("its encodings are parts of its paths' passes: test_exports.py runs them")
@@ -252,6 +278,47 @@ def test_c_is_clean_under_warnings_and_sanitizers(traced, tmp_path):
     held = encode_sums({"color": color}, 1.0, ("color",), Normalization())["color"]
     # The compiler keeps the interpreter's order of operations, without contraction: the sums are its bits.
     assert (np.abs(found - held) <= bound).all()
+
+
+MOVING = """
+#include <stdio.h>
+#include "path.h"
+
+static const float rows[2][{count}] = {{{rows}}};
+static float sums[{sums}];
+
+int main(void)
+{{
+    const wamnet_part part = {{{width}, {height}, {first_row}, {rows_of_part}, 0u, 1, 7u}};
+    for (int moment = 0; moment < 2; ++moment) {{
+        wamnet_trace(&part, sums, rows[moment]);
+        for (int i = 0; i < {sums}; ++i) {{
+            printf("%a\\n", (double)sums[i]);
+        }}
+    }}
+    return 0;
+}}
+"""
+"""A program that has a scene that moves pasted in, and plays two rows of its table."""
+
+
+def test_a_host_in_c_plays_two_moments(tmp_path):
+    """PTK-18, EXP-13: nothing is compiled, or read from outside of the arrays, between them."""
+    programs, rows, part, wanted = moments()
+    kernel = compile_path(programs, "c", groups=layers_of(FEATURES))
+    (tmp_path / "path.h").write_text(kernel.source)
+    lines = ", ".join("{" + ", ".join(float(x).hex() + "f" for x in row) + "}" for row in rows)
+    facts = {"count": len(rows[0]), "rows": lines, "sums": wanted[0].size, "rows_of_part": part.rows}
+    (tmp_path / "main.c").write_text(MOVING.format(**{**asdict(part), **facts}))
+    try:
+        options = ["-std=c99", "-O1", "-g", *check.WARNINGS[1:-1], *SANITIZERS]
+        tools.run("cc", *options, "-o", "main", "main.c", "-lm", folder=tmp_path)
+    except ExecutorUnavailable as error:
+        pytest.skip(str(error))
+    printed = subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    found = np.array([float.fromhex(line) for line in printed.split()])
+    # The compiler keeps the interpreter's order of operations, without contraction.
+    assert np.array_equal(found, np.concatenate([sums.ravel() for sums in wanted]))
 
 
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")

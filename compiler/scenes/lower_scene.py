@@ -122,9 +122,9 @@ def lower_scene(
         # A pixel's counter, as in refimpl/light/render.py: pixel_counter.
         pixel = given["x"] + np.uint32(render.MAX_IMAGE_SIDE_PX) * given["y"]
         counters = Counters(given["seed"], pixel, given["sample_number"])
-        place = [*(given[n].astype(np.float32) for n in "xy"), given["width"], given["height"]]
-        basis = moving.opened(laid, given)["camera"]
-        path = render.start(basis, *place, counters, np.float32, settings.sampler)
+        x, y = (given[n].astype(np.float32) for n in "xy")
+        basis, size = moving.opened(laid, given)["camera"], (given["width"], given["height"])
+        path = render.start(basis, x, y, *size, counters, np.float32, settings.sampler)
         return {**_taken(PATH, path), "pixel": pixel}
 
     def arrive(given: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from ...compiler.scenes.path_kernel import numbers_of
 from ...compiler.scenes.scene_inputs import SceneInputs, varying
 from ...refimpl import rng
 from ...refimpl.errors import InputError
-from ...refimpl.light.scene import Scene
+from ...refimpl.light.scene import Light, Scene
 from ...refimpl.light.transport import Settings
 
 TIME, CAMERA, LIGHTS, POSITIONS = "time", "camera", "lights", "positions"
@@ -123,20 +123,20 @@ def drawn(scene: Scene, kinds: Collection[str], number: int) -> Scene:
         places = {"position": _moved(camera.position, draw), "look_at": _moved(camera.look_at, draw)}
         scene = replace(scene, camera=replace(camera, **places, vertical_fov_deg=view))
     if LIGHTS in kinds:
-        lights = tuple(
-            replace(
-                light, color=tuple(0.1 + next(draw) for _ in "rgb"), power=light.power * (0.5 + next(draw))
-            )
-            for light in scene.lights
-        )
-        scene = replace(scene, lights=lights)
+        scene = replace(scene, lights=tuple(_relit(light, draw) for light in scene.lights))
     if POSITIONS in kinds:
-        shapes = {
+        shapes: dict[str, Any] = {
             kind: tuple(replace(one, **{at: _moved(getattr(one, at), draw)}) for one in getattr(scene, kind))
             for kind, at in PLACES.items()
         }
         scene = replace(scene, **shapes)
     return scene
+
+
+def _relit(light: Light, draw: Iterator[float]) -> Light:
+    """Return a lamp with a drawn colour and power."""
+    color = (0.1 + next(draw), 0.1 + next(draw), 0.1 + next(draw))
+    return replace(light, color=color, power=light.power * (0.5 + next(draw)))
 
 
 PLACES: Mapping[str, str] = {"boxes": "center", "spheres": "center", "quads": "corner", "lights": "corner"}

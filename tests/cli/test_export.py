@@ -86,6 +86,17 @@ def test_help_names_every_target():
         ),
         (["--target", "c", "--time", "2"], "--time is 2.0: there is no scene; name one with --scene"),
         (["--target", "c", "--max-depth", "2"], "--max-depth is 2: there is no scene"),
+        (["--target", "c", "--moving", "time"], "--moving is time: there is no scene"),
+        (["--target", "c", "--fps", "5"], "--fps is 5.0: nothing moves; add --moving time"),
+        (
+            ["--target", "c", "--scene", "minicubes", "--moving", "camera", "--seconds", "2"],
+            "--seconds is 2.0: time does not move; add it to --moving",
+        ),
+        (
+            ["--target", "c", "--scene", "minicubes", "--moving", "tide"],
+            "--moving is tide: ",
+        ),
+        (["--target", "html", "--moving", "time"], "--moving is time: a web page has its own"),
         (["--target", "html", "--weights", "inline"], "--weights is inline: a web page has its own"),
         (["--target", "html", "--schedule", "plain"], "--schedule is plain: a web page has its own"),
         (

@@ -39,8 +39,9 @@ def pipeline(
     """Measure one pipeline against the separate way: one path per pixel and its denoising.
 
     Both ways use compiled kernels of one executor, and take turns. Separate: trace all layers, read them
-    back, encode, upload, denoise, read back. The table also has the parts of the pipeline; below it is what a
-    new time of the scene costs, whose kernel is compiled again. The network has random weights.
+    back, encode, upload, denoise, read back. Moving: every picture shows another moment. The table also has
+    the parts of the pipeline; below it is the time to the first picture of a new scene, whose kernel is
+    compiled first. The network has random weights.
     """
     from ....kernels import EXECUTORS, open_executor
     from ....kernels.bench import measure_pipeline as measuring
@@ -68,6 +69,6 @@ def pipeline(
                 for way, times in rows.items():
                     ms = [1e3 * time for time in times]
                     row(each, f"{size}x{size}", way, f"{statistics.median(ms):.1f}", extent(ms, 1))
-            news.append(f"{each}: a new time of the scene costs {1e3 * seconds:.0f} ms to compile")
+            news.append(f"{each}: the first picture of a new scene takes {1e3 * seconds:.0f} ms")
     for line in ("", *news):
         say(line)

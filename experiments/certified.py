@@ -35,7 +35,8 @@ MODELS = ("minicubes", "cornell", "glossy")
 KERNELS = (
     "opencl:plain", "opencl:tile16", "opencl:fft32", "opencl:plain:whole8", "opencl:dot16:whole8",
     "opengl:plain", "c:plain", "c:tile8", "c:fft32x8", "c:plain:whole8", "c:dot16:whole8", "wgsl:plain",
-    "wgsl:group4", "cuda:plain", "cuda:group4",
+    "wgsl:group4", "cuda:plain", "cuda:group4", "opencl:tile16:whole8", "cuda:groupdot:whole8",
+    "wgsl:groupdot:whole8", "opencl:groupdot:whole8", "glsl-vulkan:groupdot:whole8",
 )  # fmt: skip
 """Targets, schedules and variants."""
 

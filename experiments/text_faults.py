@@ -20,7 +20,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from lab.tables import markdown
 
@@ -38,7 +38,10 @@ from wamnet.refimpl.network.denoise import Model
 TILES = (("c", "tile8"), ("opencl", "tile8"))
 """Targets and schedules of small kernels, in addition to the plain ones."""
 
-ROOM = re.compile(r" *(?:PRECISE )?(?:float|vector|union|var|wamnet_vector)\b[^=]*[\[<][^=]*;")
+ROOM = re.compile(
+    r" *(?:PRECISE )?(?:float|vector|union|var|wamnet_vector|uchar|uint8_t|sums|wamnet_sums)"
+    r"\b[^=]*[\[<][^=]*;"
+)
 """A line that declares an array without a value."""
 
 OPERATORS = {
@@ -65,6 +68,10 @@ NOTHING = re.compile(r" \(?0\)?(?![\w.])")
 """An integer zero: whether it is added or taken away is the same."""
 
 STATEMENT = re.compile(r"(?m)^ +(?!return|\(void\)|[}#])[^\n{}]*;$")
+
+
+Given = tuple[str, Any, Any, Any]
+"""A kernel's text, certificate, manifest and weights."""
 
 
 class Fault(NamedTuple):
@@ -130,19 +137,29 @@ def small(folder: Path) -> Iterator[Path]:
         yield made
 
 
+def tried(given: Given, count: int, seed: int) -> Iterator[tuple[Fault, bool]]:
+    """Plant faults in a kernel's text, one at a time; yield each, and whether the reader notices it."""
+    source, *others = given
+    every = list(faults(source))
+    random.Random(seed).shuffle(every)
+    for fault in every[:count]:
+        try:
+            run_text(source[: fault.start] + fault.new + source[fault.end :], *others)
+        except (Refused, Unread):
+            yield fault, True
+        else:
+            yield fault, False
+
+
 def planted(folder: Path, count: int, seed: int) -> tuple[list[str], int]:
     """Plant faults in a kernel; return a row of the table, and how many were accepted, spare room apart."""
     held, manifest, _, _, weights = read(folder / CERTIFICATE_NAME)
     (name,) = (name for name in manifest["files"] if name != "weights.bin")
     source = (folder / name).read_text()
     run_text(source, held, manifest, weights)  # the text itself must hold
-    every = list(faults(source))
-    random.Random(seed).shuffle(every)
     done: Counter[str] = Counter()
-    for fault in every[:count]:
-        try:
-            run_text(source[: fault.start] + fault.new + source[fault.end :], held, manifest, weights)
-        except (Refused, Unread):
+    for fault, noticed in tried((source, held, manifest, weights), count, seed):
+        if noticed:
             done["noticed"] += 1
             continue
         harmless = spare(source, fault)
@@ -152,7 +169,7 @@ def planted(folder: Path, count: int, seed: int) -> tuple[list[str], int]:
             f"{'harmless' if harmless else 'ACCEPTED'}: {folder.name}, line {line + 1}, {fault.kind}: "
         )
         sys.stderr.write(f"{source.splitlines()[line].strip()} -> {fault.new!r}\n")
-    counts = [len(every), done.total(), done["noticed"], done["harmless"], done["accepted"]]
+    counts = [len(list(faults(source))), done.total(), done["noticed"], done["harmless"], done["accepted"]]
     return [manifest["target"], manifest["schedule"]["name"], *map(str, counts)], done["accepted"]
 
 

@@ -30,8 +30,8 @@ KINDS = {"int32": (-(2**31), 2**31 - 1), "uint32": (0, 2**32 - 1)}
 """Ends of integers."""
 
 
-def check_integers(held: Mapping[str, Any], text: str, arrays: Mapping[str, Any]) -> None:
-    """Refuse a certificate of integers, a step of which does not hold."""
+def check_integers(held: Mapping[str, Any], text: str, arrays: Mapping[str, Any]) -> list[Range]:
+    """Refuse a certificate of integers, a step of which does not hold; return its values' ranges."""
     lines = [m for m in map(NODE.fullmatch, text.splitlines()) if m]
     found: list[Range] = []
     for number, line in enumerate(lines):
@@ -40,6 +40,7 @@ def check_integers(held: Mapping[str, Any], text: str, arrays: Mapping[str, Any]
     ends = [[float(Fraction(2) ** g * v) for v in (min(low), max(high))] for low, high, g in found]
     same("ranges", held["ranges"], ends)
     same("bound: output", held["bound"]["output"], [0.0] * len(held["bound"]["output"]))
+    return found
 
 
 class Line:

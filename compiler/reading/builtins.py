@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import words
 from .field import Number, blended, choice, expression, hashed, literal
 from .lanes import Wrong, chosen, clamped
 from .memory import Pointer, Texel, Weights
@@ -88,6 +89,9 @@ def bits(name: str, a: Number, b: Number) -> Number:
     """Return what an operator of bits makes of two integers."""
     if name == "bitwise_and" and a.compared and b.literal == 0x7FFFFFFF:
         return Number(None, hashed("magnitude", a.known), "int32", compared=a.compared)
+    moved = words.moved(name, a, b)
+    if moved is not None:
+        return moved
     return expression(name, a, b, commutes=not name.endswith("shift"))
 
 
@@ -107,6 +111,9 @@ def several(machine: Machine, *given: Any) -> Any:
     return given[0] if len(given) == 1 and isinstance(given[0], Number) else list(given)
 
 
+KINDS = {"int": "int32", "uint": "uint32", "float": "float32"}
+"""Kinds of numbers by the names of types."""
+
 BUILTINS: dict[str, Callable[..., Any]] = {
     "clamp": clamp, "select": select, "texelFetch": fetch,
     "textureSize": lambda machine, image, level: image.size,
@@ -116,7 +123,18 @@ BUILTINS: dict[str, Callable[..., Any]] = {
     **dict.fromkeys(("int", "i32", "convert_int"), conversion("int32")),
     **dict.fromkeys(("uint", "u32", "convert_uint"), conversion("uint32")),
     **dict.fromkeys(("float", "f32", "convert_float"), conversion("float32")),
-    **dict.fromkeys(("ivec2", "vec4", "float4"), several),
-    **{f"as_int{n}": as_int for n in ("", 4, 8, 16)}, **{f"as_float{n}": as_float for n in ("", 4, 8, 16)},
+    "ivec2": several, **dict.fromkeys(("vec4", "float4"), words.vector("float32")),
+    **dict.fromkeys(("ivec4", "make_int4"), words.vector("int32")), "uvec4": words.vector("uint32"),
+    **{f"convert_{name}{n}": conversion(kind) for name, kind in KINDS.items() for n in (4, 8, 16)},
+    **{f"as_int{n}": words.seen("int32", as_int) for n in ("", 4, 8, 16)},
+    "as_uint": words.seen("uint32", as_int),
+    **{f"as_float{n}": words.seen("float32", as_float) for n in ("", 4, 8, 16)},
+    **dict.fromkeys(("intBitsToFloat", "__int_as_float"), words.seen("float32", as_float)),
+    "memcpy": words.copy, "pack4xI8": words.packed, "dot4I8Packed": words.of_words,
+    **dict.fromkeys(("__dp4a", "dotPacked4x8EXT"), words.of_integers),
+    "dot_acc_sat_4x8packed_ss_int": words.of_words,
+    **dict.fromkeys(("__builtin_ia32_vpdpbusd512", "_mm512_dpbusd_epi32"), words.unsigned_first),
+    "_mm512_loadu_si512": words.sixteen, "_mm512_storeu_ps": words.store_sixteen,
+    "_mm512_set1_epi32": lambda machine, a: a, "_mm512_cvtepi32_ps": conversion("float32"),
 }  # fmt: skip
 """By name: called with the machine and the arguments."""

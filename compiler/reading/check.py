@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...refimpl.reading import read_file
-from ..proof.evidence import INTEGERS, Refused, read
+from ..proof.evidence import Refused, read
 from .builtins import BUILTINS
 from .claim import Claim
 from .field import add_up_lanes, fold_lanes
@@ -18,9 +18,10 @@ from .groups import FLAGS, Group, group_lanes, tile_lanes
 from .lanes import Place, Unread, Wrong, lanes_for
 from .languages import LANGUAGES, Language, Stopped, parsed
 from .machine import Machine
-from .memory import Image, Memory, Pointer, Result, Weights
+from .memory import Image, Memory, Pointer, Result
 from .spectra import Tiles
 from .syntax import Text, Variable
+from .words import Stored, pointed
 
 LANES_SEED = 20261123
 """Which borders meet in a lane; every run draws other unknowns [field.py]."""
@@ -50,8 +51,6 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
     if language is None:
         raise Unread(f"texts of target {manifest['target']}")
     pixels, rows, group = int(schedule.get("pixels", 1)), int(schedule.get("rows", 1)), schedule.get("group")
-    if group and held["schema"] == INTEGERS:
-        raise Unread("schedules of bytes")
     window, centre = int(manifest["window"]["size"]), int(manifest["window"]["centre"])
     try:
         tiles = Tiles(held["spectra"], pixels, rows, window) if "spectra" in held else None
@@ -106,7 +105,7 @@ def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> Non
         int(manifest["output"]["channels"]),
         manifest["schedule"].get("group"),
     )
-    result, target = Result(claim, channels), Memory("result", 4)
+    result, target = Result(claim, channels), Memory("result", 4, kind="float32")
     given = arguments(claim, language.fragment, result, target)
     group = Group(lanes, size[0] * size[1]) if size else None
     known: Mapping[str, Any]
@@ -117,7 +116,8 @@ def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> Non
         known, calls = items(claim)
     names = {v.name: sized(given[v.name], v) for v, _ in text.outside if v.name in given}
     names |= {name: known[name] for name in language.brings if name in known}
-    machine = Machine(text, lanes, names, {**BUILTINS, **calls}, claim.added, group)
+    span_of = claim.ranges.of if claim.stated else None
+    machine = Machine(text, lanes, names, {**BUILTINS, **calls}, claim.added, group, span_of)
     if group and text.group and [machine.value(n) for n in text.group][:2] != size:
         raise Wrong(f"its groups are not of {size[0]} x {size[1]} items")
     entry = manifest["entry_point"] if manifest["entry_point"] in text.functions else "main"
@@ -150,8 +150,11 @@ def arguments(claim: Claim, fragment: bool, result: Result, target: Memory) -> d
     """Return what a kernel is given, by name."""
     lanes = claim.lanes
     x, width, y, height = (lanes.place(axis) for axis in range(4))
-    images = {f"image_{name}": Image(name, int(n), (width, height)) for name, n in claim.images}
-    weights = Pointer(Weights(claim.weights, claim.tiles.range if claim.tiles else range(0)), 0)
+    spans = claim.ranges.images(claim.text)
+    images = {
+        f"image_{name}": Image(name, int(n), (width, height), spans.get(name)) for name, n in claim.images
+    }
+    weights = Pointer(claim.weights, 0)
     size = {"width": width, "height": height}
     given: dict[str, Any] = {
         **size, "size": size, **dict.fromkeys(("weights", "weight_texture", "w"), weights),
@@ -169,7 +172,11 @@ def sized(value: Any, variable: Variable) -> Any:
     """Return what a kernel is given, a buffer as one of the numbers or vectors that the text declares."""
     if not isinstance(value, Pointer) or value.sizes != (None,):
         return value
-    return Pointer(value.memory, 0, variable.type.width)
+    return (
+        pointed(value, variable.type)
+        if isinstance(value.memory, Stored)
+        else Pointer(value.memory, 0, variable.type.width)
+    )
 
 
 def check_host(text: Text, host: str, kernel: str, claim: Claim) -> None:

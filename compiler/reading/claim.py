@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..core.sine import exact_sine, sine
 from ..proof.evidence import INTEGERS, NODE, places
-from . import field
+from . import field, words
 from .field import (
     Number,
     P,
@@ -34,6 +34,7 @@ from .field import (
     total,
 )
 from .lanes import Lanes, Mask, Unread
+from .memory import Weights
 from .spectra import Tiles
 
 COMMUTE = ("minimum", "maximum", "bitwise_and", "bitwise_xor", "bitwise_or")
@@ -87,7 +88,9 @@ class Claim:
         self.parameters, self.tiles, self.rows = held["parameters"], tiles, tiles.rows if tiles else 1
         self.exact = held["schema"] == INTEGERS
         self.sine = self._sine(held)
-        self.weights = self._weights(raw)
+        self.stated = words.stated(held)
+        self.ranges = words.Ranges(held, self.stated)
+        self.weights: Any = words.Stored(raw) if self.stated else self._memory(raw)
         self.tables: list[tuple[NDArray[np.uint32], str, str]] = []
         self.first: dict[int, tuple[int, int]] = {}
         self.found: set[int] = set()
@@ -111,6 +114,9 @@ class Claim:
 
     # ---- inputs --------------------------------------------------------------------------------------------
 
+    def _memory(self, raw: NDArray[np.float32]) -> Weights:
+        return Weights(self._weights(raw), self.tiles.range if self.tiles else range(0))
+
     def _weights(self, raw: NDArray[np.float32]) -> Number:
         """Return all weights (2, 1, n) of the file: those of the program as unknowns, others as they are."""
         shape = hashed("weight", np.arange(len(raw)))
@@ -132,11 +138,14 @@ class Claim:
 
     def parameter(self, name: str) -> Number:
         """Return a parameter's numbers, (2, 1, outputs * inputs) or (2, 1, outputs)."""
+        if self.stated:
+            array = self.stated[name]
+            return words.integers(array.ravel(), "float32", True) if array.ndim > 1 else words.floats(array)
         if "base64" in self.parameters[name]:
             raise Unread("weights that the file does not hold")
-        at = places(name, self.parameters[name], self.weights.value.shape[-1]).ravel()
-        shape = self.weights.known[:, at]
-        return Number(self.weights.value[:, :, at], shape, weight=True)
+        numbers = self.weights.numbers
+        at = places(name, self.parameters[name], numbers.value.shape[-1]).ravel()
+        return Number(numbers.value[:, :, at], numbers.known[:, at], weight=True)
 
     def _input(self, at: int) -> Number:
         """Return the window (2, lanes, n) of a pixel of each lane: tap by tap, all images' channels.
@@ -163,7 +172,16 @@ class Claim:
                         if self.window[2] == "zero":
                             value = np.where(inside, number.value, nothing.value)
                             number = Number(value, np.where(inside, number.known, nothing.known))
-                        yield number
+                        yield self._kept(number)
+
+    def _kept(self, number: Number) -> Number:
+        """Return a number as an exact program reads it: 0 where it is below what the program's text says."""
+        (least,) = re.findall(r"(?m)^  exact, numbers below (\S+) are read as 0$", self.text) or [None]
+        if least is None:
+            return number
+        size, end = expression("absolute", number), literal(float(least), "float32")
+        below = expression("less", size, end, kind="bool")
+        return choice(below, literal(0.0, "float32"), number)
 
     # ---- the program ---------------------------------------------------------------------------------------
 
@@ -177,6 +195,7 @@ class Claim:
             if op == "input":
                 values[number] = None if self.tiles else self._input(pixel)  # which only spectra read
             elif op == "affine":
+                self.ranges.note(re.findall(r"%(\d+)", m[3])[0], given[0])
                 values[number] = self._affine(number, given[0], named, is_window=values["0"] is given[0])
             elif op == "constant":
                 values[number] = literal(float(named["value"]), kind)
@@ -234,7 +253,8 @@ class Claim:
         if not biased:
             return found
         at = self.tiles.bias
-        bias = Number(self.weights.value[:, :, at], self.weights.known[:, at], weight=True)
+        numbers = self.weights.numbers
+        bias = Number(numbers.value[:, :, at], numbers.known[:, at], weight=True)
         whole = (found.term + np.tile(bias.term, self.together)) % P
         self._note(whole, "sum", f"the sums of %{node}")
         return self._number(whole)

@@ -29,6 +29,12 @@ P = np.uint64(2013265921)
 
 Words = NDArray[np.uint64]
 
+Span = tuple[Any, Any]
+"""The least and the largest value of an integer, or of a vector's (width,), in any lane."""
+
+ZERO = "is zero"
+"""The kind of the truth that a number is zero, of either sign."""
+
 HALF, MASK = np.uint64(16), np.uint64(0xFFFF)
 """Half the bits of a field element, and which these are."""
 
@@ -40,7 +46,7 @@ class Number:
     `given` is that value, None where it is drawn from the shape. `shape` (lanes, ...) is None for sums under
     way, whose value is not reduced. `kind` is its type. `weight`: it was read from the weights. `literal`:
     what a constant is. `held` (lanes,): where it has been written, None for everywhere. `compared`: a and b
-    of a < b. `source`: the vector that it is a number of, and which.
+    of a < b. `source`: the vector that it is a number of, and which. `span`, `parts`: of integers [words.py].
     """
 
     given: Words | None
@@ -51,6 +57,8 @@ class Number:
     held: NDArray[np.bool_] | None = None
     compared: tuple[Number, Number] | None = None
     source: tuple[Number, int] | None = None
+    span: Span | None = None
+    parts: tuple[tuple[Number | None, bool], ...] | None = None
 
     @cached_property
     def value(self) -> Words:
@@ -59,6 +67,11 @@ class Number:
             assert self.shape is not None
             return drawn(self.shape)
         return self.given
+
+    @cached_property
+    def made(self) -> dict[Any, Number]:
+        """What operators of bits have made of it, so that it is made once."""
+        return {}
 
     @property
     def axes(self) -> int:
@@ -73,6 +86,8 @@ class Number:
         if self.source:
             vector, k = self.source
             return vector.term[..., k]
+        if self.value.shape[1] == 1:
+            return np.asarray(self.value % P * FACTORS["sum"] % P)
         return added_up(self.value, FACTORS["lanes"])
 
     @property
@@ -82,7 +97,7 @@ class Number:
 
 
 FACTORS: dict[str, Words] = {}
-"""The factors (lanes,) of "lanes" where sums are added up over them; empty where each lane has its own."""
+"""The factors (lanes,) of "lanes", and their "sum", where sums are added up over them; else empty."""
 
 
 FOLDED: dict[str, NDArray[np.bool_]] = {}
@@ -95,6 +110,7 @@ def add_up_lanes(count: int | None) -> None:
     FOLDED.clear()
     if count is not None:
         FACTORS["lanes"] = hashed("factor", secrets.randbits(63), np.arange(count)) % P
+        FACTORS["sum"] = FACTORS["lanes"].sum() % P
 
 
 def fold_lanes(count: NDArray[np.bool_]) -> None:
@@ -119,8 +135,6 @@ def added_up(value: Words, factors: Words) -> Words:
     Halves of 16 bits times 31: 2^16 of these stay below 2^63.
     """
     lanes = len(factors)
-    if value.shape[1] == 1:
-        return np.asarray(value % P * (factors.sum() % P) % P)
     found = np.zeros((2, 1, *value.shape[2:]), dtype=np.uint64)
     for at in range(0, lanes, 2**16):
         part, by = value[:, at : at + 2**16] % P, factors[at : at + 2**16]
@@ -174,13 +188,24 @@ def leaf(shape: Words, kind: str = "float32", **other: Any) -> Number:
 
 
 def literal(value: float, kind: str) -> Number:
-    """Return a constant (2, 1) of a text: exact, since a float32 is an integer times a power of two."""
-    value = float(np.float32(value)) if kind == "float32" else float(value)
+    """Return a constant (2, 1) of a text: exact, since a float32 is an integer times a power of two.
+
+    An integer has no magnitude of its own: its sums are exact [words.py].
+    """
+    is_float = kind == "float32"
+    value = (
+        float(np.float32(value))
+        if is_float
+        else float(int(value) % 2**32 if kind == "uint32" else int(value))
+    )
     numerator, denominator = value.as_integer_ratio()
     inverse = pow(denominator, -1, int(P))
-    rows = [[n * inverse % int(P)] for n in (numerator, abs(numerator))]
+    rows = [[n * inverse % int(P)] for n in (numerator, abs(numerator) if is_float else numerator)]
     bits = np.float64(value + 0.0).view(np.uint64)
-    return Number(np.array(rows, dtype=np.uint64), hashed(f"literal {kind}", bits)[None], kind, literal=value)
+    return Number(
+        np.array(rows, dtype=np.uint64), hashed(f"literal {kind}", bits)[None], kind, literal=value,
+        span=(int(value), int(value)) if value.is_integer() and abs(value) <= 2**32 else None,
+    )  # fmt: skip
 
 
 def alike(*parts: Words) -> list[Words]:
@@ -242,8 +267,12 @@ def expression(name: str, *operands: Number, commutes: bool = False, kind: str |
 def choice(condition: Number, a: Number, b: Number) -> Number:
     """Return condition ? a : b, which is the minimum or the maximum where these two were compared.
 
-    Of NaN they differ; no number of a certified program is NaN.
+    Of NaN they differ; no number of a certified program is NaN. `a == 0 ? 0 : a` is a.
     """
+    if condition.kind == ZERO and condition.compared:
+        if a.literal == 0.0 and equal(b.known, condition.compared[0].known):
+            return b
+        raise Unread("a comparison with zero that is not of its sign")
     if condition.compared:
         less, more = (part.known for part in condition.compared)
         for one, other, name in ((less, more, "minimum"), (more, less, "maximum")):
@@ -263,7 +292,7 @@ def blended(new: Number, old: Number | None, active: NDArray[np.bool_]) -> Numbe
         raise Unread("sums that some items of a group make and others do not")
     if old is None:
         where = active if new.held is None else active & new.held
-        return Number(new.given, new.shape, held=where)
+        return Number(new.given, new.shape, new.kind, held=where, span=new.span)
     va, vb = alike(new.value, old.value)
     value = np.where(active.reshape((-1,) + (1,) * (va.ndim - 2)), va, vb)
     shape = None
@@ -277,7 +306,14 @@ def blended(new: Number, old: Number | None, active: NDArray[np.bool_]) -> Numbe
             active, ones if new.held is None else new.held, ones if old.held is None else old.held
         )
         held = None if held.all() else held
-    return Number(value, shape, new.kind, held=held)
+    span = hull(new.span, old.span) if new.span and old.span else None
+    return Number(value, shape, new.kind, held=held, span=span)
+
+
+def hull(a: Span, b: Span) -> Span:
+    """Return the span of what lies in one of two."""
+    low, high = np.minimum(a[0], b[0]), np.maximum(a[1], b[1])
+    return (low, high) if low.ndim else (int(low), int(high))
 
 
 def wide(value: Any) -> int:
@@ -293,7 +329,9 @@ def part_of(value: Any, k: int | None) -> Any:
         return value
     shape = None if value.shape is None else value.shape[..., k]
     given = None if value.given is None else value.given[..., k]
-    return Number(given, shape, value.kind, value.weight, held=value.held, source=(value, k))
+    ends = value.span
+    span = (int(ends[0][k]), int(ends[1][k])) if ends and np.ndim(ends[0]) else ends
+    return Number(given, shape, value.kind, value.weight, held=value.held, source=(value, k), span=span)
 
 
 def repeated(number: Number, width: int) -> Number:
@@ -302,7 +340,7 @@ def repeated(number: Number, width: int) -> Number:
         None if part is None else np.repeat(part[..., None], width, axis=-1)
         for part in (number.shape, number.given)
     )
-    return Number(given, shape, number.kind, held=number.held)
+    return Number(given, shape, number.kind, held=number.held, span=number.span)
 
 
 def stacked(parts: list[Number]) -> Number:
@@ -313,11 +351,22 @@ def stacked(parts: list[Number]) -> Number:
     if FACTORS and any(part.shape is not None and part.given is None for part in parts):
         parts = [leaf(part.known) if part.shape is None else part for part in parts]
     shape, done = None, all(part.shape is not None for part in parts)
+    span = _spans(parts) if all(part.span for part in parts) else None
     if done:
         shape = _joined([np.asarray(part.shape)[None] for part in parts])[0]
         if all(part.given is None for part in parts):
-            return Number(None, shape, parts[0].kind)
-    return Number(_joined([part.value for part in parts]), shape, parts[0].kind, all(p.weight for p in parts))
+            return Number(None, shape, parts[0].kind, span=span)
+    values = [part.value if done else part.term for part in parts]
+    return Number(_joined(values), shape, parts[0].kind, all(p.weight for p in parts), span=span)
+
+
+def _spans(parts: list[Number]) -> Span:
+    """Return the spans of numbers and of vectors' numbers behind each other."""
+    low, high = (
+        np.concatenate([np.broadcast_to(part.span[k], (wide(part),)) for part in parts if part.span])
+        for k in (0, 1)
+    )
+    return low, high
 
 
 def _joined(parts: list[Words]) -> Words:

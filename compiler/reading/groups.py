@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .field import Number, part_of, stacked
+from .field import Number, Span, hull, part_of, stacked
 from .lanes import FAR, Lanes, Place, Unread, Wrong, plus, words
+from .words import apart, joined
 
 if TYPE_CHECKING:
     from .machine import Machine
@@ -86,9 +87,10 @@ def _cases(steps: tuple[int, int], window: int, seed: int) -> tuple[NDArray[np.i
 class Shared:
     """An array that the items of a group share: its numbers, and who read and wrote them in this phase."""
 
-    def __init__(self, name: str, size: int, lanes: Lanes, items: int) -> None:
+    def __init__(self, name: str, size: int, kind: str, lanes: Lanes, items: int) -> None:
         groups = lanes.count // items
-        self.name, self.size, self.kind = name, size, ""
+        self.name, self.size, self.kind, self.blank = name, size, kind, True
+        self.span: Span | None = None
         self.value = np.zeros((2, groups * size), dtype=np.uint64)
         self.shape = np.zeros(groups * size, dtype=np.uint64)
         self.held = np.zeros(groups * size, dtype=bool)
@@ -133,12 +135,14 @@ class Shared:
         self.reader[at] = item
         several = (self.reader[at] != item) | ((reader != NOBODY) & (reader != item))
         self.reader[at[several]] = SEVERAL
-        return Number(self.value.take(every, axis=1), self.shape[every], self.kind)
+        found = Number(self.value.take(every, axis=1), self.shape[every], self.kind, span=self.span)
+        return found if found.axes < 3 else joined(found)
 
     def _store(self, offset: Any, value: Any, machine: Machine) -> None:
-        if not isinstance(value, Number) or value.shape is None or value.kind != (self.kind or value.kind):
+        if not isinstance(value, Number) or value.shape is None or value.kind != self.kind:
             raise Unread(f"anything but numbers of one kind, or sums, in {self.name}")
         machine.written(value, self.name)
+        value = self._apart(value)
         running = machine.running
         at, item = self._index(offset, machine)[running], self.item[running]
         writer, reader = self.writer[at], self.reader[at]
@@ -147,10 +151,21 @@ class Shared:
         self.writer[at] = item
         if (self.writer[at] != item).any() or ((writer != NOBODY) & (writer != item)).any():
             raise Wrong(f"{self.name}: two items write one number")
-        self.kind = value.kind
-        self.value[:, at] = np.broadcast_to(value.value, (2, len(running)))[:, running]
-        self.shape[at] = np.broadcast_to(value.shape, running.shape)[running]
+        tail = self.shape.shape[1:]
+        self.value[:, at] = np.broadcast_to(value.value, (2, len(running), *tail))[:, running]
+        self.shape[at] = np.broadcast_to(value.shape, (len(running), *tail))[running]
         self.held[at] = True
+
+    def _apart(self, value: Number) -> Number:
+        """Return a number, a word as its bytes, for which there is room; note its span."""
+        value = apart(value)
+        if self.blank and value.axes == 3:
+            self.value, self.shape = (np.repeat(a[..., None], 4, axis=-1) for a in (self.value, self.shape))
+        if self.shape.ndim != value.axes - 1:
+            raise Unread(f"words and other numbers in {self.name}")
+        both = value.span and self.span and hull(value.span, self.span)
+        self.span, self.blank = value.span if self.blank else both, False
+        return value
 
 
 class Group:
@@ -160,9 +175,9 @@ class Group:
         self.lanes, self.items = lanes, items
         self.memories: list[Shared] = []
 
-    def share(self, name: str, size: int) -> Shared:
-        """Return an array of so many numbers in each group."""
-        self.memories.append(Shared(name, size, self.lanes, self.items))
+    def share(self, name: str, size: int, kind: str) -> Shared:
+        """Return an array of so many numbers of a kind in each group."""
+        self.memories.append(Shared(name, size, kind, self.lanes, self.items))
         return self.memories[-1]
 
     def wait(self, machine: Machine, flags: int = LOCAL_FENCE) -> None:

@@ -35,35 +35,55 @@ class Language:
     of_integers: tuple[str, ...] = ()
 
 
+AVX512 = dict.fromkeys(("__AVX512F__", "__AVX512BW__", "__AVX512VNNI__"), "1")
+"""What compilers define for the largest processors that texts ask for."""
+
+CLANG = {
+    "__has_builtin(name)": "1", "__builtin_elementwise_floor": "floor",
+    "__builtin_convertvector(a, kind)": "((kind)(a))", **AVX512,
+    "__opencl_c_integer_dot_product_input_4x8bit_packed": "1",
+}  # fmt: skip
+"""A compiler of OpenCL C with all that texts ask for; its own functions by what they mean."""
+
 LANGUAGES: Mapping[str, Language] = {
     "opencl": Language(
+        compilers=({}, CLANG),
         doubles=True,
         brings=("CLK_LOCAL_MEM_FENCE", "CLK_GLOBAL_MEM_FENCE"),
         of_floats=("tile", "vector", "group", "fft"),
+        of_integers=("tile", "vector", "group", "dot"),
     ),
     "c": Language(
         compilers=(
             {"FLT_EVAL_METHOD": "0"},
-            {"FLT_EVAL_METHOD": "0", "__GNUC__": "12", "__AVX__": "1", "__AVX512F__": "1"},
+            {"FLT_EVAL_METHOD": "0", "__GNUC__": "12", "__AVX__": "1", **AVX512},
         ),
         within=True,
         host="wamnet_image",
         doubles=True,
         of_floats=("tile", "fft"),
-        of_integers=("tile",),
+        of_integers=("tile", "dot"),
     ),
     "opengl": Language(
         compilers=({"GL_ARB_gpu_shader5": "1"},), within=True, fragment=True, brings=("gl_FragCoord",)
     ),
     "glsl-es": Language(within=True, fragment=True, brings=("gl_FragCoord",)),
     "glsl-vulkan": Language(
-        brings=("gl_GlobalInvocationID", "gl_LocalInvocationID", "gl_WorkGroupID"), of_floats=("group",)
+        compilers=({}, {"GL_EXT_integer_dot_product": "1"}),
+        brings=("gl_GlobalInvocationID", "gl_LocalInvocationID", "gl_WorkGroupID"),
+        of_floats=("group",),
+        of_integers=("group",),
     ),
-    "wgsl": Language(WgslParser, preprocessed=False, of_floats=("group",)),
+    "wgsl": Language(WgslParser, preprocessed=False, of_floats=("group",), of_integers=("group",)),
     "metal": Language(
         brings=tuple(f"mem_flags::mem_{a}" for a in ("none", "device", "threadgroup")), of_floats=("group",)
     ),
-    "cuda": Language(doubles=True, brings=("threadIdx", "blockIdx", "blockDim"), of_floats=("group",)),
+    "cuda": Language(
+        doubles=True,
+        brings=("threadIdx", "blockIdx", "blockDim"),
+        of_floats=("group",),
+        of_integers=("group",),
+    ),
 }
 """By a manifest's target."""
 
@@ -72,14 +92,14 @@ class Stopped(Unread):
     """A text that is an error for a compiler: it computes nothing there."""
 
 
-READ_PROFILE = "ieee"
-"""The profile whose sines are read, of every degree."""
+READ_PROFILES = ("ieee", "exact")
+"""The profiles whose sines are read, of every degree."""
 
 
 def is_read(manifest: Mapping[str, Any]) -> bool:
     """Return whether the text of a kernel is of a kind that is read, by its manifest (TXT-7)."""
     language, schedule = LANGUAGES.get(manifest["target"]), manifest["schedule"]["name"]
-    known_sines = not manifest["sine_arguments"] or manifest["profile"]["name"].startswith(READ_PROFILE)
+    known_sines = not manifest["sine_arguments"] or manifest["profile"]["name"].startswith(READ_PROFILES)
     if language is None or not known_sines:
         return False
     begins = language.of_floats if any(manifest["bound"]["output"]) else language.of_integers

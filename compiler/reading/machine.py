@@ -12,15 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from . import together
+from . import together, words
 from .builtins import bits, choose
 from .field import (
     FOLDED,
+    ZERO,
     Number,
+    Span,
     blended,
     choice,
     difference,
     expression,
+    hashed,
     literal,
     part_of,
     product,
@@ -64,9 +67,10 @@ class Machine:
         builtins: dict[str, Callable[..., Any]],
         added: Callable[[Number, Mask], Number],
         group: Group | None = None,
+        span_of: Callable[[Number, Mask], Span | None] | None = None,
     ) -> None:
         self.text, self.lanes, self.builtins, self.added = text, lanes, builtins, added
-        self.group = group
+        self.group, self.span_of = group, span_of
         names = [(name.split("_", 2), name) for name in dir(self) if name.startswith(("_run_", "_value_"))]
         self.statements, self.forms = (
             {form: getattr(self, name) for (_, group, form), name in names if group == kind}
@@ -104,19 +108,20 @@ class Machine:
                 memory.store(k * type_.width, type_.width, one, self)
             given = held
         elif type_.width > 1 and not type_.pointer and not (isinstance(given, list) and not numbers(given)):
-            memory = Memory(variable.name, type_.width, self.mask)
+            memory = Memory(variable.name, type_.width, self.mask, type_.kind)
             if given is not None:
                 memory.store(0, type_.width, stacked(given) if numbers(given) else given, self)
             given = Pointer(memory, 0, type_.width, ())
         self.frames[-1][variable.name] = given
+        self.frames[-1][f"type of {variable.name}"] = type_
 
     def _memory(self, variable: Variable, size: int) -> Any:
         """Return an array of a text: each lane's, or its group's."""
         if not variable.shared:
-            return Memory(variable.name, size, self.mask)
+            return Memory(variable.name, size, self.mask, variable.type.kind)
         if self.group is None:
             raise Unread("memory that a group shares, without groups")
-        return self.group.share(variable.name, size)
+        return self.group.share(variable.name, size, variable.type.kind)
 
     def written(self, value: Any, name: str) -> Any:
         """Return a value that every running lane has written."""
@@ -284,14 +289,18 @@ class Machine:
             or isinstance(value, bool)
         ):
             return value
-        if type_.kind == "float32" and isinstance(value, int):
-            return literal(value, "float32")
+        if isinstance(value, int) and (
+            type_.kind == "float32" or (type_.width > 3 and type_.kind in words.LIMITS)
+        ):
+            return literal(value, type_.kind)
         if isinstance(value, Number) and value.kind != type_.kind and value.kind != "bool":
             return self.cast(value, type_.kind)
         return value
 
     def cast(self, value: Number, kind: str) -> Number:
         """Return a number as one of another kind."""
+        if value.kind != kind and (found := words.cast(value, kind, self)) is not None:
+            return found
         if kind not in ("float32", "int32", "uint32") or value.kind == kind:
             return value
         return (
@@ -348,17 +357,22 @@ class Machine:
         found = self.forms[whole[0]](*whole[1:])
         if isinstance(found, dict):
             return found[member]
-        if isinstance(found, Pointer) and found.sizes in ((), (None,)) and member not in "xyzwrgba":
-            return Pointer(found.memory, found.offset, 1, (found.width,))
+        if isinstance(found, Pointer) and found.sizes in ((), (None,)) and words.component(member) is None:
+            whole = member in self.text.vectors
+            return Pointer(found.memory, found.offset, *((found.width, ()) if whole else (1, (found.width,))))
         if isinstance(found, Pointer):
             found = found.load(self)
-        at = "xyzw".find(member) if member in "xyzw" else "rgba".find(member)
+        at = words.component(member)
+        if at is None:
+            raise Unread(f"member {member}")
         if isinstance(found, (tuple, list)):
             return found[at]
         return found.component(at, self) if hasattr(found, "component") else part_of(found, at)
 
     def _value_unary(self, op: str, tree: Tree) -> Any:
         if op == "&":
+            if tree[0] == "name" and not isinstance((frame := self._find(tree[1]))[tree[1]], Pointer):
+                return words.Slot(frame, tree[1], frame[f"type of {tree[1]}"])
             found = self.forms[tree[0]](*tree[1:])
             if not isinstance(found, Pointer):
                 raise Wrong("it takes the address of what has none")
@@ -378,6 +392,10 @@ class Machine:
             return found
         raise Unread(f"operator {op}")
 
+    def _value_sizeof(self, tree: Tree) -> int:
+        found = self.forms[tree[0]](*tree[1:])
+        return int(np.prod(found.sizes)) * found.width * words.size_of(found.memory.kind)
+
     def _value_binary(self, op: str, left: Tree, right: Tree) -> Any:
         a = self.value(left)
         if op in ("&&", "||"):
@@ -393,6 +411,8 @@ class Machine:
         """Return what an operator makes of two values."""
         if f"operator{op}" in self.text.functions and wide(a) > 1:
             return self._call_operator(op, a, b)
+        if isinstance(a, list) or isinstance(b, list):
+            a, b = (stacked(one) if numbers(one) else one for one in (a, b))
         if isinstance(a, Number) or isinstance(b, Number):
             return self._operate_numbers(op, *self.both(a, b))
         if isinstance(a, Pointer):
@@ -437,16 +457,21 @@ class Machine:
         if not isinstance(a, (int, Number)) or not isinstance(b, (int, Number)):
             raise Wrong("it mixes coordinates and numbers of the picture")
         kind = next(n.kind for n in (a, b) if isinstance(n, Number))
+        kind = "int32" if kind in ("int8", "uint8") else kind
         one, other = (n if isinstance(n, Number) else literal(n, kind) for n in (a, b))
         return one, other
 
     def _operate_numbers(self, op: str, a: Number, b: Number) -> Number:
+        if (whole := words.operate(op, a, b)) is not None:
+            return whole
         if op == "+":
             return self.added(total(a, b), self.running)
         if op == "-":
             return difference(a, b)
         if op == "*":
             return product(a, b)
+        if op == "==" and b.literal == 0.0:
+            return Number(None, hashed("is zero", a.known), ZERO, compared=(a, b))
         if op in ("<", ">", "<=", ">="):
             a, b = (a, b) if op[0] == "<" else (b, a)
             found = expression("less_equal" if "=" in op else "less", a, b, kind="bool")
@@ -484,8 +509,11 @@ class Machine:
             return self._call_operator(f"{op}=", place, new)
         if op:
             new = self.operate(op, place.load(self), new)
+        kind = getattr(place.memory, "kind", "")
+        if kind and isinstance(new, Number):
+            new = self.converted(new, Type(kind))
         if isinstance(new, int) and not isinstance(new, bool):
-            new = literal(new, "float32")
+            new = literal(new, kind or "float32")
         place.store(new, self)
         return new
 
@@ -513,7 +541,7 @@ class Machine:
         if type_.kind == "void":
             return None
         if type_.pointer:
-            return Pointer(found.memory, found.offset, type_.width)
+            return words.pointed(found, type_)
         if isinstance(found, list):
             found = self.converted(found, type_)
             return found[0] if len(found) == 1 else stacked(found)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .field import FOLDED, Number, blended, folded, hashed, leaf, part_of, repeated, stacked, wide
+from .field import FOLDED, Number, Span, blended, folded, hashed, leaf, part_of, repeated, stacked, wide
 from .lanes import Mask, Place, Wrong, plus, times
 
 if TYPE_CHECKING:
@@ -55,11 +55,11 @@ class Memory:
     """An array of a text: what was written, by offset; a vector is several numbers.
 
     `vectors` are those at multiples of their width `unit` that have been written as a whole. `mask`:
-    the lanes that declare it; no other lane sees it.
+    the lanes that declare it; no other lane sees it. `kind`: of its numbers, nothing where that is not known.
     """
 
-    def __init__(self, name: str, size: int, mask: Mask | None = None) -> None:
-        self.name, self.size, self.mask, self.unit = name, size, mask, 0
+    def __init__(self, name: str, size: int, mask: Mask | None = None, kind: str = "") -> None:
+        self.name, self.size, self.mask, self.kind, self.unit = name, size, mask, kind, 0
         self.cells: dict[int, tuple[Any, int | None]] = {}
         self.vectors: dict[int, Number] = {}
 
@@ -129,8 +129,8 @@ class Memory:
 class Image:
     """An image: every number of it is an unknown of the claim."""
 
-    def __init__(self, name: str, channels: int, size: tuple[Place, Place]) -> None:
-        self.name, self.channels, self.size, self.lanes = name, channels, size, size[0].lanes
+    def __init__(self, name: str, channels: int, size: tuple[Place, Place], span: Span | None = None) -> None:
+        self.name, self.channels, self.size, self.lanes, self.span = name, channels, size, size[0].lanes, span
 
     def load(self, offset: Any, width: int, machine: Machine) -> Number:
         """Return numbers of it, each within the picture."""
@@ -142,7 +142,7 @@ class Image:
         count = self.size[0].values * self.size[1].values * self.channels
         if (((values < 0) | (values >= count)) & machine.running).any():
             raise Wrong(f"image {self.name} is read beyond its ends")
-        return leaf(hashed(f"image {self.name}", values))
+        return leaf(hashed(f"image {self.name}", values), span=self.span)
 
     def store(self, *given: Any) -> None:
         """Refuse."""

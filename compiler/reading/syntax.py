@@ -5,7 +5,8 @@ that no construct passes unread. Qualifiers that change no value are dropped; th
 
     expression   ("number", text), ("name", n), ("call", callee, [arguments]), ("at", a, index),
                  ("of", a, member), ("unary", op, a), ("binary", op, a, b), ("choice", c, a, b),
-                 ("assign", op, target, value), ("step", op, target), ("cast", type, a), ("list", [values])
+                 ("assign", op, target, value), ("step", op, target), ("cast", type, a), ("list", [values]),
+                 ("sizeof", a)
     statement    ("declare", Variable, value or None), ("declarations", [...]), ("union", name, [Variable]),
                  ("do", expression), ("for", start, condition, step, body), ("if", c, then, otherwise),
                  ("return", value or None), ("block", [statements])
@@ -66,6 +67,7 @@ SHARED = {"__local", "local", "threadgroup", "__shared__", "shared"}
 
 SCALARS = {
     "void": "void", "bool": "bool", "float": "float32", "int": "int32", "uint": "uint32", "f32": "float32",
+    "int8_t": "int8", "uint8_t": "uint8", "char": "int8", "uchar": "uint8",
     "int32_t": "int32", "uint32_t": "uint32", "i32": "int32", "u32": "uint32", "sampler2D": "image",
 }  # fmt: skip
 """Names of types of one number."""
@@ -110,13 +112,17 @@ class Function:
 
 @dataclass
 class Text:
-    """A parsed text: functions and variables outside them by name, structs' members, sizes of work groups."""
+    """A parsed text: functions and variables outside them by name, structs' members, sizes of work groups.
+
+    `vectors`: names of members that are all of a struct.
+    """
 
     functions: dict[str, Function] = field(default_factory=dict)
     outside: list[tuple[Variable, Any]] = field(default_factory=list)
     structs: dict[str, list[Variable]] = field(default_factory=dict)
     group: list[Tree] = field(default_factory=list)
     bindings: dict[str, int] = field(default_factory=dict)
+    vectors: set[str] = field(default_factory=set)
 
 
 def tokens(text: str) -> list[tuple[str, str, int]]:
@@ -147,9 +153,10 @@ class Parser:
             ("int", "int32"),
             ("uint", "uint32"),
             ("char", "int8"),
-            ("uchar", "int8"),
+            ("uchar", "uint8"),
         ):
             self.types |= {f"{base}{n}": Type(kind, n) for n in (2, 3, 4, 8, 16)}
+        self.types["__m512i"] = Type("int32", 16)
         for base, kind in (("vec", "float32"), ("ivec", "int32"), ("uvec", "uint32")):
             self.types |= {f"{base}{n}": Type(kind, n) for n in (2, 3, 4)}
 
@@ -219,6 +226,7 @@ class Parser:
     def _typedef(self) -> None:
         self._take("typedef")
         if self._has("struct"):
+            self._qualifiers()
             at = self.at
             self._skip_brackets("{", "}")
             name, end = self._take(), self.at
@@ -248,6 +256,9 @@ class Parser:
             self.types[name] = Type(members[0].type.kind, constant(members[0].sizes[0]))
         elif [v.name for v in members] == list("xyzw") and {v.type for v in members} == {Type("float32")}:
             self.types[name] = Type("float32", 4)
+        elif len(members) == 1 and members[0].type.width > 1:
+            self.types[name] = members[0].type
+            self.text.vectors.add(members[0].name)
         else:
             self.types[name] = Type(name)
         self.text.structs[name] = members
@@ -506,6 +517,8 @@ class Parser:
         if self._now in ("++", "--"):
             op = self._take()
             return ("step", op, self._unary())
+        if self._has("sizeof"):
+            return ("sizeof", self._unary())
         cast = self._cast()
         return self._postfix(self._primary()) if cast is None else cast
 

@@ -7,6 +7,10 @@ from typing import Any
 from .lanes import Unread
 from .syntax import SCALARS, Function, Parser, Tree, Type, Variable, constant
 
+MADE = {"float32": "vec4", "int32": "ivec4", "uint32": "uvec4"}
+SEEN = {"float32": "as_float", "int32": "as_int", "uint32": "as_uint"}
+"""Functions that make vectors of four, and that take bits for another kind's, by the kind of number."""
+
 
 class WgslParser(Parser):
     """Reads one text of WGSL."""
@@ -131,10 +135,16 @@ class WgslParser(Parser):
         return False
 
     def _primary(self) -> Tree:
-        """Read `vec4<f32>` as the name of the function that makes one."""
-        if self._now == "vec4" and self._ahead() == "<":
-            line = self.tokens[self.at][2]
-            if self._type() != Type("float32", 4):
+        """Read `vec4<f32>` as the name of the function that makes one, and `bitcast<f32>` of its own."""
+        if self._now in ("vec4", "bitcast") and self._ahead() == "<":
+            line, made = self.tokens[self.at][2], MADE if self._now == "vec4" else SEEN
+            if made is SEEN:
+                self._take()
+                self._take("<")
+            found = self._type()
+            if made is SEEN:
+                self._close()
+            if found.kind not in made or found.width != (4 if made is MADE else found.width):
                 raise Unread(f"line {line}: vectors of other numbers")
-            return ("name", "vec4")
+            return ("name", made[found.kind])
         return super()._primary()

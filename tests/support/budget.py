@@ -18,7 +18,7 @@ BUDGET = {
     "compiler/core": 3250,
     "compiler/languages": 2250,
     "compiler/proof": 3100,
-    "compiler/reading": 3350,
+    "compiler/reading": 4050,
     "compiler/schedules": 4650,
     "compiler/scenes": 1500,
     "compiler/training": 1200,

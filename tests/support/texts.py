@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import random
-
 import numpy as np
 import text_faults
 
 from wamnet.compiler import artifact
-from wamnet.compiler.compile import compile_program
+from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.proof.evidence import Refused, read
-from wamnet.compiler.reading.check import run_text
-from wamnet.compiler.reading.lanes import Unread
+from wamnet.compiler.proof.evidence import read
+from wamnet.compiler.variants import plan_model
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
@@ -28,6 +25,13 @@ def model(size=3, border="zero", activation="sine", seed=5):
 def kernel(folder, target, schedule="plain", **kwargs):
     """Write a kernel; return its certificate's path."""
     artifact.write(compile_program(lower(model(**kwargs)), target, schedule=schedule), folder)
+    return folder / NAME
+
+
+def planned(folder, target, schedule="plain", variant="whole8", profile="ieee", **kwargs):
+    """Write a kernel of a variant or a profile; return its certificate's path."""
+    plan = plan_model(model(**kwargs), target, profile, schedule, variant)
+    artifact.write(compile_plan(plan), folder)
     return folder / NAME
 
 
@@ -47,21 +51,6 @@ def changed(given, old, new, count=1):
 
 def unnoticed(given, count):
     """Plant faults of a fixed seed in a text, one at a time; return those that its reader accepts."""
-    source, *others = given
-    every = [f for f in text_faults.faults(source) if not spare(source, f)]
-    random.Random(7).shuffle(every)
-    assert len(every) >= count
-    return [f for f in every[:count] if accepted(source[: f.start] + f.new + source[f.end :], *others)]
-
-
-def accepted(*given):
-    try:
-        return run_text(*given)
-    except (Refused, Unread):
-        return None
-
-
-def spare(source, fault):
-    """Return whether a fault makes an array larger, which changes nothing."""
-    before = source[: fault.start].rpartition("\n")[2]
-    return before.strip().startswith(("float", "union")) and "[" in before and "=" not in before
+    found = [*text_faults.tried(given, count, seed=7)]
+    assert len(found) == count
+    return [f for f, noticed in found if not noticed and not text_faults.spare(given[0], f)]

@@ -371,7 +371,8 @@ class Machine:
 
     def _value_unary(self, op: str, tree: Tree) -> Any:
         if op == "&":
-            if tree[0] == "name" and not isinstance((frame := self._find(tree[1]))[tree[1]], Pointer):
+            frame = self._find(tree[1]) if tree[0] == "name" else {}
+            if frame and not isinstance(frame[tree[1]], Pointer):
                 return words.Slot(frame, tree[1], frame[f"type of {tree[1]}"])
             found = self.forms[tree[0]](*tree[1:])
             if not isinstance(found, Pointer):

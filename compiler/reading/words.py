@@ -269,7 +269,8 @@ def bytes_of(number: Number, signed: bool) -> list[Number]:
     if numbers is not None:
         if kind not in number.made:
             four = np.asarray(numbers).astype("<i4")[..., None].view(TYPES[kind])
-            number.made[kind] = [integers(four[..., k], "int32", number.weight) for k in range(4)]  # type: ignore[assignment]
+            parts = [integers(four[..., k], "int32", number.weight) for k in range(4)]
+            number.made[kind] = parts  # type: ignore[assignment]
         return number.made[kind]  # type: ignore[return-value]
     found = []
     for part, fills in parts_of(number) or [OTHER]:

@@ -358,8 +358,10 @@ class Machine:
         if isinstance(found, dict):
             return found[member]
         if isinstance(found, Pointer) and found.sizes in ((), (None,)) and words.component(member) is None:
-            whole = member in self.text.vectors
-            return Pointer(found.memory, found.offset, *((found.width, ()) if whole else (1, (found.width,))))
+            vector = member in self.text.vectors
+            return Pointer(
+                found.memory, found.offset, *((found.width, ()) if vector else (1, (found.width,)))
+            )
         if isinstance(found, Pointer):
             found = found.load(self)
         at = words.component(member)
@@ -395,7 +397,7 @@ class Machine:
 
     def _value_sizeof(self, tree: Tree) -> int:
         found = self.forms[tree[0]](*tree[1:])
-        return int(np.prod(found.sizes)) * found.width * words.size_of(found.memory.kind)
+        return int(np.prod(found.sizes) * found.width * words.size_of(found.memory.kind))
 
     def _value_binary(self, op: str, left: Tree, right: Tree) -> Any:
         a = self.value(left)

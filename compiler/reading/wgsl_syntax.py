@@ -8,8 +8,10 @@ from .lanes import Unread
 from .syntax import SCALARS, Function, Parser, Tree, Type, Variable, constant
 
 MADE = {"float32": "vec4", "int32": "ivec4", "uint32": "uvec4"}
+"""Functions that make vectors of four, by the kind of number."""
+
 SEEN = {"float32": "as_float", "int32": "as_int", "uint32": "as_uint"}
-"""Functions that make vectors of four, and that take bits for another kind's, by the kind of number."""
+"""Functions that take bits for another kind's, by that kind."""
 
 
 class WgslParser(Parser):

@@ -6,7 +6,7 @@
 2. A word's `parts` are its bytes, the lowest first: (n, False) is the low byte of an integer n, (n, True) one
    that n's sign fills, (None, False) is 0 and (None, True) not known. Shifts by whole bytes, masks and `or`
    move bytes about [`moved`]; what is one integer again has its span [`word`].
-3. The weights of such kernels are no unknowns: they are read bit by bit, as what a text takes them for
+3. The weights of such kernels are known: they are read bit by bit, as what a text takes them for
    [`Stored`]. Their products with an integer are terms of a sum.
 4. What instructions add to a sum is four products of bytes [`dots`].
 
@@ -146,7 +146,7 @@ def operate(op: str, a: Number, b: Number) -> Number | None:
 
 
 def cast(value: Number, kind: str, machine: Machine) -> Number | None:
-    """Return a number as one of another kind, where it is an integer or a byte is asked for; else None."""
+    """Return a number as one of another kind, where it is an integer or a byte is wanted; else None."""
     if value.literal is not None or kind not in TYPES:
         return None
     if value.kind == "float32":
@@ -163,7 +163,7 @@ def cast(value: Number, kind: str, machine: Machine) -> Number | None:
     if kind == "int8":
         raise Unread("a number that may be no byte, as one with a sign")
     parts = parts_of(value)
-    return parts and Number(None, expression("convert", value).shape, kind, parts=parts)
+    return Number(None, expression("convert", value).shape, kind, parts=parts) if parts else None
 
 
 def _whole(value: Number, kind: str, machine: Machine) -> Number | None:
@@ -223,7 +223,7 @@ def moved(name: str, a: Number, b: Number) -> Number | None:
         return integers(getattr(np, name)(one, other).astype(TYPES[kind]), kind, a.weight or b.weight)
     if name == "bitwise_or":
         found = _both(parts_of(a), parts_of(b))
-        return found and word(found, kind, expression(name, a, b, commutes=True).shape)
+        return word(found, kind, expression(name, a, b, commutes=True).shape) if found else None
     if not isinstance(other, int):
         return None
     if (name, other, kind) not in a.made:

@@ -77,7 +77,9 @@ def test_faults_of_bytes_are_named(dot16, old, new, why):
 def test_faults_of_words_are_noticed(grouped, old, new):
     """A word has each byte at its own place, and nothing of another's sign."""
     pair = [t.replace("uint", "unsigned int") if "__dp4a" in grouped[0] else t for t in (old, new)]
-    with pytest.raises((Refused, Unread)):
+    with pytest.raises(
+        (Refused, Unread), match=r"not known as int8|words and other numbers|the sums of %1 are never made"
+    ):
         run_text(*changed(grouped, *pair))
 
 
@@ -125,7 +127,8 @@ def test_bytes_move_as_words_are_shifted():
     back = words.moved("right_shift", top, by[1])
     assert back.span == (-127, 127)
     assert np.array_equal(back.value, n.value)
-    assert words.moved("right_shift", words.moved("left_shift", low, by[0]), by[1]).span == (0, 0)
+    none = words.moved("right_shift", words.moved("left_shift", low, by[0]), by[1])
+    assert none.parts == (words.ZERO,) * 4
     assert words.moved("left_shift", low, field.literal(7, "int32")) is None
 
 

@@ -94,7 +94,7 @@ def test_help_names_every_target():
         ),
         (
             ["--target", "c", "--scene", "minicubes", "--moving", "tide"],
-            "--moving is tide: ",
+            "what moves is tide: it must be one of time, camera",
         ),
         (["--target", "html", "--moving", "time"], "--moving is time: a web page has its own"),
         (["--target", "html", "--weights", "inline"], "--weights is inline: a web page has its own"),

@@ -52,4 +52,4 @@ def test_the_first_page_names_every_certified_row():
     certified = [names[row["by"]] for row in found if row["bound, all frames"].endswith("†")]
     assert sorted(certified) == sorted(CERTIFIED)
     assert all(row["schedule"] == names[row["by"]][1] for row in found)
-    assert {names[row["by"]] for row in found if row["text checked"] == "yes"} < set(CERTIFIED)
+    assert {names[row["by"]] for row in found if row["text checked"] == "yes"} <= set(CERTIFIED)

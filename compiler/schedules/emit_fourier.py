@@ -328,6 +328,12 @@ class FourierBody(TiledBody):
         self._comment("rows back, and the other layers")
         blocks, words = -(-self.tile.tiles * self.sizes.out // self.tile.pixels), self.vectors
         self._line(words.vectors("sums", f"{blocks} * PIXELS * NEURONS * 2"))
+        if blocks * self.tile.pixels > self.tile.tiles * self.sizes.out:
+            # The last block reaches beyond the tiles: its numbers there are read, and none is written.
+            self._line("/* beyond the tiles */")
+            beyond = f"({blocks} * PIXELS - TILES * OUT) * NEURONS * 2"
+            place = "TILES * OUT * NEURONS * 2 + i"
+            self._nest([words.loop("i", beyond)], [f"sums[{place}] = {words.zeros};"])
         self._open(words.loop_while("line", "OUT", "tile_y + line < height"))
         self._open(words.loop("tile", "TILES * NEURONS"))
         self._line(words.index("at", "(tile / NEURONS * OUT * NEURONS + tile % NEURONS) * 2"))

@@ -16,7 +16,7 @@ from .claim import Claim
 from .field import add_up_lanes, fold_lanes
 from .groups import FLAGS, Group, group_lanes, tile_lanes
 from .lanes import Place, Unread, Wrong, lanes_for
-from .languages import LANGUAGES, Language, Stopped, parsed
+from .languages import LANGUAGES, Language, Stopped, is_read, parsed
 from .machine import Machine
 from .memory import Image, Memory, Pointer, Result
 from .spectra import Tiles
@@ -41,15 +41,16 @@ def check_text(path: Path, source: Path | None = None) -> dict[str, int]:
     sources = [name for name in manifest["files"] if name != "weights.bin"]
     if len(sources) != 1:
         raise Unread(f"kernels of {len(sources)} texts")
+    if not is_read(manifest):
+        kind = f"schedule {manifest['schedule']['name']}, profile {manifest['profile']['name']}"
+        raise Unread(f"texts of target {manifest['target']} with {kind}")
     text = read_file(source or path.parent / sources[0], "kernel", "name a text in the kernel's language")
     return run_text(text.decode(errors="replace"), held, manifest, weights)
 
 
 def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, int]:
     """Run a text in every lane, once for each kind of compiler that it makes a difference between."""
-    language, schedule = LANGUAGES.get(manifest["target"]), manifest["schedule"]
-    if language is None:
-        raise Unread(f"texts of target {manifest['target']}")
+    language, schedule = LANGUAGES[manifest["target"]], manifest["schedule"]
     pixels, rows, group = int(schedule.get("pixels", 1)), int(schedule.get("rows", 1)), schedule.get("group")
     window, centre = int(manifest["window"]["size"]), int(manifest["window"]["centre"])
     try:

@@ -76,7 +76,9 @@ LANGUAGES: Mapping[str, Language] = {
     ),
     "wgsl": Language(WgslParser, preprocessed=False, of_floats=("group",), of_integers=("group",)),
     "metal": Language(
-        brings=tuple(f"mem_flags::mem_{a}" for a in ("none", "device", "threadgroup")), of_floats=("group",)
+        brings=tuple(f"mem_flags::mem_{a}" for a in ("none", "device", "threadgroup")),
+        of_floats=("group",),
+        of_integers=("group",),
     ),
     "cuda": Language(
         doubles=True,

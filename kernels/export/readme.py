@@ -8,7 +8,7 @@ from typing import Any
 from ...compiler.artifact import Artifact
 from ...compiler.languages.interface import SCENE_NUMBERS
 from ...compiler.reading.languages import is_read
-from ...compiler.schedules.schedules import PLAIN, text
+from ...compiler.schedules.schedules import text
 from .targets import ONNX, TARGETS
 
 ONNX_CODE = """\
@@ -187,11 +187,8 @@ def _text(facts: Mapping[str, Any], denoiser: Artifact) -> str:
     """Return what the command does with the text of a kernel that has a certificate."""
     source, schedule = denoiser.source_name, denoiser.manifest["schedule"]["name"]
     if not is_read(denoiser.manifest):
-        plainly = {**denoiser.manifest, "schedule": {"name": PLAIN}}
-        there = schedule != PLAIN and PLAIN in facts["schedules"] and is_read(plainly)
-        other = f"; it reads the one that `--schedule {PLAIN}` writes" if there else ""
         kind = f"schedule {schedule}, profile {denoiser.profile}"
-        return f"It does not read `{source}`, whose kind ({kind}) it does not know{other}."
+        return f"It does not read `{source}`, whose kind ({kind}) it does not know."
     made = [name for name in facts["kernels"][-1]["files"] if name != f"denoise/{source}"]
     besides = f" {', '.join(f'`{name}`' for name in made)}: translated from it, and not read." if made else ""
     return f"It reads `denoise/{source}` too, and checks that this text computes what is certified.{besides}"

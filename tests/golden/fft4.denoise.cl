@@ -222,6 +222,10 @@ __kernel void wamnet_denoise(
 
     /* rows back, and the other layers */
     vector sums[2 * PIXELS * NEURONS * 2];
+    /* beyond the tiles */
+    for (int i = 0; i < (2 * PIXELS - TILES * OUT) * NEURONS * 2; ++i) {
+        sums[TILES * OUT * NEURONS * 2 + i] = (vector)(0.0f);
+    }
     for (int line = 0; line < OUT && tile_y + line < height; ++line) {
         for (int tile = 0; tile < TILES * NEURONS; ++tile) {
             int at = (tile / NEURONS * OUT * NEURONS + tile % NEURONS) * 2;

@@ -42,7 +42,7 @@ wamnet bench --quick --only 'opencl:*,torch.compile' -o speed
 wamnet bench --synthetic --size 512 --sizes 256,512,1024,2048,4096 --repeats 3 -o speed"""
 """Shown below the help of `wamnet bench`."""
 
-PEER_PACKAGES = ("torch", "onnxruntime", "onnx", "tinygrad", "pyoidn")
+PEER_PACKAGES = ("torch", "onnxruntime", "onnx", "openvino", "tinygrad", "halide", "pyoidn")
 """Packages of peers whose versions the result names."""
 
 QUICK = {"size": 256, "repeats": 3, "budget": 4.0, "frames": 2, "reference_spp": 64, "steps": 500}
@@ -176,9 +176,9 @@ def bench(
 
     The model of the mini cubes that ships with the package is measured on unseen frames of its scene, which
     are rendered first; another one on those of its own scene, or of a data set. Peers that are installed take
-    part: PyTorch, ONNX Runtime, tinygrad on the same OpenCL device, and Open Image Denoise, which is another
-    denoiser. [bold]pip install 'wamnet\[peers]'[/] brings them. Errors are against float64, PSNR against the
-    references. Predictions come from operations, sines and bytes and the machine's measured rates.
+    part: PyTorch, ONNX Runtime, OpenVINO, Halide, tinygrad on the same OpenCL device, and Open Image Denoise,
+    which is another denoiser. [bold]pip install 'wamnet\[peers]'[/] brings them. Errors are against float64,
+    PSNR against the references. Predictions come from operations, sines and bytes and the machine's measured rates.
     """
     packages.need("matplotlib", "for the plots", "report")
     check_folder(output)

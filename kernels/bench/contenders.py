@@ -24,7 +24,7 @@ from ...refimpl.network.denoise import Model
 from ..devices.images import Images
 from .contender import FULL, IEEE, NO_CACHE, Contender, Opened, Tools, Variant
 from .cost import fused, sines_of
-from .peers import peer_oidn, peer_onnxruntime, peer_openvino, peer_tinygrad, peer_torch
+from .peers import peer_halide, peer_oidn, peer_onnxruntime, peer_openvino, peer_tinygrad, peer_torch
 from .workload import Given
 
 EXACT = "exact"
@@ -54,6 +54,7 @@ PEERS: tuple[Contender, ...] = (
     *peer_onnxruntime.CONTENDERS,
     *peer_openvino.CONTENDERS,
     *peer_tinygrad.CONTENDERS,
+    *peer_halide.CONTENDERS,
     *peer_oidn.CONTENDERS,
 )
 """What others make."""

@@ -1,20 +1,25 @@
-"""OpenVINO as a peer: it reads the graph in 8 bits that ONNX Runtime's tool makes. Kernels are its own."""
+"""OpenVINO as a peer, with the graph that ONNX Runtime has: in float32, in bfloat16, and in 8 bits.
+
+It chooses bfloat16 by itself on processors that have it; here each way says what it computes in. The graph in
+8 bits is made by ONNX Runtime's tool. Kernels are OpenVINO's own.
+"""
 
 from __future__ import annotations
 
 import tempfile
+from functools import partial
 from pathlib import Path
 
 from ....refimpl.network.denoise import Model
-from ..contender import Contender, Opened, Tools, told_as_missing
+from ..contender import FULL, Contender, Opened, Tools, told_as_missing
 from ..cost import layered
 from ..workload import Given
-from .peer_onnxruntime import Run, at_first, quantised
+from .peer_onnxruntime import Run, at_first, graph, quantised
 
 
-def _open(tools: Tools, model: Model, size: int) -> Opened:
-    """Return OpenVINO with the same graph."""
-    with told_as_missing("openvino:int8"):
+def _open(name: str, precision: str, tools: Tools, model: Model, size: int) -> Opened:
+    """Return OpenVINO with a graph, that in 8 bits for `openvino:int8`, and its floats in a precision."""
+    with told_as_missing(name):
         import openvino
 
         core = openvino.Core()
@@ -22,24 +27,28 @@ def _open(tools: Tools, model: Model, size: int) -> Opened:
         def make(given: Given) -> Run:
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "model.onnx"
-                path.write_bytes(quantised(model, given))
+                path.write_bytes(quantised(model, given) if name.endswith("int8") else graph(model))
                 found = core.read_model(path)
             found.reshape({name: image.shape for name, image in given.images.items()})
-            # Floats stay floats: processors with bfloat16 would use that by themselves.
-            ready = core.compile_model(found, "CPU", {"INFERENCE_PRECISION_HINT": "f32"})
+            ready = core.compile_model(found, "CPU", {"INFERENCE_PRECISION_HINT": precision})
             return lambda given: next(iter(ready(dict(given.images)).values()))
 
         device = f"OpenVINO {openvino.__version__.split('-')[0]}, CPU"
     return Opened(at_first(make), device, layered(model, fuses=False))
 
 
-CONTENDERS = (
-    Contender(
-        "openvino:int8",
-        "the same graph in OpenVINO",
-        _open,
-        variant=None,
-        packages=("onnx", "onnxruntime", "openvino"),
-    ),
+CONTENDERS = tuple(
+    Contender(name, text, partial(_open, name, precision), variant, packages=packages)
+    for name, text, precision, variant, packages in (
+        ("openvino", "OpenVINO", "f32", FULL, ("onnx", "openvino")),
+        ("openvino:bf16", "OpenVINO in bfloat16", "bf16", None, ("onnx", "openvino")),
+        (
+            "openvino:int8",
+            "the same graph in OpenVINO",
+            "f32",
+            None,
+            ("onnx", "onnxruntime", "openvino"),
+        ),
+    )
 )
-"""The runtime with floats kept as floats. It computes another function: only quality is compared."""
+"""The runtime in three precisions. In the last two it computes another function: only quality is compared."""

@@ -1,7 +1,8 @@
 """PyTorch as a peer: one convolution as large as the window, then 1 x 1 convolutions, on all threads.
 
 Eager, and compiled by `torch.compile` with its default options. Pictures are in channels-last order, which is
-the order of rows with interleaved channels: nothing is copied on the way in or out.
+the order of rows with interleaved channels: nothing is copied on the way in or out. Compiled with `torch.fft`
+the first layer is computed by the algorithm of our schedule `fft32`, in tiles of `TILE` pixels [`_spectra`].
 
 It trains too, eager and with its own Adam: a peer of the compiled trainer [`trainer`].
 """
@@ -25,9 +26,44 @@ from ..workload import Given
 MODES = {"clamp": "replicate", "zero": "constant"}
 """Border rules as modes of `torch.nn.functional.pad`."""
 
+TILE = 32
+"""Width and height of a tile of spectra, as of the schedule `fft32`."""
 
-def _open(compiled: bool, model: Model) -> Opened:
-    """Return the network, compiled or not."""
+
+def _spectra(model: Model) -> Callable[[Any], Any]:
+    """Return the first layer's products (1, N, H, W) as a function of a padded picture (1, C, H', W').
+
+    Tiles overlap by the window less one pixel; a spectrum of a tile times the conjugate of a kernel's is that
+    of their correlation, whose first pixels no border has touched.
+    """
+    import torch
+
+    size, weight = model.window.size, torch.from_numpy(model.siren.weights[0].astype(np.float32))
+    whole = TILE - size + 1
+    kernels = torch.fft.rfft2(
+        weight.reshape(len(weight), size, size, -1).permute(1, 2, 3, 0), (TILE, TILE), (0, 1)
+    )
+    kernels = kernels.conj().resolve_conj().reshape(-1, *kernels.shape[2:])
+
+    def products(x: Any) -> Any:
+        height, width = (length - size + 1 for length in x.shape[2:])
+        rows, columns = -(-height // whole), -(-width // whole)
+        more = [
+            length * whole + size - 1 - there for length, there in ((columns, x.shape[3]), (rows, x.shape[2]))
+        ]
+        x = torch.nn.functional.pad(x[0], (0, more[0], 0, more[1]))
+        tiles = x.unfold(1, TILE, whole).unfold(2, TILE, whole)
+        spectra = torch.fft.rfft2(tiles).permute(3, 4, 1, 2, 0).reshape(len(kernels), rows * columns, -1)
+        sums = torch.bmm(spectra, kernels).reshape(TILE, TILE // 2 + 1, rows, columns, -1)
+        maps = torch.fft.irfft2(sums, (TILE, TILE), (0, 1))[:whole, :whole]
+        joined = maps.permute(2, 0, 3, 1, 4).reshape(rows * whole, columns * whole, -1)
+        return joined[:height, :width].permute(2, 0, 1)[None]
+
+    return products
+
+
+def _open(compiled: bool, model: Model, spectra: bool = False) -> Opened:
+    """Return the network, compiled or not; with `spectra` its first layer is computed by them."""
     import torch
 
     size = model.window.size
@@ -39,11 +75,16 @@ def _open(compiled: bool, model: Model) -> Opened:
     omegas = (model.siren.omega_0_first, *[model.siren.omega_0_hidden] * len(others))
     activate = activation_in("PyTorch", {SINE: torch.sin, RELU: torch.relu}, model)
     margins, mode = (model.window.before, model.window.after) * 2, MODES[model.window.border]
+    # The compiler makes no code of complex numbers: they are computed eagerly, by FFTs of a library.
+    products = torch.compiler.disable(_spectra(model)) if spectra else None
 
     def network(images: Sequence[Any]) -> Any:
         x = torch.nn.functional.pad(torch.cat(images, dim=1), margins, mode=mode)
         for number, (kernel, bias) in enumerate(zip(kernels, biases, strict=True)):
-            x = torch.nn.functional.conv2d(x, kernel, bias)
+            if products and number == 0:
+                x = products(x) + bias[:, None, None]
+            else:
+                x = torch.nn.functional.conv2d(x, kernel, bias)
             if number < len(others):
                 x = activate(omegas[number] * x)
         return x.clamp(0.0, 1.0)
@@ -70,6 +111,12 @@ def _open_compiled(tools: Tools, model: Model, size: int) -> Opened:
     """Return the network that PyTorch compiles when it is first run."""
     with told_as_missing("torch.compile"):
         return _open(compiled=True, model=model)
+
+
+def _open_spectra(tools: Tools, model: Model, size: int) -> Opened:
+    """Return the network with a first layer by spectra, which PyTorch compiles when it is first run."""
+    with told_as_missing("torch.fft"):
+        return _open(compiled=True, model=model, spectra=True)
 
 
 def trainer(
@@ -113,6 +160,9 @@ def trainer(
     return run
 
 
+CACHES = "PyTorch keeps code on disk, in a folder torchinductor_USER of temporary files"
+"""What is kept of compiled code."""
+
 CONTENDERS = (
     Contender("torch", "PyTorch, eager", _open_eager, packages=("torch",)),
     Contender(
@@ -120,7 +170,14 @@ CONTENDERS = (
         "PyTorch, compiled",
         _open_compiled,
         packages=("torch",),
-        caches="PyTorch keeps code on disk, in a folder torchinductor_USER of temporary files",
+        caches=CACHES,
+    ),
+    Contender(
+        "torch.fft",
+        "PyTorch, compiled, its first layer by torch.fft",
+        _open_spectra,
+        packages=("torch",),
+        caches=CACHES,
     ),
 )
-"""Both forms."""
+"""All forms."""

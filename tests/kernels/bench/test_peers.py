@@ -71,8 +71,8 @@ def test_a_peer_computes_the_network(peer, border, activation) -> None:
     assert (np.abs(picture - denoise(model, frame, np.float64)) <= bound).all()
 
 
-OTHERS = [p for p in contenders.PEERS if not p.variant and not p.name.endswith("int8")]
-"""Peers that are another denoiser; those in 8 bits of this network: test_integers.py."""
+OTHERS = [p for p in contenders.PEERS if p.name.startswith("oidn")]
+"""Peers that are another denoiser; those of this network in fewer bits: test_integers.py."""
 
 
 @pytest.mark.parametrize("peer", OTHERS, ids=lambda peer: peer.name)

@@ -92,7 +92,7 @@ def test_weights_in_another_order_are_refused(dot16):
         run_text(source, held, manifest, turned)
 
 
-@pytest.mark.parametrize(("target", "schedule", "count"), [("opencl", "dot16", 16), ("wgsl", "groupdot", 16)])
+@pytest.mark.parametrize(("target", "schedule", "count"), [("opencl", "dot16", 8), ("wgsl", "groupdot", 8)])
 def test_planted_faults_in_bytes_are_noticed(target, schedule, count, tmp_path):
     """TXT-8: what holds the reader."""
     assert unnoticed(parts(planned(tmp_path, target, schedule)), count) == []

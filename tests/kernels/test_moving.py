@@ -32,8 +32,9 @@ def model(kit):
 
 
 def cubes(time, **changed):
-    """Return the mini cubes at a time; `changed` are colours of lights."""
-    return scenes.canonical("minicubes", time=time, **changed)
+    """Return four of the mini cubes, which compile sooner, at a time; `changed` are colours of lights."""
+    scene = scenes.canonical("minicubes", time=time, **changed)
+    return replace(scene, boxes=scene.boxes[:4])
 
 
 @pytest.fixture

@@ -44,7 +44,7 @@ CASES = {
 
 def scene(name, time=1.3):
     """Return a canonical scene; the mini cubes are turned."""
-    return scenes.canonical(name, **({"time": time} if name == "minicubes" else {}))
+    return scenes.canonical(name, time=time)
 
 
 @pytest.fixture(scope="module")
@@ -290,12 +290,12 @@ def test_nothing_is_read_back_or_uploaded_in_between_on_opengl(
 def test_another_time_compiles_paths_alone(executor, model_of, monkeypatch):
     """The picture of another time is that of a pipeline made for it; encoding and denoiser stay built."""
     model, size = model_of(("color", "normal"), 3, "clamp"), (8, 12)
-    with Pipeline(executor, scene("minicubes", 2.0), model, size, settings=SETTINGS) as pipeline:
+    with Pipeline(executor, scene("cornell", 2.0), model, size, settings=SETTINGS) as pipeline:
         wanted = pipeline.run(4)
-    with Pipeline(executor, scene("minicubes", 1.0), model, size, settings=SETTINGS) as pipeline:
+    with Pipeline(executor, scene("cornell", 1.0), model, size, settings=SETTINGS) as pipeline:
         other = pipeline.run(4)
         kernels = pipeline.encode, pipeline.denoise
-        pipeline.set_scene(scene("minicubes", 2.0))
+        pipeline.set_scene(scene("cornell", 2.0))
         assert np.array_equal(pipeline.run(4), wanted)
         assert kernels == (pipeline.encode, pipeline.denoise)
     assert np.abs(other - wanted).max() > 1e-3

@@ -170,29 +170,40 @@ def closest_hit(geometry: Geometry, origin: Points, direction: Directions) -> Hi
     return Hit(t, surface)
 
 
-def occluded(geometry: Geometry, origin: Points, direction: Directions, t_max: Floats) -> Truths:
-    """Tell (...) whether rays meet anything nearer than t_max (...)."""
+def occluded(
+    geometry: Geometry, origin: Points, direction: Directions, t_max: Floats, asked: Truths | None = None
+) -> Truths:
+    """Tell (...) whether rays meet anything nearer than t_max (...).
+
+    The answer is of no use where asked (...) does not hold.
+    """
 
     def nearer(values: tuple[Any], t_new: Floats, _: Ids | np.int32) -> tuple[Any]:
         return (np.minimum(values[0], t_new),)
 
     t = np.full_like(direction[..., 0], MISS)
-    (t,) = fold_distances(geometry, origin, direction, nearer, (t,))
+    reach = t_max if asked is None else np.where(asked, t_max, 0.0)
+    (t,) = fold_distances(geometry, origin, direction, nearer, (t,), reach)
     return t < t_max
 
 
 def fold_distances(
-    geometry: Geometry, origin: Points, direction: Directions, take: Take, values: Values
+    geometry: Geometry,
+    origin: Points,
+    direction: Directions,
+    take: Take,
+    values: Values,
+    reach: Floats | None = None,
 ) -> Values:
     """Return the values after take(values, distance, surface id) for each primitive in the order of ids.
 
-    A room has the id of its first wall.
+    A room has the id of its first wall. Who gives a reach (...) asks only whether a distance is below it.
     """
     if geometry.room is not None:
         t_room = room_distance(*_room_slabs(geometry, origin, direction))
         values = take(values, t_room, np.int32(geometry.room_id))
     for group in geometry.groups:
-        values = group.fold(origin, direction, take, values)
+        values = group.fold(origin, direction, take, values, reach)
     return values
 
 

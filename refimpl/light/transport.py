@@ -319,7 +319,7 @@ def direct_light(
         other_pdf = shading.pdf(world.materials, site, hit, wi, cos_surface)
         weight = weight * mis_weight(world.settings, pdf, other_pdf)
     facing = (cos_surface > 0.0) & (cos_light > 0.0)
-    visible = facing & ~intersection.occluded(world.geometry, origin, wi, distance)
+    visible = facing & ~intersection.occluded(world.geometry, origin, wi, distance, facing)
     return color, vectors.scale(radiance, np.where(visible, weight, 0.0))
 
 

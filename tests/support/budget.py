@@ -12,15 +12,15 @@ ROOT = Path(__file__).parents[2]
 
 BUDGET = {
     "refimpl": 1150,
-    "refimpl/light": 3550,
+    "refimpl/light": 3600,
     "refimpl/network": 2050,
     "compiler": 1700,
-    "compiler/core": 3250,
+    "compiler/core": 3450,
     "compiler/languages": 2250,
     "compiler/proof": 3100,
     "compiler/reading": 4050,
     "compiler/schedules": 4650,
-    "compiler/scenes": 1500,
+    "compiler/scenes": 1850,
     "compiler/training": 1200,
     "kernels": 150,
     "kernels/devices": 2350,

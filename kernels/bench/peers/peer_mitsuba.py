@@ -18,7 +18,6 @@ Mitsuba: Jakob et al., "Mitsuba 3 renderer", https://mitsuba-renderer.org, its d
 from __future__ import annotations
 
 import importlib
-import itertools
 from typing import Any
 
 import numpy as np
@@ -99,7 +98,7 @@ def check(scene: Scene, settings: Settings) -> None:
 
 def _holds(room: Room, part: Box | Sphere | Quad | Light) -> bool:
     """Tell whether a primitive lies within the room, up to rounding."""
-    low, high = _extent(part)
+    low, high, _ = part.extent
     slack = 1e-6 * (np.array(room.high) - room.low)
     return bool(np.all(low >= room.low - slack) and np.all(high <= room.high + slack))
 
@@ -107,16 +106,6 @@ def _holds(room: Room, part: Box | Sphere | Quad | Light) -> bool:
 def _within(room: Room, point: Any) -> bool:
     """Tell whether a point (3,) lies in the room."""
     return bool(np.all(np.array(point) >= room.low) and np.all(np.array(point) <= room.high))
-
-
-def _extent(part: Box | Sphere | Quad | Light) -> tuple[Any, Any]:
-    """Return the least and the greatest corner (3,) of a primitive."""
-    if isinstance(part, (Box, Sphere)):
-        reach = part.radius if isinstance(part, Sphere) else np.abs(part.rotation).T @ part.half_extent
-        return part.center - np.asarray(reach), part.center + np.asarray(reach)
-    edges = np.array([part.edge_u, part.edge_v])
-    corners = np.array([part.corner + np.array(ab) @ edges for ab in itertools.product((0, 1), repeat=2)])
-    return corners.min(axis=0), corners.max(axis=0)
 
 
 def _surrounds(part: Box | Sphere, point: Any) -> bool:

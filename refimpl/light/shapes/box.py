@@ -26,6 +26,7 @@ from .shape import (
     MISS,
     OMITTED,
     Constant,
+    Extent,
     Group,
     Matrix,
     Met,
@@ -79,6 +80,12 @@ class Box(Shape):
         require(min(half) > 0.0, half, f"{path}.half_extent", "half extents must be positive", "use a quad")
         rule, way_out = "its rows must be orthonormal", "normalise the rows"
         require(_is_rotation(rows), rows, f"{path}.rotation", rule, way_out)
+
+    @property
+    def extent(self) -> Extent:
+        """The axes' projections, added up."""
+        reach = np.abs(np.array(self.rotation)).T @ np.array(self.half_extent)
+        return Extent(np.array(self.center) - reach, np.array(self.center) + reach)
 
     @classmethod
     def parts(cls, scene: Scene) -> tuple[Box, ...]:
@@ -161,7 +168,9 @@ class BoxGroup(Group):
         """Tell whether all boxes have one rotation."""
         return bool(self.rotation.ndim == 2)
 
-    def fold(self, origin: Points, direction: Directions, take: Take, values: Values) -> Values:
+    def fold(
+        self, origin: Points, direction: Directions, take: Take, values: Values, reach: Floats | None = None
+    ) -> Values:
         """Return the values after take(values, distance, surface id) for each box in the order of ids."""
         boxes = (self.centers, self.half_extents)
 

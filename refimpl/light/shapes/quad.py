@@ -19,6 +19,7 @@ from .shape import (
     MISS,
     OMITTED,
     Constant,
+    Extent,
     Group,
     Met,
     Rows,
@@ -26,6 +27,7 @@ from .shape import (
     Vector,
     away_from_zero,
     facing,
+    length,
     require,
     spans_area,
 )
@@ -50,6 +52,11 @@ class Quad(Shape):
     def check(self, path: str) -> None:
         """Refuse edges that span no area."""
         check_edges(self, path)
+
+    @property
+    def extent(self) -> Extent:
+        """The corners' least and greatest coordinates."""
+        return quad_extent(self)
 
     @staticmethod
     def distance(row: tuple[Any, ...], origin: Points, direction: Directions) -> Floats:
@@ -90,6 +97,11 @@ class Light:
         require(min(self.color) >= 0.0, self.color, f"{path}.color", "a colour must not be negative", light)
         require(self.power >= 0.0, self.power, f"{path}.power", "power must not be negative", light)
 
+    @property
+    def extent(self) -> Extent:
+        """The corners' least and greatest coordinates."""
+        return quad_extent(self)
+
 
 @dataclass(frozen=True)
 class QuadGroup(Rows):
@@ -118,6 +130,14 @@ def quad_row(quad: Quad | Light) -> tuple[Any, ...]:
     square = vectors.dot(normal, normal)
     dual_u, dual_v = vectors.cross(v, normal) / square, vectors.cross(normal, u) / square
     return np.array(quad.corner, np.float64), dual_u, dual_v, normal / np.sqrt(square)
+
+
+def quad_extent(quad: Quad | Light) -> Extent:
+    """Return where a quad is; a hit's error across an edge moves its ends by 1 / sine as much."""
+    corner, u, v = (np.array(numbers, np.float64) for numbers in (quad.corner, quad.edge_u, quad.edge_v))
+    corners = np.array([corner, corner + u, corner + v, corner + u + v])
+    sine = length(vectors.cross(u, v)) / (length(u) * length(v))
+    return Extent(corners.min(axis=0), corners.max(axis=0), 1.0 + 2.0 / sine)
 
 
 def quad_area_pdf(quad: Quad | Light) -> float:

@@ -69,6 +69,17 @@ class Met(NamedTuple):
     fronts: Any
 
 
+class Extent(NamedTuple):
+    """Corners low and high (3,) of the least box parallel to the axes that holds a shape, in float64.
+
+    `spread`: how many times farther from the shape a hit can lie than the rounding errors of its numbers.
+    """
+
+    low: Any
+    high: Any
+    spread: float = 1.0
+
+
 class Shape:
     """A kind of shapes; a subclass is a frozen dataclass in one file, and a line in the registry.
 
@@ -100,6 +111,11 @@ class Shape:
         """Return unit normals (..., 3) of points on shapes, which a row of (..., 3) or (...) describes."""
         raise NotImplementedError
 
+    @property
+    def extent(self) -> Extent | None:
+        """Where points of the shape can be; None: nobody says."""
+        return None
+
     @classmethod
     def parts(cls, scene: Scene) -> tuple[Any, ...]:
         """Return the scene's shapes of this kind in the order of their ids."""
@@ -130,8 +146,13 @@ class Group(ABC):
         return None
 
     @abstractmethod
-    def fold(self, origin: Points, direction: Directions, take: Take, values: Values) -> Values:
-        """Return the values after take(values, distance, surface id) for each shape in the order of ids."""
+    def fold(
+        self, origin: Points, direction: Directions, take: Take, values: Values, reach: Floats | None = None
+    ) -> Values:
+        """Return the values after take(values, distance, surface id) for each shape in the order of ids.
+
+        Who gives a reach (...) asks only whether a distance is below it.
+        """
 
     @abstractmethod
     def normal(self, met: Met) -> Normals:
@@ -155,7 +176,9 @@ class Rows(Group):
         """Return N."""
         return len(self.tables[0])
 
-    def fold(self, origin: Points, direction: Directions, take: Take, values: Values) -> Values:
+    def fold(
+        self, origin: Points, direction: Directions, take: Take, values: Values, reach: Floats | None = None
+    ) -> Values:
         """Return the values after take(values, distance, surface id) for each shape in the order of ids."""
 
         def meet(values: Values, *row: Any) -> Any:

@@ -14,7 +14,7 @@ import numpy as np
 from ... import vectors
 from ...vectors import Directions, Floats, Normals, Points
 from ..materials import Material
-from .shape import BLACK, LEAST_COMPONENT, MISS, OMITTED, Met, Shape, Vector, require
+from .shape import BLACK, LEAST_COMPONENT, MISS, OMITTED, Extent, Met, Shape, Vector, require
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,11 @@ class Sphere(Shape):
         require(
             self.radius > 0.0, self.radius, f"{path}.radius", "it must be positive", "use a positive radius"
         )
+
+    @property
+    def extent(self) -> Extent:
+        """The radius, to all sides."""
+        return Extent(np.array(self.center) - self.radius, np.array(self.center) + self.radius)
 
     @property
     def row(self) -> tuple[Any, ...]:

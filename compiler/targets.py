@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..refimpl.errors import CompileError
-from .core.loops import MOST_UNROLLED
+from .core.loops import USUAL, Forms
 from .core.profiles import SineContract
 from .languages import opencl_path
 from .languages.c import C
@@ -57,8 +57,8 @@ class Target:
     """Something that runs kernels: how its source is made, and what its own sine promises.
 
     `dialect` is the language's, which the interpreter lacks; `paths` are the dialects of path kernels by the
-    number of paths that they follow at once, none where there are no path kernels, and `unrolled` is the most
-    primitives of a scene that become statements each. `widest`: most channels of an image that a kernel
+    number of paths that they follow at once, none where there are no path kernels, and `forms` says what
+    becomes of a scene's primitives. `widest`: most channels of an image that a kernel
     reads, `most` of all that it writes; None: any number. `assumes`: what a bound rests on that the language
     does not promise.
     """
@@ -71,7 +71,7 @@ class Target:
     schedules: tuple[Schedule, ...]
     dialect: Dialect | None = None
     paths: Mapping[int, Dialect | None] = field(default_factory=dict)
-    unrolled: int = MOST_UNROLLED
+    forms: Forms = USUAL
     widest: int | None = None
     most: int | None = None
     assumes: str = ""
@@ -103,11 +103,12 @@ def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
     )
 
 
-UNROLLED_BY_MESA = 128
-"""Most primitives of a scene that become statements each in fragment shaders. llvmpipe reads a table at a
+MESA = Forms(few=10000.0)
+"""Most operations of primitives that become statements in fragment shaders. llvmpipe reads a table at a
 loop's counter lane by lane, so a loop that Mesa does not unroll itself (it does up to some 30 trips) is two
-to four times slower than statements; but it compiles the statements of 100 primitives in 1 to 5 s, those of
-300 in 9 to 60 s (`wamnet bench primitives --executors opengl`)."""
+to four times slower than statements; but it compiles the statements of 100 primitives of all kinds, which
+take 8,000 operations, in 1 to 5 s, those of 300 in 9 to 60 s. A walk is slower still than a loop
+(`wamnet bench primitives --executors opengl`)."""
 
 TARGETS: Mapping[str, Target] = {
     target.name: target
@@ -126,13 +127,17 @@ TARGETS: Mapping[str, Target] = {
                 OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_DOT, *OPENCL_GROUPS, *OPENCL_GROUP_DOT
             ),
             paths={lanes: opencl_path.of_lanes(lanes) for lanes in opencl_path.LANES},
+            forms=Forms(trees=True),
         ),
-        replace(_dialect_target(GLSL(), Inlined(GLSLInlined()), *GLSL_COMPUTE), unrolled=UNROLLED_BY_MESA),
+        replace(_dialect_target(GLSL(), Inlined(GLSLInlined()), *GLSL_COMPUTE), forms=MESA),
     )
 }
 """The targets that the demo and the benchmark show, by the name of the executor that runs them."""
 
-DENOISERS: Mapping[str, Target] = {**TARGETS, "c": _dialect_target(C(), *C_LADDER, *C_FOURIER, *C_DOT)}
+DENOISERS: Mapping[str, Target] = {
+    **TARGETS,
+    "c": replace(_dialect_target(C(), *C_LADDER, *C_FOURIER, *C_DOT), forms=Forms(trees=True)),
+}
 """All targets that an executor of the registry runs."""
 
 EXPORTED: Mapping[str, Target] = {
@@ -140,7 +145,7 @@ EXPORTED: Mapping[str, Target] = {
     for target in (
         replace(
             _dialect_target(GLSLES(), Inlined(GLSLESInlined()), Packed(GLSLESPacked())),
-            unrolled=UNROLLED_BY_MESA,
+            forms=MESA,
         ),
         _dialect_target(Compute(), *groups(ComputeGroup(), 8)),
         _dialect_target(Vulkan(), *groups(VulkanGroup(), 8), *dots(VulkanDot(), 8)),

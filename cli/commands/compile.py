@@ -208,7 +208,7 @@ def _compiled_scene(
 ) -> PathArtifact:
     """Return the kernel that follows a scene's paths; of a large scene it is said first how long it takes."""
     from ...compiler.scenes.lower_scene import lower_scene
-    from ...compiler.scenes.path_kernel import compile_path, most_unrolled
+    from ...compiler.scenes.path_kernel import compile_path, forms_of
     from ...refimpl.light.transport import Settings
 
     for line in said_of_compiling(scene):
@@ -216,7 +216,7 @@ def _compiled_scene(
     settings = Settings() if max_depth is None else Settings(max_depth=max_depth)
     if sampler is not None:
         settings = replace(settings, sampler=sampler.value)
-    programs = lower_scene(scene, settings, most_unrolled(target))
+    programs = lower_scene(scene, settings, forms_of(target))
     return compile_path(programs, target, profile, 1 if lanes is None else lanes)
 
 

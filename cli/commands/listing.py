@@ -65,12 +65,12 @@ def _lines(model: str, target: str, profile: str) -> list[Line]:
     from ...compiler.core.listing import lines_of
     from ...compiler.core.lower import lower
     from ...compiler.scenes.lower_scene import lower_scene
-    from ...compiler.scenes.path_kernel import compile_path, most_unrolled
+    from ...compiler.scenes.path_kernel import compile_path, forms_of
     from ...refimpl.light.transport import Settings
 
     if is_scene(model):
         scene = load_scene(model, None, [])
-        programs = lower_scene(scene, Settings(), most_unrolled(target), keep_places=True)
+        programs = lower_scene(scene, Settings(), forms_of(target), keep_places=True)
         path_kernel = compile_path(programs, target, profile)
         return lines_of(path_kernel.source, path_kernel.programs.parts())
     kernel = compile_program(lower(load_model(Path(model)), keep_places=True), target, profile)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from .ir import LEAST, Gather, Node, Parameters, Program
-from .loops import Loop, last_reads, loops
+from .loops import Loop, Part, last_reads, loops
 from .ops import OPS
 from .sums import parts
 
@@ -56,14 +56,25 @@ def _run(
     loop: Loop, program: Program, values: list[Any], given: Mapping[str, Array], parameters: Any, kind: Any
 ) -> None:
     """Make the trips of a loop; the carried numbers are then its results."""
-    for trip in range(loop.trips):
-        for index in loop.body:
+
+    def compute(indices: tuple[int, ...], at: int) -> None:
+        for index in indices:
             node = program.nodes[index]
-            if node.op == "row":
-                values[index] = parameters[str(node["table"])][trip]
+            if node.op in ("row", "branch"):
+                values[index] = parameters[str(node["table"])][at]
             else:
                 values[index] = _value(node, program, values, given, parameters, kind)
-        after = [values[index] for index in loop.after]
+
+    def enters(branch: int) -> bool:
+        assert loop.walk is not None
+        compute(loop.walk.guard, branch)
+        return bool(np.any(values[loop.walk.enters]))
+
+    walk, plain = loop.walk, Part(loop.body, loop.after)
+    rows = walk.rows(program.parameters, enters) if walk else ((plain, trip) for trip in range(loop.trips))
+    for part, row in rows:
+        compute(part.body, row)
+        after = [values[index] for index in part.after]
         for index, value in zip(loop.carried, after, strict=True):
             values[index] = value
 

@@ -162,13 +162,19 @@ def _trip(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters:
 
 
 def _loop(args: Sequence[Type], attributes: Mapping[str, Attribute], parameters: Parameters) -> Type:
-    """All carried numbers, then what each is after a trip: the result is one of them."""
-    index, half = attributes["index"], len(args) // 2
-    if len(args) % 2 or not isinstance(index, int) or not 0 <= index < half:
+    """All carried numbers, then what each is after a trip (of each part); a walk's boolean at last."""
+    index, parts = attributes["index"], int(attributes.get("parts", 1))  # type: ignore[arg-type]
+    if "skip" in attributes:
+        if args[-1] != Type("bool"):
+            raise TypeRuleError("the last operand of a walk must be a boolean: whether a lane enters a node")
+        args = args[:-1]
+    count = len(args) // (parts + 1)
+    if len(args) != count * (parts + 1) or not isinstance(index, int) or not 0 <= index < count:
         raise TypeRuleError(f"result {index!r} does not exist of a loop with {len(args)} operands")
-    if args[:half] != args[half:]:
-        before, after = (", ".join(map(str, types)) for types in (args[:half], args[half:]))
-        raise TypeRuleError(f"a trip must keep the kinds that are carried: {before} became {after}")
+    for after in (args[i : i + count] for i in range(count, len(args), count)):
+        if after != args[:count]:
+            before, became = (", ".join(map(str, types)) for types in (args[:count], after))
+            raise TypeRuleError(f"a trip must keep the kinds that are carried: {before} became {became}")
     return args[index]
 
 
@@ -294,14 +300,24 @@ OPS: Mapping[str, Op] = {
         Op("take", 1, _take, _take_value, "exact", required=("table",), parameters=("table",)),
         Op("carried", 1, _carried, _no_definition, "exact", required=("index", "loop")),
         Op("row", 0, _trip, _no_definition, "exact", required=("loop", "table"), parameters=("table",)),
-        Op("loop", None, _loop, _no_definition, "exact", required=("index", "loop", "trips")),
+        Op("branch", 0, _trip, _no_definition, "exact", required=("loop", "table"), parameters=("table",)),
+        Op(
+            "loop",
+            None,
+            _loop,
+            _no_definition,
+            "exact",
+            required=("index", "loop", "trips"),
+            optional=("first", "parts", "skip"),
+            parameters=("first", "skip"),
+        ),
         Op("stack", None, _stack, _stack_value, "exact"),
         Op("component", 1, _component, _component_value, "exact", required=("index",)),
     )
 }
 """All operations, by name."""
 
-LOOPS = ("carried", "row", "loop")
+LOOPS = ("carried", "row", "branch", "loop")
 """The operations that make up a loop over the rows of tables (loops.py)."""
 
 ELEMENTWISE = tuple(op for op in OPS.values() if op.elementwise)

@@ -18,6 +18,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
@@ -367,28 +368,72 @@ def _fold_rows(builder: Builder, step: Any, tables: Any, start: Any) -> Any:
     trips = len(tables[0])
     if not isinstance(builder, Tracer) or builder.unrolls(trips) or any(map(_is_mixed, tables)):
         return NotImplemented
+    return _looped(builder, step, tables, start)
+
+
+def walk_rows(
+    parts: Any, start: Any, enters: Any, boxes: Any, first: NDArray[Any], skip: NDArray[Any]
+) -> Any:
+    """Return what `start`, traced values (...), becomes by a walk along a tree over rows [loops.py: Walk].
+
+    parts: (step, tables) of each part. enters(values, *box) tells in which lanes a node is entered; row i of
+    `boxes` (n, ...) is node i's.
+    """
+    builder = next(value.builder for value in start if isinstance(value, Traced))
+    number, carried = _carried(builder, start)
+    rows = (_row(builder, table, number, "branch") for table in boxes)
+    entered = _operand(builder, enters(tuple(carried), *rows))
+    after = [_stepped(builder, step, tables, number, carried) for step, tables in parts]
+    names = {"first": builder.table(first.reshape(-1)), "skip": builder.table(skip), "parts": len(parts)}
+    trips = sum(len(tables[0]) for _, tables in parts)
+    return _results(builder, number, trips, carried, [*chain(*after), entered], names)
+
+
+def _looped(builder: Tracer, step: Any, tables: Any, start: Any) -> Any:
+    """Return a loop's results."""
+    number, carried = _carried(builder, start)
+    after = _stepped(builder, step, tables, number, carried)
+    return _results(builder, number, len(tables[0]), carried, after, {})
+
+
+def _carried(builder: Tracer, start: Any) -> tuple[int, list[Traced]]:
+    """Return the number of a new loop, and what it carries."""
     number, builder.loops = builder.loops, builder.loops + 1
-    carried = [
+    return number, [
         Traced(builder, _add(builder, "carried", (_operand(builder, value),), index=i, loop=number))
         for i, value in enumerate(start)
     ]
+
+
+def _stepped(builder: Builder, step: Any, tables: Any, number: int, carried: list[Traced]) -> list[int]:
+    """Return what the carried numbers become in a trip."""
     stepped = step(tuple(carried), *(_row(builder, table, number) for table in tables))
     if not isinstance(stepped, tuple) or len(stepped) != len(carried):
         _refuse(f"vectors.fold_rows with a step that does not return {len(carried)} values")
-    after = [_operand(builder, v, c.type.dtype) for v, c in zip(stepped, carried, strict=True)]
+    return [_operand(builder, v, c.type.dtype) for v, c in zip(stepped, carried, strict=True)]
+
+
+def _results(
+    builder: Builder, number: int, trips: int, carried: list[Traced], after: list[int], named: Any
+) -> tuple[Traced, ...]:
+    """Return the carried numbers after all trips."""
     args = (*(value.index for value in carried), *after)
-    named = {"loop": number, "trips": trips}
-    return tuple(Traced(builder, _add(builder, "loop", args, index=i, **named)) for i in range(len(carried)))
+    return tuple(
+        Traced(builder, _add(builder, "loop", args, index=i, loop=number, trips=trips, **named))
+        for i in range(len(carried))
+    )
 
 
-def _row(builder: Builder, table: NDArray[Any], number: int) -> Any:
+def _row(builder: Builder, table: NDArray[Any], number: int, op: str = "row") -> Any:
     """Return the entry of a loop's trip: a number of (K,), a vector of (K, n), several of (K, m, n)."""
     if table.ndim == 3:
-        return [_row(builder, table[:, i], number) for i in range(table.shape[1])]
+        return [_row(builder, table[:, i], number, op) for i in range(table.shape[1])]
     if table.ndim == 2:
-        return emit(builder, "stack", *(_row(builder, table[:, i], number) for i in range(table.shape[1])))
+        return emit(
+            builder, "stack", *(_row(builder, table[:, i], number, op) for i in range(table.shape[1]))
+        )
     name = builder.table(_known(table))
-    return Traced(builder, _add(builder, "row", (), loop=number, table=name))
+    return Traced(builder, _add(builder, op, (), loop=number, table=name))
 
 
 def _known(array: NDArray[Any]) -> NDArray[Any]:

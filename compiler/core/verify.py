@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ...refimpl.errors import CompileError
-from .ir import DTYPES, Node, Program, Type
-from .loops import bodies, loop_number, split
+from .ir import DTYPES, Attribute, Node, Program, Type
+from .loops import bodies, is_walk, loop_number, loops, split
 from .ops import OPS, TypeRuleError
 
 Rule = Callable[[Program], Iterator[str]]
@@ -112,7 +112,7 @@ def loops_are_whole(program: Program) -> Iterator[str]:
         if node.op != "loop":
             continue
         first = ends.setdefault(loop_number(node), node)
-        if (node.args, node["trips"]) != (first.args, first["trips"]):
+        if (node.args, _shared(node)) != (first.args, _shared(first)):
             yield f"%{index} and another result of loop {node['loop']} have other operands or trips"
         for place, arg in enumerate(split(node)[0]):
             found = program.nodes[arg]
@@ -120,12 +120,18 @@ def loops_are_whole(program: Program) -> Iterator[str]:
                 yield f"%{index} loop: operand {place} must be carried number {place} of loop {node['loop']}"
 
 
+def _shared(node: Node) -> dict[str, Attribute]:
+    """Return the attributes that all results of a loop have."""
+    return {name: value for name, value in node.attributes if name != "index"}
+
+
 def tables_are_as_long_as_loops(program: Program) -> Iterator[str]:
     """A loop makes at least one trip, and each of its tables has a row for every trip."""
     trips = {}
     for index, node in enumerate(program.nodes):
         if node.op == "loop":
-            trips[loop_number(node)] = node["trips"]
+            if not is_walk(node):
+                trips[loop_number(node)] = node["trips"]
             if type(node["trips"]) is not int or node["trips"] < 1:
                 yield f"%{index} loop makes {node['trips']!r} trips; it must make one or more"
     for index, node in enumerate(program.nodes):
@@ -146,6 +152,39 @@ def loops_are_closed(program: Program) -> Iterator[str]:
     for name, index in program.outputs:
         if inside[index]:
             yield f"output {name!r}, %{index}, is a value of a trip; take the loop's result"
+
+
+def walks_stay_on_their_trees(program: Program) -> Iterator[str]:
+    """A walk's tables are a tree over all rows, and its test and its parts read their own tables only."""
+    for index, loop in loops(program)[0].items():
+        if loop.walk is None:
+            continue
+        first, skip = (program.parameters[name] for name in (loop.walk.first, loop.walk.skip))
+        parts, nodes = len(loop.walk.parts), len(skip)
+        if len(first) != parts * (nodes + 1):
+            yield f"%{index} loop: table {loop.walk.first} has {len(first)} entries for {parts} x {nodes + 1}"
+            continue
+        if not ((np.arange(nodes) < skip) & (skip <= nodes)).all():
+            yield f"%{index} loop: table {loop.walk.skip} must lead each node to a later one, or to {nodes}"
+        ends = first.reshape(parts, nodes + 1)
+        if ends[:, 0].any() or (np.diff(ends) < 0).any() or ends[:, -1].sum() != loop.trips:
+            yield f"%{index} loop: table {loop.walk.first} must share out rows 0 to {loop.trips - 1} in order"
+        read = [("branch", nodes, loop.walk.guard)]
+        read += [("row", end, part.body) for end, part in zip(ends[:, -1], loop.walk.parts, strict=True)]
+        yield from _own_tables(program, read)
+
+
+def _own_tables(program: Program, read: list[tuple[str, int, tuple[int, ...]]]) -> Iterator[str]:
+    """Yield what reads a table in a way, or of a length, that is not its own."""
+    for op, length, body in read:
+        for index in body:
+            node = program.nodes[index]
+            if node.op not in ("row", "branch"):
+                continue
+            found = len(program.parameters[str(node["table"])])
+            if (node.op, found) != (op, length):
+                wanted = f"a {op} of a table of {length}"
+                yield f"%{index} {node.op}: table {node['table']} has {found} rows; {wanted} is read here"
 
 
 def window_matches(program: Program) -> Iterator[str]:
@@ -183,6 +222,7 @@ RULES: tuple[Rule, ...] = (
     loops_are_whole,
     tables_are_as_long_as_loops,
     loops_are_closed,
+    walks_stay_on_their_trees,
     window_matches,
     images_have_ranges,
 )

@@ -33,7 +33,7 @@ def weights(program: Program) -> Mapping[str, NDArray[Any]]:
 
 def tables(program: Program) -> Mapping[str, NDArray[Any]]:
     """Return the parameters that look-ups read, in the order in which the program holds them."""
-    read = {node["table"] for node in program.nodes if node.op in ("take", "row")}
+    read = {node.get(key) for node in program.nodes for key in ("table", "first", "skip")}
     return {name: array for name, array in program.parameters.items() if name in read}
 
 

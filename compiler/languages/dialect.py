@@ -77,7 +77,8 @@ class Dialect:
     unordered: tuple[str, str] = ("", "")
     assumes: str = ""
     first: tuple[str, ...] = ()
-    counted: str = "for (int {i} = 0; {i} < {count}; ++{i}) {{"
+    counted: str = "for (int {i} = {start}; {i} < {count}; ++{i}) {{"
+    walked: str = "for (int {i} = 0; {i} < {count};) {{"
     define: str = "#define {name} {value}"
     choice: str = "{0} ? {1} : {2}"
     exact: tuple[str, ...] = ()
@@ -90,6 +91,7 @@ class Dialect:
     lanes: int = 1
     lane_numbers: str = "0u"
     any_lane: str = "{mask}"
+    any_enters: str = "{mask}"
     helpers: Mapping[str, str] = {}
     said_numbers: str = f"{SCENE_NUMBERS}: {{count}} floats, after the sums in the list of arguments"
     most_numbers: int = 2**16
@@ -225,9 +227,13 @@ class Dialect:
         """Return the declaration of an array."""
         return f"{self.variable(dtype) if kept else self.types[dtype]} {name}[{count}];"
 
-    def loop(self, counter: str, count: int | str) -> str:
-        """Return the line that opens a loop of a counter from 0 on."""
-        return self.counted.format(i=counter, count=count)
+    def loop(self, counter: str, count: int | str, start: int | str = 0) -> str:
+        """Return the line that opens a loop of a counter from `start` on."""
+        return self.counted.format(i=counter, count=count, start=start)
+
+    def walk(self, counter: str, count: int) -> str:
+        """Return the line that opens a loop whose body moves the counter from 0 on."""
+        return self.walked.format(i=counter, count=count)
 
     def select(self, condition: str, yes: str, no: str) -> str:
         """Return the text of a choice between two numbers."""

@@ -45,6 +45,26 @@ float{lanes} floor_float{lanes}(float{lanes} x)
 """Floor of vectors: cut off towards zero, and one less where that is above; the bits 0x4b000000 are 2^23."""
 
 
+def any_enters(lanes: int) -> str:
+    """Return the function of a walk that tells whether any component of a boolean holds: `or` of halves."""
+    head, lines, name = f"int any_enters(int{lanes} mask)", [], "mask"
+    while lanes > 2:
+        lanes //= 2
+        lines.append(f"    int{lanes} of_{lanes} = {name}.lo | {name}.hi;")
+        name = f"of_{lanes}"
+    return "\n".join(
+        [
+            "/* Whether any path enters a node. The library's any() is a call, which saves all registers. */",
+            head,
+            "{",
+            *lines,
+            f"    return {name}.lo | {name}.hi;",
+            "}",
+            "",
+        ]
+    )
+
+
 class OpenCLPath(OpenCL):
     """The dialect's table for one path in a work item."""
 
@@ -59,6 +79,7 @@ class OpenCLVectorPath(OpenCLPath):
     """The dialect's table for 4, 8 or 16 paths in a work item."""
 
     any_lane = "any({mask})"
+    any_enters = "any_enters({mask})"
 
     def __init__(self, lanes: int) -> None:
         kinds = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "int"}
@@ -74,7 +95,7 @@ class OpenCLVectorPath(OpenCLPath):
             "take": f"({{type}})({entries})",
             "row": "({type})({table}[{0}])",
         }
-        self.helpers = {"floor": FLOOR.format(lanes=lanes)}
+        self.helpers = {"floor": FLOOR.format(lanes=lanes), "walk": any_enters(lanes)}
 
     def splat(self, value: str, dtype: str) -> str:
         """Return the text of a number that is the same in all lanes."""

@@ -35,7 +35,7 @@ from ...refimpl.errors import CompileError
 from ..core.interpret import apply, element
 from ..core.intervals import Ends
 from ..core.ir import Node, Program
-from ..core.loops import Loop, last_reads, loops
+from ..core.loops import Loop, Part, last_reads, loops
 from ..core.ops import image
 from ..core.profiles import (
     EMITTED_COSINE,
@@ -164,11 +164,15 @@ class _Run:
     found: list[Any]
 
     def loop(self, loop: Loop) -> None:
-        """Make the trips of a loop, as interpret.py does; the carried numbers are then its results."""
-        for trip in range(loop.trips):
-            for index in loop.body:
-                self.found[index] = self.node(index, trip)
-            after = [self.found[index] for index in loop.after]
+        """Make the trips of a loop, as interpret.py does; the carried numbers are then its results.
+
+        A walk makes all of them: what it leaves out changes nothing.
+        """
+        plain = ((Part(loop.body, loop.after), trip) for trip in range(loop.trips))
+        for part, row in loop.walk.all_rows(self.program.parameters) if loop.walk else plain:
+            for index in part.body:
+                self.found[index] = self.node(index, row)
+            after = [self.found[index] for index in part.after]
             for index, found in zip(loop.carried, after, strict=True):
                 self.found[index] = found
 

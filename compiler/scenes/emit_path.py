@@ -21,7 +21,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ...refimpl.errors import CompileError
 from ..core.ir import Image, Node, Program, Type, attributes
 from ..core.lines import Lines
-from ..core.loops import Loop, loops
+from ..core.loops import Loop, Part, Walk, is_walk, loops
 from ..core.weights import tables
 from ..languages import interface
 from ..languages.dialect import Dialect, Parts
@@ -62,6 +62,9 @@ GROUPS: Mapping[str, Sequence[str]] = {
 
 TRIP = "i"
 """Name of the counter of a loop over the rows of tables."""
+
+BRANCH = "node"
+"""Name of the number of a tree's node, where a loop walks along one."""
 
 FRAME_GROUPS = ("color", "deviation", *LAYERS)
 """What a rendered frame needs."""
@@ -160,9 +163,10 @@ class _Kernel(Lines):
         )
 
     def _operations(self) -> set[str]:
-        """Return the names of all operations of the programs."""
+        """Return the names of all operations of the programs; loops that walk along trees are of another."""
         programs = [*self.programs.parts().values(), *([self.encoding.program] if self.encoding else [])]
-        return {node.op for program in programs for node in program.nodes}
+        nodes = [node for program in programs for node in program.nodes]
+        return {"walk" if node.op == "loop" and is_walk(node) else node.op for node in nodes}
 
     def _sums(self) -> None:
         """Declare the image's size in lanes, and the sums."""
@@ -330,12 +334,41 @@ class _Kernel(Lines):
         return self.dialect.let(dtype, name, value, kept=True)
 
     def _loop(self, part: str, program: Program, texts: Sequence[str], loop: Loop) -> None:
-        """Write a loop over the rows of tables: its body, then the assignments of what it carries."""
+        """Write a loop over the rows of tables."""
+        if loop.walk is not None:
+            self._walk(part, program, texts, loop, loop.walk)
+            return
         self._open(self.dialect.loop(TRIP, loop.trips))
-        for index in loop.body:
+        self._trip(part, program, texts, loop, Part(loop.body, loop.after))
+        self._close()
+
+    def _walk(self, part: str, program: Program, texts: Sequence[str], loop: Loop, walk: Walk) -> None:
+        """Write a walk along a tree: a node is entered where any of the paths enters it."""
+        first, skip = (self.tables[part, name] for name in (walk.first, walk.skip))
+        nodes = len(program.parameters[walk.skip])
+        self._open(self.dialect.walk(BRANCH, nodes))
+        for index in walk.guard:
+            self._statement(part, program, texts, index)
+        entered = self.dialect.any_enters.format(mask=texts[walk.enters])
+        self._open(f"if ({entered}) {{")
+        for number, each in enumerate(walk.parts):
+            start, end = (f"{first}[{BRANCH} + {number * (nodes + 1) + more}]" for more in (0, 1))
+            self._open(self.dialect.loop(TRIP, end, start.replace(" + 0]", "]")))
+            self._trip(part, program, texts, loop, each)
+            self._close()
+        self._line(f"++{BRANCH};")
+        self._close()
+        self._open("else {")
+        self._line(f"{BRANCH} = {skip}[{BRANCH}];")
+        self._close()
+        self._close()
+
+    def _trip(self, part: str, program: Program, texts: Sequence[str], loop: Loop, done: Part) -> None:
+        """Write a trip of a loop: its body, then the assignments of what it carries."""
+        for index in done.body:
             self._statement(part, program, texts, index)
         before, after = [], []
-        for carried, new in zip(loop.carried, loop.after, strict=True):
+        for carried, new in zip(loop.carried, done.after, strict=True):
             value = texts[new]
             if new in loop.carried and new != carried:
                 # Another carried number, which may be assigned before it is read: keep its value.
@@ -345,17 +378,17 @@ class _Kernel(Lines):
                 after.append(f"{texts[carried]} = {value};")
         for line in before + after:
             self._line(line)
-        self._close()
 
     def _expression(self, part: str, program: Program, node: Node, texts: Sequence[str]) -> str:
         """Return the right side of a statement."""
         if node.op == "carried":
             return texts[node.args[0]]
-        if node.op in ("take", "row"):
+        if node.op in ("take", "row", "branch"):
             table = self.tables[part, str(node["table"])]
             node = Node(node.op, node.args, node.type, attributes(table=table))
-        if node.op == "row":
-            return self.dialect.expression(node, node.type.dtype, [TRIP])
+        if node.op in ("row", "branch"):
+            counter = TRIP if node.op == "row" else BRANCH
+            return self.dialect.expression(replace(node, op="row"), node.type.dtype, [counter])
         kind = program.nodes[node.args[-1]].type.dtype
         return self.dialect.expression(node, kind, [texts[arg] for arg in node.args])
 

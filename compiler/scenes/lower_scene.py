@@ -15,7 +15,7 @@ program. Numbers of it that shall move are inputs of all four [scene_inputs.py].
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -24,13 +24,14 @@ import numpy as np
 from ...refimpl import vectors
 from ...refimpl.light import render, transport
 from ...refimpl.light.intersection import Hit, Surface, reflecting
-from ...refimpl.light.scene import Scene, primitives, scene_digest
+from ...refimpl.light.scene import Scene, scene_digest
 from ...refimpl.light.transport import Counters, Path, Settings, World
 from ..core.ir import Program, Type
-from ..core.loops import MOST_UNROLLED
+from ..core.loops import USUAL, Forms
 from ..core.passes import pipeline
 from ..core.trace import Traced, trace
 from ..core.verify import verify
+from .forms import as_statements, planted
 from .scene_inputs import Places, SceneInputs, flattened, lay_out
 
 XYZ, RGB, NUMBER = ("_x", "_y", "_z"), ("_r", "_g", "_b"), ("",)
@@ -104,18 +105,19 @@ class PathPrograms:
 def lower_scene(
     scene: Scene,
     settings: Settings,
-    most_unrolled: int | None = MOST_UNROLLED,
+    forms: Forms = USUAL,
     moving: SceneInputs | None = None,
     *,
     keep_places: bool = False,
 ) -> PathPrograms:
     """Return the programs of a path through a scene, in float32.
 
-    The primitives of a scene that has more than `most_unrolled` of them are tables and loops, else statements
-    for each; None unrolls any scene. A table of one row needs no loop. Numbers that are `moving` are inputs.
-    `keep_places`: nodes know the lines of the reference that they came from, for listings.
+    Primitives are statements each, tables and loops, or a tree, as `forms` and their costs say [forms.py].
+    `keep_places`: nodes know the lines of the reference that they came from, for listings. Numbers that are
+    `moving` are inputs; such a scene has no tree, whose boxes would have to move.
     """
-    laid, moving = lay_out(scene, settings), moving or SceneInputs(settings, ())
+    moving = moving or SceneInputs(settings, ())
+    laid, values, statements = _laid_out(scene, settings, forms, moving)
     world_of = partial(_world, laid, moving)
 
     def start(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -147,8 +149,7 @@ def lower_scene(
     numbers = dict.fromkeys(("x", "y", "seed", "sample_number"), (NUMBER, COUNTER))
     size, depth = dict.fromkeys(("width", "height"), (NUMBER, FLOAT)), {"depth": (NUMBER, COUNTER)}
     scene_numbers = dict.fromkeys(moving.names, (NUMBER, FLOAT))
-    few = most_unrolled is None or primitives(scene) <= most_unrolled
-    lowered = partial(_lowered, most_unrolled=None if few else 1, keep_places=keep_places)
+    lowered = partial(_lowered, most_unrolled=None if statements else 1, keep_places=keep_places)
     return PathPrograms(
         scene.name,
         scene_digest(scene),
@@ -159,8 +160,20 @@ def lower_scene(
         lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, **depth, **scene_numbers}),
         moving.names,
         moving.places,
-        tuple(map(float, moving.read(flattened(laid)))),
+        tuple(map(float, values)),
     )
+
+
+def _laid_out(
+    scene: Scene, settings: Settings, forms: Forms, moving: SceneInputs
+) -> tuple[dict[str, Any], Any, bool]:
+    """Return the tables, with a tree if it seems to pay, the inputs' values, and if all are statements."""
+    laid = lay_out(scene, settings)
+    world: World = laid["world"]
+    values, statements = moving.read(flattened(laid)), as_statements(world.geometry, forms)
+    if forms.trees and not statements and not moving.places:
+        laid["world"] = replace(world, geometry=planted(world.geometry, scene))
+    return laid, values, statements
 
 
 def _world(laid: dict[str, Any], moving: SceneInputs, given: Mapping[str, Any]) -> World:

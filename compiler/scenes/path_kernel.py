@@ -21,12 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError
-from ...refimpl.light.scene import Scene, primitives
+from ...refimpl.light.scene import Scene
 from ...refimpl.reading import SIZES
 from ..artifact import OneSource
 from ..compile import asdict_finite
 from ..core import ir, profiles
 from ..core.ir import Image
+from ..core.loops import Forms
 from ..core.passes import pipeline
 from ..core.profiles import Profile
 from ..languages import interface
@@ -36,8 +37,9 @@ from ..plan import sine_contract
 from ..targets import integers_of, target_named
 from . import emit_path
 from .emit_path import Encoding
+from .forms import as_statements
 from .lower_scene import PASSES, PathPrograms
-from .scene_inputs import SceneInputs, Tables
+from .scene_inputs import SceneInputs, Tables, lay_out
 
 SCHEMA = "wamnet-path-kernel-1"
 """Name and version of the manifest's form; described in spec/path_kernel.md."""
@@ -83,9 +85,9 @@ class PathArtifact(OneSource):
         return np.array(self.programs.values, np.float32)
 
 
-def most_unrolled(target: str) -> int:
-    """Return the number of primitives above which a scene becomes tables and loops on a target."""
-    return target_named(target).unrolled
+def forms_of(target: str) -> Forms:
+    """Return the forms of a scene's primitives from which a target gains."""
+    return target_named(target).forms
 
 
 def can_move(target: str, scene: Scene, tables: Tables, inputs: SceneInputs) -> bool:
@@ -97,7 +99,9 @@ def can_move(target: str, scene: Scene, tables: Tables, inputs: SceneInputs) -> 
     chosen = target_named(target)
     if any(dialect and len(inputs.places) > dialect.most_numbers for dialect in chosen.paths.values()):
         return False
-    return primitives(scene) <= chosen.unrolled or not inputs.move_rows(tables)
+    if not inputs.move_rows(tables):
+        return True
+    return as_statements(lay_out(scene, inputs.settings)["world"].geometry, chosen.forms)
 
 
 def compile_path(

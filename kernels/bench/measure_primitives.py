@@ -1,9 +1,9 @@
-"""Many primitives: what statements for each cost, and what tables with a loop do.
+"""Many primitives: what statements for each cost, and what tables with a loop or a tree do.
 
-1. Scenes of some primitives in a room [`crowd`] are traced in both forms ("unrolled", "looped").
+1. Scenes of some primitives in a room [`crowd`] are traced in all forms ("unrolled", "looped", "tree").
 2. Tracing and emitting are timed, then building by a driver without its caches on disk, until it has
    followed a first row of paths [`built`].
-3. The forms take turns, so that drift of the machine's speed affects both alike [`compare`]; rates are in
+3. The forms take turns, so that drift of the machine's speed affects all alike [`compare`]; rates are in
    million samples a second.
 
 A sample is one path with up to five scatterings, each with a shadow ray.
@@ -14,13 +14,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.core.loops import LISTS, STATEMENTS, TREES, Forms
 from ...compiler.scenes.lower_scene import lower_scene
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
+from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...refimpl import rng
 from ...refimpl.light.scene import (
     Box,
@@ -36,9 +38,11 @@ from ...refimpl.light.scene import (
 )
 from ...refimpl.light.transport import Settings
 from ..devices.executor import Executor, Part
+from . import peer_mitsuba
+from .measure_render import VARIANT
 
-FORMS = {"unrolled": None, "looped": 0}
-"""Most primitives that are unrolled, by the name of the form."""
+FORMS = {"unrolled": STATEMENTS, "looped": LISTS, "tree": TREES}
+"""What primitives become, by the name of the form; a tree is there where it seems to pay."""
 
 NO_CACHES = {
     "POCL_KERNEL_CACHE": "0",
@@ -47,30 +51,58 @@ NO_CACHES = {
 }
 """Environment in which drivers reuse no kernel that they built before."""
 
-EXECUTORS = ("opencl", "opengl")
-"""What is measured: executors whose kernels a driver builds."""
+EXECUTORS = ("opencl", "opengl", "mitsuba")
+"""What is measured: executors whose kernels a driver builds, and Mitsuba, which has a tree of its own."""
+
+MOST_STATEMENTS = 300
+"""Most primitives that are measured as statements: a driver takes minutes for those of more."""
 
 
 @dataclass
 class Kernel:
-    """A kernel and what was measured of it; `chosen` is the form that a scene of so many primitives has."""
+    """A kernel, how it follows a picture's paths, and what was measured; `source` is empty for a peer.
+
+    `chosen`: the scene has this form on the executor's target.
+    """
 
     scene: str
     form: str
-    artifact: PathArtifact
+    source: str
+    follow: Callable[[], Any]
     trace_s: float
     build_s: float
-    chosen: bool
+    chosen: bool = False
     rates: list[float] = field(default_factory=list)
 
 
 def compare(executor: Executor, scene: Scene, part: Part, repeats: int) -> list[Kernel]:
-    """Return both forms of a scene, measured on a part of a picture."""
-    kernels = [built(executor, scene, form, part) for form in FORMS]
+    """Return the forms of a scene, measured on a part of a picture: a tree only where there is one."""
+    chosen = _compiled(executor, scene, forms_of(executor.name)).source
+    forms = [form for form in FORMS if form != "unrolled" or primitives(scene) <= MOST_STATEMENTS + 1]
+    found: dict[str, Kernel] = {}
+    for kernel in (built(executor, scene, form, part) for form in forms):
+        found.setdefault(kernel.source, replace(kernel, chosen=kernel.source == chosen))
+    return timed(list(found.values()), part, repeats)
+
+
+def peer(scene: Scene, part: Part, repeats: int) -> list[Kernel]:
+    """Return Mitsuba on a scene; what it builds is built by its first picture."""
+    start = time.perf_counter()
+    mi = peer_mitsuba.open_mitsuba(VARIANT)
+    loaded = mi.load_dict(peer_mitsuba.export(mi, scene, part.width, part.rows, Settings()))
+    traced = time.perf_counter()
+    follow = partial(peer_mitsuba.render, mi, loaded, part.samples, 0)
+    follow()
+    made = Kernel(scene.name, VARIANT, "", follow, traced - start, time.perf_counter() - traced)
+    return timed([made], part, repeats)
+
+
+def timed(kernels: list[Kernel], part: Part, repeats: int) -> list[Kernel]:
+    """Let kernels take turns, and note their rates."""
     for _ in range(repeats):
         for kernel in kernels:
             start = time.perf_counter()
-            executor.trace(kernel.artifact, part)
+            kernel.follow()
             samples = part.width * part.rows * part.samples
             kernel.rates.append(samples / (time.perf_counter() - start) / 1e6)
     return kernels
@@ -79,14 +111,18 @@ def compare(executor: Executor, scene: Scene, part: Part, repeats: int) -> list[
 def built(executor: Executor, scene: Scene, form: str, part: Part) -> Kernel:
     """Trace, emit and build a kernel in one form."""
     start = time.perf_counter()
-    programs = lower_scene(scene, Settings(), FORMS[form])
-    artifact = compile_path(programs, executor.name, lanes=executor.lanes)
+    artifact = _compiled(executor, scene, FORMS[form])
     traced = time.perf_counter()
     executor.build(artifact)
     executor.trace(artifact, replace(part, rows=1, samples=1))
     done = time.perf_counter()
-    chosen = (primitives(scene) <= most_unrolled(executor.name)) == (form == "unrolled")
-    return Kernel(scene.name, form, artifact, traced - start, done - traced, chosen)
+    follow = partial(executor.trace, artifact, part)
+    return Kernel(scene.name, form, artifact.source, follow, traced - start, done - traced)
+
+
+def _compiled(executor: Executor, scene: Scene, forms: Forms) -> PathArtifact:
+    """Return the kernel of a scene for an executor."""
+    return compile_path(lower_scene(scene, Settings(), forms), executor.name, lanes=executor.lanes)
 
 
 # ---- scenes ------------------------------------------------------------------------------------------------

@@ -30,7 +30,7 @@ from ...compiler.scenes.encode_kernel import EncodeArtifact, compile_encode
 from ...compiler.scenes.host_pass import feature_pass
 from ...compiler.scenes.lower_encode import layers_of
 from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
+from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.variants import FULL, parse, plan_model, vary
 from ...refimpl.errors import InputError
 from ...refimpl.light.scene import Scene
@@ -311,7 +311,7 @@ def _programs(request: Request, row: Row) -> PathPrograms | None:
         rule = f"the passes of target {row.name} have no place for numbers of a scene"
         raise InputError("--moving", ", ".join(request.motion.kinds), rule, "leave it out")
     moving = request.motion.inputs(request.settings) if request.motion else None
-    return lower_scene(request.scene, request.settings, most_unrolled(_usual(row)), moving)
+    return lower_scene(request.scene, request.settings, forms_of(_usual(row)), moving)
 
 
 def _usual(row: Row) -> str:

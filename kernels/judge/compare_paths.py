@@ -29,7 +29,7 @@ from ...compiler.proof import ranges
 from ...compiler.proof.ranges import Arithmetic, Range
 from ...compiler.scenes.emit_path import END
 from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, kinds, lower_scene, names
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
+from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...refimpl.light import render
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
@@ -164,7 +164,7 @@ def compare_paths(
 
     on_progress is called with 1 after each depth.
     """
-    programs = lower_scene(scene, settings, most_unrolled(executor.name))
+    programs = lower_scene(scene, settings, forms_of(executor.name))
     given = _given(view)
     before: State | None = None
     together = np.ones(view.width * view.height, bool)

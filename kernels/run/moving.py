@@ -39,12 +39,16 @@ class Moment:
 
 @dataclass
 class _Family:
-    """Scenes of one layout: the first one with its tables, the inputs, and the kernel when it is compiled."""
+    """Scenes of one layout: the first one with its tables, the inputs, and the kernel when it is compiled.
+
+    `moves` says whether a kernel takes the inputs, once it is known.
+    """
 
     scene: Scene
     tables: Tables
     inputs: SceneInputs
     kernel: PathArtifact | None = None
+    moves: bool | None = None
 
 
 class MovingPaths:
@@ -68,8 +72,11 @@ class MovingPaths:
             self._families[layout] = _Family(scene, tables, inputs)
         family = self._families[layout]
         if not family.inputs.fits(family.tables, tables):
-            family.inputs, family.kernel = family.inputs.widened([family.tables, tables]), None
-        if not can_move(self._target, scene, tables, family.inputs):
+            family.inputs = family.inputs.widened([family.tables, tables])
+            family.kernel = family.moves = None
+        if family.moves is None:
+            family.moves = can_move(self._target, family.scene, family.tables, family.inputs)
+        if not family.moves:
             return Moment(self._compiled(scene, SceneInputs(self._settings, ())), np.zeros(0, np.float32))
         if family.kernel is None:
             family.kernel = self._compiled(family.scene, family.inputs)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ...compiler.scenes.emit_path import GROUPS
 from ...compiler.scenes.lower_scene import lower_scene
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
+from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...refimpl.errors import InputError
 from ...refimpl.frame import LAYERS, Frame
@@ -53,7 +53,7 @@ def compile_scene(executor: Executor, scene: Scene, job: Job, profile: str = "ie
 @lru_cache(KEPT_SCENES)
 def _compiled(scene: Scene, settings: Settings, target: str, profile: str, lanes: int) -> PathArtifact:
     """Return the kernel; it depends on nothing else."""
-    programs = lower_scene(scene, settings, most_unrolled(target))
+    programs = lower_scene(scene, settings, forms_of(target))
     return compile_path(programs, target, profile, lanes)
 
 
@@ -71,7 +71,7 @@ class Frames:
             target, lanes = executor.name, executor.lanes
 
             def compiled(scene: Scene, inputs: SceneInputs) -> PathArtifact:
-                programs = lower_scene(scene, settings, most_unrolled(target), inputs)
+                programs = lower_scene(scene, settings, forms_of(target), inputs)
                 return compile_path(programs, target, profile, lanes)
 
             self._paths[key] = MovingPaths(target, compiled, settings, self._scenes)

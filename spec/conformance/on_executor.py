@@ -26,7 +26,7 @@ from ...compiler.core.profiles import profile_named
 from ...compiler.core.trace import trace
 from ...compiler.scenes.emit_path import END
 from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, lower_scene
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path, most_unrolled
+from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import DENOISERS, target_named
 from ...kernels.devices.executor import Executor, Part
@@ -107,7 +107,7 @@ class OnExecutor:
 
     def _lowered(self, scene: str, settings: Settings) -> PathPrograms:
         """Return the programs of a path, which do not depend on the depth."""
-        return lower_scene(scene_module.from_json(scene), settings, most_unrolled(self.executor.name))
+        return lower_scene(scene_module.from_json(scene), settings, forms_of(self.executor.name))
 
     def _denoised(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
         """Return a denoised picture."""

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.loops import LISTS, STATEMENTS, USUAL
 from wamnet.compiler.core.loops import loops as loops_of
-from wamnet.compiler.scenes.lower_scene import LAYERS, PATH, SURFACE, lower_scene, names, primitives
+from wamnet.compiler.scenes.lower_scene import LAYERS, PATH, SURFACE, lower_scene, names
 from wamnet.refimpl import rng
 from wamnet.refimpl.light import render as R
 from wamnet.refimpl.light import scenes, transport
@@ -83,22 +84,22 @@ def components(values, *tuples):
 @pytest.mark.parametrize("name", SCENES)
 def test_programs_give_the_reference_s_bits(name, settings):
     """All programs at each depth, on the reference's own states, in float32, the same sine in both."""
-    follow(SCENES[name], settings, None)
+    follow(SCENES[name], settings, STATEMENTS)
 
 
 @pytest.mark.parametrize("name", ["minicubes", "everything"])
 def test_loops_give_the_reference_s_bits(name):
     """As above, with every table of two primitives and more as a loop."""
-    programs = follow(SCENES[name], Settings(max_depth=2), 0)
+    programs = follow(SCENES[name], Settings(max_depth=2), LISTS)
     loops = {"minicubes": [27, 2], "everything": [2, 2, 3]}[name]
     for program, results in ((programs.arrive, 2), (programs.scatter, 1)):
         found = [node["trips"] for node in program.nodes if node.op == "loop"]
         assert found == [trips for trips in loops for _ in range(results)]
 
 
-def follow(scene, settings, most_unrolled):
+def follow(scene, settings, forms):
     """Check all programs of a scene, and return them."""
-    programs = lower_scene(scene, settings, most_unrolled)
+    programs = lower_scene(scene, settings, forms)
     world = transport.build(scene, settings, np.float32)
     y, x = np.divmod(np.arange(16 * 12), 16)
     counters = transport.Counters(rng.counter(7), R.pixel_counter(x, y), rng.counter(3))
@@ -170,27 +171,16 @@ def test_a_rotation_that_boxes_share_is_applied_once(count):
     assert from_input(arrive, "multiply", "origin") == 7
 
 
-@pytest.mark.parametrize("most_unrolled", [0, 20, None])
-def test_a_rotation_that_boxes_share_is_outside_of_their_loop(most_unrolled):
+@pytest.mark.parametrize("forms", [LISTS, USUAL, STATEMENTS])
+def test_a_rotation_that_boxes_share_is_outside_of_their_loop(forms):
     """The same seven products: none of them depends on the row."""
-    arrive = lower_scene(room_with(boxes=boxes(20, TURNED)), Settings(), most_unrolled).arrive
-    assert ops(arrive, "loop") == (2 if most_unrolled == 0 else 0)
+    arrive = lower_scene(room_with(boxes=boxes(20, TURNED)), Settings(), forms).arrive
+    assert ops(arrive, "loop") == (2 if forms == LISTS else 0)
     inside = loops_of(arrive)[1]
     for prefix in ("direction", "origin"):
         assert from_input(arrive, "multiply", prefix) == 7
     read = [arrive.nodes[arg] for i in inside for arg in arrive.nodes[i].args]
     assert not [node for node in read if node.op == "input"]
-
-
-def test_the_number_of_primitives_decides_on_loops():
-    """The room is not a row; a table of one row is not a loop."""
-    scene = room_with(boxes=boxes(20, TURNED), lights=(LIGHT,))
-    assert primitives(scene) == 21
-    assert ops(lower_scene(scene, Settings(), 21).arrive, "loop") == 0
-    assert ops(lower_scene(scene, Settings(), 20).arrive, "loop") == 2
-    assert {str(n["trips"]) for n in lower_scene(scene, Settings(), 0).arrive.nodes if n.op == "loop"} == {
-        "20"
-    }
 
 
 def test_boxes_that_are_parallel_to_the_axes_are_not_rotated():

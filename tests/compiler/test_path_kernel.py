@@ -9,6 +9,7 @@ from dataclasses import replace
 import pytest
 
 from wamnet.compiler.core import ir
+from wamnet.compiler.core.loops import LISTS
 from wamnet.compiler.scenes.emit_path import GROUPS, planes
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
@@ -47,7 +48,7 @@ def test_golden_source_of_a_loop(golden, target, lanes):
     """Three spheres in the furnace: a table and a loop in the text, in two programs if there is a light."""
     spheres = tuple(Sphere((0.3 * i, 0.1, 0.2 - i), 0.1 + 0.1 * i, (0.2, 0.3 * i, 0.1)) for i in range(3))
     scene = replace(scenes.canonical("furnace"), name="spheres", spheres=spheres)
-    programs = lower_scene(scene, Settings(max_depth=1), most_unrolled=0)
+    programs = lower_scene(scene, Settings(max_depth=1), LISTS)
     made = compile_path(programs, target, "native", lanes, groups=("color",))
     golden(f"path.spheres.native.{lanes}.{made.source_name}", made.source)
 

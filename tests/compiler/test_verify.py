@@ -113,6 +113,50 @@ LOOPS = [
 ]
 """What a loop must not be."""
 
+
+def walk(skip=(2, 2), first=(0, 1, 3), *changed):
+    """Return the sum of x and a table's entries in the nodes of a tree whose own entry is below it."""
+    nodes = [
+        Node("input", (), NUMBER, attributes(name="x", type=NUMBER)),
+        Node("carried", (0,), NUMBER, attributes(index=0, loop=0)),
+        Node("row", (), NUMBER, attributes(loop=0, table="T0")),
+        Node("add", (1, 2), NUMBER),
+        Node("branch", (), NUMBER, attributes(loop=0, table="T1")),
+        Node("less", (4, 1), Type("bool")),
+        Node("loop", (1, 3, 5), NUMBER, attributes(index=0, loop=0, trips=3, first="T2", skip="T3")),
+    ]
+    for index, node in changed:
+        nodes[index] = node
+    tables = {"T2": np.array(first, np.int32), "T3": np.array(skip, np.int32)}
+    return Program(tuple(nodes), (("sum", 6),), {"T0": A, "T1": A[:2], **tables})
+
+
+WALKS = "walks_stay_on_their_trees"
+LOOPS += [
+    (WALKS, walk(first=(0, 1, 2, 3)), "%6 loop: table T2 has 4 entries for 1 x 3"),
+    (WALKS, walk(skip=(2, 1)), "%6 loop: table T3 must lead each node to a later one, or to 2"),
+    (WALKS, walk(skip=(3, 2)), "%6 loop: table T3 must lead each node to a later one, or to 2"),
+    (WALKS, walk(first=(0, 1, 2)), "%6 loop: table T2 must share out rows 0 to 2 in order"),
+    (WALKS, walk(first=(0, 4, 3)), "%6 loop: table T2 must share out rows 0 to 2 in order"),
+    (
+        WALKS,
+        walk((2, 2), (0, 1, 3), (4, Node("branch", (), NUMBER, attributes(loop=0, table="T0")))),
+        "%4 branch: table T0 has 3 rows; a branch of a table of 2 is read here",
+    ),
+    (
+        WALKS,
+        walk((2, 2), (0, 1, 3), (2, Node("branch", (), NUMBER, attributes(loop=0, table="T1")))),
+        "%2 branch: table T1 has 2 rows; a row of a table of 3 is read here",
+    ),
+    (
+        "types_follow",
+        walk((2, 2), (0, 1, 3), (5, Node("add", (4, 1), NUMBER))),
+        "the last operand of a walk must be a boolean: whether a lane enters a node",
+    ),
+]
+"""What a walk must not be."""
+
+
 CASES = [
     *LOOPS,
     (
@@ -230,3 +274,4 @@ def test_every_rule_has_a_case():
 def test_well_formed_program_passes():
     assert verify(GOOD) is GOOD
     verify(loop())
+    verify(walk())

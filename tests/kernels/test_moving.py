@@ -115,7 +115,7 @@ def test_numbers_that_a_kernel_should_not_take_are_constants(executor, model, mo
     scene = scenes.canonical("empty")
     box = cubes(0.4).boxes[0]
     many = [
-        replace(scene, boxes=tuple(replace(box, center=(0.1 * i, by, -0.1 * i)) for i in range(200)))
+        replace(scene, boxes=tuple(replace(box, center=(0.1 * i, by, -0.1 * i)) for i in range(600)))
         for by in (0.0, 0.5)
     ]
     with Pipeline(executor, many[0], model, SIZE, settings=SETTINGS, moving=many) as pipeline:

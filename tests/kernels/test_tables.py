@@ -1,4 +1,4 @@
-"""Many primitives as tables and loops: the unrolled kernel's image, to the bit, and the reference's."""
+"""Many primitives as tables, loops and trees (PTK-14, PTK-19): the unrolled kernel's image, to the bit."""
 
 from __future__ import annotations
 
@@ -9,16 +9,20 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.core.ir import Type
-from wamnet.compiler.core.loops import MOST_UNROLLED
+from wamnet.compiler.core.loops import LISTS, STATEMENTS, TREES, USUAL, Forms
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.core.verify import verify
-from wamnet.compiler.scenes.lower_scene import lower_scene, primitives
-from wamnet.compiler.scenes.path_kernel import compile_path, most_unrolled
+from wamnet.compiler.scenes import forms, hierarchy
+from wamnet.compiler.scenes.forms import list_cost, row_cost
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path, forms_of
 from wamnet.kernels.devices.executor import Part
 from wamnet.kernels.run.render_on import compile_scene, render_on
 from wamnet.refimpl import vectors
+from wamnet.refimpl.light import intersection
 from wamnet.refimpl.light import render as R
 from wamnet.refimpl.light.scene import IDENTITY, Box, Camera, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.light.scenes import CANONICAL, canonical
 from wamnet.refimpl.light.transport import Settings
 
 U = 2.0**-24
@@ -79,9 +83,9 @@ SCENES = {
 }
 
 
-def sums(executor, scene, most, size=(24, 16), samples=2):
+def sums(executor, scene, forms, size=(24, 16), samples=2):
     """Return the kernel's text and its sums (planes, rows, width)."""
-    programs = lower_scene(scene, SETTINGS, most)
+    programs = lower_scene(scene, SETTINGS, forms)
     kernel = compile_path(programs, executor.name, lanes=executor.lanes)
     return kernel.source, executor.trace(kernel, Part(*size, 0, size[1], 0, samples, 3))
 
@@ -89,33 +93,29 @@ def sums(executor, scene, most, size=(24, 16), samples=2):
 @pytest.mark.parametrize("name", SCENES)
 def test_a_loop_computes_what_statements_compute(executor, name):
     """The same operations in the same order, one a statement: no compiler contracts them, no bit differs."""
-    (unrolled, expected), (looped, found) = (sums(executor, SCENES[name], most) for most in (None, 0))
+    (unrolled, expected), (looped, found) = (
+        sums(executor, SCENES[name], forms) for forms in (STATEMENTS, LISTS)
+    )
     assert unrolled != looped or name == "one of each kind"
     assert np.isfinite(expected).all()
     assert expected[0].std() > 0
     assert np.array_equal(found, expected)
 
 
-@pytest.mark.parametrize("more", [-1, 0, 1])
-def test_loops_begin_above_the_threshold(executor, more):
-    """Below and at it a statement for each primitive, above it none; the image is the reference's either way.
+def shown(executor, scene, trips):
+    """Check that the usual kernel of a scene has such loops, and shows the reference's image.
 
     99 pixels in 100 to 1e-5 of the layer's size (168 u: a distance with 64 u s of error, twice, and sums), as
     in test_paths.py.
     """
-    most = most_unrolled(executor.name)
-    scene = crowd(("shared", most // 2), ("turned", 5), ("quad", most - most // 2 - 5 - 1 + more))
-    assert primitives(scene) == most + more
     job = R.Job(24, 16, 1, 3, SETTINGS)
     kernel = compile_scene(executor, scene, job)
-    trips = [most // 2, 5, most - most // 2 - 5 + more]  # quads and lights are one table
     if executor.name == "numpy":
-        assert [int(n) for n in re.findall(r"trips=(\d+)}", kernel.source)] == (
-            # Two numbers are carried to the next surface, one by shadow rays.
-            [t for t in trips for _ in range(2)] + trips if more > 0 else []
-        )
+        # Two numbers are carried to the next surface, one by shadow rays.
+        found = [int(n) for n in re.findall(r"trips=(\d+)}", kernel.source)]
+        assert found == [t for t in trips for _ in range(2)] + trips
     else:
-        assert [int(n) for n in LOOP.findall(kernel.source)] == (trips * 2 if more > 0 else [])
+        assert [int(n) for n in LOOP.findall(kernel.source)] == trips * 2
     expected, found = R.render(scene, job).frame, render_on(executor, scene, job).frame
     for layer, values in expected.layers.items():
         size = np.abs(values).max(axis=-1, keepdims=True) + np.abs(values).mean()
@@ -123,10 +123,69 @@ def test_loops_begin_above_the_threshold(executor, more):
         assert near.all(axis=-1).mean() >= 0.99, layer
 
 
+@pytest.mark.parametrize("more", [0, 1])
+def test_loops_begin_above_the_threshold(executor, more):
+    """As many spheres, beside a light, as are statements, and one more, for which there is a loop."""
+    few = forms_of(executor.name).few
+    light, sphere = (row_cost(intersection.build(crowd(*p)).groups[0]) for p in ((), (("sphere", 2),)))
+    scene = crowd(("sphere", int((few - light) // sphere) + more))
+    assert (list_cost(intersection.build(scene)) > few) == bool(more)
+    shown(executor, scene, [len(scene.spheres)] if more else [])
+
+
 def test_thresholds():
-    """Lower bounds of what is known to be worth it: the canonical scenes are statements on every target."""
-    assert MOST_UNROLLED == most_unrolled("opencl") == most_unrolled("numpy") == 32
-    assert most_unrolled("opengl") == 128
+    """What is known to be worth it: the canonical scenes are statements on every target."""
+    assert forms_of("numpy") == USUAL
+    assert forms_of("opencl") == forms_of("c") == replace(USUAL, trees=True)
+    assert forms_of("opengl") == Forms(few=10000.0)
+    for name in CANONICAL:
+        programs = lower_scene(canonical(name), SETTINGS, forms_of("opencl")).parts().values()
+        assert not any(node.op == "loop" for program in programs for node in program.nodes), name
+
+
+TREE = re.compile(r"for \(int node = 0; node < (\d+);\) {")
+"""A walk along a tree."""
+
+GROWN = {
+    **{kind: crowd((kind, 40)) for kind in MAKERS},
+    "mixture": crowd(
+        *((kind, 24) for kind in MAKERS), lights=(LIGHT, replace(LIGHT, corner=(-0.9, 0.9, -0.9)))
+    ),
+    "no light, no room": replace(
+        crowd(*((kind, 24) for kind in MAKERS)), lights=(), room=None, background=(0.4, 0.5, 0.6)
+    ),
+}
+"""Scenes of enough primitives for a tree."""
+
+
+@pytest.mark.parametrize("name", GROWN)
+def test_a_tree_computes_what_the_list_computes(denoiser, name, monkeypatch):
+    """The same bits, whichever paths go together; nodes are taken for cheap, so that each kind has a tree."""
+    monkeypatch.setattr(hierarchy, "VISIT", 5.0)
+    (listed, expected), (grown, found) = (sums(denoiser, GROWN[name], forms) for forms in (LISTS, TREES))
+    assert listed != grown
+    assert denoiser.name == "numpy" or len(TREE.findall(grown)) == 1 + bool(GROWN[name].lights)
+    assert expected[0].std() > 0
+    assert np.array_equal(found, expected)
+
+
+@pytest.mark.parametrize("lanes", [1, 4, 8])
+def test_a_tree_is_the_same_for_any_number_of_lanes(executor_named, lanes, monkeypatch):
+    monkeypatch.setattr(hierarchy, "VISIT", 5.0)
+    executor, part = executor_named("opencl"), Part(24, 16, 0, 16, 0, 2, 3)
+    programs = lower_scene(GROWN["mixture"], SETTINGS, TREES)
+    one, other = (compile_path(programs, "opencl", lanes=n) for n in (16, lanes))
+    assert np.array_equal(executor.trace(one, part), executor.trace(other, part))
+
+
+@pytest.mark.parametrize("first", [0, 2])
+def test_of_coincident_faces_a_tree_takes_the_first_listed(executor, first, monkeypatch):
+    """Coincident shapes in a tree: as the list does, though leaves are met in another order."""
+    monkeypatch.setattr(hierarchy, "VISIT", 1.0)
+    monkeypatch.setattr(forms, "LEAST_ROWS", 2)
+    (listed, expected), (grown, found) = (sums(executor, coincident(first), f) for f in (LISTS, TREES))
+    assert listed != grown
+    assert np.array_equal(found, expected)
 
 
 def carried_about(surface):
@@ -172,7 +231,7 @@ def coincident(first):
 @pytest.mark.parametrize("first", [0, 2])
 def test_of_coincident_faces_the_first_listed_wins(executor, first):
     scene = coincident(first)
-    source, found = sums(executor, scene, 0, samples=1)
+    source, found = sums(executor, scene, LISTS, samples=1)
     assert ("loop" if executor.name == "numpy" else "int i") in source
     albedo = np.moveaxis(found[6:9], 0, -1).reshape(-1, 3)
     walls = np.float32(CLOSED.reflectances[0])
@@ -184,7 +243,7 @@ def test_of_coincident_faces_the_first_listed_wins(executor, first):
 def test_a_wrong_loop_is_caught(executor_named):
     """The tests above can fail: a loop that leaves out its last row loses a primitive."""
     executor = executor_named("opencl")
-    kernel = compile_path(lower_scene(SINGLES["sphere"], SETTINGS, 0), "opencl", lanes=executor.lanes)
+    kernel = compile_path(lower_scene(SINGLES["sphere"], SETTINGS, LISTS), "opencl", lanes=executor.lanes)
     part = Part(24, 16, 0, 16, 0, 2, 3)
     source = LOOP.sub("for (int i = 0; i < 4; ++i) {", kernel.source, count=1)
     assert source != kernel.source

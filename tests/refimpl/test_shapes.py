@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wamnet.compiler.core.loops import LISTS, STATEMENTS, TREES, Forms
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels import open_executor, render_on
@@ -116,10 +117,10 @@ def test_rays_meet_a_new_shape(known: None, dtype: Any) -> None:
     assert normal.tolist() == [[0, 1, 0], [0, 0, 0], [0, -1, 0], [0, 0, 1]]
 
 
-@pytest.mark.parametrize("most_unrolled", [None, 0])
-def test_a_new_shape_compiles(known: None, most_unrolled: int | None) -> None:
+@pytest.mark.parametrize("forms", [STATEMENTS, LISTS, TREES])
+def test_a_new_shape_compiles(known: None, forms: Forms) -> None:
     """As statements and as a loop, for both languages of paths."""
-    programs = lower_scene(SCENE, Settings(), most_unrolled)
+    programs = lower_scene(SCENE, Settings(), forms)
     for target in ("opencl", "opengl"):
         assert compile_path(programs, target).source
 

@@ -135,7 +135,7 @@ def _selected(builder: Builder, node: Node, args: tuple[int, ...], constants: Kn
 
 def _looked_up(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
     """Return the constant of a table whose entries are all the same bits."""
-    if node.op not in ("take", "row"):
+    if node.op not in ("take", "row", "branch"):
         return None
     table = builder.parameters[str(node["table"])]
     same = len({entry.tobytes() for entry in table}) == 1

@@ -72,7 +72,7 @@ class Met(NamedTuple):
 class Extent(NamedTuple):
     """Corners low and high (3,) of the least box parallel to the axes that holds a shape, in float64.
 
-    `spread`: how many times farther from the shape a hit can lie than the rounding errors of its numbers.
+    `spread`: how many times farther from the shape a hit can be than the rounding errors of its numbers.
     """
 
     low: Any

@@ -38,8 +38,8 @@ from ...refimpl.light.scene import (
 )
 from ...refimpl.light.transport import Settings
 from ..devices.executor import Executor, Part
-from . import peer_mitsuba
 from .measure_render import VARIANT
+from .peers import peer_mitsuba
 
 FORMS = {"unrolled": STATEMENTS, "looped": LISTS, "tree": TREES}
 """What primitives become, by the name of the form; a tree is there where it seems to pay."""

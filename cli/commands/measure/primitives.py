@@ -1,8 +1,9 @@
-"""`wamnet bench primitives`: scenes of many primitives as statements, and as tables with a loop."""
+"""`wamnet bench primitives`: scenes of many primitives as statements, loops and trees."""
 
 from __future__ import annotations
 
 import statistics
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -17,7 +18,7 @@ EXAMPLES = """Examples:
 
 wamnet bench primitives
 
-wamnet bench primitives --executors opengl --kinds turned --counts 30,100"""
+wamnet bench primitives --executors opencl,mitsuba --kinds spheres --counts 30,3000"""
 """Shown below the help of `wamnet bench primitives`."""
 
 HEADS = ("by", "scene", "form", "lines", "kB", "trace, s", "build, s", "Msamples/s", "range")
@@ -26,7 +27,7 @@ HEADS = ("by", "scene", "form", "lines", "kB", "trace, s", "build, s", "Msamples
 
 def primitives(
     executors: Annotated[
-        str, typer.Option(metavar="NAME,...", help="What runs the kernels: opencl, opengl.")
+        str, typer.Option(metavar="NAME,...", help="Who follows paths: opencl, opengl, mitsuba.")
     ] = "opencl,opengl",
     kinds: Annotated[
         str, typer.Option(metavar="NAME,...", help="Primitives: shared, turned, spheres, quads, mixture.")
@@ -36,12 +37,12 @@ def primitives(
     spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 4,
     repeats: Repeats = 5,
 ) -> None:
-    """Measure scenes of many primitives in both forms: statements for each, and tables with a loop.
+    """Measure scenes of many primitives in all forms: statements for each, tables with a loop, and a tree.
 
     The table has lines and size of the source, seconds to trace and emit it, seconds until the driver has
     built it and followed a first row of paths (its caches on disk are not used), and million samples a
-    second: median and range of turns that both forms take. A star marks the form that a scene of so many
-    primitives has.
+    second: median and range of turns that all forms take. A star marks the form that the scene has; a tree
+    is measured only where it seems to pay.
     """
     from ....kernels import open_executor
     from ....kernels.bench import measure_primitives as measuring
@@ -61,15 +62,16 @@ def primitives(
     part = Part(size, size, 0, size, 0, spp, 0)
     with environment(measuring.NO_CACHES):
         for name in given:
-            with open_executor(name) as executor:
+            with nullcontext() if name == "mitsuba" else open_executor(name) as executor:
                 for scene in (measuring.crowd(kind, count) for kind in scenes for count in numbers):
-                    for kernel in measuring.compare(executor, scene, part, repeats):
+                    done = measuring.compare(executor, scene, part, repeats) if executor else None
+                    for kernel in done or measuring.peer(scene, part, repeats):
                         _show(name, kernel)
 
 
 def _show(by: str, kernel: Kernel) -> None:
     """Print the row of a kernel."""
-    source = kernel.artifact.source
+    source = kernel.source
     row(
         *(by, kernel.scene, f"{kernel.form}{'*' if kernel.chosen else ''}", f"{source.count(chr(10)):,}"),
         *(f"{len(source.encode()) / 1000:,.0f}", f"{kernel.trace_s:.2f}", f"{kernel.build_s:.2f}"),

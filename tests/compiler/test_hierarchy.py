@@ -1,4 +1,4 @@
-"""Trees of bounding boxes: the list's bits for any rays and primitives; the builder (PTK-19, IR-18, SHP-4)."""
+"""Trees of bounding boxes: the list's bits for any rays and primitives (PTK-19, IR-18, SHP-4)."""
 
 from __future__ import annotations
 

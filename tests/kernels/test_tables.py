@@ -178,6 +178,17 @@ def test_a_tree_is_the_same_for_any_number_of_lanes(executor_named, lanes, monke
     assert np.array_equal(executor.trace(one, part), executor.trace(other, part))
 
 
+def test_a_mask_of_lanes_tells_what_the_or_of_their_halves_tells(executor_named, monkeypatch):
+    """PTK-19: a processor without the instruction has the same bits."""
+    monkeypatch.setattr(hierarchy, "VISIT", 5.0)
+    executor, part = executor_named("opencl"), Part(24, 16, 0, 16, 0, 2, 3)
+    kernel = compile_path(lower_scene(GROWN["mixture"], SETTINGS, TREES), "opencl", lanes=16)
+    source = kernel.source.replace("defined(__AVX512DQ__)", "0")
+    assert source != kernel.source
+    plain = replace(kernel, source=source, manifest={**kernel.manifest, "digest": "without masks"})
+    assert np.array_equal(executor.trace(kernel, part), executor.trace(plain, part))
+
+
 @pytest.mark.parametrize("first", [0, 2])
 def test_of_coincident_faces_a_tree_takes_the_first_listed(executor, first, monkeypatch):
     """Coincident shapes in a tree: as the list does, though leaves are met in another order."""

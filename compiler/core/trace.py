@@ -380,6 +380,8 @@ def walk_rows(
     `boxes` (n, ...) is node i's.
     """
     builder = next(value.builder for value in start if isinstance(value, Traced))
+    if not isinstance(builder, Tracer):
+        _refuse("a walk outside of a traced function")
     number, carried = _carried(builder, start)
     rows = (_row(builder, table, number, "branch") for table in boxes)
     entered = _operand(builder, enters(tuple(carried), *rows))

@@ -78,7 +78,7 @@ class Dialect:
     assumes: str = ""
     first: tuple[str, ...] = ()
     counted: str = "for (int {i} = {start}; {i} < {count}; ++{i}) {{"
-    walked: str = "for (int {i} = 0; {i} < {count};) {{"
+    stepped: str = "for (int {i} = 0; {i} < {count};) {{"
     define: str = "#define {name} {value}"
     choice: str = "{0} ? {1} : {2}"
     exact: tuple[str, ...] = ()
@@ -233,7 +233,7 @@ class Dialect:
 
     def walk(self, counter: str, count: int) -> str:
         """Return the line that opens a loop whose body moves the counter from 0 on."""
-        return self.walked.format(i=counter, count=count)
+        return self.stepped.format(i=counter, count=count)
 
     def select(self, condition: str, yes: str, no: str) -> str:
         """Return the text of a choice between two numbers."""

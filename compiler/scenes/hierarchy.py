@@ -104,7 +104,8 @@ def plant(low: Array, high: Array, costs: Array, parts: Sequence[int]) -> Tree:
     whole = _area(low.min(axis=0), high.max(axis=0))
 
     def chance(node_low: Array, node_high: Array) -> float:
-        return float(1.0 - (1.0 - min(_area(node_low, node_high) / whole, 1.0)) ** TOGETHER)
+        share = min(float(_area(node_low, node_high) / whole), 1.0)
+        return float(1.0 - (1.0 - share) ** TOGETHER)
 
     def grow(members: Array) -> _Node:
         box = low[members].min(axis=0), high[members].max(axis=0)
@@ -302,10 +303,12 @@ class Walked(Group):
 
         if reach is not None:
             (t,) = walk(parts(_any), (reach,), enters, self.tree)
-            return take(values, t, np.int32(0))
+            shadowed: Values = take(values, t, np.int32(0))
+            return shadowed
         nothing = np.full_like(values[0], -1, dtype=np.int32)
         t, surface = walk(parts(_nearest), (values[0], nothing), enters, self.tree)
-        return take(values, t, surface)
+        nearest: Values = take(values, t, surface)
+        return nearest
 
 
 def _nearest(values: Any, t_new: Any, surface_new: Any) -> Any:

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_plan
 from ...compiler.core.ir import digest, sha256
+from ...compiler.core.loops import STATEMENTS
 from ...compiler.core.lower import lower
 from ...compiler.languages.glsl import MOST_UNIFORMS
 from ...compiler.languages.glsl_es import MOST_BUFFERS
@@ -203,7 +204,7 @@ def path_kernel(
     scene: Scene, settings: Settings, inputs: SceneInputs, features: Sequence[str], profile: str
 ) -> PathArtifact:
     """Return the kernel that adds up the planes of some features."""
-    programs = lower_scene(scene, settings, None, moving=inputs)
+    programs = lower_scene(scene, settings, STATEMENTS, inputs)
     return compile_path(programs, TARGET, profile, 1, layers_of(features))
 
 

@@ -26,6 +26,7 @@ from .shape import (
     Shape,
     Vector,
     away_from_zero,
+    cross,
     facing,
     length,
     require,
@@ -136,7 +137,8 @@ def quad_extent(quad: Quad | Light) -> Extent:
     """Return where a quad is; a hit's error across an edge moves its ends by 1 / sine as much."""
     corner, u, v = (np.array(numbers, np.float64) for numbers in (quad.corner, quad.edge_u, quad.edge_v))
     corners = np.array([corner, corner + u, corner + v, corner + u + v])
-    sine = length(vectors.cross(u, v)) / (length(u) * length(v))
+    area = cross(quad.edge_u, quad.edge_v)
+    sine = length(area) / (length(quad.edge_u) * length(quad.edge_v))
     return Extent(corners.min(axis=0), corners.max(axis=0), 1.0 + 2.0 / sine)
 
 

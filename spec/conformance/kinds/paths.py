@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ....compiler.core.loops import STATEMENTS
 from ....compiler.proof import ranges
 from ....compiler.proof.ranges import Range
 from ....compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, Values, kinds, lower_scene
@@ -113,7 +114,7 @@ def programs_of(name: str, settings: Settings) -> PathPrograms:
 @cache
 def _programs(name: str, settings: Settings) -> PathPrograms:
     """Return the programs of a path through a canonical scene, made once."""
-    return lower_scene(scene_module.from_json(scene_text(name)), settings, None)
+    return lower_scene(scene_module.from_json(scene_text(name)), settings, STATEMENTS)
 
 
 # ---- steps in float64 -----------------------------------------------------------------------------------

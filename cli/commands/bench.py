@@ -178,7 +178,8 @@ def bench(
     are rendered first; another one on those of its own scene, or of a data set. Peers that are installed take
     part: PyTorch, ONNX Runtime, OpenVINO, Halide, tinygrad on the same OpenCL device, and Open Image Denoise,
     which is another denoiser. [bold]pip install 'wamnet\[peers]'[/] brings them. Errors are against float64,
-    PSNR against the references. Predictions come from operations, sines and bytes and the machine's measured rates.
+    PSNR against the references. Predictions come from operations, sines and bytes and the machine's measured
+    rates.
     """
     packages.need("matplotlib", "for the plots", "report")
     check_folder(output)

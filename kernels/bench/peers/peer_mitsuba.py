@@ -27,8 +27,9 @@ from ....refimpl.light.scene import Box, Light, Quad, Room, Scene, Sphere
 from ....refimpl.light.shapes.quad import light_radiance
 from ....refimpl.light.transport import Settings
 
-LEAST_LLVM = 16
-"""First version of LLVM that compiles Dr.Jit's code for AVX-512; earlier ones end the process."""
+LEAST_LLVM = 17
+"""First version of LLVM that compiles Dr.Jit's code for AVX-512: 16 ends the process, for it knows no maximum
+of single numbers there that passes NaN on, which Dr.Jit 1.5 asks for; 19 is what was run."""
 
 ENTRY_OFFSET = 1e-4
 """How far behind the entry into the room a ray starts, in the distance to it: float32 rounds to 6e-8 of the

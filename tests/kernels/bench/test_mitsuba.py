@@ -204,10 +204,10 @@ def test_missing_mitsuba_is_told(monkeypatch):
         peer_mitsuba.open_mitsuba("scalar_rgb")
 
 
-@pytest.mark.parametrize(("version", "found"), [(15, "LLVM 15"), (-1, "none")])
+@pytest.mark.parametrize(("version", "found"), [(16, "LLVM 16"), (-1, "none")])
 def test_missing_or_old_llvm_is_told(monkeypatch, version, found):
     library = SimpleNamespace(detail=SimpleNamespace(llvm_version=lambda: (version, 0, 6)))
     monkeypatch.setitem(sys.modules, "mitsuba", SimpleNamespace())
     monkeypatch.setitem(sys.modules, "drjit", library)
-    with pytest.raises(ExecutorUnavailable, match=f"libLLVM 16 or newer and finds {found}; apt-get install"):
+    with pytest.raises(ExecutorUnavailable, match=f"libLLVM 17 or newer and finds {found}; apt-get install"):
         peer_mitsuba.open_mitsuba("llvm_ad_rgb")

@@ -18,6 +18,7 @@ PEERS = {
     "tinygrad": "kernels/bench/peers/peer_tinygrad.py",
     "pyoidn": "kernels/bench/peers/peer_oidn.py",
     "mitsuba": "kernels/bench/peers/peer_mitsuba.py",
+    "bpy": "kernels/bench/peers/cycles_process.py",
 }
 """Packages that the benchmark compares with, and the only file of each."""
 

@@ -122,7 +122,7 @@ def export(mi: Any, scene: Scene, width: int, height: int, settings: Settings) -
     check(scene, settings)
     path = {"type": "path", "max_depth": settings.max_depth + 1, "rr_depth": settings.max_depth + 2}
     made = {"type": "scene", "integrator": path, "sensor": _sensor(mi, scene, width, height)}
-    for wall, (corner, edge_u, edge_v) in enumerate(_walls(scene.room) if scene.room else ()):
+    for wall, (corner, edge_u, edge_v) in enumerate(room_walls(scene.room) if scene.room else ()):
         assert scene.room is not None
         look = _look(scene.room.reflectances[wall], scene.room.emission)
         made[f"wall_{wall}"] = _rectangle(mi, corner, edge_u, edge_v, look)
@@ -143,7 +143,7 @@ def export(mi: Any, scene: Scene, width: int, height: int, settings: Settings) -
     return made
 
 
-def _walls(room: Room) -> list[tuple[Any, Any, Any]]:
+def room_walls(room: Room) -> list[tuple[Any, Any, Any]]:
     """Return corner and edges (3,) of the walls, in the order of WALLS, whose normals point inwards."""
     low, edges = np.array(room.low), np.diag(np.subtract(room.high, room.low))
     walls = []

@@ -2,7 +2,9 @@
 
 1. It is given linear colour, albedo and normal [`filtered`]; in the benchmark these two have no noise
    ("clean").
-2. Noisy albedo and normals are denoised first, each by the filter itself, and are then declared clean
+2. For pictures of one size, one after another, a filter is kept with its memory: what it prepares once it
+   does not prepare for each [`Kept`].
+3. Noisy albedo and normals are denoised first, each by the filter itself, and are then declared clean
    [`prefiltered`]: its documentation recommends that for the best quality.
 
 Source: its documentation, filter `RT`, images `color`, `albedo`, `normal` and `output`, parameters `hdr`,
@@ -69,6 +71,38 @@ def _alone(name: str, image: NDArray[np.float32], quality: str) -> NDArray[np.fl
     if (told := device.get_error()) is not None:
         raise InputError(f"{name} for Open Image Denoise", noisy.shape, f"it says: {told}", "check the frame")
     return made
+
+
+class Kept:
+    """A filter for pictures (height, width), with memory of its own: what a program keeps that shows many."""
+
+    def __init__(self, size: tuple[int, int], quality: str = "high", clean: bool = False) -> None:
+        """Make the filter ready; `clean` as in [`filtered`]."""
+        with told_as_missing("pyoidn"):
+            import pyoidn
+        self._images = {name: np.zeros((*size, 3), np.float32) for name in (*LAYERS, "output")}
+        self._device = _device()
+        self._filter = pyoidn.Filter(self._device, pyoidn.OIDN_FILTER_TYPE_RT)
+        for name, image in self._images.items():
+            self._filter.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
+        self._filter.set_bool("hdr", True)
+        self._filter.set_bool("cleanAux", clean)
+        self._filter.set_quality(getattr(pyoidn, f"OIDN_QUALITY_{quality.upper()}"))
+        self._filter.commit()
+
+    def __call__(self, frame: Frame) -> NDArray[np.float32]:
+        """Return the denoised radiance (H, W, 3) of a frame; the next call writes over it."""
+        for name in LAYERS:
+            np.copyto(self._images[name], frame[name])
+        self._filter.execute()
+        if (told := self._device.get_error()) is not None:
+            shape = self._images["color"].shape
+            raise InputError("frame for Open Image Denoise", shape, f"it says: {told}", "check the frame")
+        return self._images["output"]
+
+    def close(self) -> None:
+        """Give the filter back."""
+        self._filter.release()
 
 
 @cache

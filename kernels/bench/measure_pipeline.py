@@ -1,11 +1,14 @@
-"""One pipeline against the separate way: seconds for one path per pixel and its denoising.
+"""Whole pictures of a scene that moves: seconds for one path per pixel and its denoising, and of each part.
 
-1. Both ways use kernels of one executor that are compiled before; they take turns, so that drift of the
-   machine's speed affects them alike [`measured`]. Separate: trace all layers, read them back, encode in
-   float64, upload, denoise, read back.
-2. The parts of the pipeline take turns with them, each ended by waiting for the device [`_parts`].
-3. A scene that moves shows another moment in every picture: its numbers are inputs of one kernel [`moments`].
-   What is new in another way has a kernel of its own, which is compiled before its first picture.
+1. Ours is one pipeline on a device. A scene that moves shows another moment in every picture: its numbers are
+   inputs of one kernel [`moments`]. Its parts are each ended by waiting for the device [`_parts`].
+2. Beside it are the same pipeline of one moment, and the separate way by kernels of the same executor: trace
+   all layers, read them back, encode in float64, upload, denoise, read back.
+3. Other makers of whole pictures show the same moments: a renderer and a denoiser [`PEERS`, moving.py].
+4. All executors and makers take turns in one run, so that drift of the machine's speed affects them alike;
+   everything is compiled before, and has made a picture [`measured`].
+5. A scene that is new in another way has a kernel of its own, which is compiled before its first picture
+   [`first_pictures`]; a process that finds empty caches compiles everything [first_picture.py].
 
 The network has random weights: speed does not depend on them [`random_model`].
 """
@@ -14,9 +17,10 @@ from __future__ import annotations
 
 import inspect
 import itertools
-import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,9 +34,12 @@ from ...refimpl.network import dataset, siren
 from ...refimpl.network.denoise import Model
 from ..devices.executor import Executor
 from ..devices.passes import PICTURE
+from ..measure import in_turns
 from ..run.denoise_on import images_of
 from ..run.pipeline import Pipeline
 from ..run.render_on import render_on
+from .peers.moving import Maker, MitsubaOidn
+from .peers.peer_cycles import Cycles
 
 MOMENTS = 48
 """Pictures of a scene that moves before its first moment is shown again."""
@@ -42,6 +49,16 @@ STEP_S = 0.1
 
 NEW_SCENES = 3
 """Scenes that are compiled."""
+
+
+PAUSE_S = 0.1
+"""Seconds before each measurement: threads of a library that ran before may spin for a while."""
+
+MOVING = "one pipeline, moving"
+"""What others are compared with."""
+
+PEERS: Mapping[str, Callable[[Scene, int], Maker]] = {"mitsuba": MitsubaOidn, "cycles": Cycles}
+"""Other makers of whole pictures, which are opened for a scene and a size."""
 
 
 def moments(name: str) -> list[Scene]:
@@ -62,47 +79,82 @@ def random_model(features: Sequence[str], size: int, hidden: Sequence[int]) -> M
     )
 
 
+@dataclass(frozen=True)
+class Measured:
+    """Seconds of each way of one size: who makes the pictures, what is measured, and its turns."""
+
+    by: str
+    way: str
+    seconds: tuple[float, ...]
+
+
 def measured(
-    executor: Executor, model: Model, name: str, size: int, repeats: int
-) -> tuple[dict[str, list[float]], float]:
-    """Return the times of each way in seconds, and the median time to the first picture of a new scene."""
-    scene, job, shots = canonical(name), Job(size, size), moments(name)
+    executors: Sequence[Executor],
+    model: Model,
+    name: str,
+    size: int,
+    repeats: int,
+    makers: Mapping[str, Maker] | None = None,
+) -> list[Measured]:
+    """Return the times of all ways, in seconds: of every executor, then of other makers, by name."""
+    shots = moments(name)
+    with ExitStack() as stack:
+        ways = {
+            (executor.name, way): function
+            for executor in executors
+            for way, function in _ours(stack, executor, model, name, size, shots).items()
+        }
+        for by, maker in (makers or {}).items():
+            ways |= {(by, way): function for way, function in maker.ways(shots).items()}
+        named = {f"{by}: {way}": function for (by, way), function in ways.items()}
+        found = in_turns(named, repeats, pause_s=PAUSE_S)
+    return [Measured(by, way, found[f"{by}: {way}"].seconds) for by, way in ways]
+
+
+def _ours(
+    stack: ExitStack, executor: Executor, model: Model, name: str, size: int, shots: Sequence[Scene]
+) -> dict[str, Callable[[], Any]]:
+    """Return the ways of an executor, whose pipelines are open until the stack is closed."""
+    scene, job, shape = canonical(name), Job(size, size), (size, size)
     denoiser = compile_program(lower(model), executor.name)
 
     def separate() -> None:
         frame = render_on(executor, scene, job).frame
         executor.run(denoiser, images_of(model, frame))
 
-    with (
-        Pipeline(executor, scene, model, (size, size)) as pipeline,
-        Pipeline(executor, scene, model, (size, size), sums=True) as apart,
-        Pipeline(executor, shots[0], model, (size, size), moving=shots) as moving,
-    ):
-        turn = itertools.cycle(shots)
+    pipeline = stack.enter_context(Pipeline(executor, scene, model, shape))
+    moving = stack.enter_context(Pipeline(executor, shots[0], model, shape, moving=shots))
+    turn, seeds = itertools.cycle(shots), itertools.count()
 
-        def move() -> None:
-            moving.set_scene(next(turn))
-            moving.run()
+    def move() -> None:
+        moving.set_scene(next(turn))
+        moving.run(next(seeds))
 
-        ways: dict[str, Callable[[], Any]] = {"separate": separate, "one pipeline": pipeline.run}
-        if pipeline.path.images:
-            ways["with an encoding of its own"] = apart.run
-        ways |= {"one pipeline, moving": move, **_parts(pipeline)}
-        for function in ways.values():
-            function()  # whatever a driver does at first
-        times: dict[str, list[float]] = {way: [] for way in ways}
-        for _ in range(repeats):
-            for way, function in ways.items():
-                start = time.perf_counter()
-                function()
-                times[way].append(time.perf_counter() - start)
-    return times, statistics.median(
-        _first_picture(executor, model, shot, size) for shot in shots[1 : 1 + NEW_SCENES] or shots
-    )
+    ways: dict[str, Callable[[], Any]] = {"separate": separate, "one pipeline": pipeline.run}
+    if pipeline.path.images:
+        apart = stack.enter_context(Pipeline(executor, scene, model, shape, sums=True))
+        ways["with an encoding of its own"] = apart.run
+    ways |= {MOVING: move, "of it: the scene's numbers": lambda: moving.set_scene(next(turn))}
+    return {way: _timed(function) for way, function in (ways | _parts(moving)).items()}
+
+
+def _timed(work: Callable[[], Any]) -> Callable[[], None]:
+    """Return work that returns nothing: a picture would be read as seconds."""
+
+    def run() -> None:
+        work()
+
+    return run
+
+
+def first_pictures(executor: Executor, model: Model, name: str, size: int) -> list[float]:
+    """Return the seconds to the first picture of each of some scenes that are not known, by a known model."""
+    shots = moments(name)
+    return [_first_picture(executor, model, shot, size) for shot in shots[1 : 1 + NEW_SCENES] or shots]
 
 
 def _first_picture(executor: Executor, model: Model, scene: Scene, size: int) -> float:
-    """Return the time to the first picture of a scene that is not known, by a model that is."""
+    """Return the seconds to the first picture of a scene."""
     start = time.perf_counter()
     with Pipeline(executor, scene, model, (size, size)) as pipeline:
         pipeline.run()
@@ -122,7 +174,7 @@ def _parts(pipeline: Pipeline) -> dict[str, Callable[[], Any]]:
 
     encoded = " and encoding" if pipeline.path.images else ""
     return {
-        f"of it: paths{encoded}": waited(lambda: passes.trace(pipeline.path, part)),
+        f"of it: paths{encoded}": waited(lambda: passes.trace(pipeline.path, part, pipeline.moment.numbers)),
         **({} if encoded else {"of it: encoding": waited(lambda: passes.encode(1))}),
         "of it: denoising": waited(passes.denoise),
         "of it: reading back": lambda: passes.read(PICTURE),

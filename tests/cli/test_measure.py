@@ -100,6 +100,7 @@ def test_depth_counts_edges(printed) -> None:
         ("pipeline --executors abacus", "--executors is abacus: it must be one or more of numpy, opencl"),
         ("pipeline --sizes 8,0", "--sizes is 8,0: it must be integers from 1 to"),
         ("pipeline --features smell", "--features is smell: it must be one or more of color"),
+        ("pipeline --peers blender", "--peers is blender: it must be one or more of mitsuba, cycles"),
         ("pipeline --window 0", "--window is 0: it must be from 1 to"),
         ("exports --targets abacus", "--targets is abacus: it must be one or more of opencl"),
         ("exports --scene nowhere", "scene is nowhere: no canonical scene has this name; known are"),

@@ -1,9 +1,11 @@
-"""`wamnet bench pipeline`: one pipeline on a device against rendering and denoising one after the other."""
+"""`wamnet bench pipeline`: whole pictures of a scene that moves, by one pipeline and by other means."""
 
 from __future__ import annotations
 
 import statistics
-from typing import Annotated
+from collections.abc import Sequence
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,9 +13,15 @@ from ...common.options import SCENES
 from ...common.terminal import say
 from .shared import Repeats, check_count, counts_of, extent, facts, head, names_of, numpy_version, row
 
+if TYPE_CHECKING:
+    from ....kernels.bench.measure_pipeline import Measured
+    from ....kernels.bench.peers.moving import Maker
+
 EXAMPLES = """Examples:
 
 wamnet bench pipeline --sizes 256,512 --executors opencl,opengl --repeats 5
+
+wamnet bench pipeline --executors opencl,opengl,c --sizes 256,512,1024,2048 --peers mitsuba,cycles
 
 wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32,32"""
 """Shown below the help of `wamnet bench pipeline`."""
@@ -35,22 +43,32 @@ def pipeline(
     ),
     window: Annotated[int, typer.Option(help="Width and height of the window, in pixels.")] = 12,
     repeats: Repeats = 5,
+    peers: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME,...", help="Other makers of pictures: mitsuba, cycles.", show_default="none"
+        ),
+    ] = "",
 ) -> None:
-    """Measure one pipeline against the separate way: one path per pixel and its denoising.
+    """Measure whole pictures of a scene that moves: one path per pixel and its denoising.
 
-    Both ways use compiled kernels of one executor, and take turns. Separate: trace all layers, read them
-    back, encode, upload, denoise, read back. Moving: every picture shows another moment. The table also has
-    the parts of the pipeline; below it is the time to the first picture of a new scene, whose kernel is
-    compiled first. The network has random weights.
+    One pipeline on a device is ours, moving: every picture shows another moment; the table has its parts.
+    Separate: trace all layers, read them back, encode, upload, denoise, read back. Peers show the same
+    moments: mitsuba is Mitsuba 3 and Open Image Denoise, cycles is Blender's renderer with its own
+    (package bpy). All take turns. The first picture of a new scene waits for its kernel; with empty
+    caches, in a process of its own, for all kernels. The network has random weights.
     """
     from ....kernels import EXECUTORS, open_executor
     from ....kernels.bench import measure_pipeline as measuring
+    from ....kernels.bench.first_picture import first_picture
     from ....kernels.bench.workload import check_size
     from ....refimpl.light.scenes import canonical
+    from ....refimpl.light.transport import Settings
     from ....refimpl.network.dataset import FEATURES
 
     canonical(scene)
     given, widths = names_of("--executors", executors, EXECUTORS), counts_of("--sizes", sizes, "256,512")
+    others = names_of("--peers", peers, measuring.PEERS) if peers else ()
     for size in widths:
         check_size(size)
     check_count("--window", window, 12)
@@ -58,17 +76,59 @@ def pipeline(
     seen, layers = names_of("--features", features, FEATURES), counts_of("--hidden", hidden, "32,32")
     model = measuring.random_model(seen, window, layers)
     network = "-".join(map(str, model.siren.widths))
-    say(", ".join(facts(numpy_version(), f"{scene}, 1 spp, network {network}")))
+    say(
+        ", ".join(
+            facts(numpy_version(), f"{scene}, 1 spp, {Settings().max_depth + 1} edges, network {network}")
+        )
+    )
     say("")
-    head("executor", "size", "way", "ms, median", "ms, range")
-    news = []
-    for each in given:
-        with open_executor(each) as executor:
-            for size in widths:
-                rows, seconds = measuring.measured(executor, model, scene, size, repeats)
-                for way, times in rows.items():
-                    ms = [1e3 * time for time in times]
-                    row(each, f"{size}x{size}", way, f"{statistics.median(ms):.1f}", extent(ms, 1))
-            news.append(f"{each}: the first picture of a new scene takes {1e3 * seconds:.0f} ms")
-    for line in ("", *news):
+    head("by", "size", "way", "ms, median", "ms, range", "pictures/s", f"times {given[0]}, moving")
+    notes: dict[str, None] = {}
+    for size in widths:
+        with ExitStack() as stack:
+            opened = [stack.enter_context(open_executor(name)) for name in given]
+            makers = _makers(stack, others, scene, size, notes)
+            found = measuring.measured(opened, model, scene, size, repeats, makers)
+            for executor in opened:
+                news = measuring.first_pictures(executor, model, scene, size)
+                found.append(measuring.Measured(executor.name, "first picture of a new scene", tuple(news)))
+        for name in given:
+            cold = first_picture(name, model, scene, size)
+            if cold is not None:
+                found.append(measuring.Measured(name, "first picture, empty caches", (cold,)))
+        _show(found, size)
+    for line in ("", *notes) if notes else ():
         say(line)
+
+
+def _makers(
+    stack: ExitStack, names: Sequence[str], scene: str, size: int, notes: dict[str, None]
+) -> dict[str, Maker]:
+    """Open other makers of pictures until the stack is closed; note what they are, or why one is missing."""
+    from ....kernels.bench import measure_pipeline as measuring
+    from ....refimpl.errors import ExecutorUnavailable, InputError
+
+    makers: dict[str, Maker] = {}
+    for name in names:
+        try:
+            makers[name] = measuring.PEERS[name](measuring.moments(scene)[0], size)
+        except (ExecutorUnavailable, InputError) as error:
+            notes[f"No row: {error}"] = None
+        else:
+            stack.callback(makers[name].close)
+            notes[f"{name}: {makers[name].about}"] = None
+    return makers
+
+
+def _show(found: Sequence[Measured], size: int) -> None:
+    """Print the rows of a size; pictures a second are those of whole pictures that were not the first."""
+    from ....kernels.bench.measure_pipeline import MOVING
+
+    ours = next(statistics.median(each.seconds) for each in found if each.way == MOVING)
+    for each in found:
+        ms, median = [1e3 * second for second in each.seconds], statistics.median(each.seconds)
+        whole = not each.way.startswith(("of it", "first"))
+        rate = f"{1.0 / median:.2f}" if whole else ""
+        ratio = f"{median / ours:.2f}" if whole else ""
+        cells = (f"{statistics.median(ms):.1f}", extent(ms, 1), rate, ratio)
+        row(each.by, f"{size}x{size}", each.way, *cells)

@@ -1,0 +1,70 @@
+"""What the first picture of all costs: a process of its own, which finds nothing that was ever compiled.
+
+1. All caches of compiled code, and that of tuned schedules, are empty folders [`CACHES`].
+2. The process opens a device, compiles a scene's pipeline, and reads its first picture; the seconds begin
+   when packages are imported [`first_picture`]. Run as a module it is that process [`main`].
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from ...compiler.model_file import load_model, save_model
+from ...refimpl.light.scenes import canonical
+from ...refimpl.network.denoise import Model
+from ..devices.registry import open_executor
+from ..run.cache import FOLDER_VARIABLE
+from ..run.pipeline import Pipeline
+from . import first_run
+
+CACHES = (*first_run.CACHES, FOLDER_VARIABLE)
+"""Variables that say where compiled code, and what was measured of it, are kept."""
+
+
+def first_picture(executor: str, model: Model, scene: str, size: int) -> float | None:
+    """Return the seconds to the first picture (size, size) of a canonical scene; None where that fails."""
+    with tempfile.TemporaryDirectory() as folder:
+        places = {variable: str(Path(folder, variable.lower())) for variable in CACHES}
+        for place in places.values():
+            Path(place).mkdir()
+        path = Path(folder, "model.safetensors")
+        save_model(path, model)
+        command = [sys.executable, "-m", __name__, executor, str(path), scene, str(size)]
+        try:
+            done = subprocess.run(
+                command,
+                env=os.environ | places,
+                capture_output=True,
+                text=True,
+                timeout=first_run.SECONDS_AT_MOST,
+                stdin=subprocess.DEVNULL,
+                check=True,
+            )
+            return float(json.loads(done.stdout.splitlines()[-1])["seconds"])
+        except (subprocess.SubprocessError, ValueError, KeyError, IndexError):
+            return None
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Make a picture SIZE wide of SCENE by EXECUTOR and the model in FILE, and print the seconds as JSON."""
+    name, path, scene, size = arguments
+    model, pixels = load_model(Path(path)), int(size)
+    start = time.perf_counter()
+    with (
+        open_executor(name) as executor,
+        Pipeline(executor, canonical(scene), model, (pixels, pixels)) as pipeline,
+    ):
+        pipeline.run()
+        seconds = time.perf_counter() - start
+    sys.stdout.write(json.dumps({"seconds": seconds}) + "\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

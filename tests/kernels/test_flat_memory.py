@@ -1,0 +1,45 @@
+"""Memory of a process stays flat over pictures of a scene that moves: what a picture takes it gives back."""
+
+from __future__ import annotations
+
+import gc
+import os
+from pathlib import Path
+
+import pytest
+
+from wamnet.kernels.bench.measure_pipeline import moments, random_model
+from wamnet.kernels.run.pipeline import Pipeline
+
+SIZE, WARM, PICTURES = 64, 100, 1000
+"""Width of the pictures, how many come first, and all."""
+
+LEFT_BEHIND = 1024
+"""Bytes a picture that would be seen: less than a scene of 27 boxes takes in Python, or than any image of
+4 SIZE^2 bytes; 0.9 MB in all. Pages that allocators still add after the first pictures are some 0.1 MB."""
+
+STATUS = Path("/proc/self/statm")
+"""Where Linux says how many pages of a process are in memory: the second number."""
+
+
+def resident():
+    """Return the bytes of this process that are in memory."""
+    gc.collect()
+    return int(STATUS.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["opencl", "opengl-egl", "c"])
+def test_memory_is_flat_over_a_thousand_pictures(executor_named, name) -> None:
+    if not STATUS.exists():
+        pytest.skip("the system does not tell what is in memory as Linux does")
+    executor, shots = executor_named(name), moments("minicubes")
+    model = random_model(("color", "normal"), 3, (4,))
+    after = {}
+    with Pipeline(executor, shots[0], model, (SIZE, SIZE), moving=shots) as pipeline:
+        for number in range(PICTURES):
+            pipeline.set_scene(shots[number % len(shots)])
+            pipeline.run(number)
+            if number + 1 in (WARM, PICTURES):
+                after[number + 1] = resident()
+    assert after[PICTURES] - after[WARM] <= LEFT_BEHIND * (PICTURES - WARM)

@@ -16,6 +16,7 @@ from .shared import Repeats, check_count, counts_of, extent, facts, head, names_
 if TYPE_CHECKING:
     from ....kernels.bench.measure_pipeline import Measured
     from ....kernels.bench.peers.moving import Maker
+    from ....refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
 
@@ -58,9 +59,8 @@ def pipeline(
     (package bpy). All take turns. The first picture of a new scene waits for its kernel; with empty
     caches, in a process of its own, for all kernels. The network has random weights.
     """
-    from ....kernels import EXECUTORS, open_executor
+    from ....kernels import EXECUTORS
     from ....kernels.bench import measure_pipeline as measuring
-    from ....kernels.bench.first_picture import first_picture
     from ....kernels.bench.workload import check_size
     from ....refimpl.light.scenes import canonical
     from ....refimpl.light.transport import Settings
@@ -85,20 +85,35 @@ def pipeline(
     head("by", "size", "way", "ms, median", "ms, range", "pictures/s", f"times {given[0]}, moving")
     notes: dict[str, None] = {}
     for size in widths:
-        with ExitStack() as stack:
-            opened = [stack.enter_context(open_executor(name)) for name in given]
-            makers = _makers(stack, others, scene, size, notes)
-            found = measuring.measured(opened, model, scene, size, repeats, makers)
-            for executor in opened:
-                news = measuring.first_pictures(executor, model, scene, size)
-                found.append(measuring.Measured(executor.name, "first picture of a new scene", tuple(news)))
-        for name in given:
-            cold = first_picture(name, model, scene, size)
-            if cold is not None:
-                found.append(measuring.Measured(name, "first picture, empty caches", (cold,)))
-        _show(found, size)
+        _show(_rows(given, others, model, scene, size, repeats, notes), size)
     for line in ("", *notes) if notes else ():
         say(line)
+
+
+def _rows(
+    given: Sequence[str],
+    others: Sequence[str],
+    model: Model,
+    scene: str,
+    size: int,
+    repeats: int,
+    notes: dict[str, None],
+) -> list[Measured]:
+    """Return all rows of a size: what takes turns, then first pictures."""
+    from ....kernels import open_executor
+    from ....kernels.bench.first_picture import first_picture
+    from ....kernels.bench.measure_pipeline import Measured, first_pictures, measured
+
+    with ExitStack() as stack:
+        opened = [stack.enter_context(open_executor(name)) for name in given]
+        found = measured(opened, model, scene, size, repeats, _makers(stack, others, scene, size, notes))
+        for executor in opened:
+            news = tuple(first_pictures(executor, model, scene, size))
+            found.append(Measured(executor.name, "first picture of a new scene", news))
+    for name in given:
+        if (cold := first_picture(name, model, scene, size)) is not None:
+            found.append(Measured(name, "first picture, empty caches", (cold,)))
+    return found
 
 
 def _makers(

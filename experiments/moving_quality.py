@@ -57,6 +57,12 @@ EVERY, FIRST = 8, 4
 REFERENCE_SEED = 9_000
 """Seed of the first reference: no way draws with it."""
 
+NETWORKS = {
+    "shipped": "the network that ships",
+    "best-1": "a network that has learned from features of 1 ray",
+}
+"""Our networks; all but the first are rows of `quality.py`."""
+
 HEADS = ("picture", "PSNR, dB", "worst, dB", "SSIM", "FLIP")
 """Columns of the table."""
 
@@ -73,22 +79,25 @@ def shown(chosen: Sequence[int], train: int) -> None:
         compare(learned, {"moments": tests})
 
 
+def network(name: str, options: Namespace) -> Model:
+    """Return a network of ours; what is to be trained is trained where the cache lacks it."""
+    if name == "shipped":
+        return load_model(MODEL)
+    bench = Bench(SCENE, PLANS[options.scale], options.cache, options.executor)
+    return bench.model(ROWS[name], 0)[0]
+
+
 def ours(options: Namespace) -> Iterator[Pictures]:
-    """Yield the pictures of our pipeline: what it begins with, and by each network."""
-    size, plan = PLANS[options.scale].size, PLANS[options.scale]
-    networks: dict[str, Model] = {"the network that ships": load_model(MODEL)}
-    row = ROWS["best-1"]
-    networks["a network that has learned from features of 1 ray"] = Bench(
-        SCENE, plan, options.cache, options.executor
-    ).model(row, 0)[0]
+    """Yield the pictures of our renderer, and of the pipeline by each network."""
+    size = PLANS[options.scale].size
     with open_executor(options.executor) as device:
         yield {
             "wamnet's paths, not denoised": lambda scene, seed: to_display(
                 render_on(device, scene, Job(size, size, seed=seed)).frame["color"]
             )
         }
-        for text, model in networks.items():
-            everything = moments(SCENE)
+        everything = moments(SCENE)
+        for text, model in ((NETWORKS[name], network(name, options)) for name in options.networks):
             with Pipeline(device, everything[0], model, (size, size), moving=everything) as pipeline:
 
                 def picture(scene: Scene, seed: int, pipeline: Pipeline = pipeline) -> Floats:
@@ -177,6 +186,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Render, train where a network is not there, judge, and print a line a kind of picture."""
     parser = command.parser(__doc__ or "", "moving_quality")
     parser.add_argument("--peers", nargs="*", default=["mitsuba"], choices=list(PEERS))
+    parser.add_argument("--networks", nargs="+", default=list(NETWORKS), choices=list(NETWORKS))
     parser.add_argument("--moments", type=int, default=6, help="moments that are judged")
     options = parser.parse_args(arguments)
     print(f"| {' | '.join(HEADS)} |\n|{'---|' * len(HEADS)}")

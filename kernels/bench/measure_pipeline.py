@@ -25,8 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from ...compiler.compile import compile_program
-from ...compiler.core.lower import lower
+from ...compiler.compile import compile_plan
+from ...compiler.variants import plan_model
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.scenes import CANONICAL, canonical
@@ -38,6 +38,7 @@ from ..measure import in_turns
 from ..run.denoise_on import images_of
 from ..run.pipeline import Pipeline
 from ..run.render_on import render_on
+from ..run.tune import choose
 from .peers.moving import Maker, MitsubaOidn
 from .peers.peer_cycles import Cycles
 
@@ -116,7 +117,7 @@ def _ours(
 ) -> dict[str, Callable[[], Any]]:
     """Return the ways of an executor, whose pipelines are open until the stack is closed."""
     scene, job, shape = canonical(name), Job(size, size), (size, size)
-    denoiser = compile_program(lower(model), executor.name)
+    denoiser = compile_plan(choose(executor, plan_model(model, executor.name), shape).plan)
 
     def separate() -> None:
         frame = render_on(executor, scene, job).frame

@@ -32,7 +32,7 @@ def resident():
 @pytest.mark.parametrize("name", ["opencl", "opengl-egl", "c"])
 def test_memory_is_flat_over_a_thousand_pictures(executor_named, name) -> None:
     if not STATUS.exists():
-        pytest.skip("the system does not tell what is in memory as Linux does")
+        pytest.skip("the system does not say what is in memory as Linux does")
     executor, shots = executor_named(name), moments("minicubes")
     model = random_model(("color", "normal"), 3, (4,))
     after = {}

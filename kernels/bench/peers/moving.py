@@ -4,7 +4,7 @@
    can be kept from picture to picture is kept: the renderer's scene, compiled code, the denoiser's filter.
 2. It has the ways that are measured by what a table calls them [`Maker.ways`]: whole pictures, and parts.
    A way takes the next moment by itself; one that returns a number has measured itself, in seconds.
-3. Mitsuba's vertices are replaced where a shape has changed, and its emitters and surfaces likewise; another
+3. Mitsuba's vertices are replaced where a shape has changed, and so are its emitters and surfaces; another
    camera, room or background loads the scene again [`MitsubaOidn.show`].
 
 All have one path a pixel of as many edges as ours, pixels by a box filter, albedo and normal of the first hit

@@ -79,7 +79,7 @@ class Cycles:
         return f"Cycles of Blender {self._version}, and its Open Image Denoise"
 
     def _asked(self, question: dict[str, Any]) -> dict[str, Any]:
-        """Return what the process answers; one that has ended is told."""
+        """Return what the process answers; one that has ended is reported."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         try:

@@ -4,8 +4,8 @@
    can be kept from picture to picture is kept: the renderer's scene, compiled code, the denoiser's filter.
 2. It has the ways that are measured by what a table calls them [`Maker.ways`]: whole pictures, and parts.
    A way takes the next moment by itself; one that returns a number has measured itself, in seconds.
-3. Mitsuba's vertices are replaced where a shape has changed, and so are its emitters and surfaces; another
-   camera, room or background loads the scene again [`MitsubaOidn.show`].
+3. Mitsuba's vertices are replaced where a shape has changed, and so are its emitters; another
+   camera, room, background or reflectance loads the scene again [`MitsubaOidn.show`].
 
 All have one path a pixel of as many edges as ours, pixels by a box filter, albedo and normal of the first hit
 by the same path, and Open Image Denoise with these as they come (`cleanAux` off).
@@ -84,7 +84,8 @@ class MitsubaOidn:
         made = peer_mitsuba.export(self._mi, scene, self._size, self._size, self._settings)
         for name in _changed(scene, self._scene, made):
             for key, value in self._mi.traverse(self._mi.load_dict(made[name])):
-                self._parameters[f"{name}.{key}"] = value
+                if not key.startswith("bsdf."):  # Mitsuba joins equal ones under one name
+                    self._parameters[f"{name}.{key}"] = value
         self._parameters.update()
         self._scene = scene
 
@@ -132,9 +133,18 @@ def _nothing(value: Any) -> None:
 
 
 def _alike(scene: Scene, other: Scene) -> bool:
-    """Tell whether two scenes differ in their shapes only, and have as many."""
+    """Return whether two scenes differ in places and emission of their shapes only, and have as many."""
     same = all(len(getattr(scene, kind)) == len(getattr(other, kind)) for kind in SHAPES)
-    return same and replace(scene, **{kind: getattr(other, kind) for kind in SHAPES}) == other
+    return (
+        same
+        and _colours(scene) == _colours(other)
+        and replace(scene, **{kind: getattr(other, kind) for kind in SHAPES}) == other
+    )
+
+
+def _colours(scene: Scene) -> list[Any]:
+    """Return the reflectances of all shapes; lights have none."""
+    return [part.reflectance for part in (*scene.boxes, *scene.spheres, *scene.quads)]
 
 
 def _changed(scene: Scene, other: Scene, made: Mapping[str, Any]) -> list[str]:

@@ -81,7 +81,7 @@ class Plan:
 
     `analysed`: the program after the passes that bounds see, each sine one node; `asked`: the name of the
     schedule that was requested; `cut`: both passes of a first layer of low rank; `varied`: the variant of a
-    network that the program is, if it is one.
+    network that the program is, if it is one; `proves`: whether a proof is looked for, which takes seconds.
     """
 
     analysed: Program
@@ -90,6 +90,7 @@ class Plan:
     asked: str = PLAIN
     cut: Cut | None = None
     varied: Varied | None = None
+    proves: bool = True
 
     def __getstate__(self) -> dict[str, Any]:
         """Travel to other processes without what is computed when it is needed."""
@@ -168,9 +169,9 @@ class Plan:
         errors = bounds.output_errors(program, found)[program.outputs[0][0]]
         if not all(math.isfinite(error) for error in errors):
             return Bound(None, tuple(ranges))
-        proof = (
-            None if self.cut else certificate.prove(program, found, self.sine, self.schedule.spectra(program))
-        )
+        proof = None
+        if self.proves and not self.cut:
+            proof = certificate.prove(program, found, self.sine, self.schedule.spectra(program))
         return Bound(proof.bound if proof else tuple(float(e) for e in errors), tuple(ranges), proof)
 
     @cached_property
@@ -183,6 +184,8 @@ class Plan:
         """Return why its kernel has no certificate (CER-1), or nothing where it has one."""
         if self.bound.exact or self.bound.proof:
             return ""
+        if not self.proves:
+            return "it was compiled to be run at once, without one"
         if self.cut is not None:
             return "it is two kernels, one after the other, of a first layer that is cut to a rank"
         if self.sine.error is None:

@@ -17,7 +17,7 @@ with a NaN or an infinity; here the encoding clips what can be clipped.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +82,8 @@ class Pipeline:
     ) -> None:
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
-        plan = plan_model(model, executor.name, profile, variant=variant)
+        # The first picture does not wait for a proof that nobody reads.
+        plan = replace(plan_model(model, executor.name, profile, variant=variant), proves=False)
         model = plan.model
         self._height, self._width = size
         Job(self._width, self._height)  # refuses sizes that mean nothing

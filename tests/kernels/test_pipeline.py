@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.core import ir
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed, sine_contract
@@ -299,6 +300,23 @@ def test_another_time_compiles_paths_alone(executor, model_of, monkeypatch):
         assert np.array_equal(pipeline.run(4), wanted)
         assert kernels == (pipeline.encode, pipeline.denoise)
     assert np.abs(other - wanted).max() > 1e-3
+
+
+def test_the_first_picture_waits_for_no_proof(executor_named, model_of):
+    """PPL-14: the bound in its header is a valid one, without a certificate's search for a small one."""
+    model, executor = model_of(("color", "normal"), 3, "clamp"), executor_named("numpy")
+    with Pipeline(executor, scene("furnace"), model, (8, 12), settings=SETTINGS) as pipeline:
+        made = pipeline.denoise
+    assert made.certificate is None
+    assert made.plan.unproven == "it was compiled to be run at once, without one"
+    proven = compile_plan(replace(made.plan, proves=True))
+    assert proven.certificate is not None
+    assert all(0 < error < 1 / 255 for error in made.manifest["bound"]["output"])
+
+    def statements(source):
+        return source[source.index("*/") :]
+
+    assert statements(made.source) == statements(proven.source)
 
 
 def test_seed_samples_and_first_sample(executor, model_of):

@@ -26,7 +26,7 @@ BUDGET = {
     "kernels/devices": 2350,
     "kernels/run": 2850,
     "kernels/judge": 1450,
-    "kernels/bench": 3850,
+    "kernels/bench": 4100,
     "kernels/export": 3200,
     "spec/conformance": 4950,
     "cli": 300,

@@ -16,6 +16,7 @@ PEERS = {
     "onnxruntime": "kernels/bench/peers/peer_onnxruntime.py",
     "openvino": "kernels/bench/peers/peer_openvino.py",
     "tinygrad": "kernels/bench/peers/peer_tinygrad.py",
+    "halide": "kernels/bench/peers/peer_halide.py",
     "pyoidn": "kernels/bench/peers/peer_oidn.py",
     "mitsuba": "kernels/bench/peers/peer_mitsuba.py",
     "bpy": "kernels/bench/peers/cycles_process.py",

@@ -54,9 +54,23 @@ LAYERS: Mapping[str, Layer] = {
             3,
             "radiance of the first hit from the lamps only, if it were matte and nothing were in between",
         ),
+        Layer(
+            "seen_albedo",
+            3,
+            "reflectance of what is seen, past mirrors and glass, times theirs; 0 where nothing is hit",
+        ),
+        Layer("seen_normal", 3, "unit normal of what is seen in world space, on the path's side"),
+        Layer("seen_depth", 1, "length of the way to what is seen, in scene units; 0 where nothing is hit"),
+        Layer("seen_position", 3, "what is seen in world space, in scene units; 0 where nothing is hit"),
     )
 }
 """Every layer that a frame may have; a new one is one line here."""
+
+SEEN = tuple(name for name in LAYERS if name.startswith("seen_"))
+"""The layers of what is seen past mirrors and glass (light/following.py): a frame has them on request."""
+
+USUAL = tuple(name for name in LAYERS if name not in SEEN)
+"""The layers that any rendered frame has."""
 
 
 @dataclass(frozen=True, eq=False)

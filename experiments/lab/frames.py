@@ -25,7 +25,7 @@ from wamnet.kernels.run.draws import times
 from wamnet.kernels.run.frame_plan import version
 from wamnet.kernels.run.render_frame import render_frame
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.frame import LAYERS, Frame
+from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.render import Job, feature_job, render_info
 from wamnet.refimpl.light.scene import Scene, scene_digest
 from wamnet.refimpl.light.scenes import canonical
@@ -48,7 +48,8 @@ Pair = tuple[Frame, Frame]
 class Shot:
     """A picture to be rendered; `parameters` are those of the canonical scene, without its time.
 
-    Its features are means over `feature_spp` camera rays; 0: over the colour's.
+    Its features are means over `feature_spp` camera rays; 0: over the colour's. `seen`: they are also of what
+    is seen past mirrors and glass.
     """
 
     scene: str = "minicubes"
@@ -59,11 +60,13 @@ class Shot:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     feature_spp: int = 0
     variation: Variation = AT_REST
+    seen: bool = False
 
     @property
     def job(self) -> Job:
         """Return size, samples and seed as the renderer wants them."""
-        return Job(self.size, self.size, self.spp, self.seed, feature_spp=self.feature_spp)
+        rays = {"feature_spp": self.feature_spp, "seen": self.seen}
+        return Job(self.size, self.size, self.spp, self.seed, **rays)
 
     def build(self) -> Scene:
         """Return the scene at its time, from its side and under its lamps."""
@@ -73,10 +76,10 @@ class Shot:
 
 def path_of(folder: Path, shot: Shot, executor: str) -> Path:
     """Return the name of a shot's file without checksum and suffix."""
-    job = asdict(shot.job)
-    if not shot.feature_spp:
-        del job["feature_spp"]  # these files are older than it is
-    made_from = [scene_digest(shot.build()), job, executor, sorted(LAYERS), version()]
+    # Files are older than some parts of a job: these are named where they are not as ever.
+    usual = {"feature_spp": 0, "seen": False, "color": True}
+    job = {name: value for name, value in asdict(shot.job).items() if usual.get(name, ...) != value}
+    made_from = [scene_digest(shot.build()), job, executor, sorted(shot.job.layers), version()]
     digest = hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:DIGITS]
     return folder / f"{shot.scene}-{shot.time:.4g}s-{shot.size}px-{shot.spp}spp-{digest}"
 
@@ -114,7 +117,7 @@ def _render(folder: Path, shot: Shot, executor: str, advance: Any) -> Path:
 
     Where the same colour is there with features of its own rays, only the others' first hits are traced.
     """
-    scene, plain = shot.build(), find(folder, replace(shot, feature_spp=0), executor)
+    scene, plain = shot.build(), find(folder, replace(shot, feature_spp=0, seen=False), executor)
     if (of_features := feature_job(shot.job)) is not None and plain is not None:
         hits = render_frame(executor, scene, of_features, workers=None, on_progress=advance).frame
         layers = {**hits.layers, "color": exr.read_frame(plain)["color"]}
@@ -137,7 +140,7 @@ def reference(shot: Shot, spp: int) -> Shot:
 
     Seeds of references are odd and those of noisy shots even, so that none share their random numbers.
     """
-    return replace(shot, spp=spp, seed=2 * shot.seed + 1, feature_spp=0)
+    return replace(shot, spp=spp, seed=2 * shot.seed + 1, feature_spp=0, seen=False)
 
 
 def noisy(shot: Shot) -> Shot:

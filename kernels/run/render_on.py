@@ -26,7 +26,7 @@ from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...refimpl.errors import InputError
-from ...refimpl.frame import LAYERS, Frame
+from ...refimpl.frame import USUAL, Frame
 from ...refimpl.light.render import Job, Render, checked_rows, feature_job, render_info, with_own_features
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
@@ -163,7 +163,7 @@ def _render(kernel: PathArtifact, totals: Totals, info: dict[str, str]) -> Rende
     """Return the means as a frame, and the variance of one sample."""
     means = dict(zip(kernel.planes, totals.planes / totals.samples, strict=True))
     layers: dict[str, Any] = {}
-    for name in LAYERS:
+    for name in USUAL:
         layers[name] = np.stack([means[plane] for plane in GROUPS[name]], axis=-1).astype(np.float32)
     deviations = np.stack([means[plane] for plane in GROUPS["deviation"]], axis=-1)
     return Render(Frame(layers, info), deviations * (totals.samples / max(totals.samples - 1, 1)))

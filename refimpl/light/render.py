@@ -8,6 +8,8 @@
 4. The features may be means over more camera rays than are followed to the end: they cost a fraction of a
    path, and show edges without jags. They are then the layers of a job without scattering [`feature_job`],
    [`with_own_features`].
+5. Features of what is seen past mirrors and glass are layers of their own, on request (following.py). They
+   follow the same paths; those of more camera rays end where the features do.
 """
 
 from __future__ import annotations
@@ -22,9 +24,9 @@ from numpy.typing import DTypeLike, NDArray
 
 from .. import rng, vectors
 from ..errors import InputError
-from ..frame import LAYERS, Frame
+from ..frame import LAYERS, SEEN, USUAL, Frame
 from ..vectors import Directions, Ids
-from . import intersection, transport
+from . import following, intersection, transport
 from .camera import CameraBasis, camera_basis, camera_ray
 from .intersection import Hit, Surface
 from .scene import Scene, scene_digest
@@ -50,7 +52,8 @@ class Job:
 
     `first_sample` is the number of the first sample: jobs with different ranges are independent parts of one
     render. `feature_spp` is the number of camera rays whose first hits the feature layers are means over; 0,
-    as any number up to spp, means those of the colour's samples.
+    as any number up to spp, means those of the colour's samples. `seen`: the frame has the layers of what is
+    seen past mirrors and glass too. `color` is False where paths end with their features.
     """
 
     width: int
@@ -61,6 +64,8 @@ class Job:
     dtype: str = "float32"
     first_sample: int = 0
     feature_spp: int = 0
+    seen: bool = False
+    color: bool = True
 
     def __post_init__(self) -> None:
         """Refuse sizes and counts outside their rules."""
@@ -72,6 +77,12 @@ class Job:
         _check_range("feature_spp", self.feature_spp, 0, MAX_SAMPLES - self.first_sample)
         if self.dtype not in ("float32", "float64"):
             raise InputError("dtype", self.dtype, "it must be float32 or float64", "choose one of them")
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """Return the names of the frame's layers, in their order."""
+        names = (*USUAL, *SEEN) if self.seen else USUAL
+        return names if self.color else tuple(name for name in names if name != "color")
 
     @property
     def samples(self) -> int:
@@ -119,7 +130,7 @@ def render(
         for tile in np.array_split(pixels, -(-len(pixels) // tile_pixels))
     ]
     shape = (last - first, job.width)
-    means = {name: np.concatenate([means[name] for means, _ in tiles]).reshape(*shape, -1) for name in LAYERS}
+    means = {n: np.concatenate([means[n] for means, _ in tiles]).reshape(*shape, -1) for n in job.layers}
     variance = np.concatenate([variance for _, variance in tiles]).reshape(*shape, 3)
     layers = {name: mean.astype(job.dtype) for name, mean in means.items()}
     return Render(Frame(layers, render_info(scene, job)), variance)
@@ -128,11 +139,17 @@ def render(
 def feature_job(job: Job) -> Job | None:
     """Return the job whose frame has the feature layers, or None where they come with the colour.
 
-    Its samples are those of the colour and more after them, none of which is scattered.
+    Its samples are those of the colour and more after them, none of which is scattered. Where the features
+    are also of what is seen, they are, without light samples, until that is found.
     """
     if job.feature_spp <= job.spp:
         return None
-    return replace(job, spp=job.feature_spp, feature_spp=0, settings=replace(job.settings, max_depth=0))
+    features = replace(job, spp=job.feature_spp, feature_spp=0)
+    if not job.seen:
+        return replace(features, settings=replace(job.settings, max_depth=0))
+    most = min(following.MOST_FOLLOWED, job.settings.max_depth)
+    settings = replace(job.settings, max_depth=most, strategy="bsdf", roulette_depth=None)
+    return replace(features, settings=settings, color=False)
 
 
 def with_own_features(scene: Scene, job: Job, render_part: Callable[[Job], Render]) -> Render:
@@ -140,7 +157,8 @@ def with_own_features(scene: Scene, job: Job, render_part: Callable[[Job], Rende
     of_features = feature_job(job)
     assert of_features is not None
     color, features = render_part(replace(job, feature_spp=0)), render_part(of_features)
-    layers = {**features.frame.layers, "color": color.frame["color"]}
+    found = {**features.frame.layers, "color": color.frame["color"]}
+    layers = {name: found[name] for name in job.layers}
     return Render(Frame(layers, render_info(scene, job)), color.color_variance)
 
 
@@ -161,7 +179,7 @@ def _render_tile(
 ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
     """Return the layers' means (P, C) over the samples of P pixels, and the variance (P, 3) of a colour."""
     y, x = np.divmod(pixels, job.width)
-    sums = {name: np.zeros((len(pixels), layer.channels)) for name, layer in LAYERS.items()}
+    sums = {name: np.zeros((len(pixels), LAYERS[name].channels)) for name in job.layers}
     # Welford's running variance: no cancellation where the mean is large.
     squares = np.zeros((len(pixels), 3))
     for n in range(job.spp):
@@ -186,14 +204,22 @@ def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: in
     direction = path.direction
     color = np.zeros((len(x), 3), dtype)
     lanes = np.arange(len(x))
+    way, most = following.begin(direction), following.most_followed(world)
     layers: dict[str, Any] = {}
     for depth in range(job.settings.max_depth + 1):
         path, surface, hit = transport.arrive(world, path)
         if depth == 0:
             layers = first_hit_layers(world, surface, hit, direction)
-        if depth == job.settings.max_depth:
+            layers |= {n: np.zeros((len(x), LAYERS[n].channels), dtype) for n in SEEN if n in job.layers}
+        if job.seen:
+            way, seen = following.see(world, way, path, surface, hit, rng.counter(depth), most)
+            for name, values in seen.items():
+                layers[name][lanes] += values.reshape(len(lanes), -1)
+        if depth == job.settings.max_depth or not (job.color or way.going.any()):
             break
         path, alive = transport.scatter(world, path, surface, hit, rng.counter(depth), counters)
+        if not job.color:
+            alive = alive & way.going
         # Store what paths that end have gathered, and continue with the others.
         ended = np.flatnonzero(~alive)
         color[lanes[ended]] = path.radiance[ended]
@@ -201,10 +227,12 @@ def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: in
             going = np.flatnonzero(alive)
             lanes, counters = lanes[going], counters._replace(pixel=counters.pixel[going])
             path = Path(*(_select(part, going) for part in path))
+            way = following.Way(*(_select(part, going) for part in way))
         if len(lanes) == 0:
             break
     color[lanes] = path.radiance
-    return {"color": color, **layers}
+    found = {"color": color, **layers}
+    return {name: found[name] for name in job.layers}
 
 
 def start(

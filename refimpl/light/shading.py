@@ -45,6 +45,11 @@ class Materials:
         """Whether all kinds scatter into single directions, which no light sample meets."""
         return all(kind.single for kind in self.kinds)
 
+    @property
+    def by_kind(self) -> tuple[Any, ...]:
+        """Return the kinds, who is of each, and each one's numbers."""
+        return self.kinds, self.is_kind, self.parameters
+
 
 def build(scene: Scene, dtype: DTypeLike) -> Materials:
     """Lay out the materials of a scene; surfaces without one are Lambertian."""
@@ -115,6 +120,23 @@ def pdf(materials: Materials, at: Site, hit: Hit, wi: Directions, cos_surface: F
     for is_kind, other in others:
         density = np.where(is_kind, other, density)
     return density
+
+
+def ever_follows(materials: Materials) -> bool:
+    """Tell whether features look past any surface of the scene."""
+    rows = zip(*materials.by_kind, strict=True)
+    return any(bool(np.any(is_kind & kind.follows(parameters))) for kind, is_kind, parameters in rows)
+
+
+def follows(materials: Materials, hit: Hit) -> Truths:
+    """Tell (...) whether features look past the surface that was hit, as its material says."""
+    told: Truths = hit.surface < 0  # nobody yet
+    for kind, is_kind, parameters in zip(*materials.by_kind, strict=True):
+        own = None if parameters is None else vectors.look_up(parameters, hit.surface)
+        said = kind.follows(own)
+        if said is not False:
+            told = told | (vectors.look_up(is_kind, hit.surface) & said)
+    return told
 
 
 def _ask(

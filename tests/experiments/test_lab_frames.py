@@ -13,7 +13,8 @@ from lab.frames import Shot
 
 from wamnet.kernels.run.frame_plan import version
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.frame import LAYERS
+from wamnet.refimpl.frame import USUAL
+from wamnet.refimpl.light import render as driver
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scene import scene_digest
 from wamnet.refimpl.light.scenes import canonical
@@ -68,6 +69,7 @@ def test_an_interrupted_run_keeps_what_was_done(tmp_path, monkeypatch):
         {"spp": 3},
         {"seed": 4},
         {"scene": "cornell"},
+        {"seen": True},
         {"parameters": {"cool": (0.5, 0.5, 1.0)}},
         {"parameters": {"warm": (1.0, 0.5, 0.25)}},
     ],
@@ -81,7 +83,7 @@ def test_another_shot_has_another_file(tmp_path, change):
 
 def test_a_new_layer_makes_new_files(tmp_path, monkeypatch):
     before = frames.path_of(tmp_path, SHOT, "numpy")
-    monkeypatch.setattr(frames, "LAYERS", {**frames.LAYERS, "another": None})
+    monkeypatch.setattr(driver, "USUAL", (*driver.USUAL, "another"))
     assert frames.path_of(tmp_path, SHOT, "numpy") != before
 
 
@@ -127,7 +129,7 @@ def test_names_without_features_of_their_own_are_the_older_ones(tmp_path):
     names = {frames.path_of(tmp_path, replace(shot, feature_spp=rays), "numpy") for rays in (0, 5, 16)}
     assert len(names) == 3
     job = {**asdict(shot.job)}
-    del job["feature_spp"]
-    made_from = [scene_digest(shot.build()), job, "numpy", sorted(LAYERS), version()]
+    del job["feature_spp"], job["seen"], job["color"]
+    made_from = [scene_digest(shot.build()), job, "numpy", sorted(USUAL), version()]
     digest = hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()
     assert any(name.name.endswith(digest[:16]) for name in names)

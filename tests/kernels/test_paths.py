@@ -112,7 +112,7 @@ def test_image_does_not_depend_on_the_parts(executor_named, monkeypatch, name):
     rows = render_on(executor, scene("cornell"), job, on_progress=counted.append)
     assert sum(counted) == 19 * 11 * 7
     assert len(counted) == 3
-    assert all(np.array_equal(rows.frame[layer], whole.frame[layer]) for layer in frame.LAYERS)
+    assert all(np.array_equal(rows.frame[layer], whole.frame[layer]) for layer in frame.USUAL)
     monkeypatch.setattr(sys.modules[render_on.__module__], "SAMPLES_AT_ONCE", 3)
     ranges = render_on(executor, scene("cornell"), job)
     color = whole.frame["color"]
@@ -168,4 +168,4 @@ def test_too_wide_an_image_is_refused(executor_named):
 
 
 def test_a_frame_has_all_layers():
-    assert set(FRAME_GROUPS) == {*frame.LAYERS, "deviation"}
+    assert set(FRAME_GROUPS) == {*frame.USUAL, "deviation"}

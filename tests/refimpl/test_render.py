@@ -20,7 +20,7 @@ CORNELL = scenes.canonical("cornell")
 
 
 def equal(a: R.Render, b: R.Render) -> bool:
-    same_layers = all(np.array_equal(a.frame[name], b.frame[name]) for name in frame.LAYERS)
+    same_layers = all(np.array_equal(a.frame[name], b.frame[name]) for name in a.frame.layers)
     return same_layers and np.array_equal(a.color_variance, b.color_variance)
 
 

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 
 BUDGET = {
     "refimpl": 1150,
-    "refimpl/light": 3600,
+    "refimpl/light": 3750,
     "refimpl/network": 2050,
     "compiler": 1700,
     "compiler/core": 3450,

@@ -35,6 +35,10 @@ LEAST_ROUGHNESS = 1e-3
 """Least width alpha of a lobe. In float32 a half vector is off by some 1e-7, 1e-4 of such a lobe's width;
 sharper ones would lose their digits, and look like mirrors anyway."""
 
+LARGEST_FOLLOWED = 0.1
+"""Largest roughness alpha of a metal past which features look (following.py): half of the normals of its
+microscopic mirrors are then within atan(0.1), six degrees, of the surface's own."""
+
 LEAST_HEIGHT = 1e-7
 """Least cosine between normal and wo: half an ulp of 1, below which a direction's own rounding decides on
 which side of the surface it is. It keeps q + z away from zero on lanes that hit nothing."""
@@ -89,6 +93,11 @@ class Conductor(Material):
         z_o, q_o, _, _ = _heights(wo, local, site.parameter)
         pdf = distribution(m, site.parameter) / (2.0 * (q_o + z_o))
         return np.where(cos_surface > 0.0, pdf, 0.0)
+
+    @staticmethod
+    def follows(parameter: Floats) -> Any:
+        """Tell (...) whether a metal of this roughness (...) is nearly a mirror."""
+        return parameter <= LARGEST_FOLLOWED
 
 
 def distribution(m: Normals, alpha: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""What a material is: three functions of lanes, and the numbers that a scene gives it.
+"""What a material is: four functions of lanes, and the numbers that a scene gives it.
 
 1. A material is a frozen dataclass; its fields are what a scene's JSON says of it beside `kind`. A surface's
    `reflectance` belongs to the surface, and each material says how it uses it.
@@ -6,6 +6,8 @@
 3. `value` and `pdf` say what light from a given direction is worth, and how likely `sample` was to find that
    direction: light sampling and multiple importance sampling ask for them. Materials that reflect into single
    directions (`single` is true) have neither: no light sample ever meets those directions [`Single`].
+4. `follows` says whether features are those of what the path meets next, and not the surface's own
+   (following.py).
 
 A vertex is described by a [`Site`]. Materials neither know the scene nor which surface they are on: what
 differs from surface to surface is in the site's `parameter` [`Material.parameter`].
@@ -92,6 +94,11 @@ class Material:
         """Return the density (...), in 1/sr, with which `sample` finds wi (..., 3)."""
         raise NotImplementedError
 
+    @staticmethod
+    def follows(parameter: Any) -> Any:
+        """Tell (...) whether features look past surfaces of this parameter (...), or None for any."""
+        return False
+
 
 class Single(Material):
     """A material that scatters into single directions: light samples are worth nothing to it."""
@@ -107,6 +114,11 @@ class Single(Material):
     def pdf(site: Site, wi: Directions, cos_surface: Floats) -> Floats:
         """Return 0: the density of all directions but one."""
         return np.zeros_like(cos_surface)
+
+    @staticmethod
+    def follows(parameter: Any) -> Any:
+        """Return true: what is there to be seen is elsewhere."""
+        return True
 
 
 def unit(a: Directions) -> Directions:

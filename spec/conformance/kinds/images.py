@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....refimpl import metrics, rng
-from ....refimpl.frame import LAYERS, Frame
+from ....refimpl.frame import LAYERS, USUAL, Frame
 from ....refimpl.network import dataset
 from ....refimpl.network.dataset import Normalization, Window
 from ..case import Case, Kind, Output
@@ -73,7 +73,7 @@ def bad_layers(height: int, width: int, index: int) -> dict[str, Array]:
     """Return the layers of a small frame with NaN, infinities, negatives and a firefly."""
     layers = {
         name: single(noise(index + i, (height, width, layer.channels)) * 1.5 - 0.25)
-        for i, (name, layer) in enumerate(LAYERS.items())
+        for i, (name, layer) in enumerate((name, LAYERS[name]) for name in USUAL)
     }
     flat = layers["color"].reshape(-1)
     flat[:6] = (np.nan, np.inf, -np.inf, 1e6, -3.0, 0.0)
@@ -91,7 +91,7 @@ SCALES = {
 """The scales of the cases."""
 
 FEATURE_ROWS = (
-    *((name, "DAT-1", "scales and clips", False) for name in dataset.FEATURES),
+    *((name, "DAT-1", "scales and clips", False) for name in dataset.FEATURES if name in USUAL),
     ("position,color", "DAT-3", "features in the order in which they are named", False),
     ("color", "DAT-10", "NaN is 0, infinities and fireflies are clipped", True),
     ("normal,depth", "DAT-10", "NaN is 0, what is out of range is clipped", True),
@@ -312,7 +312,7 @@ def _metric(name: str) -> Kind:
     )
 
 
-LAYER_FIELDS = {name: f"float[H][W][{layer.channels}]" for name, layer in LAYERS.items()}
+LAYER_FIELDS = {name: f"float[H][W][{layer.channels}]" for name, layer in LAYERS.items() if name in USUAL}
 """What the layers of a frame are, for the page."""
 
 KINDS = (

@@ -66,8 +66,14 @@ LAYERS: Mapping[str, Layer] = {
 }
 """Every layer that a frame may have; a new one is one line here."""
 
-SEEN = tuple(name for name in LAYERS if name.startswith("seen_"))
-"""The layers of what is seen past mirrors and glass (light/following.py): a frame has them on request."""
+SEEN: Mapping[str, str] = {
+    "seen_albedo": "albedo",
+    "seen_normal": "normal",
+    "seen_depth": "depth",
+    "seen_position": "position",
+}
+"""The layers of what is seen past mirrors and glass (light/following.py), which a frame has on request, and
+those of the first hit that they are where nothing is followed."""
 
 USUAL = tuple(name for name in LAYERS if name not in SEEN)
 """The layers that any rendered frame has."""

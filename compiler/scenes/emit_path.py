@@ -5,8 +5,9 @@
         for depth = 0, 1, ... MAX_DEPTH
             arrive: the next surface; radiance of the paths that are alive
             depth 0: look, add the features of the first surface
+            while the path is followed: see, add the features of what is seen past mirrors and glass
             depth MAX_DEPTH: done
-            scatter: the path continues; done when no path is alive
+            scatter: the path continues; done when no path is alive, or followed if that is all
         add the path's radiance
 
 1. Each program is a block of statements, one a node, on variables that have the names of its inputs
@@ -16,6 +17,7 @@
 3. With an encoding, sums stay variables, and become channels of images at the end [`_Kernel._images`].
 4. A path that has ended is computed on with the others of its work item, and changes nothing: radiance is
    assigned where it is alive.
+5. `see` is in a kernel that has a plane of it, and no other [`asked`].
 """
 
 from __future__ import annotations
@@ -35,10 +37,13 @@ from ..languages import interface
 from ..languages.dialect import Dialect, Parts
 from ..languages.interface import ENCODE
 from ..schedules.emit import framed
-from .lower_scene import LAYERS, PATH, SURFACE, PathPrograms, Values, kinds, names
+from .lower_scene import LAYERS, PATH, SEEN, SURFACE, WAY, PathPrograms, Values, kinds, names
 
 FIRST = {layer: names({layer: value}) for layer, value in LAYERS.items()}
 """Planes of the first surface: outputs of `look`, by group."""
+
+PAST = {layer: names({layer: value}) for layer, value in SEEN.items()}
+"""Planes of what is seen past mirrors and glass: outputs of `see`, by group."""
 
 END = {
     "alive": ["alive"],
@@ -56,6 +61,7 @@ GROUPS: Mapping[str, Sequence[str]] = {
     "color": COLOR,
     "deviation": DEVIATION,
     **FIRST,
+    **PAST,
     **{group: [f"last_{n}" if n != "alive" else n for n in members] for group, members in END.items()},
 }
 """What a kernel can add up: groups of planes, by name."""
@@ -68,6 +74,9 @@ BRANCH = "node"
 
 FRAME_GROUPS = ("color", "deviation", *LAYERS)
 """What a rendered frame needs."""
+
+WHOLE = {"color", "deviation", *END}
+"""What needs paths to their end."""
 
 
 def planes(groups: Sequence[str]) -> list[str]:
@@ -94,7 +103,15 @@ def emit_path(
     encoding: Encoding | None = None,
 ) -> str:
     """Return the kernel's source; `header` are the lines of the comment at its top."""
-    return _Kernel(programs, dialect, groups, encoding).text(header)
+    return _Kernel(asked(programs, groups), dialect, groups, encoding).text(header)
+
+
+def asked(programs: PathPrograms, groups: Sequence[str]) -> PathPrograms:
+    """Return the programs that groups of planes need: `see` only for its own, which it must be there for."""
+    wanted = [group for group in groups if group in PAST]
+    if wanted and programs.see is None:
+        raise CompileError(f"planes {wanted[0]!r} need the program 'see': lower the scene with seen=True")
+    return programs if wanted else replace(programs, see=None)
 
 
 def renamed_tables(programs: PathPrograms) -> Mapping[tuple[str, str], str]:
@@ -148,6 +165,16 @@ class _Kernel(Lines):
         self._images()
         return framed(self.dialect, self.kernel, self._parts(), header, self.lines)
 
+    @property
+    def short(self) -> bool:
+        """Whether paths may end with what is seen: nothing else is asked for, and something of that."""
+        return self.programs.see is not None and not WHOLE & set(self.groups)
+
+    @property
+    def followed(self) -> bool:
+        """Whether the way to what is seen is state of a path."""
+        return self.programs.see is not None and self.programs.most_followed > 0
+
     # ---- the skeleton ------------------------------------------------------------------------------------
 
     def _parts(self) -> Parts:
@@ -159,7 +186,7 @@ class _Kernel(Lines):
         helpers = [text for op, text in self.dialect.helpers.items() if op in self._operations()]
         return Parts(
             top="\n".join([*constants, *helpers, *self.dialect.image_helpers(self.kernel)]),
-            max_depth=self.programs.settings.max_depth,
+            max_depth=self.programs.settings.max_depth if self.followed or not self.short else 0,
         )
 
     def _operations(self) -> set[str]:
@@ -184,6 +211,9 @@ class _Kernel(Lines):
         self._line(dialect.var("uint32", "pixel"))
         self._declare({**PATH, **SURFACE})
         self._line(dialect.var("bool", "alive", dialect.number(True, "bool")))
+        if self.followed:
+            self._line(dialect.var("bool", "way_going", dialect.number(True, "bool")))
+            self._line(dialect.var("float32", "way_length", dialect.number(0.0, "float32")))
         self.block("start", "the path at the camera", {"width": "image_width", "height": "image_height"})
         self._open(dialect.bounces())
         self._line(dialect.let("uint32", "depth", dialect.splat("bounce", "uint32")))
@@ -192,11 +222,17 @@ class _Kernel(Lines):
             self._open("if (bounce == 0u) {")
             self.block("look", "the features of the first surface", summed=True)
             self._close()
+        if self.programs.see is not None:
+            going = self.dialect.any_lane.format(mask="way_going")
+            self._open(f"if ({going if self.followed else 'bounce == 0u'}) {{")
+            self.block("see", "what is seen past mirrors and glass", summed=True)
+            self._close()
         self._open("if (bounce == MAX_DEPTH) {")
         self._line("break;")
         self._close()
         self.block("scatter", "the path goes on", masked=("radiance_r", "radiance_g", "radiance_b"))
-        self._open(f"if (!{self.dialect.any_lane.format(mask='alive')}) {{")
+        mask = "(alive && way_going)" if self.short and self.followed else "alive"
+        self._open(f"if (!{self.dialect.any_lane.format(mask=mask)}) {{")
         self._line("break;")
         self._close()
         self._close()
@@ -298,7 +334,9 @@ class _Kernel(Lines):
         self._line(f"/* {part}: {comment} */")
         self._open("{")
         texts = self._statements(part, program, renamed)
-        for line in self._added(program, texts) if summed else self._assignments(program, texts, masked):
+        for line in self._added(program, texts) if summed else []:
+            self._line(line)
+        for line in self._assignments(program, texts, masked, WAY if summed else None):
             self._line(line)
         self._close()
 
@@ -396,11 +434,15 @@ class _Kernel(Lines):
         """Return the statements that add a program's outputs up, where they are planes."""
         return [f"sum_{name} += {texts[i]};" for name, i in program.outputs if name in self.planes]
 
-    def _assignments(self, program: Program, texts: Sequence[str], masked: Sequence[str]) -> list[str]:
-        """Return the assignments of a program's outputs to the variables of their names."""
+    def _assignments(
+        self, program: Program, texts: Sequence[str], masked: Sequence[str], only: Values | None
+    ) -> list[str]:
+        """Return the assignments of a program's outputs, or of some, to the variables of their names."""
         inputs = {str(node["name"]) for node in program.nodes if node.op == "input"}
         before, after = [], []
         for name, index in program.outputs:
+            if only is not None and name not in only:
+                continue
             value = texts[index]
             if value in inputs and value != name:
                 # The variable may be assigned before it is read: keep its value.

@@ -89,6 +89,11 @@ def compile_encode(
             f"target {target} has no kernels that encode features: compile for one that has, as opencl"
         )
     dialect = chosen.dialect
+    if dialect and len(images) > (most := dialect.max_planes // dialect.planes_per_buffer):
+        raise CompileError(
+            f"the kernel encodes {len(images)} features: {dialect.language} draws at most {most} images at "
+            "once; use fewer"
+        )
     arguments = dialect.said[interface.ENCODE] if dialect else chosen.schedules[0].arguments
     arguments = arguments.format(planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
     header = _header(program, images, dialect.language if dialect else chosen.language, arguments)

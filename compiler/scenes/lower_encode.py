@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...refimpl import vectors
+from ...refimpl.frame import SEEN
 from ...refimpl.network.dataset import (
     FEATURES,
     Normalization,
@@ -35,6 +36,11 @@ def layers_of(features: Sequence[str]) -> tuple[str, ...]:
     """Return the layers that features are made of: the groups of planes that a path kernel has to add up."""
     check_features(features)
     return tuple(FEATURES[name].layer for name in features)
+
+
+def sees(features: Sequence[str]) -> bool:
+    """Tell whether some of the features are of what is seen past mirrors and glass."""
+    return any(layer in SEEN for layer in layers_of(features))
 
 
 def planes_of(features: Sequence[str]) -> tuple[str, ...]:

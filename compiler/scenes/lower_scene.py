@@ -6,6 +6,8 @@ A path is four pure functions of the reference, each a program; a kernel's skele
 2. `arrive`: path -> its next surface and the radiance gathered so far (refimpl/light/transport.py).
 3. `look`: the first surface -> the feature layers (refimpl/light/render.py).
 4. `scatter`: path, surface, depth and counters -> the path after it, and whether it continues.
+5. On request `see`: way, path and surface -> the layers of what is seen past mirrors and glass, and the way
+   after it (refimpl/light/following.py). Where nothing is followed it is the first surface's layers [`_see`].
 
 Values between them have names [`PATH`, `SURFACE`, `COUNTERS`]: a vector is three numbers, `origin_x` and so
 on. The scene is constants by then: what it lacks (a kind of primitive, a second light, a rotation) is in no
@@ -14,15 +16,15 @@ program. Numbers of it that shall move are inputs of all four [scene_inputs.py].
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ...refimpl import vectors
-from ...refimpl.light import render, transport
+from ...refimpl import frame, vectors
+from ...refimpl.light import following, render, transport
 from ...refimpl.light.intersection import Hit, Surface, reflecting
 from ...refimpl.light.scene import Scene, scene_digest
 from ...refimpl.light.transport import Counters, Path, Settings, World
@@ -74,6 +76,15 @@ LAYERS: Values = {
 }
 """The feature layers of the first hit, as refimpl/light/render.py: first_hit_layers."""
 
+SEEN: Values = {seen: LAYERS[first] for seen, first in frame.SEEN.items()}
+"""The feature layers past mirrors and glass, as refimpl/light/following.py: see."""
+
+WAY: Values = {"way_going": (NUMBER, TRUTH), "way_length": (NUMBER, FLOAT)}
+"""State of the way to what is seen, as refimpl/light/following.py: Way."""
+
+MATERIALS = "world.materials."
+"""How the paths of the tables of materials begin: if one has an input, any metal may be nearly a mirror."""
+
 PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "eliminate_dead")
 """What every program of a path goes through: numbers in place of vectors, the bits that float32 gives."""
 
@@ -82,6 +93,7 @@ PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "elimina
 class PathPrograms:
     """The programs of one path in one scene; `alive`, `scatter`'s boolean, says whether it continues.
 
+    `see` is there where it was asked for; the path is followed past `most_followed` surfaces at most.
     `inputs` are the names of the scene's numbers that all four are given [scene_inputs.py], `places` where
     they are in its tables, `values` those of this scene.
     """
@@ -96,10 +108,13 @@ class PathPrograms:
     inputs: tuple[str, ...] = ()
     places: tuple[Places, ...] = ()
     values: tuple[float, ...] = ()
+    see: Program | None = None
+    most_followed: int = 0
 
     def parts(self) -> Mapping[str, Program]:
         """Return the programs by name."""
-        return {name: getattr(self, name) for name in ("start", "arrive", "look", "scatter")}
+        first = {name: getattr(self, name) for name in ("start", "arrive", "look", "scatter")}
+        return first if self.see is None else {**first, "see": self.see}
 
 
 def lower_scene(
@@ -109,12 +124,14 @@ def lower_scene(
     moving: SceneInputs | None = None,
     *,
     keep_places: bool = False,
+    seen: bool = False,
 ) -> PathPrograms:
     """Return the programs of a path through a scene, in float32.
 
     Primitives are statements each, tables and loops, or a tree, as `forms` and their costs say [forms.py].
     `keep_places`: nodes know the lines of the reference that they came from, for listings. Numbers that are
-    `moving` are inputs; such a scene has no tree, whose boxes would have to move.
+    `moving` are inputs; such a scene has no tree, whose boxes would have to move. `seen`: with the program of
+    what is seen past mirrors and glass.
     """
     moving = moving or SceneInputs(settings, ())
     laid, values, statements = _laid_out(scene, settings, forms, moving)
@@ -135,10 +152,7 @@ def lower_scene(
 
     def look(given: Mapping[str, Any]) -> dict[str, Any]:
         toward = _vector(given, "direction", XYZ)
-        layers = render.first_hit_layers(world_of(given), *_surface(given), toward)
-        return {
-            name: value for layer, (ends, _) in LAYERS.items() for name, value in _split(layer, ends, layers)
-        }
+        return _components(LAYERS, render.first_hit_layers(world_of(given), *_surface(given), toward))
 
     def scatter(given: Mapping[str, Any]) -> dict[str, Any]:
         surface, hit = _surface(given)
@@ -150,6 +164,7 @@ def lower_scene(
     size, depth = dict.fromkeys(("width", "height"), (NUMBER, FLOAT)), {"depth": (NUMBER, COUNTER)}
     scene_numbers = dict.fromkeys(moving.names, (NUMBER, FLOAT))
     lowered = partial(_lowered, most_unrolled=None if statements else 1, keep_places=keep_places)
+    most = _most_followed(laid["world"], moving) if seen else 0
     return PathPrograms(
         scene.name,
         scene_digest(scene),
@@ -161,6 +176,8 @@ def lower_scene(
         moving.names,
         moving.places,
         tuple(map(float, values)),
+        lowered("see", *_see(world_of, most, scene_numbers)) if seen else None,
+        most,
     )
 
 
@@ -174,6 +191,35 @@ def _laid_out(
     if forms.trees and not statements and not moving.places:
         laid["world"] = replace(world, geometry=planted(world.geometry, scene))
     return laid, values, statements
+
+
+def _most_followed(world: World, moving: SceneInputs) -> int:
+    """Return past how many surfaces a path is followed at most, whatever the scene's numbers will be."""
+    if any(path.startswith(MATERIALS) for places in moving.places for path, _ in places):
+        return min(following.MOST_FOLLOWED, world.settings.max_depth)
+    return following.most_followed(world)
+
+
+def _see(
+    world_of: Callable[[Mapping[str, Any]], World], most: int, scene_numbers: Values
+) -> tuple[Callable[[Mapping[str, Any]], dict[str, Any]], Values]:
+    """Return the function that sees, and its inputs; with nothing to follow it has no state."""
+
+    def first(given: Mapping[str, Any]) -> dict[str, Any]:
+        layers = render.first_hit_layers(world_of(given), *_surface(given), _vector(given, "point", XYZ))
+        return _components(SEEN, {name: layers[of] for name, of in frame.SEEN.items()})
+
+    def see(given: Mapping[str, Any]) -> dict[str, Any]:
+        way = following.Way(given["way_going"] & given["alive"], given["way_length"])
+        path = Path(*[None] * 5)._replace(beta=_vector(given, "beta", RGB))  # type: ignore[arg-type]
+        depth = given["depth"]
+        way, layers = following.see(world_of(given), way, path, *_surface(given), depth, most)
+        return {**_components(SEEN, layers), "way_going": way.going, "way_length": way.length}
+
+    if not most:
+        return first, {**SURFACE, **scene_numbers}
+    state = {"beta": PATH["beta"], "depth": (NUMBER, COUNTER), "alive": (NUMBER, TRUTH)}
+    return see, {**SURFACE, **state, **WAY, **scene_numbers}
 
 
 def _world(laid: dict[str, Any], moving: SceneInputs, given: Mapping[str, Any]) -> World:
@@ -234,6 +280,11 @@ def _taken(values: Values, *tuples: Any) -> dict[str, Traced]:
             name, ends, next(t._asdict() for t in reversed(tuples) if name in t._fields)
         )
     }
+
+
+def _components(values: Values, found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the components of values by name."""
+    return {part: number for name, (ends, _) in values.items() for part, number in _split(name, ends, found)}
 
 
 def _split(name: str, ends: tuple[str, ...], values: Mapping[str, Any]) -> list[tuple[str, Any]]:

@@ -54,6 +54,9 @@ SUMS = (
 )
 """What the numbers mean that a kernel adds up: for whoever calls it."""
 
+PAST_SUMS = ("seen_*: the same of what is seen past mirrors and glass; albedo times the tints on the way",)
+"""What the planes of `see` mean."""
+
 
 @dataclass(frozen=True)
 class PathArtifact(OneSource):
@@ -122,10 +125,11 @@ def compile_path(
     if lanes not in chosen.paths:
         known = ", ".join(map(str, chosen.paths))
         raise CompileError(f"target {target} does not follow {lanes} paths at once; it can do {known}")
+    programs = emit_path.asked(programs, groups)
     emitted, dialect = _passed(programs, promised.passes), chosen.paths[lanes]
     planes = tuple(emit_path.planes(groups))
     images = encoding.images if encoding else ()
-    written = _written(images) if images else SUMS
+    written = _written(images) if images else (*SUMS, *(PAST_SUMS if programs.see is not None else ()))
     header = _header(programs, dialect.language if dialect else chosen.language, promised, lanes, written)
     arguments = dialect.said[interface.PATH] if dialect else chosen.schedules[0].arguments
     if images:
@@ -220,8 +224,7 @@ def _identity(programs: PathPrograms, name: str, text: str) -> dict[str, Any]:
 
 def _passed(programs: PathPrograms, passes: Sequence[str]) -> PathPrograms:
     """Return the programs after the named passes."""
-    start, arrive, look, scatter = (pipeline.run(part, passes) for part in programs.parts().values())
-    return replace(programs, start=start, arrive=arrive, look=look, scatter=scatter)
+    return replace(programs, **{n: pipeline.run(part, passes) for n, part in programs.parts().items()})
 
 
 def _printed(programs: PathPrograms, header: Sequence[str]) -> str:

@@ -17,7 +17,7 @@ from ...compiler.core.interpret import interpret
 from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.lower_encode import SAMPLES, channel_name
-from ...compiler.scenes.lower_scene import PathPrograms
+from ...compiler.scenes.lower_scene import WAY, PathPrograms
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...refimpl.network import dataset
 from .executor import Executor, Kernel, Memory
@@ -107,21 +107,26 @@ def _denoised(artifact: Artifact, image: NDArray[np.float32], result: NDArray[np
 
 
 def follow(programs: PathPrograms, given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Follow paths; return the features of their first surfaces and their state in the end.
+    """Follow paths; return the features of what they meet first and their state in the end.
 
     given holds the inputs of `start`: x, y, seed, sample_number (...), width and height; and the scene's
     numbers that are inputs of all programs.
     """
     state: dict[str, Any] = {**given, **interpret(programs.start, given)}
-    state["alive"] = np.ones(state["x"].shape, bool)
+    state["alive"] = state["way_going"] = np.ones(state["x"].shape, bool)
+    state["way_length"] = np.zeros(state["x"].shape, np.float32)
     first: dict[str, Any] = {}
     for depth in range(programs.settings.max_depth + 1):
+        state["depth"] = np.full(state["x"].shape, depth, np.uint32)
         state = _masked(state, interpret(programs.arrive, state))
         if depth == 0:
             first = interpret(programs.look, state)
+        if programs.see is not None and (depth == 0 or programs.most_followed > 0):
+            found = interpret(programs.see, state)
+            state |= {name: found.pop(name) for name in WAY if name in found}
+            first |= {name: first.get(name, np.float32(0)) + value for name, value in found.items()}
         if depth == programs.settings.max_depth:
             break
-        state["depth"] = np.full(state["x"].shape, depth, np.uint32)
         state = _masked(state, interpret(programs.scatter, state))
         if not state["alive"].any():
             break

@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.scenes.emit_path import GROUPS
+from ...compiler.scenes.emit_path import FRAME_GROUPS, GROUPS
 from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...refimpl.errors import InputError
-from ...refimpl.frame import USUAL, Frame
+from ...refimpl.frame import SEEN, Frame
 from ...refimpl.light.render import Job, Render, checked_rows, feature_job, render_info, with_own_features
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
@@ -47,14 +47,22 @@ KEPT_SCENES = 8
 
 def compile_scene(executor: Executor, scene: Scene, job: Job, profile: str = "ieee") -> PathArtifact:
     """Return the kernel that renders a scene on an executor."""
-    return _compiled(scene, job.settings, executor.name, profile, executor.lanes)
+    return _compiled(scene, job.settings, executor.name, profile, executor.lanes, groups_of(job))
 
 
 @lru_cache(KEPT_SCENES)
-def _compiled(scene: Scene, settings: Settings, target: str, profile: str, lanes: int) -> PathArtifact:
+def _compiled(
+    scene: Scene, settings: Settings, target: str, profile: str, lanes: int, groups: tuple[str, ...]
+) -> PathArtifact:
     """Return the kernel; it depends on nothing else."""
-    programs = lower_scene(scene, settings, forms_of(target))
-    return compile_path(programs, target, profile, lanes)
+    programs = lower_scene(scene, settings, forms_of(target), seen=bool(SEEN.keys() & set(groups)))
+    return compile_path(programs, target, profile, lanes, groups)
+
+
+def groups_of(job: Job) -> tuple[str, ...]:
+    """Return the groups of planes that a job's kernel adds up: its layers, and what its variance is of."""
+    wanted = {*job.layers, "deviation"} if job.color else {*job.layers}
+    return tuple(group for group in (*FRAME_GROUPS, *SEEN) if group in wanted)
 
 
 class Frames:
@@ -62,17 +70,18 @@ class Frames:
 
     def __init__(self, scenes: Sequence[Scene]) -> None:
         self._scenes = tuple(scenes)
-        self._paths: dict[tuple[str, int, str, Settings], MovingPaths] = {}
+        self._paths: dict[tuple[object, ...], MovingPaths] = {}
 
-    def of(self, executor: Executor, scene: Scene, settings: Settings, profile: str = "ieee") -> Moment:
-        """Return the kernel that renders a scene on an executor, and the scene's numbers."""
-        key = (executor.name, executor.lanes, profile, settings)
+    def of(self, executor: Executor, scene: Scene, job: Job, profile: str = "ieee") -> Moment:
+        """Return the kernel that renders a job's scene on an executor, and the scene's numbers."""
+        settings, groups = job.settings, groups_of(job)
+        key = (executor.name, executor.lanes, profile, settings, groups)
         if key not in self._paths:
             target, lanes = executor.name, executor.lanes
 
             def compiled(scene: Scene, inputs: SceneInputs) -> PathArtifact:
-                programs = lower_scene(scene, settings, forms_of(target), inputs)
-                return compile_path(programs, target, profile, lanes)
+                programs = lower_scene(scene, settings, forms_of(target), inputs, seen=job.seen)
+                return compile_path(programs, target, profile, lanes, groups)
 
             self._paths[key] = MovingPaths(target, compiled, settings, self._scenes)
         return self._paths[key].of(scene)
@@ -101,7 +110,7 @@ def render_on(
         return with_own_features(scene, job, partial(render_on, executor, scene, **options, frames=frames))
     first, last = checked_rows(job, rows)
     if moment is None and frames is not None:
-        moment = frames.of(executor, scene, job.settings, profile)
+        moment = frames.of(executor, scene, job, profile)
     kernel = compile_scene(executor, scene, job, profile) if moment is None else moment.kernel
     numbers = None if moment is None else moment.numbers
     executor.build(kernel)
@@ -116,7 +125,7 @@ def render_on(
         totals = merge(
             kernel, totals, Totals(parts[0].samples, np.concatenate(sums, axis=1, dtype=np.float64))
         )
-    return _render(kernel, totals, render_info(scene, job))
+    return _render(kernel, totals, job.layers, render_info(scene, job))
 
 
 def sample_ranges(job: Job, band: tuple[int, int]) -> Iterator[list[Part]]:
@@ -153,17 +162,20 @@ def merge(kernel: PathArtifact, a: Totals, b: Totals) -> Totals:
         return b
     planes = a.planes + b.planes
     for names in zip(GROUPS["color"], GROUPS["deviation"], strict=True):
+        if names[0] not in kernel.planes:
+            continue
         color, deviation = map(kernel.planes.index, names)
         difference = b.planes[color] / b.samples - a.planes[color] / a.samples
         planes[deviation] += difference**2 * (a.samples * b.samples / (a.samples + b.samples))
     return Totals(a.samples + b.samples, planes)
 
 
-def _render(kernel: PathArtifact, totals: Totals, info: dict[str, str]) -> Render:
-    """Return the means as a frame, and the variance of one sample."""
+def _render(kernel: PathArtifact, totals: Totals, names: Sequence[str], info: dict[str, str]) -> Render:
+    """Return the means as a frame of these layers, and the variance of one sample."""
     means = dict(zip(kernel.planes, totals.planes / totals.samples, strict=True))
     layers: dict[str, Any] = {}
-    for name in USUAL:
+    for name in names:
         layers[name] = np.stack([means[plane] for plane in GROUPS[name]], axis=-1).astype(np.float32)
-    deviations = np.stack([means[plane] for plane in GROUPS["deviation"]], axis=-1)
+    none = np.zeros(totals.planes.shape[1:])
+    deviations = np.stack([means.get(plane, none) for plane in GROUPS["deviation"]], axis=-1)
     return Render(Frame(layers, info), deviations * (totals.samples / max(totals.samples - 1, 1)))

@@ -19,7 +19,6 @@ surfaces to follow the path to the first diffuse or glossy one, with the product
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,14 +31,6 @@ from .transport import Path, World
 
 MOST_FOLLOWED = 4
 """Most surfaces past which a path is followed: through two bodies of glass, one behind the other."""
-
-SEEN: Mapping[str, str] = {
-    "seen_albedo": "albedo",
-    "seen_normal": "normal",
-    "seen_depth": "depth",
-    "seen_position": "position",
-}
-"""The layers that are made here, and those of the first hit that they are where nothing is followed."""
 
 
 class Way(NamedTuple):

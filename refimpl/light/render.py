@@ -15,7 +15,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -84,6 +84,11 @@ class Job:
         names = (*USUAL, *SEEN) if self.seen else USUAL
         return names if self.color else tuple(name for name in names if name != "color")
 
+    def facts(self) -> dict[str, Any]:
+        """Return what determines the frame by name: parts that jobs have not always had, if not as ever."""
+        usual = {"seen": False, "color": True}
+        return {name: value for name, value in asdict(self).items() if usual.get(name, ...) != value}
+
     @property
     def samples(self) -> int:
         """Return the number of samples of all pixels together, the features' own camera rays among them."""
@@ -93,7 +98,10 @@ class Job:
 
 @dataclass(frozen=True, eq=False)
 class Render:
-    """A rendered frame (or some of its rows) and color_variance (H, W, 3), the variance of one sample."""
+    """A rendered frame (or some of its rows) and color_variance (H, W, 3), the variance of one sample.
+
+    Without colour the variance is 0.
+    """
 
     frame: Frame
     color_variance: NDArray[np.float64]
@@ -144,12 +152,16 @@ def feature_job(job: Job) -> Job | None:
     """
     if job.feature_spp <= job.spp:
         return None
-    features = replace(job, spp=job.feature_spp, feature_spp=0)
-    if not job.seen:
-        return replace(features, settings=replace(job.settings, max_depth=0))
-    most = min(following.MOST_FOLLOWED, job.settings.max_depth)
-    settings = replace(job.settings, max_depth=most, strategy="bsdf", roulette_depth=None)
-    return replace(features, settings=settings, color=False)
+    settings, color = feature_settings(job.settings, job.seen), not job.seen
+    return replace(job, spp=job.feature_spp, feature_spp=0, settings=settings, color=color)
+
+
+def feature_settings(settings: Settings, seen: bool) -> Settings:
+    """Return the settings of paths that only features need: of first hits, or of what is seen as well."""
+    if not seen:
+        return replace(settings, max_depth=0)
+    most = min(following.MOST_FOLLOWED, settings.max_depth)
+    return replace(settings, max_depth=most, strategy="bsdf", roulette_depth=None)
 
 
 def with_own_features(scene: Scene, job: Job, render_part: Callable[[Job], Render]) -> Render:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..encoding import to_display
 from ..errors import InputError
-from ..frame import Frame, check_finite
+from ..frame import SEEN, Frame, check_finite
 from ..reading import parse_json, to_dataclass
 from ..rng import counter, random_block
 from ..vectors import vector
@@ -126,7 +126,7 @@ def encode_position(values: Array, normalization: Normalization) -> Array:
 DISPLAY_FORMULA = "sRGB of (linear radiance * 2^{exposure_stops!r}) clipped to 0 .. 1 (IEC 61966-2-1)"
 """How colour is encoded, on the way in and on the way out."""
 
-FEATURES: Mapping[str, Feature] = {
+FIRST_HITS: Mapping[str, Feature] = {
     feature.name: feature
     for feature in (
         Feature("color", "color", 3, 0.0, 1.0, encode_color, DISPLAY_FORMULA),
@@ -186,7 +186,20 @@ FEATURES: Mapping[str, Feature] = {
         ),
     )
 }
-"""Every feature that a model may use; a new one is one line here and one `encode_*` function."""
+"""Features of colour and of the first hit; a new one is one line here and one `encode_*` function."""
+
+PAST = "past mirrors and glass: "
+"""How the formulas of features begin that are of what is seen there."""
+
+FEATURES: Mapping[str, Feature] = {
+    **FIRST_HITS,
+    **{
+        seen: replace(FIRST_HITS[first], name=seen, layer=seen, formula=PAST + FIRST_HITS[first].formula)
+        for seen, first in SEEN.items()
+    },
+}
+"""Every feature that a model may use. Those of what is seen past mirrors and glass are encoded as those of
+the first hit are, by the same scales."""
 
 BORDERS: Mapping[str, str] = {"clamp": "edge", "zero": "constant"}
 """Border rules, by name, as NumPy's padding modes: repeat the nearest pixel, or see zeros."""
@@ -264,14 +277,22 @@ def n_inputs(features: Sequence[str], window: Window) -> int:
 
 
 def normalization_of(frames: Sequence[Frame], exposure_stops: float = 0.0) -> Normalization:
-    """Measure the scales: the farthest depth, and the cube around all positions that are not exactly 0."""
-    far = max((_farthest(frame["depth"]) for frame in frames if "depth" in frame.layers), default=0.0)
-    hits = [_hits(frame["position"]) for frame in frames if "position" in frame.layers]
+    """Measure the scales: the farthest depth, and the cube around all positions that are not exactly 0.
+
+    Those of what is seen past mirrors and glass count where a frame has them.
+    """
+    far = max(map(_farthest, _layers(frames, "depth", "seen_depth")), default=0.0)
+    hits = [_hits(position) for position in _layers(frames, "position", "seen_position")]
     points = np.concatenate(hits) if hits else np.zeros((0, 3))
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.zeros(3))
     x, y, z = (float(value) for value in (low + high) / 2)
     extent = float((high - low).max()) / 2
     return Normalization(exposure_stops, far if far > 0 else 1.0, (x, y, z), extent if extent > 0 else 1.0)
+
+
+def _layers(frames: Sequence[Frame], *names: str) -> list[Array]:
+    """Return the layers (H, W, C) of these names that frames have."""
+    return [frame[name] for frame in frames for name in names if name in frame.layers]
 
 
 def _farthest(depth: Array) -> float:

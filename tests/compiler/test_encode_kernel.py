@@ -13,10 +13,10 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
 from wamnet.compiler.scenes.lower_encode import SAMPLES, channel_name, layers_of, lower_encode, planes_of
 from wamnet.refimpl.errors import CompileError, InputError
-from wamnet.refimpl.network.dataset import FEATURES, Normalization, encode_sums
+from wamnet.refimpl.network.dataset import FEATURES, FIRST_HITS, Normalization, encode_sums
 
 SCALES = Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
-ALL = tuple(FEATURES)
+ALL = tuple(FIRST_HITS)
 
 
 def sums_of(samples, seed=1):
@@ -92,6 +92,13 @@ def test_the_manifest_names_what_was_made():
     assert [image.name for image in made.images] == ["normal", "depth"]
     assert made.images[1].encoding == FEATURES["depth"].encoding(SCALES)
     assert "image_color" not in made.source
+
+
+def test_more_images_than_a_fragment_draws():
+    """PPL-6: eight colour buffers; languages with buffers take any number."""
+    with pytest.raises(CompileError, match=r"encodes 11 features: GLSL 3.30, .* at most 8 images at once"):
+        compile_encode(tuple(FEATURES), SCALES, "opengl")
+    assert len(compile_encode(tuple(FEATURES), SCALES, "opencl").images) == 11
 
 
 def test_it_is_written_as_other_kernels_are(tmp_path):

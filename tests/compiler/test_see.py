@@ -1,0 +1,132 @@
+"""The program of what is seen past mirrors and glass: the reference's bits, only where it is wanted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.scenes.emit_path import FRAME_GROUPS
+from wamnet.compiler.scenes.lower_encode import sees
+from wamnet.compiler.scenes.lower_scene import SEEN, lower_scene, names
+from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.compiler.scenes.scene_inputs import varying
+from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.numpy_executor import NumpyExecutor
+from wamnet.refimpl import rng
+from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.light import following, render, scenes, transport
+from wamnet.refimpl.light.camera import camera_basis
+from wamnet.refimpl.light.transport import Counters, Settings
+
+SETTINGS = Settings(max_depth=3)
+PART = Part(16, 12, 0, 12, 0, 2, 7)
+TARGETS = [("opencl", 1), ("opencl", 16), ("opengl", 1), ("c", 1)]
+
+
+@pytest.mark.parametrize("name", ["glossy", "daylight"])
+def test_the_program_has_the_reference_s_bits(name):
+    """PTK-19: at each vertex of paths of 16 x 12 pixels, with those that are alive."""
+    scene, programs = scenes.canonical(name), lower_scene(scenes.canonical(name), SETTINGS, seen=True)
+    world, basis = transport.build(scene, SETTINGS), camera_basis(scene.camera, np.float32)
+    y, x = np.divmod(np.arange(16 * 12), 16)
+    counters = Counters(rng.counter(7), render.pixel_counter(x, y), rng.counter(3))
+    path = render.start(basis, *(a.astype(np.float32) for a in (x, y)), 16, 12, counters, np.float32)
+    way, most = following.begin(path.direction), following.most_followed(world)
+    assert most == programs.most_followed == 3
+    alive, ends = np.ones(len(x), bool), 0
+    with np.errstate(all="ignore"):
+        for depth in range(SETTINGS.max_depth + 1):
+            path, surface, hit = transport.arrive(world, path)
+            given = {f"point_{c}": surface.point[:, i] for i, c in enumerate("xyz")}
+            given |= {f"normal_{c}": surface.normal[:, i] for i, c in enumerate("xyz")}
+            given |= {f"reflectance_{c}": surface.reflectance[:, i] for i, c in enumerate("rgb")}
+            given |= {f"beta_{c}": path.beta[:, i] for i, c in enumerate("rgb")}
+            given |= {"t": hit.t, "surface": hit.surface, "alive": alive, "depth": rng.counter(depth)}
+            given |= {"way_going": way.going, "way_length": way.length}
+            found = interpret(programs.see, given)
+            going = way._replace(going=way.going & alive)
+            way, layers = following.see(world, going, path, surface, hit, rng.counter(depth), most)
+            for layer, values in layers.items():
+                planes = names({layer: SEEN[layer]})
+                for i, plane in enumerate(planes):
+                    expected = values[:, i] if len(planes) > 1 else values
+                    assert np.array_equal(found[plane], expected), plane
+            assert np.array_equal(found["way_going"], way.going)
+            assert np.array_equal(found["way_length"], way.length, equal_nan=True)
+            ends += int((going.going & ~way.going).sum())
+            path, further = transport.scatter(world, path, surface, hit, rng.counter(depth), counters)
+            alive = alive & further
+    assert ends == len(x)
+
+
+@pytest.mark.parametrize(("target", "lanes"), TARGETS)
+def test_a_kernel_that_is_not_asked_has_no_word_of_it(target, lanes):
+    scene = scenes.canonical("glossy")
+    plain, more = (lower_scene(scene, SETTINGS, seen=seen) for seen in (False, True))
+    first, second = (compile_path(programs, target, lanes=lanes) for programs in (plain, more))
+    assert (first.source, first.manifest) == (second.source, second.manifest)
+    assert "way_going" not in first.source
+    with pytest.raises(CompileError, match="planes 'seen_albedo' need the program 'see': lower the scene wi"):
+        compile_path(plain, target, lanes=lanes, groups=("color", "seen_albedo"))
+    asked = compile_path(more, target, lanes=lanes, groups=("color", "seen_albedo"))
+    assert "way_going" in asked.source
+    assert list(asked.manifest["programs"]) == ["start", "arrive", "look", "scatter", "see"]
+    assert "seen_*" in asked.manifest["sums"]
+
+
+@pytest.mark.parametrize(("target", "lanes"), TARGETS)
+def test_a_scene_of_matte_surfaces_has_no_way(target, lanes):
+    """FOL-4: no state, the first surface again; and of features only the first surface is traced."""
+    programs = lower_scene(scenes.canonical("cornell"), SETTINGS, seen=True)
+    made = compile_path(programs, target, lanes=lanes, groups=(*FRAME_GROUPS, *SEEN))
+    assert programs.most_followed == 0
+    assert "way_" not in made.source
+    features = compile_path(programs, target, lanes=lanes, groups=("albedo", *SEEN))
+    assert made.source.count("MAX_DEPTH 3") == features.source.count("MAX_DEPTH 0") == 1
+
+
+def sums(programs, numbers=None):
+    kernel = compile_path(programs, "numpy", groups=("color", "albedo", *SEEN))
+    return kernel.planes, NumpyExecutor().trace(kernel, PART, numbers)
+
+
+def test_planes_are_the_first_hit_s_where_nothing_is_followed():
+    planes, found = sums(lower_scene(scenes.canonical("cornell"), SETTINGS, seen=True))
+    by_name = dict(zip(planes, found, strict=True))
+    for channel in "rgb":
+        assert np.array_equal(by_name[f"seen_albedo_{channel}"], by_name[f"albedo_{channel}"])
+
+
+def test_a_roughness_may_move_across_the_limit():
+    """PTK-16: with one kernel of both scenes, each has the sums of its own kernel."""
+    shots = [scenes.glossy(0.5, roughness=roughness) for roughness in (0.05, 0.5)]
+    inputs = varying(shots, SETTINGS)
+    programs = lower_scene(shots[1], SETTINGS, moving=inputs, seen=True)
+    apart = [sums(lower_scene(shot, SETTINGS, seen=True))[1] for shot in shots]
+    assert not np.array_equal(*apart)
+    for shot, expected in zip(shots, apart, strict=True):
+        assert np.array_equal(sums(programs, inputs.values(shot))[1], expected)
+
+
+def test_a_metal_may_become_nearly_a_mirror_in_a_scene_of_none():
+    """Of the first scene alone nothing is followed; the kernel of both has a way all the same."""
+    plain = scenes.cornell()
+    rough, smooth = (
+        replace(plain, boxes=tuple(replace(box, material=metal) for box in plain.boxes))
+        for metal in (scenes.Conductor(0.5), scenes.Conductor(0.05))
+    )
+    inputs = varying([rough, smooth], SETTINGS)
+    assert lower_scene(rough, SETTINGS, seen=True).most_followed == 0
+    programs = lower_scene(rough, SETTINGS, moving=inputs, seen=True)
+    assert programs.most_followed == 3
+    for shot in (rough, smooth):
+        expected = sums(lower_scene(shot, SETTINGS, seen=True))[1]
+        assert np.array_equal(sums(programs, inputs.values(shot))[1], expected)
+
+
+def test_features_say_whether_they_see():
+    assert sees(("color", "seen_depth"))
+    assert not sees(("color", "normal", "depth"))

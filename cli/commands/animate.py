@@ -14,7 +14,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -109,6 +109,7 @@ def animate(
 
     After any interruption the same command resumes where it was.
     """
+    from ...compiler.scenes.lower_encode import sees
     from ...kernels.run.frame_plan import animation_times
     from ...refimpl.network.denoise import learned_feature_spp
 
@@ -123,7 +124,7 @@ def animate(
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     named = scene or scene_of(network), _parameters(parameters), view
     times = animation_times(start, seconds, fps)
-    shots = plan_shots(folder, named, times, (size, reference_spp, seed, rays), facts)
+    shots = plan_shots(folder, named, times, (size, reference_spp, seed, rays), facts, sees(network.features))
     if is_film:
         check_real_folder(folder)
     missing(folder, shots)
@@ -240,11 +241,12 @@ def plan_shots(
     times: Sequence[float],
     numbers: tuple[int, int, int, int],
     facts: Sequence[str],
+    seen: bool = False,
 ) -> list[Shot]:
     """Return the pictures of an animation at some times.
 
     `named` are the scene's name, parameters and view; numbers are size, samples of the reference (or 0), seed
-    and camera rays of the features (or 0).
+    and camera rays of the features (or 0). `seen`: features are also of what is seen past mirrors and glass.
     """
     from ...refimpl.light.render import Job
     from ...refimpl.light.scene import scene_digest
@@ -254,9 +256,9 @@ def plan_shots(
     shots = []
     for index, time in enumerate(times):
         scene = view.of(canonical(name, **{**chosen, "time": time}))
-        noisy = Job(size, size, 1, seed + 2 * index, feature_spp=rays)
+        noisy = Job(size, size, 1, seed + 2 * index, feature_spp=rays, seen=seen)
         reference = Job(size, size, spp, seed + 2 * index + 1) if spp else None
-        made_from = [scene_digest(scene), asdict(noisy), reference and asdict(reference), *facts]
+        made_from = [scene_digest(scene), noisy.facts(), reference and reference.facts(), *facts]
         text = json.dumps([*made_from, machine.versions()["wamnet"]])
         origin = hashlib.sha256(text.encode()).hexdigest()
         shots.append(Shot(folder / f"{index:05d}.png", scene, noisy, reference, origin))

@@ -113,6 +113,7 @@ def scene_of(model: Model) -> str | None:
 
 def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     """Return the request of frames that are like those that a model was trained on."""
+    from ...compiler.scenes.lower_encode import sees
     from ...kernels.run.frame_plan import Request
     from ...refimpl.network.denoise import learned_feature_spp
 
@@ -120,6 +121,7 @@ def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     assert scene is not None, "whoever asks for frames has looked for a scene"
     rays = learned_feature_spp(model)
     numbers = {**numbers, **ranges_of(model), "feature_spp": rays if rays > 1 else 0}
+    numbers["seen"] = sees(model.features)
     found = Request(scene, executor=executor, **numbers)
     return replace(found, max_depth=_first(model, "max_depth", found.max_depth))
 

@@ -95,6 +95,7 @@ def dataset(
     spp: Annotated[int, typer.Option(help="Paths per pixel of a target; a noisy picture has 1.")] = 64,
     test_spp: TestSpp = 0,
     feature_spp: options.FeatureSpp = 0,
+    seen: options.Seen = False,
     start: Annotated[float, typer.Option(help="Begin of the animation, in seconds.")] = 0.0,
     seconds: Annotated[float, typer.Option(help="Length of the animation; minicubes turn in 8 s.")] = 8.0,
     arc: Arc = 0.0,
@@ -132,7 +133,7 @@ def dataset(
     ways = (executor.value, sampler.value, feature_spp, test_spp, outside, arc)
     limits = {"--yaw": yaw, "--pitch": pitch, "--distance": distance, "--saturation": saturation}
     ranges = (text and options.parse_limits(option, text) for option, text in limits.items())
-    request = Request(scene, chosen, *numbers, *ways, *ranges)  # type: ignore[arg-type]
+    request = Request(scene, chosen, *numbers, *ways, *ranges, seen)  # type: ignore[arg-type]
     _check_workers(workers, scheduler)
     with hint_on_interrupt(lambda: f"the same command resumes where it was, in {output}"):
         make(output, request, plan(request), workers, scheduler)

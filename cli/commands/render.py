@@ -22,6 +22,8 @@ wamnet render minicubes
 
 wamnet render minicubes --feature-spp 16 -o noisy.exr
 
+wamnet render glossy --seen -o mirrors.exr
+
 wamnet render minicubes --time 2.5 --spp 64 --width 512 --height 512 -o reference.exr
 
 wamnet render minicubes --yaw 20 --light 1=1,0.3,0.3 --light 2=0.3,0.6,1
@@ -57,6 +59,7 @@ def render(
     height: Annotated[int, typer.Option(help="Height in pixels.")] = 256,
     spp: Annotated[int, typer.Option(help="Paths per pixel: 1 is noisy, 1024 is smooth.")] = 1,
     feature_spp: options.FeatureSpp = 0,
+    seen: options.Seen = False,
     seed: options.Seed = 0,
     time: options.Time = None,
     parameters: options.Parameters = None,
@@ -88,7 +91,7 @@ def render(
     path = output or Path(f"{Path(scene).stem}.exr")
     check_output(path, (".exr", ".png"), [Path(scene)])
     settings = Settings(max_depth=max_depth, sampler=sampler.value)
-    job = Job(width, height, spp, seed, settings, dtype.value, feature_spp=feature_spp)
+    job = Job(width, height, spp, seed, settings, dtype.value, feature_spp=feature_spp, seen=seen)
     if workers is not None and renderer(executor.value).shares_work:
         rule = f"{executor.value} shares the work by itself"
         raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")

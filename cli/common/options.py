@@ -293,6 +293,12 @@ FeatureSpp = Annotated[
         show_default="the colour's",
     ),
 ]
+Seen = Annotated[
+    bool,
+    typer.Option(
+        "--seen", help="Also layers of what is seen past mirrors and glass: seen_albedo, seen_normal, ..."
+    ),
+]
 Yaw = Annotated[
     float,
     typer.Option("--yaw", metavar="DEG", help="Turn the camera around what it looks at, in degrees."),

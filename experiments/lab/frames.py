@@ -14,7 +14,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -76,9 +76,9 @@ class Shot:
 
 def path_of(folder: Path, shot: Shot, executor: str) -> Path:
     """Return the name of a shot's file without checksum and suffix."""
-    # Files are older than some parts of a job: these are named where they are not as ever.
-    usual = {"feature_spp": 0, "seen": False, "color": True}
-    job = {name: value for name, value in asdict(shot.job).items() if usual.get(name, ...) != value}
+    job = shot.job.facts()
+    if not shot.feature_spp:
+        del job["feature_spp"]  # these files are older than it is
     made_from = [scene_digest(shot.build()), job, executor, sorted(shot.job.layers), version()]
     digest = hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:DIGITS]
     return folder / f"{shot.scene}-{shot.time:.4g}s-{shot.size}px-{shot.spp}spp-{digest}"

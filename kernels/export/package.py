@@ -28,7 +28,7 @@ from ...compiler.core.lower import lower
 from ...compiler.plan import plan_program
 from ...compiler.scenes.encode_kernel import EncodeArtifact, compile_encode
 from ...compiler.scenes.host_pass import feature_pass
-from ...compiler.scenes.lower_encode import layers_of
+from ...compiler.scenes.lower_encode import layers_of, sees
 from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.variants import FULL, parse, plan_model, vary
@@ -311,7 +311,8 @@ def _programs(request: Request, row: Row) -> PathPrograms | None:
         rule = f"the passes of target {row.name} have no place for numbers of a scene"
         raise InputError("--moving", ", ".join(request.motion.kinds), rule, "leave it out")
     moving = request.motion.inputs(request.settings) if request.motion else None
-    return lower_scene(request.scene, request.settings, forms_of(_usual(row)), moving)
+    seen = sees(request.model.features)
+    return lower_scene(request.scene, request.settings, forms_of(_usual(row)), moving, seen=seen)
 
 
 def _usual(row: Row) -> str:

@@ -63,7 +63,8 @@ class Request:
     `parameters` are those of the canonical scene. Cameras are drawn from the ranges `yaw_deg`, `pitch_deg`
     and `distance` (a factor), lamps' colours from the range `saturation` (None: the lamps' own). The features
     of noisy pictures are means over `feature_spp` camera rays; 0: over the colour's one. Targets have `spp`
-    samples, those of test frames `test_spp`; 0: as many.
+    samples, those of test frames `test_spp`; 0: as many. `seen`: noisy pictures have the layers of what is
+    seen past mirrors and glass too.
     """
 
     scene: str
@@ -86,11 +87,14 @@ class Request:
     pitch_deg: Pair = (0.0, 0.0)
     distance: Pair = (1.0, 1.0)
     saturation: Pair | None = None
+    seen: bool = False
 
     def as_data(self) -> dict[str, Any]:
-        """Return the request as JSON's types."""
+        """Return the request as JSON's types; `seen`, which requests have not always had, if it is true."""
         data = {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(self).items()}
         lists = {k: list(v) if isinstance(v, tuple) else v for k, v in sorted(self.parameters.items())}
+        if not self.seen:
+            del data["seen"]
         return {**data, "parameters": lists}
 
     @property
@@ -204,7 +208,7 @@ def plan(request: Request) -> list[FramePlan]:
         for offset, (kind, spp) in enumerate(zip(KINDS, (NOISY_SPP, target_spp), strict=True)):
             job = Job(size, size, spp, request.seed + 2 * index + offset, settings)
             if kind == KINDS[0]:
-                job = replace(job, feature_spp=request.feature_spp)
+                job = replace(job, feature_spp=request.feature_spp, seen=request.seen)
             pictures[kind] = Picture(f"{split}/{numbers[split]:05d}-{kind}.exr", request, draw, job)
         frames.append(FramePlan(split, draw, pictures))
         numbers[split] += 1

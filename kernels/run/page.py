@@ -32,7 +32,7 @@ from ...compiler.languages.glsl import MOST_UNIFORMS
 from ...compiler.languages.glsl_es import MOST_BUFFERS
 from ...compiler.plan import plan_program
 from ...compiler.scenes.encode_kernel import compile_encode
-from ...compiler.scenes.lower_encode import layers_of, planes_of
+from ...compiler.scenes.lower_encode import layers_of, planes_of, sees
 from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs, varying
@@ -41,7 +41,7 @@ from ...compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
 from ...refimpl import rng
 from ...refimpl.errors import InputError
 from ...refimpl.light import transport
-from ...refimpl.light.render import Job, render
+from ...refimpl.light.render import Job, feature_settings, render
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.scenes import TURN_SECONDS
 from ...refimpl.light.shapes.quad import quad_area_pdf
@@ -136,10 +136,11 @@ def page_data(
     scene, first = animation.scenes[0], networks[0].model
     inputs, numbers = moving_numbers(animation, settings)
     together = drawn_together(shown)
+    # Whole paths give colour; the other features are of their first hit, or of what is seen.
+    lengths = [settings, *(feature_settings(settings, sees(part)) for part in together[1:])]
     paths = [
-        # Whole paths give colour; the other features are those of their first hit, which has no scattering.
-        path_kernel(scene, replace(settings, max_depth=0) if number else settings, inputs, part, profile)
-        for number, part in enumerate(together)
+        path_kernel(scene, length, inputs, part, profile)
+        for length, part in zip(lengths, together, strict=True)
     ]
     images = check(animation, first, shown, settings)
     variants = [variant(network, images, profile) for network in networks]
@@ -204,7 +205,7 @@ def path_kernel(
     scene: Scene, settings: Settings, inputs: SceneInputs, features: Sequence[str], profile: str
 ) -> PathArtifact:
     """Return the kernel that adds up the planes of some features."""
-    programs = lower_scene(scene, settings, STATEMENTS, inputs)
+    programs = lower_scene(scene, settings, STATEMENTS, inputs, seen=sees(features))
     return compile_path(programs, TARGET, profile, 1, layers_of(features))
 
 
@@ -318,7 +319,7 @@ def check(
     animation: Animation, model: Model, features: Sequence[str], settings: Settings
 ) -> dict[str, NDArray[np.float32]]:
     """Return the encoded features (H, W, C) of a small noisy picture, by name."""
-    job = Job(CHECK_PX, CHECK_PX, 1, CHECK_SEED, settings)
+    job = Job(CHECK_PX, CHECK_PX, 1, CHECK_SEED, settings, seen=sees(features))
     frame = render(animation.scenes[0], job).frame
     return dict(images_of(replace(model, features=tuple(features)), frame))
 

@@ -25,12 +25,13 @@ from numpy.typing import NDArray
 from ...compiler.compile import compile_plan
 from ...compiler.scenes.emit_path import FRAME_GROUPS
 from ...compiler.scenes.encode_kernel import compile_encode, encoding_of
-from ...compiler.scenes.lower_encode import layers_of
+from ...compiler.scenes.lower_encode import layers_of, sees
 from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...compiler.variants import FULL, plan_model
 from ...refimpl.errors import InputError
+from ...refimpl.frame import SEEN
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
@@ -110,8 +111,11 @@ class Pipeline:
     def _compiled(self, scene: Scene, inputs: SceneInputs) -> PathArtifact:
         """Return the path kernel of a scene, built; numbers of the scene are inputs of it."""
         executor, profile = self._executor, self._profile
-        programs = lower_scene(scene, self._settings, forms_of(executor.name), inputs)
-        groups = FRAME_GROUPS if self._whole else layers_of(self._features)
+        seen = sees(self._features)
+        programs = lower_scene(scene, self._settings, forms_of(executor.name), inputs, seen=seen)
+        groups = layers_of(self._features)
+        if self._whole:
+            groups = (*FRAME_GROUPS, *(SEEN if seen else ()))
         kernel = compile_path(programs, executor.name, profile, executor.lanes, groups, self._encoding)
         executor.build(kernel)
         return kernel

@@ -19,6 +19,7 @@ from wamnet.cli.common import cluster
 from wamnet.cli.files import dataset_files, exr
 from wamnet.kernels.run import draws, frame_plan, render_frame
 from wamnet.refimpl.errors import ExecutorUnavailable
+from wamnet.refimpl.frame import SEEN, USUAL
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scene import scene_digest
 from wamnet.refimpl.light.scenes import canonical
@@ -96,6 +97,30 @@ def test_the_sampler_is_the_request_s(wamnet, tmp_path) -> None:
     outcome = wamnet("dataset", *TINY, "-o", "a")
     assert outcome.status == 2
     assert "sampler sobol (now pcg4d)" in outcome.err
+
+
+def test_what_is_seen_is_the_request_s(wamnet, tmp_path) -> None:
+    """DSF-3: noisy pictures have its layers and targets do not; a request without it does not name it."""
+    assert wamnet("dataset", *TINY, "--seen", "-o", "a").status == 0
+    assert json.loads((tmp_path / "a/manifest.json").read_text())["request"]["seen"] is True
+    assert set(exr.read_frame(tmp_path / "a/train/00000-noisy.exr").layers) == {*USUAL, *SEEN}
+    assert set(exr.read_frame(tmp_path / "a/train/00000-target.exr").layers) == set(USUAL)
+    assert wamnet("dataset", *TINY, "-o", "b").status == 0
+    assert "seen" not in json.loads((tmp_path / "b/manifest.json").read_text())["request"]
+    few = (
+        "--preset",
+        "short",
+        "--steps",
+        2,
+        "--features",
+        "color,seen_normal,seen_depth",
+        "-o",
+        "m.safetensors",
+    )
+    assert wamnet("train", "--dataset", "a", *few).status == 0
+    assert (
+        wamnet("animate", "m.safetensors", "--seconds", 0.2, "--fps", 5, "--size", 9, "-o", "c").status == 0
+    )
 
 
 def test_a_scene_and_a_check_do_not_mix(wamnet, refused) -> None:

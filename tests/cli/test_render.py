@@ -12,6 +12,7 @@ import pytest
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
 from wamnet.refimpl import encoding
+from wamnet.refimpl.frame import SEEN
 from wamnet.refimpl.light import scenes, variation
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scene import scene_digest
@@ -79,6 +80,18 @@ def test_features_of_more_rays(wamnet, tmp_path) -> None:
     found, want = exr.read_frame(tmp_path / "a.exr"), render(canonical("cornell"), Job(4, 3, feature_spp=6))
     assert all((found[name] == values).all() for name, values in want.frame.layers.items())
     assert found.info["feature_spp"] == "6"
+
+
+def test_what_is_seen_past_mirrors(wamnet, tmp_path) -> None:
+    """On request the file has four layers more, and all others as without."""
+    size = ("--width", 6, "--height", 4)
+    for options, name in (((), "a.exr"), (("--seen",), "b.exr")):
+        assert wamnet("render", "glossy", *size, *options, "-o", name).status == 0
+    plain, seen = (exr.read_frame(tmp_path / name) for name in ("a.exr", "b.exr"))
+    want = render(canonical("glossy"), Job(6, 4, seen=True)).frame
+    assert set(seen.layers) == set(want.layers) == {*plain.layers, *SEEN}
+    assert all((seen[name] == values).all() for name, values in want.layers.items())
+    assert all((seen[name] == values).all() for name, values in plain.layers.items())
 
 
 def test_a_picture(wamnet, tmp_path) -> None:

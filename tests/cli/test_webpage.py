@@ -132,7 +132,7 @@ def share_alike(found, held):
 
 def test_all_features_together_are_the_reference_s(chromium, kit, tmp_path):
     """They take two kernels of paths; the lamps' light without shadows follows their colours."""
-    features, window = tuple(dataset.FEATURES), dataset.Window(3, "clamp")
+    features, window = tuple(dataset.FIRST_HITS), dataset.Window(3, "clamp")
     network = kit.network([dataset.n_inputs(features, window), 6, 3], (3.0, 3.0))
     animation = P.Animation(TIMES, tuple(scenes.canonical("minicubes", time=time) for time in TIMES))
     networks = P.networks_of(Model(network, features, window, SCALES), rank=2)[:1]

@@ -76,7 +76,7 @@ def test_features_are_encoded_in_passes_of_four(model_of):
 
 
 def test_all_features_take_a_second_kernel_that_ends_at_the_first_hit(model_of):
-    model = model_of(*dataset.FEATURES)
+    model = model_of(*dataset.FIRST_HITS)
     data = P.page_data(animation("cornell", 0.0), P.networks_of(model, rank=2), SETTINGS)
     whole, first_hit = data["paths"]
     assert len(whole["planes"]) + len(first_hit["planes"]) == 19
@@ -85,7 +85,21 @@ def test_all_features_take_a_second_kernel_that_ends_at_the_first_hit(model_of):
     encoded = [[image["name"] for image in encoder["images"]] for encoder in data["encoders"]]
     for encoder, names in zip(data["encoders"], encoded, strict=True):
         assert set(P.planes_of(names)) <= set(data["paths"][encoder["path"]]["planes"])
-    assert sorted(name for names in encoded for name in names) == sorted(dataset.FEATURES)
+    assert sorted(name for names in encoded for name in names) == sorted(dataset.FIRST_HITS)
+
+
+def test_a_second_kernel_follows_what_is_seen(model_of):
+    """RND-2c: paths past four mirrors at most, without light samples; colour's path has those that fit."""
+    data = P.page_data(animation("glossy", 0.0), P.networks_of(model_of(*dataset.FEATURES), rank=2), SETTINGS)
+    whole, seen = data["paths"]
+    assert "seen_depth" in seen["planes"]
+    assert seen["settings"] == {**whole["settings"], "strategy": "bsdf"}
+    assert "way_going" in seen["source"]
+    assert "way_going" not in whole["source"]
+    one = P.page_data(
+        animation("glossy", 0.0), P.networks_of(model_of("color", "seen_normal"), rank=2), SETTINGS
+    )
+    assert len(one["paths"]) == 1
 
 
 @pytest.mark.parametrize("start", range(len(dataset.FEATURES)))

@@ -21,7 +21,7 @@ from wamnet.compiler.variants import FULL, with_rank
 from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
 from wamnet.kernels.devices.executor import Part
 from wamnet.refimpl.errors import CompileError, InputError
-from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.frame import SEEN, Frame
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.transport import Settings
@@ -31,13 +31,14 @@ from wamnet.refimpl.network.whole import rounded
 
 SCALES = dataset.Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 SETTINGS = Settings(max_depth=3)
-ALL = tuple(dataset.FEATURES)
+ALL = tuple(dataset.FIRST_HITS)
 
 CASES = {
     "minicubes, all features": ("minicubes", ALL, 4, "clamp", (13, 37), 1),
     "cornell, colour and normal": ("cornell", ("color", "normal"), 5, "zero", (9, 17), 3),
     "lone light, odd order": ("lone_light", ("depth", "normal", "color"), 3, "clamp", (7, 1), 2),
     "empty, one pixel": ("empty", ("color", "direction"), 2, "zero", (1, 1), 1),
+    "glossy, past mirrors": ("glossy", ("color", *SEEN), 3, "clamp", (9, 11), 2),
     "furnace, many samples": ("furnace", ("albedo", "color"), 1, "zero", (5, 33), 16),
 }
 """Scene, features, window, border, (height, width) and samples."""

@@ -36,6 +36,7 @@ FIGURES = {
     "learning_curve": {"curve.png"},
     "losses": set(),
     "lights": {"psnr.png", "color.png", "a-on-b.png", "each-frame.png"},
+    "seen": set(),
 }
 """The experiments, and figures that each must leave."""
 

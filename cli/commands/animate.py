@@ -109,7 +109,6 @@ def animate(
 
     After any interruption the same command resumes where it was.
     """
-    from ...compiler.scenes.lower_encode import sees
     from ...kernels.run.frame_plan import animation_times
     from ...refimpl.network.denoise import learned_feature_spp
 
@@ -124,7 +123,7 @@ def animate(
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     named = scene or scene_of(network), _parameters(parameters), view
     times = animation_times(start, seconds, fps)
-    shots = plan_shots(folder, named, times, (size, reference_spp, seed, rays), facts, sees(network.features))
+    shots = plan_shots(folder, named, times, (size, reference_spp, seed, rays), facts, network.features)
     if is_film:
         check_real_folder(folder)
     missing(folder, shots)
@@ -241,13 +240,14 @@ def plan_shots(
     times: Sequence[float],
     numbers: tuple[int, int, int, int],
     facts: Sequence[str],
-    seen: bool = False,
+    features: Sequence[str],
 ) -> list[Shot]:
     """Return the pictures of an animation at some times.
 
     `named` are the scene's name, parameters and view; numbers are size, samples of the reference (or 0), seed
-    and camera rays of the features (or 0). `seen`: features are also of what is seen past mirrors and glass.
+    and camera rays of the features (or 0).
     """
+    from ...compiler.scenes.lower_encode import sees
     from ...refimpl.light.render import Job
     from ...refimpl.light.scene import scene_digest
     from ...refimpl.light.scenes import canonical
@@ -256,7 +256,7 @@ def plan_shots(
     shots = []
     for index, time in enumerate(times):
         scene = view.of(canonical(name, **{**chosen, "time": time}))
-        noisy = Job(size, size, 1, seed + 2 * index, feature_spp=rays, seen=seen)
+        noisy = Job(size, size, 1, seed + 2 * index, feature_spp=rays, seen=sees(features))
         reference = Job(size, size, spp, seed + 2 * index + 1) if spp else None
         made_from = [scene_digest(scene), noisy.facts(), reference and reference.facts(), *facts]
         text = json.dumps([*made_from, machine.versions()["wamnet"]])

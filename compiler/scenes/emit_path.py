@@ -167,7 +167,7 @@ class _Kernel(Lines):
 
     @property
     def short(self) -> bool:
-        """Whether paths may end with what is seen: nothing else is asked for, and something of that."""
+        """Whether paths may end with what is seen: nothing else is requested, and something of that."""
         return self.programs.see is not None and not WHOLE & set(self.groups)
 
     @property

@@ -89,11 +89,8 @@ def compile_encode(
             f"target {target} has no kernels that encode features: compile for one that has, as opencl"
         )
     dialect = chosen.dialect
-    if dialect and len(images) > (most := dialect.max_planes // dialect.planes_per_buffer):
-        raise CompileError(
-            f"the kernel encodes {len(images)} features: {dialect.language} draws at most {most} images at "
-            "once; use fewer"
-        )
+    if dialect:
+        _check_images(images, dialect)
     arguments = dialect.said[interface.ENCODE] if dialect else chosen.schedules[0].arguments
     arguments = arguments.format(planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
     header = _header(program, images, dialect.language if dialect else chosen.language, arguments)
@@ -122,6 +119,15 @@ def compile_encode(
         SIZES: {name: len(text.encode())},
     }
     return EncodeArtifact(target, profile, entry, text, name, program, planes, images, manifest)
+
+
+def _check_images(images: Sequence[Image], dialect: Dialect) -> None:
+    """Refuse more images than a language draws at once."""
+    if len(images) > (most := dialect.max_planes // dialect.planes_per_buffer):
+        raise CompileError(
+            f"the kernel encodes {len(images)} features: {dialect.language} draws at most {most} images at "
+            "once; use fewer"
+        )
 
 
 def encoding_of(

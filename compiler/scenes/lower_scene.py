@@ -93,7 +93,7 @@ PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "elimina
 class PathPrograms:
     """The programs of one path in one scene; `alive`, `scatter`'s boolean, says whether it continues.
 
-    `see` is there where it was asked for; the path is followed past `most_followed` surfaces at most.
+    `see` is there where it was requested; the path is followed past `most_followed` surfaces at most.
     `inputs` are the names of the scene's numbers that all four are given [scene_inputs.py], `places` where
     they are in its tables, `values` those of this scene.
     """
@@ -130,8 +130,7 @@ def lower_scene(
 
     Primitives are statements each, tables and loops, or a tree, as `forms` and their costs say [forms.py].
     `keep_places`: nodes know the lines of the reference that they came from, for listings. Numbers that are
-    `moving` are inputs; such a scene has no tree, whose boxes would have to move. `seen`: with the program of
-    what is seen past mirrors and glass.
+    `moving` are inputs; such a scene has no tree, whose boxes would have to move. `seen`: `see` too.
     """
     moving = moving or SceneInputs(settings, ())
     laid, values, statements = _laid_out(scene, settings, forms, moving)
@@ -164,7 +163,6 @@ def lower_scene(
     size, depth = dict.fromkeys(("width", "height"), (NUMBER, FLOAT)), {"depth": (NUMBER, COUNTER)}
     scene_numbers = dict.fromkeys(moving.names, (NUMBER, FLOAT))
     lowered = partial(_lowered, most_unrolled=None if statements else 1, keep_places=keep_places)
-    most = _most_followed(laid["world"], moving) if seen else 0
     return PathPrograms(
         scene.name,
         scene_digest(scene),
@@ -176,8 +174,7 @@ def lower_scene(
         moving.names,
         moving.places,
         tuple(map(float, values)),
-        lowered("see", *_see(world_of, most, scene_numbers)) if seen else None,
-        most,
+        *_seen(lowered, world_of, _most_followed(laid["world"], moving), scene_numbers, seen),
     )
 
 
@@ -198,6 +195,17 @@ def _most_followed(world: World, moving: SceneInputs) -> int:
     if any(path.startswith(MATERIALS) for places in moving.places for path, _ in places):
         return min(following.MOST_FOLLOWED, world.settings.max_depth)
     return following.most_followed(world)
+
+
+def _seen(
+    lowered: Callable[..., Program],
+    world_of: Callable[[Mapping[str, Any]], World],
+    most: int,
+    scene_numbers: Values,
+    wanted: bool,
+) -> tuple[Program | None, int]:
+    """Return the program that sees, if it is wanted, and how many surfaces it is followed past at most."""
+    return (lowered("see", *_see(world_of, most, scene_numbers)), most) if wanted else (None, 0)
 
 
 def _see(

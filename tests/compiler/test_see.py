@@ -112,7 +112,7 @@ def test_a_roughness_may_move_across_the_limit():
 
 
 def test_a_metal_may_become_nearly_a_mirror_in_a_scene_of_none():
-    """Of the first scene alone nothing is followed; the kernel of both has a way all the same."""
+    """Of the first scene by itself nothing is followed; the kernel of both has a way all the same."""
     plain = scenes.cornell()
     rough, smooth = (
         replace(plain, boxes=tuple(replace(box, material=metal) for box in plain.boxes))

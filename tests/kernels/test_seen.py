@@ -40,9 +40,10 @@ def test_the_other_layers_keep_their_bits(executor):
     off = {name: np.abs(more.frame[name] - plain.frame[name]).max() for name in plain.frame.layers}
     if executor.name == "numpy":
         assert max(off.values()) == 0.0
-    # Compilers that contract may do so in other places where there is more text, and move a whole path.
+    # Compilers that contract may do so in other places where there is more text, and move a whole path; a
+    # first hit they move by 64 u s at most (spec/intersection.md), s below 16 here.
     del off["color"]
-    assert max(off.values()) <= 1e-5
+    assert max(off.values()) <= 64 * 2.0**-24 * 16
 
 
 def test_a_job_without_colour_asks_for_no_plane_of_it():

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -133,7 +134,8 @@ def dataset(
     ways = (executor.value, sampler.value, feature_spp, test_spp, outside, arc)
     limits = {"--yaw": yaw, "--pitch": pitch, "--distance": distance, "--saturation": saturation}
     ranges = (text and options.parse_limits(option, text) for option, text in limits.items())
-    request = Request(scene, chosen, *numbers, *ways, *ranges, seen)  # type: ignore[arg-type]
+    request = Request(scene, chosen, *numbers, *ways, *ranges)  # type: ignore[arg-type]
+    request = replace(request, seen=seen)
     _check_workers(workers, scheduler)
     with hint_on_interrupt(lambda: f"the same command resumes where it was, in {output}"):
         make(output, request, plan(request), workers, scheduler)

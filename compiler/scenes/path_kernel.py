@@ -224,7 +224,8 @@ def _identity(programs: PathPrograms, name: str, text: str) -> dict[str, Any]:
 
 def _passed(programs: PathPrograms, passes: Sequence[str]) -> PathPrograms:
     """Return the programs after the named passes."""
-    return replace(programs, **{n: pipeline.run(part, passes) for n, part in programs.parts().items()})
+    passed: dict[str, Any] = {n: pipeline.run(part, passes) for n, part in programs.parts().items()}
+    return replace(programs, **passed)
 
 
 def _printed(programs: PathPrograms, header: Sequence[str]) -> str:

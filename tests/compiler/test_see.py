@@ -28,7 +28,7 @@ TARGETS = [("opencl", 1), ("opencl", 16), ("opengl", 1), ("c", 1)]
 
 @pytest.mark.parametrize("name", ["glossy", "daylight"])
 def test_the_program_has_the_reference_s_bits(name):
-    """PTK-19: at each vertex of paths of 16 x 12 pixels, with those that are alive."""
+    """PTK-20: at each vertex of paths of 16 x 12 pixels, with those that are alive."""
     scene, programs = scenes.canonical(name), lower_scene(scenes.canonical(name), SETTINGS, seen=True)
     world, basis = transport.build(scene, SETTINGS), camera_basis(scene.camera, np.float32)
     y, x = np.divmod(np.arange(16 * 12), 16)

@@ -17,7 +17,7 @@ SETTINGS = Settings(max_depth=4)
 @pytest.mark.parametrize("feature_spp", [0, 5])
 @pytest.mark.parametrize("name", ["glossy", "daylight", "cornell"])
 def test_layers_are_the_reference_s(executor, name, feature_spp):
-    """PTK-19; at least 98 pixels in 100 have every layer to 1e-4 of its size.
+    """PTK-20; at least 98 pixels in 100 have every layer to 1e-4 of its size.
 
     A way through a ball multiplies the error of a distance, 64 u s (spec/intersection.md), by 2 t / r, about
     ten, at each of four surfaces; where it falls on the other side of an edge its pixel is another one.

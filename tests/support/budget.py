@@ -20,7 +20,7 @@ BUDGET = {
     "compiler/proof": 3100,
     "compiler/reading": 4050,
     "compiler/schedules": 4650,
-    "compiler/scenes": 2000,
+    "compiler/scenes": 2150,
     "compiler/training": 1200,
     "kernels": 150,
     "kernels/devices": 2350,

@@ -115,6 +115,7 @@ def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     """Return the request of frames that are like those that a model was trained on."""
     from ...compiler.scenes.lower_encode import sees
     from ...kernels.run.frame_plan import Request
+    from ...refimpl.light.render import FEATURE_SAMPLER
     from ...refimpl.network.denoise import learned_feature_spp
 
     scene = scene_of(model)
@@ -122,6 +123,8 @@ def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     rays = learned_feature_spp(model)
     numbers = {**numbers, **ranges_of(model), "feature_spp": rays if rays > 1 else 0}
     numbers["seen"] = sees(model.features)
+    # Frames of before say no source: theirs was the colour's.
+    numbers["feature_sampler"] = model.info.get(f"trained_on_{FEATURE_SAMPLER}", Request.sampler)
     found = Request(scene, executor=executor, **numbers)
     return replace(found, max_depth=_first(model, "max_depth", found.max_depth))
 

@@ -99,7 +99,7 @@ class Plan:
     test_frames: int = 2
     train_spp: int = 64
     reference_spp: int = 1024
-    feature_spp: int = 16
+    feature_spp: int = 4
     preset: str = "best"
     steps: int | None = None
     seed: int = 1

@@ -72,20 +72,41 @@ def load_model(path: Path) -> Model:
 
 def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what about a frame of this info a model has not learned, as sentences; not known is nothing."""
-    from ...refimpl.light.render import FEATURE_SPP
-
     told = []
     scenes, scene = model.info.get("trained_on_scene", ""), info.get("scene", "")
     if scenes and scene and scene not in scenes.split(", "):
         told.append(f"it shows {scene}, and the model has learned only {scenes}: expect a poor picture")
     elif beyond := outside_ranges(model, info):
         told.append(f"outside of what the model has learned: {', '.join(beyond)}; expect errors")
-    if scenes and "spp" in info:
-        rays, wanted = info.get(FEATURE_SPP, "1"), model.info.get(f"trained_on_{FEATURE_SPP}", "1")
-        if rays not in wanted.split(", "):
-            rule = f"its features are of --feature-spp {rays}, those that the model learned from of {wanted}"
-            told.append(f"{rule}: expect worse edges")
+    if scenes and "spp" in info and (rule := unlike_features(model, info)):
+        told.append(f"{rule}: expect worse edges")
     return told
+
+
+def unlike_features(model: Model, info: Mapping[str, str]) -> str:
+    """Return that a frame's features are of other rays than a model's, or "": fewer do if spread."""
+    from ...refimpl.light.render import FEATURE_SAMPLER, FEATURE_SPP, spread_rays
+
+    rays, wanted = info.get(FEATURE_SPP, "1"), model.info.get(f"trained_on_{FEATURE_SPP}", "1")
+    source, learned = info.get(FEATURE_SAMPLER, ""), model.info.get(f"trained_on_{FEATURE_SAMPLER}", "")
+    counts = wanted.split(", ")
+    if source and not learned:
+        counts = [str(spread_rays(int(count))) for count in counts if count.isdigit()] + counts
+    if rays in counts and (source or not learned):
+        return ""
+    at_random = "" if source or not learned else " at random"
+    return (
+        f"its features are of --feature-spp {rays}{at_random}, those that the model learned from of {wanted}"
+    )
+
+
+def feature_rays(model: Model) -> int:
+    """Return how many camera rays that are spread evenly are worth those that a model has learned from."""
+    from ...refimpl.light.render import FEATURE_SAMPLER, spread_rays
+    from ...refimpl.network.denoise import learned_feature_spp
+
+    rays = learned_feature_spp(model)
+    return rays if model.info.get(f"trained_on_{FEATURE_SAMPLER}") else spread_rays(rays)
 
 
 def outside_ranges(model: Model, info: Mapping[str, str]) -> list[str]:

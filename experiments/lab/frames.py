@@ -29,6 +29,7 @@ from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.render import Job, feature_job, render_info
 from wamnet.refimpl.light.scene import Scene, scene_digest
 from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import AT_REST, Variation, varied
 
 NOISY_SPP = 1
@@ -40,6 +41,9 @@ DIGITS = 16
 TIMES_SEED = 0
 """Seed of the sequence of times of all experiments."""
 
+RANDOM = Settings().sampler
+"""Source of camera rays that are independent of each other."""
+
 Pair = tuple[Frame, Frame]
 """A noisy frame and its reference."""
 
@@ -48,8 +52,8 @@ Pair = tuple[Frame, Frame]
 class Shot:
     """A picture to be rendered; `parameters` are those of the canonical scene, without its time.
 
-    Its features are means over `feature_spp` camera rays; 0: over the colour's. `seen`: they are also of what
-    is seen past mirrors and glass.
+    Its features are means over `feature_spp` camera rays of `feature_sampler`; 0: over the colour's. Records
+    were made with rays at random. `seen`: features are also of what is seen past mirrors and glass.
     """
 
     scene: str = "minicubes"
@@ -61,12 +65,13 @@ class Shot:
     feature_spp: int = 0
     variation: Variation = AT_REST
     seen: bool = False
+    feature_sampler: str = RANDOM
 
     @property
     def job(self) -> Job:
         """Return size, samples and seed as the renderer wants them."""
-        rays = {"feature_spp": self.feature_spp, "seen": self.seen}
-        return Job(self.size, self.size, self.spp, self.seed, **rays)
+        rays = {"feature_spp": self.feature_spp, "feature_sampler": self.feature_sampler}
+        return Job(self.size, self.size, self.spp, self.seed, seen=self.seen, **rays)  # type: ignore[arg-type]
 
     def build(self) -> Scene:
         """Return the scene at its time, from its side and under its lamps."""
@@ -79,6 +84,8 @@ def path_of(folder: Path, shot: Shot, executor: str) -> Path:
     job = shot.job.facts()
     if not shot.feature_spp:
         del job["feature_spp"]  # these files are older than it is
+    if not shot.feature_spp or shot.feature_sampler == RANDOM:
+        del job["feature_sampler"]  # and so are these
     made_from = [scene_digest(shot.build()), job, executor, sorted(shot.job.layers), version()]
     digest = hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:DIGITS]
     return folder / f"{shot.scene}-{shot.time:.4g}s-{shot.size}px-{shot.spp}spp-{digest}"

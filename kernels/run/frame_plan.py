@@ -24,7 +24,7 @@ import numpy as np
 
 from ...refimpl.errors import InputError
 from ...refimpl.frame import Frame
-from ...refimpl.light.render import TILE_PIXELS, Job
+from ...refimpl.light.render import FEATURE_SAMPLER, TILE_PIXELS, Job, other_sampler, spread
 from ...refimpl.light.scene import Scene, scene_digest
 from ...refimpl.light.scenes import TURN_SECONDS, canonical
 from ...refimpl.light.transport import Settings
@@ -62,9 +62,9 @@ class Request:
     The animation runs from `start_s` for `seconds`, of which training leaves out the last `arc_s`;
     `parameters` are those of the canonical scene. Cameras are drawn from the ranges `yaw_deg`, `pitch_deg`
     and `distance` (a factor), lamps' colours from the range `saturation` (None: the lamps' own). The features
-    of noisy pictures are means over `feature_spp` camera rays; 0: over the colour's one. Targets have `spp`
-    samples, those of test frames `test_spp`; 0: as many. `seen`: noisy pictures have the layers of what is
-    seen past mirrors and glass too.
+    of noisy pictures are means over `feature_spp` camera rays; 0: over the colour's one; they come from
+    `feature_sampler`, "" is an even spread. Targets have `spp` samples, those of test frames `test_spp`; 0:
+    as many. `seen`: noisy pictures have the layers of what is seen past mirrors and glass too.
     """
 
     scene: str
@@ -88,10 +88,14 @@ class Request:
     distance: Pair = (1.0, 1.0)
     saturation: Pair | None = None
     seen: bool = False
+    feature_sampler: str = ""
 
     def as_data(self) -> dict[str, Any]:
-        """Return the request as JSON's types; `seen`, which requests have not always had, if it is true."""
+        """Return the request as JSON's types: `seen` if it is true, a source that is not the colour's."""
         data = {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(self).items()}
+        source = data.pop("feature_sampler") or spread(self.sampler, self.seen)
+        if self.feature_spp > NOISY_SPP and source != self.sampler:
+            data["feature_sampler"] = source
         lists = {k: list(v) if isinstance(v, tuple) else v for k, v in sorted(self.parameters.items())}
         if not self.seen:
             del data["seen"]
@@ -208,7 +212,8 @@ def plan(request: Request) -> list[FramePlan]:
         for offset, (kind, spp) in enumerate(zip(KINDS, (NOISY_SPP, target_spp), strict=True)):
             job = Job(size, size, spp, request.seed + 2 * index + offset, settings)
             if kind == KINDS[0]:
-                job = replace(job, feature_spp=request.feature_spp, seen=request.seen)
+                rays = {"feature_spp": request.feature_spp, "feature_sampler": request.feature_sampler}
+                job = replace(job, seen=request.seen, **rays)
             pictures[kind] = Picture(f"{split}/{numbers[split]:05d}-{kind}.exr", request, draw, job)
         frames.append(FramePlan(split, draw, pictures))
         numbers[split] += 1
@@ -273,6 +278,7 @@ def describe(frame: FramePlan) -> dict[str, Any]:
         facts[kind] |= {"spp": job.spp, "seed": job.seed}
         if job.feature_spp:
             facts[kind]["feature_spp"] = job.feature_spp
+            facts[kind] |= {FEATURE_SAMPLER: source} if (source := other_sampler(job)) else {}
     return facts
 
 

@@ -7,13 +7,14 @@
    only on (seed, pixel, sample), so neither tile size nor row range changes a bit of the result.
 4. The features may be means over more camera rays than are followed to the end: they cost a fraction of a
    path, and show edges without jags. They are then the layers of a job without scattering [`feature_job`],
-   [`with_own_features`].
+   [`with_own_features`], whose rays are spread evenly over a pixel and begin with the colour's first one.
 5. Features of what is seen past mirrors and glass are layers of their own, on request (following.py). They
    follow the same paths; those of more camera rays end where the features do.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -45,6 +46,9 @@ TILE_PIXELS = 8192
 FEATURE_SPP = "feature_spp"
 """Name of the fact, in a frame's info, that its features are means over more camera rays than its colour."""
 
+FEATURE_SAMPLER = "feature_sampler"
+"""Name of the fact of the source of these rays; without it they come from the colour's."""
+
 
 @dataclass(frozen=True)
 class Job:
@@ -52,8 +56,9 @@ class Job:
 
     `first_sample` is the number of the first sample: jobs with different ranges are independent parts of one
     render. `feature_spp` is the number of camera rays whose first hits the feature layers are means over; 0,
-    as any number up to spp, means those of the colour's samples. `seen`: the frame has the layers of what is
-    seen past mirrors and glass too. `color` is False where paths end with their features.
+    as any number up to spp, means those of the colour's samples. `feature_sampler` is where they come from;
+    "" is an even spread [`spread`]. `seen`: the frame has the layers of what is seen past mirrors and glass
+    too. `color` is False where paths end with their features.
     """
 
     width: int
@@ -66,6 +71,7 @@ class Job:
     feature_spp: int = 0
     seen: bool = False
     color: bool = True
+    feature_sampler: str = ""
 
     def __post_init__(self) -> None:
         """Refuse sizes and counts outside their rules."""
@@ -77,6 +83,10 @@ class Job:
         _check_range("feature_spp", self.feature_spp, 0, MAX_SAMPLES - self.first_sample)
         if self.dtype not in ("float32", "float64"):
             raise InputError("dtype", self.dtype, "it must be float32 or float64", "choose one of them")
+        known = transport.CAMERA_SAMPLERS
+        if self.feature_sampler and self.feature_sampler not in known:
+            rule = f"known are {', '.join(known)}"
+            raise InputError("feature_sampler", self.feature_sampler, "it is unknown", rule)
 
     @property
     def layers(self) -> tuple[str, ...]:
@@ -147,13 +157,16 @@ def render(
 def feature_job(job: Job) -> Job | None:
     """Return the job whose frame has the feature layers, or None where they come with the colour.
 
-    Its samples are those of the colour and more after them, none of which is scattered. Where the features
-    are also of what is seen, they are, without light samples, until that is found.
+    Its rays are numbered as the colour's samples are, from the same one on; none is scattered. Where the
+    features are also of what is seen, they are, without light samples, until that is found.
     """
     if job.feature_spp <= job.spp:
         return None
     settings, color = feature_settings(job.settings, job.seen), not job.seen
-    return replace(job, spp=job.feature_spp, feature_spp=0, settings=settings, color=color)
+    settings = replace(settings, sampler=feature_sampler(job))
+    return replace(
+        job, spp=job.feature_spp, feature_spp=0, feature_sampler="", settings=settings, color=color
+    )
 
 
 def feature_settings(settings: Settings, seen: bool) -> Settings:
@@ -162,6 +175,31 @@ def feature_settings(settings: Settings, seen: bool) -> Settings:
         return replace(settings, max_depth=0)
     most = min(following.MOST_FOLLOWED, settings.max_depth)
     return replace(settings, max_depth=most, strategy="bsdf", roulette_depth=None)
+
+
+def feature_sampler(job: Job) -> str:
+    """Return the source of the features' own rays."""
+    return job.feature_sampler or spread(job.settings.sampler, job.seen)
+
+
+def spread(sampler: str, seen: bool) -> str:
+    """Return the source of features' own rays, spread evenly, beside a path's sampler.
+
+    It begins with the colour's first ray [transport.py: SPREAD]; paths that features follow need numbers for
+    scatterings too, and take Sobol's.
+    """
+    return "sobol" if seen else transport.SPREAD.get(sampler, sampler)
+
+
+def other_sampler(job: Job) -> str:
+    """Return the source of the features' own rays where there are such, and it is not the colour's; or ""."""
+    source = feature_sampler(job)
+    return "" if feature_job(job) is None or source == job.settings.sampler else source
+
+
+def spread_rays(rays: int) -> int:
+    """Return how many camera rays that are spread evenly show edges about as well as so many at random."""
+    return math.isqrt(max(rays - 1, 0)) + 1 if rays else 0
 
 
 def with_own_features(scene: Scene, job: Job, render_part: Callable[[Job], Render]) -> Render:
@@ -258,7 +296,7 @@ def start(
     sampler: str = "pcg4d",
 ) -> Path:
     """Return paths that leave the camera through a random point of pixels x, y (...), in floats."""
-    u, v, _, _ = transport.SAMPLERS[sampler](*counters, np.uint32(0), dtype)
+    u, v, _, _ = transport.CAMERA_SAMPLERS[sampler](*counters, np.uint32(0), dtype)
     return transport.camera_path(*camera_ray(basis, x, y, u, v, width, height))
 
 
@@ -302,10 +340,18 @@ def render_info(scene: Scene, job: Job) -> dict[str, str]:
         "scene_digest": scene_digest(scene),
         "spp": str(job.spp),
         "seed": str(job.seed),
-        **({} if feature_job(job) is None else {FEATURE_SPP: str(job.feature_spp)}),
+        **_feature_facts(job),
         **{
             name: str(value)
             for name, value in job.settings.facts().items()
             if name in ("max_depth", "sampler")
         },
     }
+
+
+def _feature_facts(job: Job) -> dict[str, str]:
+    """Return what is said of features of their own rays: how many, and their source if it is another one."""
+    if feature_job(job) is None:
+        return {}
+    source = other_sampler(job)
+    return {FEATURE_SPP: str(job.feature_spp), **({FEATURE_SAMPLER: source} if source else {})}

@@ -9,6 +9,9 @@
 3. [`uniforms`] takes the place of rng.py's function of the same arguments: each block of each pixel has its
    own scrambling, and its own order of the same points, so that blocks are independent of each other.
    Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020.
+4. [`net_uniforms`] is a cheaper source for what is spread over two numbers only, camera rays: the points of
+   the first two dimensions [`net`], scrambled, and moved by an exclusive or so that point 0 is rng.py's
+   sample 0: both sources begin with the same ray. Halves, quarters, ... keep together under a move as well.
 
 Within a block, any 2^m samples numbered from a multiple of 2^m on are evenly spread; integrals of smooth
 functions then err less. Samples of a pixel are not independent, so a variance taken from them is too large.
@@ -62,6 +65,10 @@ DIRECTIONS = (
 reversed."""
 
 
+HALVES = ((16, 0x0000FFFF), *SWAPS)
+"""Distance and mask of the halves of a polynomial over GF(2), of those halves, and so on [`net`]."""
+
+
 def reverse_bits(x: Any) -> Any:
     """Return uint32 words (...) with their bits in the opposite order."""
     x = (x >> np.uint32(16)) + x * np.uint32(1 << 16)
@@ -82,10 +89,14 @@ def sobol(index: Any, dimension: int) -> Any:
 
 def scramble(x: Any, key: Any) -> Any:
     """Return fractions of 2^32 x (...) under the nested permutation that key (...) names."""
-    x = reverse_bits(x) + key
+    return reverse_bits(_carried_up(reverse_bits(x) + key))
+
+
+def _carried_up(x: Any) -> Any:
+    """Return words (...) of which each bit is changed by the bits below it."""
     for multiplier in MULTIPLIERS:
         x = x ^ (x * np.uint32(multiplier))
-    return reverse_bits(x)
+    return x
 
 
 def uniforms(seed: Any, pixel: Any, sample: Any, block: Any, dtype: DTypeLike = np.float32) -> rng.Block:
@@ -96,3 +107,32 @@ def uniforms(seed: Any, pixel: Any, sample: Any, block: Any, dtype: DTypeLike = 
     point = (scramble(sobol(index, dimension), key) for dimension, key in enumerate(keys))
     u0, u1, u2, u3 = (rng.uniform_floats(word, dtype) for word in point)
     return u0, u1, u2, u3
+
+
+def net_uniforms(seed: Any, pixel: Any, sample: Any, block: Any, dtype: DTypeLike = np.float32) -> rng.Block:
+    """Return four uniform floats in [0, 1), the first two of them a pixel's scrambled point.
+
+    With the words w0 to w3 that rng.py has for sample 0, its point n is scrambled with the keys w2 and w3,
+    and moved by an exclusive or so that point 0 becomes (w0, w1). The last two floats, which no camera
+    asks for, are those of sample 0. Blocks of a pixel have one order: a path must not take its numbers from here.
+    """
+    w0, w1, w2, w3 = rng.random_block(seed, pixel, np.zeros_like(pixel), block)
+    moved = (
+        word ^ reverse_bits(_carried_up(point + key) ^ _carried_up(key))
+        for word, point, key in zip((w0, w1), net(sample), (w2, w3), strict=True)
+    )
+    u0, u1, u2, u3 = (rng.uniform_floats(word, dtype) for word in (*moved, w2, w3))
+    return u0, u1, u2, u3
+
+
+def net(index: Any) -> tuple[Any, Any]:
+    """Return the first two coordinates (...) of the points with uint32 indices (...), their bits reversed.
+
+    They are those of [`sobol`] in fewer steps. The direction numbers of dimension 1 are the powers of 1 + x
+    over GF(2), so its coordinate is the index as a polynomial at 1 + x; a polynomial low + x^s high there is
+    low + high + x^s high of the same halves there, as (1 + x)^s = 1 + x^s for s = 2^j.
+    """
+    at_next = index
+    for distance, mask in HALVES:
+        at_next = at_next ^ ((at_next >> np.uint32(distance)) & np.uint32(mask))
+    return index, at_next

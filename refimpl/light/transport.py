@@ -53,6 +53,15 @@ SAMPLERS: Mapping[str, Callable[..., rng.Block]] = {"pcg4d": rng.uniforms, "sobo
 """Sources of random numbers by name: four uniform floats of (seed, pixel, sample, block). The first is the
 default: its samples are independent."""
 
+NET = "net"
+"""Name of the source whose samples are spread evenly over a pixel, and over nothing else."""
+
+CAMERA_SAMPLERS: Mapping[str, Callable[..., rng.Block]] = {**SAMPLERS, NET: sobol.net_uniforms}
+"""Sources of the numbers of camera rays: of paths that end at their first hit, any of them."""
+
+SPREAD: Mapping[str, str] = {"pcg4d": NET, "sobol": "sobol"}
+"""The source of camera rays that are spread evenly, by a path's sampler: both give sample 0 the same ray."""
+
 BLOCKS_PER_BOUNCE = 2
 """Blocks of four random numbers that a scattering uses; block 0 belongs to the camera."""
 
@@ -108,7 +117,10 @@ class Settings:
             raise InputError(
                 "heuristic", self.heuristic, "it is unknown", f"known are {', '.join(HEURISTICS)}"
             )
-        if self.sampler not in SAMPLERS:
+        if self.sampler == NET and self.max_depth > 0:
+            rule = "its numbers are for camera rays, not for scatterings"
+            raise InputError("sampler", self.sampler, rule, f"use one of {', '.join(SAMPLERS)}")
+        if self.sampler not in CAMERA_SAMPLERS:
             raise InputError("sampler", self.sampler, "it is unknown", f"known are {', '.join(SAMPLERS)}")
 
     def facts(self) -> dict[str, Any]:
@@ -271,7 +283,7 @@ def _roulette(first: int, beta: Colors, alive: Truths, u: Floats, depth: Any) ->
 
 def _uniforms(world: World, counters: Counters, block: Any) -> rng.Block:
     """Return four uniform numbers (...) of the given block in the world's float type."""
-    draw = SAMPLERS[world.settings.sampler]
+    draw = CAMERA_SAMPLERS[world.settings.sampler]
     return draw(counters.seed, counters.pixel, counters.sample, block, world.geometry.dtype)
 
 

@@ -148,6 +148,22 @@ def test_models_have_names(samples, monkeypatch, tmp_path, capsys) -> None:
             {"scene": "empty", "spp": "1"},
             ["its features are of --feature-spp 1, those that the model learned from of 16"],
         ),
+        # Four rays that are spread stand for sixteen at random, but not the other way round.
+        (
+            {"scene": "empty", "feature_spp": "16"},
+            {"scene": "empty", "spp": "1", "feature_spp": "4", "feature_sampler": "net"},
+            [],
+        ),
+        (
+            {"scene": "empty", "feature_spp": "16"},
+            {"scene": "empty", "spp": "1", "feature_spp": "3", "feature_sampler": "net"},
+            ["its features are of --feature-spp 3, those that the model learned from of 16"],
+        ),
+        (
+            {"scene": "empty", "feature_spp": "4", "feature_sampler": "net"},
+            {"scene": "empty", "spp": "1", "feature_spp": "4"},
+            ["its features are of --feature-spp 4 at random, those that the model learned from of 4"],
+        ),
         (
             {"scene": "empty"},
             {"scene": "cornell", "spp": "1", "feature_spp": "4"},
@@ -165,6 +181,18 @@ def test_frames_unlike_those_of_the_training(samples, trained, shown, told) -> N
     found = inputs.unlike_training(model, shown)
     assert len(found) == len(told)
     assert all(text.startswith(begin) for text, begin in zip(found, told, strict=True))
+
+
+def test_rays_that_stand_for_those_of_the_training(samples) -> None:
+    """RND-2d: the root of so many at random, rounded up; as many where they were spread too."""
+    model = load_model(samples / "model.safetensors")
+
+    def rays(**facts: str) -> int:
+        return inputs.feature_rays(replace(model, info={f"trained_on_{k}": v for k, v in facts.items()}))
+
+    assert [rays(feature_spp=str(n)) for n in (1, 2, 4, 5, 16, 17)] == [1, 2, 2, 3, 4, 5]
+    assert rays(feature_spp="6", feature_sampler="net") == 6
+    assert rays() == 0
 
 
 RANGES = Ranges((0.0, 6.0), (-24.0, 24.0), (-8.0, 8.0), (0.9, 1.1), (0.0, 0.5))

@@ -67,6 +67,7 @@ SETTINGS = [
     Settings(max_depth=2, strategy="light"),
     Settings(max_depth=1, sampler="sobol"),
     Settings(max_depth=2, strategy="bsdf"),
+    Settings(max_depth=0, sampler="net"),
 ]
 
 

@@ -116,7 +116,7 @@ def test_a_colour_that_is_there_gets_other_features(tmp_path):
     shot = Shot("cornell", size=6, seed=4)
     (plain,) = frames.frames(tmp_path, [shot], "numpy")
     (found,) = frames.frames(tmp_path, [replace(shot, feature_spp=5)], "numpy")
-    want = render(shot.build(), Job(6, 6, seed=4, feature_spp=5)).frame
+    want = render(shot.build(), Job(6, 6, seed=4, feature_spp=5, feature_sampler="pcg4d")).frame
     assert all(np.array_equal(found[name], want[name]) for name in want.layers)
     assert found.info == want.info
     assert not np.array_equal(found["normal"], plain["normal"])
@@ -129,7 +129,7 @@ def test_names_without_features_of_their_own_are_the_older_ones(tmp_path):
     names = {frames.path_of(tmp_path, replace(shot, feature_spp=rays), "numpy") for rays in (0, 5, 16)}
     assert len(names) == 3
     job = {**asdict(shot.job)}
-    del job["feature_spp"], job["seen"], job["color"]
+    del job["feature_spp"], job["feature_sampler"], job["seen"], job["color"]
     made_from = [scene_digest(shot.build()), job, "numpy", sorted(USUAL), version()]
     digest = hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()
     assert any(name.name.endswith(digest[:16]) for name in names)

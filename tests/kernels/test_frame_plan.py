@@ -94,7 +94,10 @@ def test_rays_of_features_and_samples_of_tests() -> None:
     assert [job["target"].spp for job in jobs] == [2, 2, 5]
     noisy = frame_plan.describe(plan(request)[0])["noisy"]
     assert (noisy["spp"], noisy["feature_spp"]) == (1, 16)
-    assert "feature_spp" not in frame_plan.describe(plan(TINY)[0])["noisy"]
+    assert noisy["feature_sampler"] == request.as_data()["feature_sampler"] == "net"
+    assert not {"feature_spp", "feature_sampler"} & {*frame_plan.describe(plan(TINY)[0])["noisy"]}
+    older = replace(request, feature_sampler="pcg4d")
+    assert "feature_sampler" not in {**older.as_data(), **frame_plan.describe(plan(older)[0])["noisy"]}
     assert {"feature_spp": 16, "test_spp": 5}.items() <= request.as_data().items()
     task = tasks_of(plan(request)[0].pictures["noisy"])[0]
     assert task.samples == 6 * 6 * (1 + 16)

@@ -188,3 +188,22 @@ def test_the_sampler_is_told_where_it_is_not_the_usual_one():
 def test_refuses_an_unknown_sampler():
     with pytest.raises(InputError, match="sampler is halton: it is unknown; known are pcg4d, sobol"):
         Settings(sampler="halton")
+
+
+@given(st.lists(WORD, min_size=1, max_size=32))
+def test_points_of_two_dimensions_in_fewer_steps(index):
+    """SOB-5: the same points as by direction numbers, to the bit."""
+    index = words(*index)
+    for dimension, found in enumerate(sobol.net(index)):
+        assert np.array_equal(sobol.reverse_bits(found), sobol.sobol(index, dimension))
+
+
+@given(WORD, WORD, st.integers(0, 12))
+def test_moved_points_stay_a_net(seed, pixel, m):
+    """SOB-5: of 2^m samples each elementary interval of area 2^-m has one; 24 bits of a float keep that."""
+    sample, count = np.arange(2**m, dtype=np.uint32), 2**m
+    key = [np.full(count, value, np.uint32) for value in (seed, pixel)]
+    u, v, _, _ = sobol.net_uniforms(*key, sample, np.uint32(0), np.float64)
+    for bits in range(m + 1):
+        cell = np.floor(u * 2**bits) * 2 ** (m - bits) + np.floor(v * 2 ** (m - bits))
+        assert len(set(cell.tolist())) == count

@@ -25,7 +25,7 @@ from ...compiler.core.writing import remove_temporaries
 from ...refimpl.errors import InputError
 from ..common import options
 from ..common.effort import said_of_rendering
-from ..common.inputs import load_model, model_path, unlike_training
+from ..common.inputs import feature_rays, load_model, model_path, unlike_training
 from ..common.options import ExecutorName, Renderer
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import movie
@@ -73,9 +73,8 @@ Rays = Annotated[
     int | None,
     typer.Option(
         metavar="N",
-        help="Camera rays per pixel of the features; with more than the colour's, pictures are rendered and "
-        "denoised one after the other.",
-        show_default="as in training",
+        help="Camera rays per pixel of the features, spread evenly.",
+        show_default="worth those of the training",
     ),
 ]
 
@@ -110,7 +109,6 @@ def animate(
     After any interruption the same command resumes where it was.
     """
     from ...kernels.run.frame_plan import animation_times
-    from ...refimpl.network.denoise import learned_feature_spp
 
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
@@ -119,7 +117,7 @@ def animate(
     network = load_model(model)
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
     facts += cut_facts(network, rank)
-    rays = learned_feature_spp(network) if feature_spp is None else feature_spp
+    rays = feature_rays(network) if feature_spp is None else feature_spp
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     named = scene or scene_of(network), _parameters(parameters), view
     times = animation_times(start, seconds, fps)
@@ -171,6 +169,13 @@ def _draw(
     return len(left)
 
 
+def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job) -> bool:
+    """Tell whether a pipeline can draw: one device does both, and what is seen is seen by the paths."""
+    from ...refimpl.light.render import feature_job
+
+    return renderer.value == executor.value != "numpy" and not (noisy.seen and feature_job(noisy))
+
+
 def _said_of(shots: Sequence[Shot], renderer: Renderer) -> list[str]:
     """Return the sentence about large work."""
     if not shots:
@@ -188,13 +193,6 @@ def _check_names(output: Path, model: Path, fps: float) -> None:
     elif output.suffix:
         rule = f"a film's name must end in {' or '.join(movie.WRITERS)}, a folder's in none"
         raise InputError("output", str(output), rule, "rename it")
-
-
-def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job) -> bool:
-    """Tell whether a pipeline can draw: one device does both, features come from the colour's camera rays."""
-    from ...refimpl.light.render import feature_job
-
-    return renderer.value == executor.value != "numpy" and feature_job(noisy) is None
 
 
 def _parameters(assignments: Sequence[str] | None) -> dict[str, Any]:
@@ -312,10 +310,14 @@ def draw_frames(
 ) -> Iterator[None]:
     """Render, denoise and write pictures by one pipeline, on the device that does both."""
     from ...kernels import Pipeline, render_on
+    from ...kernels.run.render_on import Frames
+    from ...refimpl.light.render import feature_job
 
     if not shots:
         return
-    first = shots[0]
+    first, scenes = shots[0], [shot.scene for shot in shots]
+    # A reference is traced by the pipeline's kernel, unless that has rays of features too.
+    frames = None if feature_job(first.noisy) is None else Frames(scenes)
     with Pipeline(
         executor,
         first.scene,
@@ -323,10 +325,11 @@ def draw_frames(
         (first.noisy.height, first.noisy.width),
         settings=first.noisy.settings,
         show=("color",),
-        whole=first.reference is not None,
+        whole=first.reference is not None and frames is None,
         variant=variant,
         pictures=len(shots),
-        moving=[shot.scene for shot in shots],
+        moving=scenes,
+        feature_spp=first.noisy.feature_spp,
     ) as pipeline:
         before: Callable[[], None] | None = None
         for shot in shots:
@@ -334,7 +337,8 @@ def draw_frames(
             pipeline.draw(shot.noisy.seed)
             drawn, frame = pipeline.later("color"), None
             if shot.reference:
-                frame = render_on(executor, shot.scene, shot.reference, moment=pipeline.moment).frame
+                moment = pipeline.moment if frames is None else None
+                frame = render_on(executor, shot.scene, shot.reference, moment=moment, frames=frames).frame
             # The picture before is written while the device draws this one.
             if before is not None:
                 before()

@@ -9,6 +9,8 @@
             depth MAX_DEPTH: done
             scatter: the path continues; done when no path is alive, or followed if that is all
         add the path's radiance
+    for each ray of the features beyond the first sample's [`_Kernel._rays`]
+        ray: the path at the camera; arrive; look
 
 1. Each program is a block of statements, one a node, on variables that have the names of its inputs
    [`_Kernel.block`]; its outputs are assigned at the block's end. A loop over the rows of tables is a loop
@@ -161,6 +163,7 @@ class _Kernel(Lines):
             )
         self._sums()
         self._samples()
+        self._rays()
         self._stores()
         self._images()
         return framed(self.dialect, self.kernel, self._parts(), header, self.lines)
@@ -219,7 +222,7 @@ class _Kernel(Lines):
         self._line(dialect.let("uint32", "depth", dialect.splat("bounce", "uint32")))
         self.block("arrive", "the next surface", masked=("radiance_r", "radiance_g", "radiance_b"))
         if set(self.groups) & set(FIRST):
-            self._open("if (bounce == 0u) {")
+            self._open("if (bounce == 0u && n == 0) {" if self.programs.rays else "if (bounce == 0u) {")
             self.block("look", "the features of the first surface", summed=True)
             self._close()
         if self.programs.see is not None:
@@ -237,6 +240,23 @@ class _Kernel(Lines):
         self._close()
         self._close()
         self._gather()
+        self._close()
+
+    def _rays(self) -> None:
+        """Write the loop over the features' own rays; the path of the first sample has been one of them."""
+        rays, dialect = self.programs.rays, self.dialect
+        if rays is None or not set(self.groups) & set(FIRST):
+            return
+        self.lines.append("")
+        self._line("/* the features of further camera rays */")
+        self._open(dialect.loop("n", rays.count - 1))
+        number = f"{self.shared['sample']} + {dialect.number(1, 'uint32')}"
+        self._line(dialect.let("uint32", "sample_number", number))
+        self._line(dialect.var("uint32", "pixel"))
+        self._declare({**PATH, **SURFACE})
+        self.block("ray", "the ray at the camera", {"width": "image_width", "height": "image_height"})
+        self.block("arrive", "the first surface")
+        self.block("look", "its features", summed=True)
         self._close()
 
     def _declare(self, values: Values) -> None:

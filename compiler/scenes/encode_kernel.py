@@ -68,14 +68,15 @@ def compile_encode(
     profile: str = "ieee",
     planes: Sequence[str] | None = None,
     whole: bool = False,
+    rays: int = 0,
 ) -> EncodeArtifact:
     """Return the kernel that turns sums over samples into the encoded images of features.
 
     `planes` name those of the sums, in order; by default they are what the features need. `whole`: the
-    images are those of a network of integers.
+    images are those of a network of integers. `rays`: those of features [lower_encode].
     """
     chosen, promised = target_named(target), profiles.unpinned(profile, "encodings of features")
-    encoding = encoding_of(features, normalization, profile, whole)
+    encoding = encoding_of(features, normalization, profile, whole, rays)
     program, images = encoding.program, encoding.images
     planes = tuple(planes or planes_of(features))
     lacking = set(planes_of(features)) - set(planes)
@@ -131,11 +132,15 @@ def _check_images(images: Sequence[Image], dialect: Dialect) -> None:
 
 
 def encoding_of(
-    features: Sequence[str], normalization: Normalization, profile: str = "ieee", whole: bool = False
+    features: Sequence[str],
+    normalization: Normalization,
+    profile: str = "ieee",
+    whole: bool = False,
+    rays: int = 0,
 ) -> Encoding:
     """Return the encoding of features after the passes of a profile, and the images that it makes."""
     passes = profiles.profile_named(profile).passes
-    program = pipeline.run(lower_encode(features, normalization, whole), passes)
+    program = pipeline.run(lower_encode(features, normalization, whole, rays), passes)
     return Encoding(program, images_of(features, normalization, whole))
 
 

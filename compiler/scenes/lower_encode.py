@@ -53,15 +53,20 @@ def channel_name(feature: str, channel: int) -> str:
     return f"{feature}_{channel}"
 
 
-def lower_encode(features: Sequence[str], normalization: Normalization, whole: bool = False) -> Program:
-    """Return the program that turns a pixel's sums into its encoded features; `whole`: in integers."""
+def lower_encode(
+    features: Sequence[str], normalization: Normalization, whole: bool = False, rays: int = 0
+) -> Program:
+    """Return the program that turns a pixel's sums into its encoded features; `whole`: in integers.
+
+    With `rays` all sums but the colour's are over so many camera rays.
+    """
     check_normalization(normalization)
     inputs = (*planes_of(features), SAMPLES)
 
     def encode(*numbers: Any) -> dict[str, Any]:
         given = dict(zip(inputs, numbers, strict=True))
         sums = {layer: _joined([given[plane] for plane in GROUPS[layer]]) for layer in layers_of(features)}
-        return _channels(encode_sums(sums, given[SAMPLES], features, normalization, whole))
+        return _channels(encode_sums(sums, given[SAMPLES], features, normalization, whole, rays))
 
     program = trace(encode, dict.fromkeys(inputs, Type()))
     return pipeline.run(verify(program, "traced encoding"), PASSES)

@@ -9,6 +9,9 @@ A path is four pure functions of the reference, each a program; a kernel's skele
 5. On request `see`: way, path and surface -> the layers of what is seen past mirrors and glass, and the way
    after it (refimpl/light/following.py). Where nothing is followed it is the first surface's layers [`_see`].
 
+Where features are means over more camera rays [`FeatureRays`] there is a fifth one, `ray`: `start` with
+another source of random numbers.
+
 Values between them have names [`PATH`, `SURFACE`, `COUNTERS`]: a vector is three numbers, `origin_x` and so
 on. The scene is constants by then: what it lacks (a kind of primitive, a second light, a rotation) is in no
 program. Numbers of it that shall move are inputs of all four [scene_inputs.py].
@@ -19,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -89,13 +92,20 @@ PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "elimina
 """What every program of a path goes through: numbers in place of vectors, the bits that float32 gives."""
 
 
+class FeatureRays(NamedTuple):
+    """How many camera rays features are means over, and their source, whose first ray is the first path's."""
+
+    count: int
+    sampler: str
+
+
 @dataclass(frozen=True)
 class PathPrograms:
     """The programs of one path in one scene; `alive`, `scatter`'s boolean, says whether it continues.
 
     `see` is there where it was requested; the path is followed past `most_followed` surfaces at most.
     `inputs` are the names of the scene's numbers that all four are given [scene_inputs.py], `places` where
-    they are in its tables, `values` those of this scene.
+    they are in its tables, `values` those of this scene. `ray` starts the features' own `rays`, if any.
     """
 
     scene: str
@@ -110,11 +120,13 @@ class PathPrograms:
     values: tuple[float, ...] = ()
     see: Program | None = None
     most_followed: int = 0
+    ray: Program | None = None
+    rays: FeatureRays | None = None
 
     def parts(self) -> Mapping[str, Program]:
         """Return the programs by name."""
-        first = {name: getattr(self, name) for name in ("start", "arrive", "look", "scatter")}
-        return first if self.see is None else {**first, "see": self.see}
+        all_parts = {n: getattr(self, n) for n in ("start", "arrive", "look", "scatter", "see", "ray")}
+        return {name: program for name, program in all_parts.items() if program is not None}
 
 
 def lower_scene(
@@ -125,24 +137,26 @@ def lower_scene(
     *,
     keep_places: bool = False,
     seen: bool = False,
+    rays: FeatureRays | None = None,
 ) -> PathPrograms:
     """Return the programs of a path through a scene, in float32.
 
     Primitives are statements each, tables and loops, or a tree, as `forms` and their costs say [forms.py].
     `keep_places`: nodes know the lines of the reference that they came from, for listings. Numbers that are
-    `moving` are inputs; such a scene has no tree, whose boxes would have to move. `seen`: `see` too.
+    `moving` are inputs; such a scene has no tree, whose boxes would have to move. `seen`: `see` too. `rays`
+    are the features' own camera rays.
     """
     moving = moving or SceneInputs(settings, ())
     laid, values, statements = _laid_out(scene, settings, forms, moving)
     world_of = partial(_world, laid, moving)
 
-    def start(given: Mapping[str, Any]) -> dict[str, Any]:
+    def start(given: Mapping[str, Any], sampler: str = settings.sampler) -> dict[str, Any]:
         # A pixel's counter, as in refimpl/light/render.py: pixel_counter.
         pixel = given["x"] + np.uint32(render.MAX_IMAGE_SIDE_PX) * given["y"]
         counters = Counters(given["seed"], pixel, given["sample_number"])
         x, y = (given[n].astype(np.float32) for n in "xy")
         basis, size = moving.opened(laid, given)["camera"], (given["width"], given["height"])
-        path = render.start(basis, x, y, *size, counters, np.float32, settings.sampler)
+        path = render.start(basis, x, y, *size, counters, np.float32, sampler)
         return {**_taken(PATH, path), "pixel": pixel}
 
     def arrive(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -163,11 +177,12 @@ def lower_scene(
     size, depth = dict.fromkeys(("width", "height"), (NUMBER, FLOAT)), {"depth": (NUMBER, COUNTER)}
     scene_numbers = dict.fromkeys(moving.names, (NUMBER, FLOAT))
     lowered = partial(_lowered, most_unrolled=None if statements else 1, keep_places=keep_places)
+    started = {**numbers, **size, **scene_numbers}
     return PathPrograms(
         scene.name,
         scene_digest(scene),
         settings,
-        lowered("start", start, {**numbers, **size, **scene_numbers}),
+        lowered("start", start, started),
         lowered("arrive", arrive, {**PATH, **scene_numbers}),
         lowered("look", look, {**SURFACE, "direction": PATH["direction"], **scene_numbers}),
         lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, **depth, **scene_numbers}),
@@ -175,6 +190,8 @@ def lower_scene(
         moving.places,
         tuple(map(float, values)),
         *_seen(lowered, world_of, _most_followed(laid["world"], moving), scene_numbers, seen),
+        lowered("ray", partial(start, sampler=rays.sampler), started) if rays else None,
+        rays,
     )
 
 

@@ -58,6 +58,10 @@ PAST_SUMS = ("seen_*: the same of what is seen past mirrors and glass; albedo ti
 """What the planes of `see` mean."""
 
 
+OF_RAYS = "features are of {0} camera rays of the source {1}, whatever the number of samples: of one launch"
+"""What else is to be known where features have rays of their own."""
+
+
 @dataclass(frozen=True)
 class PathArtifact(OneSource):
     """A compiled path kernel; `programs` are what was emitted, `planes` what it adds up, in order.
@@ -130,6 +134,8 @@ def compile_path(
     planes = tuple(emit_path.planes(groups))
     images = encoding.images if encoding else ()
     written = _written(images) if images else (*SUMS, *(PAST_SUMS if programs.see is not None else ()))
+    if programs.rays:
+        written += (OF_RAYS.format(*programs.rays),)
     header = _header(programs, dialect.language if dialect else chosen.language, promised, lanes, written)
     arguments = dialect.said[interface.PATH] if dialect else chosen.schedules[0].arguments
     if images:
@@ -156,6 +162,7 @@ def compile_path(
         "sums": "; ".join(written),
         "arguments": arguments,
         **({"numbers": numbers_of(programs)} if programs.inputs else {}),
+        **({"feature_rays": programs.rays._asdict()} if programs.rays else {}),
     }
     name = f"path{suffix}"
     manifest = {**facts, **_identity(emitted, name, text)}
@@ -193,6 +200,8 @@ def _header(
     `written` says what the numbers mean that are the result.
     """
     settings = [f"{key} {value}" for key, value in programs.settings.facts().items()]
+    if programs.rays:
+        settings.append(f"features of {programs.rays.count} camera rays, {programs.rays.sampler}")
     fixed = "camera, time and all of the scene: another moment is another kernel"
     if programs.inputs:
         fixed = f"all of the scene but {len(programs.inputs)} numbers: {interface.SCENE_NUMBERS}"
@@ -224,8 +233,7 @@ def _identity(programs: PathPrograms, name: str, text: str) -> dict[str, Any]:
 
 def _passed(programs: PathPrograms, passes: Sequence[str]) -> PathPrograms:
     """Return the programs after the named passes."""
-    passed: dict[str, Any] = {n: pipeline.run(part, passes) for n, part in programs.parts().items()}
-    return replace(programs, **passed)
+    return replace(programs, **{name: pipeline.run(part, passes) for name, part in programs.parts().items()})
 
 
 def _printed(programs: PathPrograms, header: Sequence[str]) -> str:

@@ -21,6 +21,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -96,14 +97,18 @@ def measured(
     size: int,
     repeats: int,
     makers: Mapping[str, Maker] | None = None,
+    rays: int = 0,
 ) -> list[Measured]:
-    """Return the times of all ways, in seconds: of every executor, then of other makers, by name."""
+    """Return the times of all ways, in seconds: of every executor, then of other makers, by name.
+
+    Features are of `rays` camera rays; 0: of the paths' own.
+    """
     shots = moments(name)
     with ExitStack() as stack:
         ways = {
             (executor.name, way): function
             for executor in executors
-            for way, function in _ours(stack, executor, model, name, size, shots).items()
+            for way, function in _ours(stack, executor, model, name, size, shots, rays).items()
         }
         for by, maker in (makers or {}).items():
             ways |= {(by, way): function for way, function in maker.ways(shots).items()}
@@ -113,18 +118,25 @@ def measured(
 
 
 def _ours(
-    stack: ExitStack, executor: Executor, model: Model, name: str, size: int, shots: Sequence[Scene]
+    stack: ExitStack,
+    executor: Executor,
+    model: Model,
+    name: str,
+    size: int,
+    shots: Sequence[Scene],
+    rays: int,
 ) -> dict[str, Callable[[], Any]]:
     """Return the ways of an executor, whose pipelines are open until the stack is closed."""
-    scene, job, shape = canonical(name), Job(size, size), (size, size)
+    scene, job, shape = canonical(name), Job(size, size, feature_spp=rays), (size, size)
     denoiser = compile_plan(choose(executor, plan_model(model, executor.name), shape).plan)
 
     def separate() -> None:
         frame = render_on(executor, scene, job).frame
         executor.run(denoiser, images_of(model, frame))
 
-    pipeline = stack.enter_context(Pipeline(executor, scene, model, shape))
-    moving = stack.enter_context(Pipeline(executor, shots[0], model, shape, moving=shots))
+    opened = partial(Pipeline, executor, model=model, size=shape, feature_spp=rays)
+    pipeline = stack.enter_context(opened(scene))
+    moving = stack.enter_context(opened(shots[0], moving=shots))
     turn, seeds = itertools.cycle(shots), itertools.count()
 
     def move() -> None:
@@ -133,7 +145,7 @@ def _ours(
 
     ways: dict[str, Callable[[], Any]] = {"separate": separate, "one pipeline": pipeline.run}
     if pipeline.path.images:
-        apart = stack.enter_context(Pipeline(executor, scene, model, shape, sums=True))
+        apart = stack.enter_context(opened(scene, sums=True))
         ways["with an encoding of its own"] = apart.run
     ways |= {MOVING: move, "of it: the scene's numbers": lambda: moving.set_scene(next(turn))}
     return {way: _timed(function) for way, function in (ways | _parts(moving)).items()}
@@ -148,16 +160,16 @@ def _timed(work: Callable[[], Any]) -> Callable[[], None]:
     return run
 
 
-def first_pictures(executor: Executor, model: Model, name: str, size: int) -> list[float]:
+def first_pictures(executor: Executor, model: Model, name: str, size: int, rays: int = 0) -> list[float]:
     """Return the seconds to the first picture of each of some scenes that are not known, by a known model."""
     shots = moments(name)
-    return [_first_picture(executor, model, shot, size) for shot in shots[1 : 1 + NEW_SCENES] or shots]
+    return [_first_picture(executor, model, shot, size, rays) for shot in shots[1 : 1 + NEW_SCENES] or shots]
 
 
-def _first_picture(executor: Executor, model: Model, scene: Scene, size: int) -> float:
+def _first_picture(executor: Executor, model: Model, scene: Scene, size: int, rays: int) -> float:
     """Return the seconds to the first picture of a scene."""
     start = time.perf_counter()
-    with Pipeline(executor, scene, model, (size, size)) as pipeline:
+    with Pipeline(executor, scene, model, (size, size), feature_spp=rays) as pipeline:
         pipeline.run()
     return time.perf_counter() - start
 

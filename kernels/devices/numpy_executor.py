@@ -71,13 +71,21 @@ def _traced(
         "height": np.float32(integers["height"]),
         **dict(zip(kernel.programs.inputs, numbers, strict=True)),
     }
-    sums = {plane: np.zeros(shape, np.float32) for plane in kernel.planes}
+    sums, rays = {plane: np.zeros(shape, np.float32) for plane in kernel.planes}, kernel.programs.rays
     # Paths that have ended are computed on, and may leave the range of numbers.
     with np.errstate(all="ignore"):
         for n in range(integers["samples"]):
             state["sample_number"] = np.full(shape, (integers["first_sample"] + n) % 2**32, np.uint32)
             first, end = follow(kernel.programs, state)
+            # Features of their own rays are those of the first path, and of the further ones.
+            if n and rays:
+                first = dict.fromkeys(first, np.float32(0))
             _add(sums, first, end, np.float32(n))
+        for n in range(1, rays.count if rays else 1):
+            state["sample_number"] = np.full(shape, (integers["first_sample"] + n) % 2**32, np.uint32)
+            for plane, value in looked(kernel.programs, state).items():
+                if plane in sums:
+                    sums[plane] += value
     return np.stack(list(sums.values()))
 
 
@@ -131,6 +139,13 @@ def follow(programs: PathPrograms, given: Mapping[str, Any]) -> tuple[dict[str, 
         if not state["alive"].any():
             break
     return first, state
+
+
+def looked(programs: PathPrograms, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the features of the first surfaces of the features' own rays; given as for [`follow`]."""
+    assert programs.ray is not None
+    state = {**given, **interpret(programs.ray, given)}
+    return interpret(programs.look, {**state, **interpret(programs.arrive, state)})
 
 
 def _masked(state: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,8 @@
    (kernels/devices/passes.py).
 3. The result is read back, and other images only on request [`Pipeline.picture`], [`Pipeline.image`]. Of an
    animation one picture is copied while the device draws the next one [`Pipeline.later`, `Pipeline.stream`].
-4. A scene that moves is other numbers for the same path kernel, and compiles nothing (moving.py).
+4. Features may be means over more camera rays than are followed to the end: the path kernel traces these too.
+5. A scene that moves is other numbers for the same path kernel, and compiles nothing (moving.py).
 
 The definition is the composition of the three on the executor `numpy`. The separate way (render_on.py, then
 denoise_on.py) gives the same picture up to rounding: it encodes in float64 on the host. It refuses pictures
@@ -26,15 +27,15 @@ from ...compiler.compile import compile_plan
 from ...compiler.scenes.emit_path import FRAME_GROUPS
 from ...compiler.scenes.encode_kernel import compile_encode, encoding_of
 from ...compiler.scenes.lower_encode import layers_of, sees
-from ...compiler.scenes.lower_scene import lower_scene
+from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...compiler.variants import FULL, plan_model
 from ...refimpl.errors import InputError
 from ...refimpl.frame import SEEN
-from ...refimpl.light.render import Job
+from ...refimpl.light.render import Job, feature_job, feature_sampler
 from ...refimpl.light.scene import Scene
-from ...refimpl.light.transport import Settings
+from ...refimpl.light.transport import SPREAD, Settings
 from ...refimpl.network.dataset import check_features
 from ...refimpl.network.denoise import Model, check_model
 from ...refimpl.network.whole import INPUT_LEVELS
@@ -53,6 +54,25 @@ class Drawn:
     images: Mapping[str, NDArray[np.float32]]
 
 
+def _rays_of(job: Job, whole: bool, seen: bool) -> FeatureRays | None:
+    """Return the features' own rays of a job of one path, if there are any, or refuse them."""
+    if feature_job(job) is None:
+        return None
+    if seen:
+        rule = (
+            "in a pipeline what is seen past mirrors and glass is seen by the paths, of which there are fewer"
+        )
+        raise InputError("feature_spp", job.feature_spp, rule, "use 0, or render_on and denoise_on")
+    source, sampler = feature_sampler(job), job.settings.sampler
+    if source not in (sampler, SPREAD[sampler]):
+        rule = f"in a pipeline the first ray is that of the path, whose sampler is {sampler}"
+        raise InputError("feature_sampler", source, rule, f"use {sampler} or {SPREAD[sampler]}")
+    if whole:
+        rule = "kernels of render_on trace no rays of features"
+        raise InputError("whole", whole, rule, "render references by a kernel of their own")
+    return FeatureRays(job.feature_spp, source)
+
+
 class Pipeline:
     """A scene and a model on an open executor, for pictures of one size; a context manager.
 
@@ -61,8 +81,9 @@ class Pipeline:
     `moving` are scenes that [`set_scene`] will be given, or the numbers that are inputs: the path kernel is
     then compiled once for all of them. A `variant` of the model has fewer operations [variants.py]. So many
     `pictures` are to come: what compiles long may pay [tune.py]. The kernels are `path`, `encode` and
-    `denoise`; `moment` is the path kernel with the scene's numbers; `passes` runs
-    them one by one. With `sums` the encoding is a kernel of its own on all devices.
+    `denoise`; `moment` is the path kernel with the scene's numbers; `passes` runs them one by one.
+    `feature_spp` and `feature_sampler` are those of a Job, whose features the images then have; the paths'
+    first camera ray is one of these rays. With `sums` the encoding is a kernel of its own on all devices.
     """
 
     def __init__(
@@ -80,6 +101,8 @@ class Pipeline:
         pictures: int = 1,
         sums: bool = False,
         moving: Sequence[Scene] | SceneInputs = (),
+        feature_spp: int = 0,
+        feature_sampler: str = "",
     ) -> None:
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
@@ -87,32 +110,49 @@ class Pipeline:
         plan = replace(plan_model(model, executor.name, profile, variant=variant), proves=False)
         model = plan.model
         self._height, self._width = size
-        Job(self._width, self._height)  # refuses sizes that mean nothing
         self._executor, self._profile = executor, profile
         self._settings = settings or Settings()
+        # The job refuses sizes and numbers that mean nothing.
+        rays = {"feature_spp": feature_spp, "feature_sampler": feature_sampler}
+        job = Job(self._width, self._height, settings=self._settings, **rays)  # type: ignore[arg-type]
+        self._rays = _rays_of(job, whole, sees(self._features))
         self._features = tuple(dict.fromkeys((*model.features, *show)))
         check_features(self._features)
         self._in_integers = model.is_whole
         # A kernel of whole frames leaves sums, which are read in another way too.
         painted = executor.paints and not whole and not sums
         self._encoding = (
-            encoding_of(self._features, model.normalization, profile, model.is_whole) if painted else None
+            encoding_of(self._features, model.normalization, profile, model.is_whole, self._ray_count)
+            if painted
+            else None
         )
         self._whole = whole
         self._paths = MovingPaths(executor.name, self._compiled, self._settings, moving)
         self.set_scene(scene)
         self.encode = compile_encode(
-            self._features, model.normalization, executor.name, profile, self.path.planes, model.is_whole
+            self._features,
+            model.normalization,
+            executor.name,
+            profile,
+            self.path.planes,
+            model.is_whole,
+            self._ray_count,
         )
         self.denoise = compile_plan(choose(executor, plan, size, pictures).plan)
         self._drawn = self._closed = False
         self.passes = executor.passes(self.encode, self.denoise, size)
 
+    @property
+    def _ray_count(self) -> int:
+        """Return the number of the features' own camera rays; 0: there are none."""
+        return self._rays.count if self._rays else 0
+
     def _compiled(self, scene: Scene, inputs: SceneInputs) -> PathArtifact:
         """Return the path kernel of a scene, built; numbers of the scene are inputs of it."""
         executor, profile = self._executor, self._profile
         seen = sees(self._features)
-        programs = lower_scene(scene, self._settings, forms_of(executor.name), inputs, seen=seen)
+        forms = forms_of(executor.name)
+        programs = lower_scene(scene, self._settings, forms, inputs, seen=seen, rays=self._rays)
         groups = layers_of(self._features)
         if self._whole:
             groups = (*FRAME_GROUPS, *(SEEN if seen else ()))
@@ -141,11 +181,23 @@ class Pipeline:
         if spp > SAMPLES_AT_ONCE:
             rule = f"a pipeline adds up in float32: at most {SAMPLES_AT_ONCE} paths per pixel"
             raise InputError("spp", spp, rule, "use fewer, or render_on and denoise_on")
+        self._check_rays(spp, first_sample)
         self.passes.trace(self.path, self.part(seed, spp, first_sample), self.moment.numbers)
         if not self.path.images:
             self.passes.encode(spp)
         self.passes.denoise()
         self._drawn = True
+
+    def _check_rays(self, spp: int, first_sample: int) -> None:
+        """Refuse samples the first of which is none of the features' rays, or that are as many as these."""
+        if self._rays is None:
+            return
+        if spp >= self._rays.count:
+            rule = f"features are of {self._rays.count} camera rays: there must be fewer paths"
+            raise InputError("spp", spp, rule, "make a pipeline without feature_spp")
+        if first_sample and self._rays.sampler != self._settings.sampler:
+            rule = f"rays of {self._rays.sampler} begin with the ray of sample 0"
+            raise InputError("first_sample", first_sample, rule, "use 0, and another seed")
 
     def part(self, seed: int, spp: int, first_sample: int) -> Part:
         """Return what the path kernel has to draw: all rows."""

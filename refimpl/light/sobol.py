@@ -114,7 +114,7 @@ def net_uniforms(seed: Any, pixel: Any, sample: Any, block: Any, dtype: DTypeLik
 
     With the words w0 to w3 that rng.py has for sample 0, its point n is scrambled with the keys w2 and w3,
     and moved by an exclusive or so that point 0 becomes (w0, w1). The last two floats, which no camera
-    asks for, are those of sample 0. Blocks of a pixel have one order: a path must not take its numbers from here.
+    asks for, are those of sample 0. Blocks of a pixel have one order: a path must not take its numbers here.
     """
     w0, w1, w2, w3 = rng.random_block(seed, pixel, np.zeros_like(pixel), block)
     moved = (

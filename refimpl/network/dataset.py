@@ -320,8 +320,11 @@ def encode_sums(
     features: Sequence[str],
     normalization: Normalization,
     whole: bool = False,
+    rays: int = 0,
 ) -> dict[str, Any]:
     """Return encoded features (..., channels) by name, from layers (..., channels) summed over the samples.
+
+    With `rays` the layers but the colour are sums over so many camera rays.
 
     That is what a renderer's kernel holds before it is read back; may be traced. The last clip changes
     nothing but what rounding has put outside the range that a feature promises. `whole`: for a network of
@@ -329,7 +332,8 @@ def encode_sums(
     """
     encoded = {}
     for feature in (FEATURES[name] for name in features):
-        values = feature.encode(sums[feature.layer] / samples, normalization)
+        count = rays if rays and feature.layer != "color" else samples
+        values = feature.encode(sums[feature.layer] / count, normalization)
         clipped = np.clip(values, feature.low, feature.high)
         encoded[feature.name] = steps_of(clipped) if whole else clipped
     return encoded

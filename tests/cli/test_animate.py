@@ -53,11 +53,13 @@ def test_the_pictures_are_the_references(wamnet, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", ["opencl", "opengl"])
-@pytest.mark.parametrize("spp", [0, 2])
-def test_one_device_draws_by_one_pipeline(wamnet, tmp_path, monkeypatch, executor_named, name, spp) -> None:
+@pytest.mark.parametrize(("spp", "rays"), [(0, 0), (2, 0), (0, 3), (2, 3)])
+def test_one_device_draws_by_one_pipeline(
+    wamnet, tmp_path, monkeypatch, executor_named, name, spp, rays
+) -> None:
     """The pictures are those of the separate way up to one level: both round what differs by less."""
     executor_named({"opengl": "opengl-egl"}.get(name, name))
-    devices = ("--executor", name, "--renderer", name, "--reference-spp", spp)
+    devices = ("--executor", name, "--renderer", name, "--reference-spp", spp, "--feature-spp", rays)
     with monkeypatch.context() as patch:
         patch.setattr(animate, "draw_apart", None)
         assert wamnet("animate", "m.safetensors", *SHORT, *devices, "-o", "one").status == 0
@@ -83,7 +85,7 @@ def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:
     save_model(tmp_path / "l.safetensors", learned)
     one = ("--seconds", 0.2, "--fps", 5, "--size", 13)
     assert wamnet("animate", "l.safetensors", *one, "-o", "own").status == 0
-    noisy = render(canonical("cornell"), Job(13, 13, feature_spp=3)).frame
+    noisy = render(canonical("cornell"), Job(13, 13, feature_spp=2)).frame
     got = read_png(tmp_path / "own" / "00000.png")[LABEL_PX:-1, 13:26]
     # Half a level of 8 bits, and float32's rounding of sums below 256.
     assert np.abs(got - denoise(network, noisy)).max() <= 0.5 / 255 + 256 * 2.0**-23

@@ -61,7 +61,7 @@ LINES: Sequence[str] = (
     "bench render --scenes furnace --by numpy --workers 1 --size 4 --spp 1 --depth 2 --repeats 1",
     "bench train --presets short --trainers numpy --size 32 --frames 1 --seconds 0.01 --repeats 1",
     "bench pipeline --scene furnace --executors numpy --sizes 4 --features color --hidden 4 --window 3 "
-    "--repeats 1",
+    "--feature-rays 2 --repeats 1",
     "bench exports --model model.safetensors --scene furnace --targets onnx --places",
     "bench primitives --executors opencl --kinds quads --counts 1 --size 4 --spp 1 --repeats 1",
     "executors",

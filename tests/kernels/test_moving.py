@@ -176,6 +176,17 @@ def test_an_animation_keeps_the_memory_of_its_device(executor_named, model, monk
     assert set(counts[1:]) == {counts[1]}
 
 
+def test_a_moving_scene_with_features_of_their_own_rays(executor, model, built):
+    """One path kernel for all moments, and each picture is that of the kernel of its constants."""
+    shots, rays = [cubes(time) for time in TIMES[:3]], {"settings": SETTINGS, "feature_spp": 3}
+    with Pipeline(executor, shots[0], model, SIZE, moving=shots, **rays) as pipeline:
+        found = [(pipeline.set_scene(shot), pipeline.run(4), pipeline.path)[1:] for shot in shots]
+    assert len({kernel.digest for _, kernel in found}) == 1
+    for shot, (picture, _) in zip(shots, found, strict=True):
+        with Pipeline(executor, shot, model, SIZE, **rays) as pipeline:
+            assert np.array_equal(picture, pipeline.run(4))
+
+
 def test_frames_of_scenes_that_are_known_share_a_kernel(executor, built):
     """Noisy picture and features of more rays have settings of their own, so two kernels in all."""
     shots = [cubes(time) for time in TIMES[:3]]

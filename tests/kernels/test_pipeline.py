@@ -13,9 +13,10 @@ from wamnet.compiler.core import ir
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
+from wamnet.compiler.scenes.emit_path import GROUPS
 from wamnet.compiler.scenes.encode_kernel import compile_encode, encoding_of, error_at
 from wamnet.compiler.scenes.lower_encode import layers_of
-from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.variants import FULL, with_rank
 from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
@@ -23,7 +24,7 @@ from wamnet.kernels.devices.executor import Part
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.frame import SEEN, Frame
 from wamnet.refimpl.light import scenes
-from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model, denoise_pixel
@@ -168,6 +169,89 @@ def test_images_at_the_end_of_paths_are_those_of_the_encoding(executor_named, la
         for feature in features:
             apart = np.abs(found[feature].astype(np.float64) - wanted[feature])
             assert np.all(apart <= (0 if name == "c" else 2 * errors[feature]))
+
+
+RAYS = {
+    "spread over the pixel": ("minicubes", ALL, (13, 37), "pcg4d", "", (4, 1, 0)),
+    "at random, later samples": ("cornell", ("color", "normal"), (9, 17), "pcg4d", "pcg4d", (3, 2, 5)),
+    "of Sobol points": ("cornell", ("albedo", "color"), (5, 12), "sobol", "", (4, 3, 4)),
+    "no colour": ("lone_light", ("depth", "normal"), (7, 3), "pcg4d", "net", (16, 1, 0)),
+}
+"""Scene, features, (height, width), sampler, features' sampler, (rays, samples, first sample)."""
+
+
+@pytest.mark.parametrize("sums", [False, True])
+@pytest.mark.parametrize("case", RAYS)
+def test_features_of_their_own_rays_are_the_separate_way_s(executor, model_of, case, sums):
+    """PPL-14: images are those of the frame with feature_spp, within twice the encoding's bound.
+
+    The frame's sums are the pipeline's in float64, rounded once more as means; where a compiler contracts two
+    kernels differently a ray may fall on the other side of an edge, and these pixels are few.
+    """
+    name, features, size, sampler, source, (rays, spp, first) = RAYS[case]
+    model, settings = model_of(features, 3, "clamp"), replace(SETTINGS, sampler=sampler)
+    own = {"feature_spp": rays, "feature_sampler": source}
+    job = Job(*size[::-1], spp, 3, settings, first_sample=first, **own)
+    frame = render_on(executor, scene(name), job).frame
+    with Pipeline(executor, scene(name), model, size, settings=settings, sums=sums, **own) as pipeline:
+        pipeline.draw(3, spp, first)
+        found = {feature: pipeline.image(feature) for feature in features}
+        encode = pipeline.encode
+    counts = {layer: spp if layer == "color" else rays for layer in frame.layers}
+    planes = {
+        plane: frame[layer][..., c] * np.float32(counts[layer])
+        for layer in layers_of(features)
+        for c, plane in enumerate(GROUPS[layer])
+    }
+    errors, near = error_at(encode, planes, spp), np.ones(size, bool)
+    for feature in features:
+        wanted = dataset.feature_image(frame, (feature,), SCALES)
+        off = 2 * errors[feature] + 2.0**-23 * np.abs(wanted)
+        near &= np.all(np.abs(found[feature].astype(np.float64) - wanted) <= off, axis=-1)
+    assert near.mean() >= (1.0 if executor.name in ("numpy", "c") else 0.99)
+
+
+@pytest.mark.parametrize("lanes", [1, 4, 8, 16])
+def test_sums_of_features_are_over_their_rays(executor_named, lanes):
+    """PTK-21: the interpreter adds the bits of single rays; kernels write its sums, deviations too."""
+    programs = lower_scene(scene("cornell"), SETTINGS, rays=FeatureRays(3, "net"))
+    part, size = Part(17, 9, 0, 9, 0, 2, 7), (17, 9)
+    made = compile_path(programs, "numpy")
+    wanted = dict(zip(made.planes, executor_named("numpy").trace(made, part), strict=True))
+    own = [
+        render(scene("cornell"), Job(*size, 1, 7, Settings(max_depth=0, sampler="net"), first_sample=n))
+        for n in range(3)
+    ]
+    for layer in ("albedo", "normal", "depth", "position", "direction", "unshadowed"):
+        total = own[0].frame[layer] + own[1].frame[layer] + own[2].frame[layer]
+        assert np.array_equal(np.stack([wanted[plane] for plane in GROUPS[layer]], axis=-1), total)
+    plain = compile_path(lower_scene(scene("cornell"), SETTINGS), "numpy")
+    colour = dict(zip(plain.planes, executor_named("numpy").trace(plain, part), strict=True))
+    for plane in (*GROUPS["color"], *GROUPS["deviation"]):
+        assert np.array_equal(wanted[plane], colour[plane])
+    for name in ("opencl", "c")[: 2 if lanes == 1 else 1]:
+        kernel = compile_path(programs, name, lanes=lanes)
+        found = executor_named(name).trace(kernel, part)
+        # Of numbers below 200, a sum of three: 2 roundings, and a few of each ray's hit.
+        apart = np.abs(found - np.stack(list(wanted.values()))).max(axis=0) > 200 * 64 * 2.0**-24
+        assert apart.mean() <= 0.02
+    assert kernel.manifest["feature_rays"] == {"count": 3, "sampler": "net"}
+
+
+def test_rays_of_features_that_mean_nothing_are_refused(executor_named, model_of):
+    executor, model = executor_named("numpy"), model_of(("color",), 1, "zero")
+    given = (executor, scene("empty"), model, (2, 2))
+    with pytest.raises(InputError, match="feature_sampler is sobol: in a pipeline the first ray is that of"):
+        Pipeline(*given, feature_spp=4, feature_sampler="sobol")
+    with pytest.raises(InputError, match="whole is True: kernels of render_on trace no rays of features"):
+        Pipeline(*given, feature_spp=4, whole=True)
+    with Pipeline(*given, feature_spp=4) as pipeline:
+        with pytest.raises(InputError, match="spp is 4: features are of 4 camera rays: there must be fewer"):
+            pipeline.draw(0, 4)
+        with pytest.raises(InputError, match="first_sample is 1: rays of net begin with the ray of sample 0"):
+            pipeline.draw(0, 1, 1)
+    with Pipeline(*given, feature_spp=1) as pipeline, Pipeline(*given) as plain:
+        assert pipeline.path.digest == plain.path.digest
 
 
 def test_what_writes_encoded_images_is_refused_elsewhere(executor_named):

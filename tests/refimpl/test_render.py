@@ -177,8 +177,8 @@ def test_four_rays_that_are_spread_are_worth_eight_at_random():
 
     A straight edge crosses about sqrt(N) of N cells of a pixel, and only these err: a mean over N rays, one
     in each, has a variance of order N^-3/2, as N^3/2 random rays have, 8 for 4. The 256 rays themselves err
-    by 64^3/2 = 512 times less than 4. Whatever the mean squares are, two seeds of 128 x 128 pixels, of which a
-    tenth are at edges, know them to about 1 / sqrt(3276), 2 %, times the few units of their kurtosis.
+    by 64^3/2 = 512 times less than 4. Two seeds of 128 x 128 pixels, of which a tenth are at edges,
+    know mean squares to about 1 / sqrt(3276), 2 %, times the few units of their kurtosis.
     """
     scene = scenes.canonical("minicubes", time=1.1)
 

@@ -43,6 +43,9 @@ def pipeline(
         "32,32,32,32"
     ),
     window: Annotated[int, typer.Option(help="Width and height of the window, in pixels.")] = 12,
+    feature_rays: Annotated[
+        int, typer.Option(metavar="N", help="Camera rays per pixel of the features; 0: the paths' own.")
+    ] = 0,
     repeats: Repeats = 5,
     peers: Annotated[
         str,
@@ -76,16 +79,14 @@ def pipeline(
     seen, layers = names_of("--features", features, FEATURES), counts_of("--hidden", hidden, "32,32")
     model = measuring.random_model(seen, window, layers)
     network = "-".join(map(str, model.siren.widths))
-    say(
-        ", ".join(
-            facts(numpy_version(), f"{scene}, 1 spp, {Settings().max_depth + 1} edges, network {network}")
-        )
-    )
+    rays = f", features of {feature_rays} rays" if feature_rays > 1 else ""
+    edges = f"{Settings().max_depth + 1} edges"
+    say(", ".join(facts(numpy_version(), f"{scene}, 1 spp{rays}, {edges}, network {network}")))
     say("")
     head("by", "size", "way", "ms, median", "ms, range", "pictures/s", f"times {given[0]}, moving")
     notes: dict[str, None] = {}
     for size in widths:
-        _show(_rows(given, others, model, scene, size, repeats, notes), size)
+        _show(_rows(given, others, model, scene, size, repeats, notes, feature_rays), size)
     for line in ("", *notes) if notes else ():
         say(line)
 
@@ -98,6 +99,7 @@ def _rows(
     size: int,
     repeats: int,
     notes: dict[str, None],
+    rays: int,
 ) -> list[Measured]:
     """Return all rows of a size: what takes turns, then first pictures."""
     from ....kernels import open_executor
@@ -106,9 +108,10 @@ def _rows(
 
     with ExitStack() as stack:
         opened = [stack.enter_context(open_executor(name)) for name in given]
-        found = measured(opened, model, scene, size, repeats, _makers(stack, others, scene, size, notes))
+        makers = _makers(stack, others, scene, size, notes)
+        found = measured(opened, model, scene, size, repeats, makers, rays)
         for executor in opened:
-            news = tuple(first_pictures(executor, model, scene, size))
+            news = tuple(first_pictures(executor, model, scene, size, rays))
             found.append(Measured(executor.name, "first picture of a new scene", news))
     for name in given:
         if (cold := first_picture(name, model, scene, size)) is not None:

@@ -33,7 +33,7 @@ EXAMPLES = """Examples:
 
 wamnet dataset minicubes -o cubes
 
-wamnet dataset minicubes --frames 64 --size 256 --feature-spp 16 --executor opencl -o cubes
+wamnet dataset minicubes --frames 64 --size 256 --feature-spp 4 --executor opencl -o cubes
 
 wamnet dataset minicubes --frames 64 --yaw -45:45 --pitch -15:20 --saturation 0:0.7 --outside 4 -o moving
 

@@ -20,7 +20,7 @@ RENDER_EXAMPLES = """Examples:
 
 wamnet render minicubes
 
-wamnet render minicubes --feature-spp 16 -o noisy.exr
+wamnet render minicubes --feature-spp 4 -o noisy.exr
 
 wamnet render glossy --seen -o mirrors.exr
 

@@ -288,8 +288,8 @@ FeatureSpp = Annotated[
     typer.Option(
         "--feature-spp",
         metavar="N",
-        help="Camera rays per pixel whose first hits the features are means over: 16 show edges without "
-        "jags, and cost a fraction of a path each.",
+        help="Camera rays per pixel, spread evenly, whose first hits the features are means over: 4 show "
+        "edges without jags, and cost a fraction of a path each.",
         show_default="the colour's",
     ),
 ]

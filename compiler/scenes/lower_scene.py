@@ -150,15 +150,6 @@ def lower_scene(
     laid, values, statements = _laid_out(scene, settings, forms, moving)
     world_of = partial(_world, laid, moving)
 
-    def start(given: Mapping[str, Any], sampler: str = settings.sampler) -> dict[str, Any]:
-        # A pixel's counter, as in refimpl/light/render.py: pixel_counter.
-        pixel = given["x"] + np.uint32(render.MAX_IMAGE_SIDE_PX) * given["y"]
-        counters = Counters(given["seed"], pixel, given["sample_number"])
-        x, y = (given[n].astype(np.float32) for n in "xy")
-        basis, size = moving.opened(laid, given)["camera"], (given["width"], given["height"])
-        path = render.start(basis, x, y, *size, counters, np.float32, sampler)
-        return {**_taken(PATH, path), "pixel": pixel}
-
     def arrive(given: Mapping[str, Any]) -> dict[str, Any]:
         path, surface, hit = transport.arrive(world_of(given), _path(given))
         return {**_taken({"radiance": PATH["radiance"]}, path), **_taken(SURFACE, surface, hit)}
@@ -177,12 +168,12 @@ def lower_scene(
     size, depth = dict.fromkeys(("width", "height"), (NUMBER, FLOAT)), {"depth": (NUMBER, COUNTER)}
     scene_numbers = dict.fromkeys(moving.names, (NUMBER, FLOAT))
     lowered = partial(_lowered, most_unrolled=None if statements else 1, keep_places=keep_places)
-    started = {**numbers, **size, **scene_numbers}
+    start, started = partial(_started, laid, moving), {**numbers, **size, **scene_numbers}
     return PathPrograms(
         scene.name,
         scene_digest(scene),
         settings,
-        lowered("start", start, started),
+        lowered("start", partial(start, settings.sampler), started),
         lowered("arrive", arrive, {**PATH, **scene_numbers}),
         lowered("look", look, {**SURFACE, "direction": PATH["direction"], **scene_numbers}),
         lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, **depth, **scene_numbers}),
@@ -190,7 +181,7 @@ def lower_scene(
         moving.places,
         tuple(map(float, values)),
         *_seen(lowered, world_of, _most_followed(laid["world"], moving), scene_numbers, seen),
-        lowered("ray", partial(start, sampler=rays.sampler), started) if rays else None,
+        lowered("ray", partial(start, rays.sampler), started) if rays else None,
         rays,
     )
 
@@ -245,6 +236,19 @@ def _see(
         return first, {**SURFACE, **scene_numbers}
     state = {"beta": PATH["beta"], "depth": (NUMBER, COUNTER), "alive": (NUMBER, TRUTH)}
     return see, {**SURFACE, **state, **WAY, **scene_numbers}
+
+
+def _started(
+    laid: dict[str, Any], moving: SceneInputs, sampler: str, given: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the path at the camera, with its pixel's counter."""
+    # As in refimpl/light/render.py: pixel_counter.
+    pixel = given["x"] + np.uint32(render.MAX_IMAGE_SIDE_PX) * given["y"]
+    counters = Counters(given["seed"], pixel, given["sample_number"])
+    x, y = (given[n].astype(np.float32) for n in "xy")
+    basis, size = moving.opened(laid, given)["camera"], (given["width"], given["height"])
+    path = render.start(basis, x, y, *size, counters, np.float32, sampler)
+    return {**_taken(PATH, path), "pixel": pixel}
 
 
 def _world(laid: dict[str, Any], moving: SceneInputs, given: Mapping[str, Any]) -> World:

@@ -189,7 +189,7 @@ class Pipeline:
         self._drawn = True
 
     def _check_rays(self, spp: int, first_sample: int) -> None:
-        """Refuse samples the first of which is none of the features' rays, or that are as many as these."""
+        """Refuse samples that do not begin with one of the features' rays, or are as many as these."""
         if self._rays is None:
             return
         if spp >= self._rays.count:

@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -92,7 +92,8 @@ PASSES = ("scalarize", "fold_float32", "expand_tables", "fold_float32", "elimina
 """What every program of a path goes through: numbers in place of vectors, the bits that float32 gives."""
 
 
-class FeatureRays(NamedTuple):
+@dataclass(frozen=True)
+class FeatureRays:
     """How many camera rays features are means over, and their source, whose first ray is the first path's."""
 
     count: int

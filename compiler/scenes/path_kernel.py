@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -135,7 +135,7 @@ def compile_path(
     images = encoding.images if encoding else ()
     written = _written(images) if images else (*SUMS, *(PAST_SUMS if programs.see is not None else ()))
     if programs.rays:
-        written += (OF_RAYS.format(*programs.rays),)
+        written += (OF_RAYS.format(programs.rays.count, programs.rays.sampler),)
     header = _header(programs, dialect.language if dialect else chosen.language, promised, lanes, written)
     arguments = dialect.said[interface.PATH] if dialect else chosen.schedules[0].arguments
     if images:
@@ -162,7 +162,7 @@ def compile_path(
         "sums": "; ".join(written),
         "arguments": arguments,
         **({"numbers": numbers_of(programs)} if programs.inputs else {}),
-        **({"feature_rays": programs.rays._asdict()} if programs.rays else {}),
+        **({"feature_rays": asdict(programs.rays)} if programs.rays else {}),
     }
     name = f"path{suffix}"
     manifest = {**facts, **_identity(emitted, name, text)}
@@ -233,7 +233,10 @@ def _identity(programs: PathPrograms, name: str, text: str) -> dict[str, Any]:
 
 def _passed(programs: PathPrograms, passes: Sequence[str]) -> PathPrograms:
     """Return the programs after the named passes."""
-    return replace(programs, **{name: pipeline.run(part, passes) for name, part in programs.parts().items()})
+    run = {name: pipeline.run(part, passes) for name, part in programs.parts().items()}
+    start, arrive, look, scatter = (run[name] for name in ("start", "arrive", "look", "scatter"))
+    ray = run.get("ray")
+    return replace(programs, start=start, arrive=arrive, look=look, scatter=scatter, ray=ray)
 
 
 def _printed(programs: PathPrograms, header: Sequence[str]) -> str:

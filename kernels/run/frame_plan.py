@@ -212,8 +212,8 @@ def plan(request: Request) -> list[FramePlan]:
         for offset, (kind, spp) in enumerate(zip(KINDS, (NOISY_SPP, target_spp), strict=True)):
             job = Job(size, size, spp, request.seed + 2 * index + offset, settings)
             if kind == KINDS[0]:
-                rays = {"feature_spp": request.feature_spp, "feature_sampler": request.feature_sampler}
-                job = replace(job, seen=request.seen, **rays)
+                rays, sampler = request.feature_spp, request.feature_sampler
+                job = replace(job, feature_spp=rays, feature_sampler=sampler, seen=request.seen)
             pictures[kind] = Picture(f"{split}/{numbers[split]:05d}-{kind}.exr", request, draw, job)
         frames.append(FramePlan(split, draw, pictures))
         numbers[split] += 1

@@ -112,6 +112,11 @@ def render_on(
     if moment is None and frames is not None:
         moment = frames.of(executor, scene, job, profile)
     kernel = compile_scene(executor, scene, job, profile) if moment is None else moment.kernel
+    if kernel.programs.rays:
+        rule = "a render's kernel adds features up over the samples, part by part"
+        raise InputError(
+            "kernel", "features of their own rays", rule, "render with frames=, or without either"
+        )
     numbers = None if moment is None else moment.numbers
     executor.build(kernel)
     keep_freed_memory()

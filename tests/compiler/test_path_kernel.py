@@ -11,7 +11,7 @@ import pytest
 from wamnet.compiler.core import ir
 from wamnet.compiler.core.loops import LISTS
 from wamnet.compiler.scenes.emit_path import GROUPS, PAST, planes
-from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.refimpl.errors import CompileError
@@ -55,6 +55,33 @@ def test_golden_source_of_a_loop(golden, target, lanes):
     programs = lower_scene(scene, Settings(max_depth=1), LISTS)
     made = compile_path(programs, target, "native", lanes, groups=("color",))
     golden(f"path.spheres.native.{lanes}.{made.source_name}", made.source)
+
+
+@pytest.mark.parametrize(("target", "lanes"), [("opencl", 16), ("opengl", 1), ("numpy", 1)])
+def test_golden_source_of_rays(golden, target, lanes):
+    """Normals of four rays that are spread: a loop of three after the samples."""
+    programs = lower_scene(scenes.canonical("furnace"), Settings(max_depth=1), rays=FeatureRays(4, "net"))
+    made = compile_path(programs, target, "native", lanes, groups=("color", "normal"))
+    golden(f"path.rays.native.{lanes}.{made.source_name}", made.source)
+
+
+@pytest.mark.parametrize("target", TRACED)
+def test_rays_of_features_in_every_language(target):
+    """PTK-19: without features, or without rays of their own, nothing of them is in the text."""
+    plain, own = (
+        lower_scene(scenes.canonical("furnace"), Settings(max_depth=1), rays=rays)
+        for rays in (None, FeatureRays(4, "net"))
+    )
+    made = compile_path(own, target, groups=("color", "normal"))
+    assert made.manifest["feature_rays"] == {"count": 4, "sampler": "net"}
+    assert "features of 4 camera rays, net" in made.source
+    if target != "numpy":
+        assert "/* ray: the ray at the camera */" in made.source
+        assert "/* ray:" not in compile_path(own, target, groups=("color",)).source
+    text = compile_path(plain, target, groups=("color", "normal"))
+    assert "camera rays" not in text.source
+    assert "feature_rays" not in text.manifest
+    assert compile_path(replace(own, ray=None, rays=None), target, groups=("color", "normal")) == text
 
 
 def test_golden_manifest(golden):

@@ -246,6 +246,8 @@ def test_rays_of_features_that_mean_nothing_are_refused(executor_named, model_of
     with pytest.raises(InputError, match="whole is True: kernels of render_on trace no rays of features"):
         Pipeline(*given, feature_spp=4, whole=True)
     with Pipeline(*given, feature_spp=4) as pipeline:
+        with pytest.raises(InputError, match="kernel is features of their own rays: a render's kernel adds"):
+            render_on(executor, scene("empty"), Job(2, 2), moment=pipeline.moment)
         with pytest.raises(InputError, match="spp is 4: features are of 4 camera rays: there must be fewer"):
             pipeline.draw(0, 4)
         with pytest.raises(InputError, match="first_sample is 1: rays of net begin with the ray of sample 0"):

@@ -89,7 +89,7 @@ def test_all_features_take_a_second_kernel_that_ends_at_the_first_hit(model_of):
 
 
 def test_a_second_kernel_follows_what_is_seen(model_of):
-    """RND-2c: paths past four mirrors at most, without light samples; colour's path has those that fit."""
+    """RND-2e: paths past four mirrors at most, without light samples; colour's path has those that fit."""
     data = P.page_data(animation("glossy", 0.0), P.networks_of(model_of(*dataset.FEATURES), rank=2), SETTINGS)
     whole, seen = data["paths"]
     assert "seen_depth" in seen["planes"]

@@ -390,7 +390,7 @@ def test_another_time_compiles_paths_alone(executor, model_of, monkeypatch):
 
 
 def test_the_first_picture_waits_for_no_proof(executor_named, model_of):
-    """PPL-14: the bound in its header is a valid one, without a certificate's search for a small one."""
+    """PPL-15: the bound in its header is a valid one, without a certificate's search for a small one."""
     model, executor = model_of(("color", "normal"), 3, "clamp"), executor_named("numpy")
     with Pipeline(executor, scene("furnace"), model, (8, 12), settings=SETTINGS) as pipeline:
         made = pipeline.denoise

@@ -129,7 +129,7 @@ def test_a_way_into_the_sky_is_a_miss_and_a_lamp_is_seen():
 
 @pytest.mark.parametrize("name", ["minicubes", "cornell", "furnace", "lone_light", "empty"])
 def test_without_mirrors_they_are_the_first_hits_to_the_bit(name):
-    """FOL-4; and a frame that has them has all other layers as ever, RND-2c."""
+    """FOL-4; and a frame that has them has all other layers as ever, RND-2e."""
     scene, job = scenes.canonical(name), R.Job(12, 9, 2)
     with_seen, usual = R.render(scene, replace(job, seen=True)).frame, R.render(scene, job).frame
     assert set(usual.layers) == set(USUAL)
@@ -141,7 +141,7 @@ def test_without_mirrors_they_are_the_first_hits_to_the_bit(name):
 
 @pytest.mark.parametrize("name", ["glossy", "daylight"])
 def test_features_of_more_rays_are_those_of_more_paths(name):
-    """RND-2c: paths that end with their features have the same features, to the bit, and colours stay."""
+    """RND-2e: paths that end with their features have the same features, to the bit, and colours stay."""
     scene, job = scenes.canonical(name), R.Job(12, 9, 1, seen=True)
     apart = R.render(scene, replace(job, feature_spp=4)).frame
     paths = R.render(scene, replace(job, spp=4)).frame

@@ -112,12 +112,12 @@ class Pipeline:
         self._height, self._width = size
         self._executor, self._profile = executor, profile
         self._settings = settings or Settings()
+        self._features = tuple(dict.fromkeys((*model.features, *show)))
+        check_features(self._features)
         # The job refuses sizes and numbers that mean nothing.
         rays = {"feature_spp": feature_spp, "feature_sampler": feature_sampler}
         job = Job(self._width, self._height, settings=self._settings, **rays)  # type: ignore[arg-type]
         self._rays = _rays_of(job, whole, sees(self._features))
-        self._features = tuple(dict.fromkeys((*model.features, *show)))
-        check_features(self._features)
         self._in_integers = model.is_whole
         # A kernel of whole frames leaves sums, which are read in another way too.
         painted = executor.paints and not whole and not sums

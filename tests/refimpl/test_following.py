@@ -142,7 +142,9 @@ def test_without_mirrors_they_are_the_first_hits_to_the_bit(name):
 @pytest.mark.parametrize("name", ["glossy", "daylight"])
 def test_features_of_more_rays_are_those_of_more_paths(name):
     """RND-2e: paths that end with their features have the same features, to the bit, and colours stay."""
-    scene, job = scenes.canonical(name), R.Job(12, 9, 1, seen=True)
+    job = R.Job(12, 9, 1, seen=True, feature_spp=4)
+    assert R.feature_job(job).settings.sampler == "sobol"
+    scene, job = scenes.canonical(name), replace(job, settings=Settings(sampler="sobol"), feature_spp=0)
     apart = R.render(scene, replace(job, feature_spp=4)).frame
     paths = R.render(scene, replace(job, spp=4)).frame
     features = [layer for layer in paths.layers if layer != "color"]

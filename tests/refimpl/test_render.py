@@ -146,7 +146,7 @@ def test_features_of_their_own_rays_begin_with_the_colour_s_ray(sampler):
     found, shared = R.render(CORNELL, job), R.render(CORNELL, replace(of_features, spp=1))
     assert all(
         np.array_equal(shared.frame[name], R.render(CORNELL, replace(job, feature_spp=0)).frame[name])
-        for name in frame.LAYERS
+        for name in frame.USUAL
         if name != "color"
     )
     facts = {"feature_spp": "4", **({"feature_sampler": "net"} if sampler == "pcg4d" else {})}

@@ -78,10 +78,9 @@ def pipeline(
     check_count("--repeats", repeats, 5)
     seen, layers = names_of("--features", features, FEATURES), counts_of("--hidden", hidden, "32,32")
     model = measuring.random_model(seen, window, layers)
-    network = "-".join(map(str, model.siren.widths))
     rays = f", features of {feature_rays} rays" if feature_rays > 1 else ""
-    edges = f"{Settings().max_depth + 1} edges"
-    say(", ".join(facts(numpy_version(), f"{scene}, 1 spp{rays}, {edges}, network {network}")))
+    network = f"network {'-'.join(map(str, model.siren.widths))}"
+    say(", ".join(facts(numpy_version(), f"{scene}, 1 spp{rays}, {Settings().max_depth + 1} edges", network)))
     say("")
     head("by", "size", "way", "ms, median", "ms, range", "pictures/s", f"times {given[0]}, moving")
     notes: dict[str, None] = {}

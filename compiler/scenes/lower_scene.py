@@ -170,14 +170,16 @@ def lower_scene(
     scene_numbers = dict.fromkeys(moving.names, (NUMBER, FLOAT))
     lowered = partial(_lowered, most_unrolled=None if statements else 1, keep_places=keep_places)
     start, started = partial(_started, laid, moving), {**numbers, **size, **scene_numbers}
+    arriving = lowered("arrive", arrive, {**PATH, **scene_numbers})
+    scattering = lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, **depth, **scene_numbers})
     return PathPrograms(
         scene.name,
         scene_digest(scene),
         settings,
         lowered("start", partial(start, settings.sampler), started),
-        lowered("arrive", arrive, {**PATH, **scene_numbers}),
+        arriving,
         lowered("look", look, {**SURFACE, "direction": PATH["direction"], **scene_numbers}),
-        lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, **depth, **scene_numbers}),
+        _reached(scattering, arriving),
         moving.names,
         moving.places,
         tuple(map(float, values)),
@@ -185,6 +187,25 @@ def lower_scene(
         lowered("ray", partial(start, rays.sampler), started) if rays else None,
         rays,
     )
+
+
+def _reached(scatter: Program, arrive: Program) -> Program:
+    """Return the program of a scattering; where no ray ever meets a surface it has nothing but the end.
+
+    What else `arrive` gives as a constant stays an input: compilers see both blocks.
+    """
+    met = arrive.nodes[dict(arrive.outputs)["surface"]]
+    if met.op != "constant":
+        return scatter
+    nodes = tuple(met if n.op == "input" and n["name"] == "surface" else n for n in scatter.nodes)
+    ended = pipeline.run(replace(scatter, nodes=nodes), ("fold_float32", "eliminate_dead"))
+    outputs = dict(ended.outputs)
+    alive = ended.nodes[outputs["alive"]]
+    if alive.op != "constant" or alive["value"]:
+        return scatter
+    kept = {str(n["name"]): index for index, n in enumerate(ended.nodes) if n.op == "input"}
+    outputs |= {name: kept[name] for name in outputs if name in kept}
+    return pipeline.run(replace(ended, outputs=tuple(outputs.items())), ("eliminate_dead",))
 
 
 def _laid_out(

@@ -32,13 +32,15 @@ class Materials:
     """The kinds of material of a scene, and tables by surface id (S+1,), one for each kind.
 
     is_kind tells who is of the kind; parameters are the kind's numbers, or None where it has none. centers
-    (S+1, 3) are those of bodies that light passes into, or None where there are none.
+    (S+1, 3) are those of bodies that light passes into, or None where there are none. A path ends at
+    surfaces numbered `ends` and higher.
     """
 
     kinds: tuple[type[Material], ...]
     is_kind: tuple[Any, ...]
     parameters: tuple[Any, ...]
     centers: Any
+    ends: int
 
     @property
     def single(self) -> bool:
@@ -56,7 +58,10 @@ def build(scene: Scene, dtype: DTypeLike) -> Materials:
     rows = [(material or Lambertian(), center) for material, center in intersection.materials_by_id(scene)]
     found = [material for material, _ in rows] or [Lambertian()]
     kinds = tuple(dict.fromkeys(type(material) for material in found))
-    # Lights and "nothing" reflect nothing: any kind will do for them, the first one takes no selection.
+    # Lights and "nothing" scatter nothing. They belong to the first kind, which takes no selection; their
+    # reflectance is 0, so a path's throughput is 0 there, and only where that kind reflects even so (a metal
+    # at grazing angles) is the path ended by the light's number.
+    ends = len(rows) if kinds[0].black_reflects else len(rows) + len(scene.lights)
     owners = [type(material) for material, _ in rows] + [kinds[0]] * (len(scene.lights) + 1)
     bodies = [center for material, center in rows if material.transmits]
     centers = [center if material.transmits else bodies[0] for material, center in rows] if bodies else []
@@ -65,6 +70,7 @@ def build(scene: Scene, dtype: DTypeLike) -> Materials:
         tuple(np.array([owner is kind for owner in owners]) for kind in kinds),
         tuple(_parameters(kind, found, len(owners), dtype) for kind in kinds),
         np.asarray(centers + bodies[:1] * (len(scene.lights) + 1), dtype) if bodies else None,
+        ends,
     )
 
 

@@ -8,8 +8,8 @@ A path starts at the camera [`camera_path`]. At each vertex
    between [`direct_light`] (next-event estimation);
 3. it then samples a direction by the surface's material, and multiplies the throughput beta by f cos / pdf
    (shading.py; for a Lambertian surface that is just the reflectance);
-4. a path ends where nothing was hit, and by Russian roulette if enabled. Drivers end it after `max_depth`
-   scatterings, with the emission that the last direction meets.
+4. a path ends where nothing or a lamp was hit, and by Russian roulette if enabled. Drivers end it after
+   `max_depth` scatterings, with the emission that the last direction meets.
 
 Both ways to find a light are combined by multiple importance sampling (Veach, "Robust Monte Carlo Methods
 for Light Transport Simulation", 1997, chapter 9) with the balance or the power heuristic; each way by itself
@@ -248,7 +248,7 @@ def scatter(
 
     depth (...) counts the scatterings so far, as uint32.
     """
-    alive = hit.surface < world.geometry.nothing
+    alive = hit.surface < world.materials.ends
     block = np.uint32(1) + np.uint32(BLOCKS_PER_BOUNCE) * depth
     u_pick, u_light_0, u_light_1, u_roulette = _uniforms(world, counters, block)
     # Add light that a sampled point of a light sends here.

@@ -51,6 +51,35 @@ def arrived(scene, size=24, depths=1, dtype=np.float32):
         path, _ = transport.scatter(world, path, surface, hit, rng.counter(depth), counters)
 
 
+METAL_FIRST = replace(
+    ALL,
+    room=None,
+    boxes=(),
+    quads=(),
+    spheres=(Sphere((0.0, -0.8, 0.3), 0.4, GREY, material=Conductor(0.1)),),
+)
+"""A scene whose first kind of material is a metal, which at grazing angles mirrors even where it is black."""
+
+
+@pytest.mark.parametrize("others", [(), (Sphere((0.0, 0.5, 0.0), 0.4, GREY),)])
+def test_a_lamp_never_scatters(others):
+    """SHD-1: light that meets a lamp, however flat, ends there, and no light sample is taken on it."""
+    second = Light((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0), 5.0)
+    scene = replace(METAL_FIRST, spheres=METAL_FIRST.spheres + others, lights=(LIGHT, second))
+    world = transport.build(scene, Settings(), np.float64)
+    height = 10.0 ** -np.arange(4.0)
+    direction = np.stack([np.ones(4), -height, np.zeros(4)], axis=-1)
+    direction /= np.sqrt(np.sum(direction**2, axis=-1, keepdims=True))
+    middle = np.array([0.5, 0.0, 0.5])
+    path = transport.camera_path(middle - 0.3 * direction, direction)
+    path, surface, hit = transport.arrive(world, path)
+    assert np.all(surface.light == 1)
+    counters = transport.Counters(rng.counter(3), rng.counter(0), rng.counter(0))
+    left, alive = transport.scatter(world, path, surface, hit, rng.counter(0), counters)
+    assert not np.any(alive)
+    assert np.array_equal(left.radiance, path.radiance)
+
+
 def test_every_surface_has_its_own_material():
     """What the selection gives are the bits of only the surface's material, with its own number."""
     numbers = uniforms(24 * 24, dtype=np.float32)[:3]

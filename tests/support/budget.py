@@ -28,7 +28,7 @@ BUDGET = {
     "kernels/judge": 1450,
     "kernels/bench": 4100,
     "kernels/export": 3200,
-    "spec/conformance": 4950,
+    "spec/conformance": 5000,
     "cli": 300,
     "cli/commands": 5200,
     "cli/common": 1050,

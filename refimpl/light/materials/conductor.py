@@ -51,6 +51,7 @@ class Conductor(Material):
     roughness: float = 0.2
 
     kind = "conductor"
+    black_reflects = True  # of grazing light (1 - cos)^5, whatever the reflectance
 
     def check(self, path: str) -> None:
         """Refuse a roughness outside its range."""

@@ -67,6 +67,7 @@ class Material:
     kind: ClassVar[str]
     single: ClassVar[bool] = False
     transmits: ClassVar[bool] = False
+    black_reflects: ClassVar[bool] = False  # whether a reflectance of 0 leaves any light to scatter
 
     def check(self, path: str) -> None:
         """Raise InputError, with the path of the value, where a number breaks a rule."""

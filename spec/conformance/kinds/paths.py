@@ -30,10 +30,13 @@ from ....refimpl.light.transport import Counters, Path, Settings
 from ....refimpl.reading import to_dataclass
 from ..case import Case, Kind, Output
 from ..functions import SOURCE
-from .terrace import TERRACE
+from .terrace import FOUNDRY, TERRACE
 
 SCENES = ("cornell", "glossy", "daylight", "minicubes")
 """Canonical scenes whose paths are cases; each at a time of its own, [`TIME_S`]."""
+
+OWN = {scene.name: scene for scene in (TERRACE, FOUNDRY)}
+"""Scenes of the vectors' own."""
 
 TIME_S = 1.25
 """Time of the scenes in their animation."""
@@ -71,14 +74,14 @@ class World(NamedTuple):
 
 def scene_text(name: str) -> str:
     """Return the JSON of a scene of these cases."""
-    if name == TERRACE.name:
-        return scene_module.to_json(TERRACE)
+    if name in OWN:
+        return scene_module.to_json(OWN[name])
     return scene_module.to_json(scenes.canonical(name, time=TIME_S))
 
 
 def files() -> dict[str, bytes]:
     """Return the scene files."""
-    return {_file(name): scene_text(name).encode() for name in (*SCENES, TERRACE.name)}
+    return {_file(name): scene_text(name).encode() for name in (*SCENES, *OWN)}
 
 
 def _file(name: str) -> str:
@@ -270,7 +273,8 @@ def _expected(
 class View:
     """A path: its scene and settings, its pixel, its sample.
 
-    `clause` is that of the light gathered at the first vertex, where the path is there for it."""
+    `clause` is that of the light gathered at the first vertex, and of the path's end if it ends there, where
+    the path is there for it."""
 
     scene: str
     settings: Settings
@@ -319,10 +323,24 @@ PLACES = (
 """Columns and rows of pixels of the terrace, and the clause that the light at what is seen there shows."""
 
 
+FLAT = (
+    (8, 9, "SHD-1"),  # a lamp at a grazing angle, where the scene's first kind is a metal
+    (3, 8, ""),  # metal
+    (0, 0, ""),  # the background
+)
+"""Columns and rows of pixels of the foundry, and their clauses."""
+
+
 def _terrace() -> Iterator[View]:
     """Yield paths over the terrace."""
     for index, (x, y, clause) in enumerate(PLACES):
         yield View(TERRACE.name, VARIANTS[index % len(VARIANTS)], x, y, index % 3, clause)
+
+
+def _foundry() -> Iterator[View]:
+    """Yield paths over the foundry."""
+    for x, y, clause in FLAT:
+        yield View(FOUNDRY.name, VARIANTS[0], x, y, 0, clause)
 
 
 def _views(count: int) -> Iterator[View]:
@@ -351,7 +369,7 @@ class Found(NamedTuple):
 def _steps() -> Found:
     """Return the cases of all steps: paths in float64 whose states are rounded to float32 at each step."""
     found = Found([], [], [])
-    for view in (*_views(16), *_terrace()):
+    for view in (*_views(16), *_terrace(), *_foundry()):
         given = view.inputs()
         programs = programs_of(view.scene, view.settings)
         wanted = start(_with_scene(given, view))
@@ -408,7 +426,8 @@ def _add(
     of_light: str = "",
 ) -> None:
     """Append a case, unless a decision of it is not sure. Its light may have a clause of its own."""
-    clauses = {**_clauses(kind, inputs), **({"radiance": of_light} if of_light else {})}
+    own = ("radiance",) if wanted.get("alive", True) else ("alive", "radiance")
+    clauses = {**_clauses(kind, inputs), **(dict.fromkeys(own, of_light) if of_light else {})}
     expected = _expected(wanted, found, clauses)
     if expected is not None:
         note = f"{inputs['settings']['strategy']}, {inputs['settings']['sampler']}"

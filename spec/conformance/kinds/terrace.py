@@ -1,7 +1,10 @@
-"""A scene of the vectors' own, with what the canonical ones lack.
+"""Scenes of the vectors' own, with what the canonical ones lack.
 
-Lamps and a sky together, one lamp seen from behind, surfaces that emit without being lamps, boxes whose
-rotations alternate (so that their numbers differ from their order), glass between a lamp and a floor.
+1. [`TERRACE`]: lamps and a sky together, one lamp seen from behind, surfaces that emit without being lamps,
+   boxes whose rotations alternate (so that their numbers differ from their order), glass between a lamp and a
+   floor.
+2. [`FOUNDRY`]: a metal as the first kind of material, a lamp seen at a grazing angle and lit by another one,
+   a background, and a camera that is rolled.
 """
 
 from __future__ import annotations
@@ -40,3 +43,18 @@ TERRACE = Scene(
     ),
 )
 """Balls, blocks, a mirror and two lamps under a sky."""
+
+FOUNDRY = Scene(
+    "foundry",
+    Camera((0.0, 1.0, 4.0), (0.0, 0.5, 0.0), (0.25, 1.0, 0.0), 50.0),
+    spheres=(
+        Sphere((-1.0, 0.75, 0.0), 0.5, (0.875, 0.75, 0.5), material=Conductor(0.375)),
+        Sphere((1.25, 0.625, -0.5), 0.375, (0.25, 0.5, 0.75)),
+    ),
+    lights=(
+        Light((-1.0, 0.25, 1.0), (2.0, 0.0, 0.0), (0.0, 0.0, -2.0), (1.0, 0.5, 0.25), 3.0),
+        Light((-0.25, 2.5, -0.5), (0.5, 0.0, 0.0), (0.0, 0.0, 0.5), (0.5, 0.75, 1.0), 8.0),
+    ),
+    background=(0.0625, 0.125, 0.25),
+)
+"""A ball of metal and a matte one over a lamp that lies flat, under another lamp."""

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -60,6 +61,12 @@ INFO_PREFIX = "info."
 
 WHOLE_TEXTS = ("amplitude", "fraction")
 """Fields of a network of integers that are texts of the header."""
+
+_WHOLE = re.compile(r"-?(0|[1-9][0-9]*)")
+"""An integer in a text (MOD-2)."""
+
+_DECIMAL = re.compile(_WHOLE.pattern + r"(\.[0-9]+)?([eE][+-]?[0-9]+)?")
+"""A decimal number in a text (MOD-2)."""
 
 _DTYPES = {"float32": "F32", "float64": "F64", "int64": "I64", "int32": "I32", "int8": "I8"}
 """Element types that are written, by NumPy's name, as safetensors names them."""
@@ -116,7 +123,8 @@ def _network(path: Path, tensors: Tensors, texts: Texts) -> Siren:
         tuple(_tensor(path, tensors, f"layer{layer}.{name}") for layer in layers)
         for name in ("weight", "bias")
     )
-    omegas = (_parsed(path, texts, "omega_0_first", float), _parsed(path, texts, "omega_0_hidden", float))
+    first, hidden = (_parsed(path, texts, name, _decimal) for name in ("omega_0_first", "omega_0_hidden"))
+    omegas = first, hidden
     if texts.get("version") != WHOLE_VERSION:
         return Siren(weights, biases, *omegas, _activation(path, texts))
     factors = tuple(_tensor(path, tensors, f"layer{layer}.factor") for layer in layers)
@@ -126,7 +134,7 @@ def _network(path: Path, tensors: Tensors, texts: Texts) -> Siren:
             raise InputError(f"{path}: type of a tensor", str(array.dtype), rule, "round the model again")
     held = (tuple(array.astype(np.float32) for array in some) for some in (weights, biases, factors))
     kept, shifts, scales = held
-    fields = (_parsed(path, texts, name, int) for name in WHOLE_TEXTS)
+    fields = (_parsed(path, texts, name, _whole) for name in WHOLE_TEXTS)
     return Whole(kept, shifts, *omegas, SINE, scales, *fields)
 
 
@@ -250,7 +258,21 @@ def _activation(path: Path, texts: Texts) -> str:
 
 def _window(text: str) -> Window:
     """Return the window of a JSON object."""
-    return to_dataclass(Window, parse_json(text, "window", "train again"), "window")
+    return to_dataclass(Window, parse_json(text, "window", "train again"), "window", whole=True)
+
+
+def _decimal(text: str) -> float:
+    """Return a number as JSON writes it; Python would also take spaces, underscores and words."""
+    if not _DECIMAL.fullmatch(text):
+        raise ValueError("a decimal number is needed")
+    return float(text)
+
+
+def _whole(text: str) -> int:
+    """Return an integer as JSON writes it."""
+    if not _WHOLE.fullmatch(text):
+        raise ValueError("a decimal integer is needed")
+    return int(text)
 
 
 def _names(text: str) -> tuple[str, ...]:

@@ -2431,11 +2431,22 @@ static network read_layers(const container *in) {
     return made;
 }
 
+/* MOD-2: a number of JSON, without spaces. */
 static double decimal(const json *in, const char *name) {
     const json *from = field(in, name);
-    double found = number_of(from);
-    if (from->type != J_TEXT || !(fabs(found) < HUGE_VAL)) refuse("%s must be a finite decimal", name);
-    return found;
+    if (from->type != J_TEXT || strspn(from->text, "0123456789+-.eE") != from->length)
+        refuse("%s must be a decimal", name);
+    const json *found = parse(from->text, from->length);
+    if (found->type != J_NUMBER || !(fabs(found->number) < HUGE_VAL)) refuse("%s must be a finite decimal", name);
+    return found->number;
+}
+
+/* RDG-3: requests have numbers as texts too, files do not. */
+static void check_numbers(const json *in) {
+    for (size_t i = 0; i < in->length; i++) {
+        if (in->items[i]->type == J_LIST) check_numbers(in->items[i]);
+        else if (in->items[i]->type != J_NUMBER) refuse("a number is expected");
+    }
 }
 
 static const json *json_text(const json *in, const char *name) {
@@ -2465,6 +2476,7 @@ static model read_model(const char *base64) {
     check_keys(window_text, " size border ");
     check_keys(scales_text, " exposure_stops depth_scale position_center position_scale ");
     made.win = read_window(window_text);
+    check_numbers(scales_text);
     made.how = read_scales(scales_text);
     if (!names->length || made.net.widths[0] != made.win.size * made.win.size * made.shown.channels
         || made.net.widths[made.net.layers] != 3)

@@ -178,10 +178,19 @@ DAMAGE = {
         with_text("features", '["color"]'),
         "inputs of the first layer is 16: 2 x 2 pixels of color",
     ),
-    "window": (with_text("window", '{"size": 0}'), "window size is 0"),
+    "window": (with_text("window", '{"size": 0, "border": "zero"}'), "window size is 0"),
     "window no JSON": (with_text("window", "12"), "window is 12: it must be a JSON object"),
     "window parts": (with_text("window", '{"width": 12}'), "window.width is 12: Window has no such key"),
-    "omega": (with_text("omega_0_first", "nan"), "omega_0_first is nan: finite and > 0"),
+    "window without a border": (
+        with_text("window", '{"size": 2}'),
+        "window.border is missing: it is required",
+    ),
+    "omega": (with_text("omega_0_first", "0.0"), "omega_0_first is 0.0: finite and > 0"),
+    "omega of Python": (
+        with_text("omega_0_first", "1_0"),
+        r"1_0: cannot be read \(a decimal number is needed\)",
+    ),
+    "omega no decimal": (with_text("omega_0_first", "nan"), "omega_0_first is nan: cannot be read"),
     "omega no number": (with_text("omega_0_hidden", "big"), "omega_0_hidden is big: cannot be read"),
     "scales": (
         with_text("normalization", "{}"),

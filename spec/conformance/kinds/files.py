@@ -8,7 +8,7 @@ import json
 import struct
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -128,6 +128,20 @@ def _texts_twice() -> bytes:
     return _joined(json.dumps(header).encode()[:-1] + again, data)
 
 
+def _key_of_tensor_twice() -> bytes:
+    """Return a file in which an entry's key appears twice, and both times the same."""
+    header, data = _parts(file_of(MODEL))
+    text = json.dumps(header)
+    key = '"dtype": "F32", '
+    return _joined(text.replace(key, key + key, 1).encode(), data)
+
+
+def _scales(**changes: Any) -> bytes:
+    """Return the file with some scales changed, or left out with the value None."""
+    scales = {**asdict(MODEL.normalization), **changes}
+    return _text("normalization", json.dumps({k: v for k, v in scales.items() if v is not None}))
+
+
 def _gap() -> bytes:
     """Return a file with four bytes between two tensors that belong to none."""
     header, data = _parts(file_of(MODEL))
@@ -195,6 +209,17 @@ BAD: Mapping[str, Callable[[], bytes]] = {
     "an infinity among the weights": lambda: _number(float("inf")),
     "a name twice": _twice,
     "all texts twice": _texts_twice,
+    "a window without a border": lambda: _text("window", '{"size": 3}'),
+    "a window with another key": lambda: _text("window", '{"border": "clamp", "shape": 1, "size": 3}'),
+    "a key of the window twice": lambda: _text("window", '{"border": "clamp", "size": 3, "size": 3}'),
+    "a key of a tensor twice": _key_of_tensor_twice,
+    "a scale left out": lambda: _scales(exposure_stops=None),
+    "a scale that is not known": lambda: _scales(gamma=1.0),
+    "a scale that is a boolean": lambda: _scales(depth_scale=True),
+    "a scale as text": lambda: _scales(depth_scale="1.0"),
+    "omega_0 with an underscore": lambda: _text("omega_0_first", "1_0"),
+    "omega_0 with a space": lambda: _text("omega_0_first", " 3.0"),
+    "omega_0 in hexadecimal": lambda: _text("omega_0_hidden", "0x1p+0"),
 }
 """Files that are refused, by what is wrong with them."""
 
@@ -270,6 +295,17 @@ SCENE_GOOD: Mapping[str, Callable[[], str]] = {
 }
 """Scenes that are read."""
 
+
+def _letters() -> str:
+    """Return the text of a scene whose name has every control character, and a zero of each kind."""
+    data = json.loads(_changed("background", [0.0, -0.0, 7.0]))
+    data["name"] = "".join(map(chr, [*range(32), 127, 128])) + '/\\"'
+    return json.dumps(data).replace("7.0]", "-0]")
+
+
+SCENE_LATER: Mapping[str, Callable[[], str]] = {"letters that are escaped, zeros with a sign": _letters}
+"""Scenes that are read, which come last: those before keep their numbers."""
+
 SCENE_BAD: Mapping[str, Callable[[], str]] = {
     "no JSON": lambda: "{",
     "no object": lambda: "[]",
@@ -319,11 +355,12 @@ FIRST_OF_VALUES = "an angle of 180 degrees"
 def _scene_cases() -> list[Case]:
     """Return good and bad scenes."""
     cases, names = list[Case](), list(SCENE_BAD)
-    for note, text in [*SCENE_GOOD.items(), *SCENE_BAD.items()]:
-        inputs = {"text": text()}
-        expected = {name: Output(v) for name, v in _scene(inputs).items()} if note in SCENE_GOOD else None
-        form = note in SCENE_BAD and names.index(note) < names.index(FIRST_OF_VALUES)
-        clause = "SCN-8" if note in SCENE_GOOD else "SCN-6" if form else "SCN-7"
+    for note, text in [*SCENE_GOOD.items(), *SCENE_BAD.items(), *SCENE_LATER.items()]:
+        inputs, bad = {"text": text()}, note in SCENE_BAD
+        expected = None if bad else {name: Output(v) for name, v in _scene(inputs).items()}
+        form = bad and names.index(note) < names.index(FIRST_OF_VALUES)
+        read = "SCN-10" if note in SCENE_LATER else "SCN-8"
+        clause = read if not bad else "SCN-6" if form else "SCN-7"
         cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note))
     return cases
 

@@ -57,4 +57,4 @@ FOUNDRY = Scene(
     ),
     background=(0.0625, 0.125, 0.25),
 )
-"""A ball of metal and a matte one over a lamp that lies flat, under another lamp."""
+"""A ball of metal and a matte one over a horizontal lamp, under another lamp."""

@@ -12,10 +12,11 @@ import pytest
 from wamnet.refimpl import encoding, metrics, rng
 from wamnet.refimpl.light import camera, environment, intersection, sampling, transport
 from wamnet.refimpl.light.materials import conductor, dielectric
+from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import adam, dataset, siren
 from wamnet.spec.conformance import blocks, case, program, run, vectors
 from wamnet.spec.conformance.functions import Field, Function
-from wamnet.spec.conformance.kinds import FUNCTIONS, KINDS
+from wamnet.spec.conformance.kinds import FUNCTIONS, KINDS, paths
 from wamnet.spec.conformance.numbers import to_json
 from wamnet.spec.conformance.on_executor import OnExecutor
 
@@ -38,6 +39,20 @@ def judged(kind: str, answer) -> list[run.Verdict]:
 def test_the_reference_answers_its_own_vectors(kind):
     wrong = [v for v in judged(kind, program.of_reference) if v.verdict != "pass"]
     assert not wrong
+
+
+def test_the_radiance_of_a_whole_path_has_no_light_sample_of_its_last_vertex():
+    """Where roulette ends a path, as where the depth does: after the vertex's emission, as the page says."""
+    ended = 0
+    for sample in range(8):
+        view = paths.View("cornell", Settings(roulette_depth=0), 8, 8, sample)
+        inputs = {**view.inputs(), "scene": paths.scene_text("cornell")}
+        found = paths.whole(inputs)
+        count = len(found["t"])
+        inputs["settings"]["max_depth"] = count - 1
+        assert np.array_equal(found["radiance"], paths.whole(inputs)["radiance"])
+        ended += count <= Settings().max_depth
+    assert ended
 
 
 # ---- mutants ----------------------------------------------------------------------------------------------

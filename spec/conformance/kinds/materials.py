@@ -25,6 +25,12 @@ VERTEX = {
 CHOICES = {**UNIFORM, "u_choice": Field("third uniform number")}
 """The numbers that choose a direction."""
 
+OF_SKY = {
+    **UNIFORM,
+    "u_choice": Field("uniform number that chooses sun or sky, the first of its block (ENV-2)"),
+}
+"""The numbers that choose a direction to the sky."""
+
 GONE_ON = {
     "direction": Field("unit direction in which the path continues", 3),
     "beta": Field("throughput, for a throughput of 1 before", 3),
@@ -235,7 +241,7 @@ SKY_SAMPLE = Function(
     "sky.sample",
     "A direction to the same sky",
     "ENV-2",
-    {**CHOICES},
+    OF_SKY,
     {"direction": Field("unit direction", 3)},
     lambda given, dtype: {
         "direction": environment.sample(

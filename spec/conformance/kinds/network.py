@@ -259,7 +259,7 @@ KINDS = (
         "network.init",
         "Initial parameters",
         {"widths": "integer[L + 1]", "omega_0_first": "float", "omega_0_hidden": "float", "seed": "integer"},
-        {name: NETWORK[name] for name in ("weight_l", "bias_l")},
+        {name: f"{NETWORK[name]}, float32" for name in ("weight_l", "bias_l")},
         _init_cases,
         _init,
     ),

@@ -456,7 +456,6 @@ def whole(inputs: Mapping[str, Any]) -> dict[str, Any]:
             break
         sent: dict[str, Any] = dict(scatter({**counters, **state, **found, "depth": depth}))
         if not sent.pop("alive"):
-            vertices[-1]["radiance"] = sent["radiance"]
             break
         state = sent
     return {name: np.array([vertex[name] for vertex in vertices]) for name in VERTEX}
@@ -522,7 +521,8 @@ OF_PATH = {
     "direction": "float[3], unit",
     "beta": "float[3], throughput",
     "radiance": "float[3], gathered so far",
-    "pdf": "float, density of the direction, 1/sr; 1e30 at the camera",
+    "pdf": "float, density of the direction, 1/sr; of single directions and at the camera float32(1e30), a "
+    "little above 1e30: it says all that the depth does (LTR-2)",
 }
 """A state, for the page."""
 
@@ -530,7 +530,7 @@ OF_SURFACE = {
     "point": "float[3]",
     "normal": "float[3]",
     "reflectance": "float[3]",
-    "t": "float, distance; 1e30 for none",
+    "t": "float, distance; 1e30 for none, which a request has as float32(1e30)",
     "surface": "integer, number of the surface (ISC-1)",
 }
 """A surface, for the page."""
@@ -564,7 +564,7 @@ KINDS = (
             **GIVEN,
             **COUNTED,
             "pixel": "integer below 2^32",
-            "depth": "scatterings before",
+            "depth": "scatterings before; who calls compares it with max_depth (LTR-8)",
             **OF_PATH,
             **OF_SURFACE,
         },
@@ -582,7 +582,7 @@ KINDS = (
             "surface": "integer[V]",
             **dict.fromkeys(("point", "normal", "reflectance"), "float[V][3]"),
             "beta": "float[V][3], on arrival",
-            "radiance": "float[V][3], after the vertex's emission",
+            "radiance": "float[V][3], after the vertex's emission, the last one's too",
         },
         _whole_cases,
         whole,

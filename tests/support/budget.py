@@ -28,7 +28,7 @@ BUDGET = {
     "kernels/judge": 1450,
     "kernels/bench": 4100,
     "kernels/export": 3200,
-    "spec/conformance": 5000,
+    "spec/conformance": 5050,
     "cli": 300,
     "cli/commands": 5200,
     "cli/common": 1050,

@@ -99,6 +99,7 @@ class Dialect:
     integers_top: tuple[str, ...] = ()
     planes_per_buffer: int = 1
     max_planes: int = 2**16
+    max_images: int = 2**16
     sum_store: str = "sums[{plane} * plane + at] = {value};"
     load: str = "float {name} = sums[{plane} * plane + at];"
     image_store: str = "image_{image}[at * {channels} + {channel}] = {value};"

@@ -115,6 +115,7 @@ class GLSL(Dialect):
     channels_per_result = 4
     planes_per_buffer = 4
     max_planes = 4 * MOST_RESULTS
+    max_images = MOST_RESULTS  # of GLSL ES too: most devices draw into more buffers than it promises
     most_numbers = 4 * MOST_UNIFORMS
     said_numbers = f"uniform vec4 {SCENE_NUMBERS}[]: {{count}} floats, four to a vector, the last one padded"
     scene_number = f"{SCENE_NUMBERS}[{{vector}}].{{component}}"

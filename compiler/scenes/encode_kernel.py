@@ -124,7 +124,7 @@ def compile_encode(
 
 def _check_images(images: Sequence[Image], dialect: Dialect) -> None:
     """Refuse more images than a language draws at once."""
-    if len(images) > (most := dialect.max_planes // dialect.planes_per_buffer):
+    if len(images) > (most := dialect.max_images):
         raise CompileError(
             f"the kernel encodes {len(images)} features: {dialect.language} draws at most {most} images at "
             "once; use fewer"

@@ -303,7 +303,8 @@ class Walked(Group):
 
         if reach is not None:
             (t,) = walk(parts(_any), (reach,), enters, self.tree)
-            shadowed: Values = take(values, t, np.int32(0))
+            # Not the reach where nothing was met: no range can tell that it is not below itself.
+            shadowed: Values = take(values, np.where(t < 0.0, t, np.full_like(t, MISS)), np.int32(0))
             return shadowed
         nothing = np.full_like(values[0], -1, dtype=np.int32)
         t, surface = walk(parts(_nearest), (values[0], nothing), enters, self.tree)

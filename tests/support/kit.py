@@ -101,7 +101,7 @@ class Kit:
         features = ("color", "normal")
         model = Model(self.network([54, 6, 3], (3.0, 3.0)), features, Window(3, "clamp"), Normalization())
         scene, settings = canonical("lone_light"), Settings(max_depth=1)
-        with Pipeline(executor, scene, model, (6, 9), settings=settings) as pipeline:
+        with Pipeline(executor, scene, model, (6, 9), settings=settings, sums=True) as pipeline:
             found = pipeline.run(seed=3)
             sums = executor.trace(pipeline.path, pipeline.part(3, 1, 0))
             wanted = executor.run(pipeline.denoise, executor.encode(pipeline.encode, sums, 1))

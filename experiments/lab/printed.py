@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any
 
 from .results import Results
@@ -62,13 +62,18 @@ def _different(heads: list[str]) -> list[str]:
     return made
 
 
-def table(results: Results, number: int | None = None, without: Collection[str] = ()) -> str:
+def table(
+    results: Results,
+    number: int | None = None,
+    without: Collection[str] = (),
+    shows: Callable[[Mapping[str, Any]], bool] = lambda row: True,
+) -> str:
     """Return one of the printed tables as Markdown, counted from 1, or all as one if headings agree.
 
-    `without`: headings of columns that are left out.
+    `without`: headings of columns that are left out. `shows` tells whether a row is shown.
     """
     rows = [record["values"] for record in results.records() if number in (None, record["values"]["table"])]
-    rows = [row for row in rows if list(row) == list(rows[0])]
+    rows = [row for row in rows if list(row) == list(rows[0]) and shows(row)]
     hidden = {"table", *without}
     shown = [{head: cell for head, cell in row.items() if head not in hidden} for row in rows]
     heads = [re.sub(r" #\d+$", "", head) for head in shown[0]] if shown else []

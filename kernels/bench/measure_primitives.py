@@ -38,7 +38,7 @@ from ...refimpl.light.scene import (
 )
 from ...refimpl.light.transport import Settings
 from ..devices.executor import Executor, Part
-from .measure_render import VARIANT
+from .measure_render import BY_HAND, VARIANT
 from .peers import peer_mitsuba
 
 FORMS = {"unrolled": STATEMENTS, "looped": LISTS, "tree": TREES}
@@ -51,8 +51,11 @@ NO_CACHES = {
 }
 """Environment in which drivers reuse no kernel that they built before."""
 
-EXECUTORS = ("opencl", "opengl", "mitsuba")
-"""What is measured: executors whose kernels a driver builds, and Mitsuba, which has a tree of its own."""
+PEERS = ("mitsuba", *BY_HAND)
+"""What is measured beside them: renderers, all with trees of their own but for Numba's, which has lists."""
+
+EXECUTORS = ("opencl", "opengl", "c", *PEERS)
+"""What is measured: executors whose kernels a driver or a compiler builds, and peers."""
 
 MOST_STATEMENTS = 300
 """Most primitives that are measured as statements: a driver takes minutes for those of more."""
@@ -85,16 +88,24 @@ def compare(executor: Executor, scene: Scene, part: Part, repeats: int) -> list[
     return timed(list(found.values()), part, repeats)
 
 
-def peer(scene: Scene, part: Part, repeats: int) -> list[Kernel]:
-    """Return Mitsuba on a scene; what it builds is built by its first picture."""
+def peer(name: str, scene: Scene, part: Part, repeats: int) -> list[Kernel]:
+    """Return a peer on a scene; what it builds is built by the first picture."""
     start = time.perf_counter()
+    form, follow = _mitsuba(scene, part) if name == "mitsuba" else _by_hand(name, scene, part)
+    traced = time.perf_counter()
+    follow()
+    made = Kernel(scene.name, form, "", follow, traced - start, time.perf_counter() - traced)
+    return timed([made], part, repeats)
+
+
+def _mitsuba(scene: Scene, part: Part) -> tuple[str, Callable[[], Any]]:
     mi = peer_mitsuba.open_mitsuba(VARIANT)
     loaded = mi.load_dict(peer_mitsuba.export(mi, scene, part.width, part.rows, Settings()))
-    traced = time.perf_counter()
-    follow = partial(peer_mitsuba.render, mi, loaded, part.samples, 0)
-    follow()
-    made = Kernel(scene.name, VARIANT, "", follow, traced - start, time.perf_counter() - traced)
-    return timed([made], part, repeats)
+    return VARIANT, partial(peer_mitsuba.render, mi, loaded, part.samples, 0)
+
+
+def _by_hand(name: str, scene: Scene, part: Part) -> tuple[str, Callable[[], Any]]:
+    return "by hand", partial(BY_HAND[name](scene, part.width, part.rows).render, part.samples, 0)
 
 
 def timed(kernels: list[Kernel], part: Part, repeats: int) -> list[Kernel]:

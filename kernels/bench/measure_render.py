@@ -8,7 +8,8 @@
 3. Turns have different seeds: their spread gives the error of a way's mean colour [`distance`].
 
 A sample is one path: at every vertex but the last a shadow ray and a scattering. The peer is Mitsuba 3,
-variant llvm_ad_rgb (vectors, all cores, Embree), all samples in one pass.
+variant llvm_ad_rgb (vectors, all cores, Embree), all samples in one pass. Others are written by
+hand: a program in C with Embree's packets of 16 rays, and functions compiled by Numba.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from __future__ import annotations
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -32,7 +33,7 @@ from ..devices.registry import open_executor
 from ..measure import environment
 from ..run.render_on import render_on
 from ..run.render_pool import render_parallel
-from .peers import peer_mitsuba
+from .peers import peer_embree, peer_mitsuba, peer_numba
 
 Frames = Callable[[int], Any]
 """From a seed to the colours (H, W, 3) of a frame."""
@@ -40,8 +41,14 @@ Frames = Callable[[int], Any]
 CACHES = {"POCL_CACHE_DIR": "pocl", "MESA_SHADER_CACHE_DIR": "mesa", "HOME": "home"}
 """Variables that say where PoCL, Mesa and Dr.Jit (in the home folder) keep what they have compiled."""
 
-BY = ("numpy", "opencl", "opengl", "mitsuba")
+BY = ("numpy", "opencl", "opengl", "c", "mitsuba", "embree", "numba")
 """What can render."""
+
+BY_HAND: Mapping[str, type[peer_embree.Embree | peer_numba.Numba]] = {
+    "embree": peer_embree.Embree,
+    "numba": peer_numba.Numba,
+}
+"""Path tracers that were written as peers, for scenes of matte surfaces."""
 
 VARIANT = "llvm_ad_rgb"
 """Mitsuba's variant: compiled, on vectors and all cores."""
@@ -85,6 +92,8 @@ def ways_of(name: str, job: Job, by: Sequence[str], workers: Sequence[int]) -> l
                 ways.append(Way(name, text, partial(_reference, scene, job, count)))
         elif kind == "mitsuba":
             ways.append(Way(name, f"mitsuba, {VARIANT}", partial(_peer, scene, job)))
+        elif kind in BY_HAND:
+            ways.append(Way(name, f"{kind}, by hand", partial(_by_hand, kind, scene, job)))
         else:
             ways.append(Way(name, kind, partial(_kernel, kind, scene, job)))
     return ways
@@ -147,3 +156,9 @@ def _peer(scene: Scene, job: Job) -> Frames:
     mi = peer_mitsuba.open_mitsuba(VARIANT)
     loaded = mi.load_dict(peer_mitsuba.export(mi, scene, job.width, job.height, job.settings))
     return lambda seed: peer_mitsuba.render(mi, loaded, job.spp, seed)
+
+
+def _by_hand(kind: str, scene: Scene, job: Job) -> Frames:
+    """Return how a path tracer by hand makes frames."""
+    peer = BY_HAND[kind](scene, job.width, job.height, job.settings)
+    return lambda seed: peer.render(job.spp, seed)

@@ -17,6 +17,7 @@ PEERS = {
     "openvino": "kernels/bench/peers/peer_openvino.py",
     "tinygrad": "kernels/bench/peers/peer_tinygrad.py",
     "halide": "kernels/bench/peers/peer_halide.py",
+    "numba": "kernels/bench/peers/peer_numba.py",
     "pyoidn": "kernels/bench/peers/peer_oidn.py",
     "mitsuba": "kernels/bench/peers/peer_mitsuba.py",
     "bpy": "kernels/bench/peers/cycles_process.py",

@@ -18,7 +18,7 @@ EXAMPLES = """Examples:
 
 wamnet bench primitives
 
-wamnet bench primitives --executors opencl,mitsuba --kinds spheres --counts 30,3000"""
+wamnet bench primitives --executors opencl,mitsuba,embree --kinds spheres --counts 30,3000"""
 """Shown below the help of `wamnet bench primitives`."""
 
 HEADS = ("by", "scene", "form", "lines", "kB", "trace, s", "build, s", "Msamples/s", "range")
@@ -27,7 +27,10 @@ HEADS = ("by", "scene", "form", "lines", "kB", "trace, s", "build, s", "Msamples
 
 def primitives(
     executors: Annotated[
-        str, typer.Option(metavar="NAME,...", help="Who follows paths: opencl, opengl, mitsuba.")
+        str,
+        typer.Option(
+            metavar="NAME,...", help="Who follows paths: opencl, opengl, c, mitsuba, embree, numba."
+        ),
     ] = "opencl,opengl",
     kinds: Annotated[
         str, typer.Option(metavar="NAME,...", help="Primitives: shared, turned, spheres, quads, mixture.")
@@ -62,10 +65,10 @@ def primitives(
     part = Part(size, size, 0, size, 0, spp, 0)
     with environment(measuring.NO_CACHES):
         for name in given:
-            with nullcontext() if name == "mitsuba" else open_executor(name) as executor:
+            with nullcontext() if name in measuring.PEERS else open_executor(name) as executor:
                 for scene in (measuring.crowd(kind, count) for kind in scenes for count in numbers):
                     done = measuring.compare(executor, scene, part, repeats) if executor else None
-                    for kernel in done or measuring.peer(scene, part, repeats):
+                    for kernel in done or measuring.peer(name, scene, part, repeats):
                         _show(name, kernel)
 
 

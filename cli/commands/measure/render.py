@@ -1,4 +1,4 @@
-"""`wamnet bench render`: samples a second of the reference, of kernels, and of Mitsuba 3."""
+"""`wamnet bench render`: samples a second of the reference, of kernels, of Mitsuba 3 and of Embree."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXAMPLES = """Examples:
 
 wamnet bench render --size 512 --spp 2 --repeats 5
 
-wamnet bench render --scenes minicubes --by numpy,opencl,opengl,mitsuba --workers 2 --spp 16"""
+wamnet bench render --scenes minicubes --by numpy,opencl,mitsuba,embree --workers 2 --spp 16"""
 """Shown below the help of `wamnet bench render`."""
 
 
@@ -32,7 +32,10 @@ def render(
     by: Annotated[
         str,
         typer.Option(
-            "--by", "--executors", metavar="NAME,...", help="What renders: numpy, opencl, opengl, mitsuba."
+            "--by",
+            "--executors",
+            metavar="NAME,...",
+            help="What renders: numpy, opencl, opengl, c, mitsuba, embree, numba.",
         ),
     ] = "numpy",
     workers: Annotated[
@@ -46,12 +49,13 @@ def render(
     depth: Annotated[int, typer.Option(help="Most edges of a path, from the camera on.")] = 6,
     repeats: Repeats = 5,
 ) -> None:
-    r"""Measure samples a second of the renderer: the reference, its kernels, and Mitsuba 3.
+    r"""Measure samples a second of the renderer: the reference, its kernels, Mitsuba 3, Embree.
 
     Each makes its first frame with empty caches of compilers, then they take turns; a turn ends when the
     frame is in memory. The table has the median and the range, samples a second, and their ratio to the last
     way's; below it is how far each mean colour is from the first's, in standard errors. A sample is one path.
     [bold]pip install 'wamnet\[bench]'[/] brings Mitsuba; it needs libLLVM too.
+    Embree by hand in C needs a compiler and libembree-dev.
     """
     from ....kernels.bench import measure_render as measuring
     from ....kernels.bench.workload import check_size

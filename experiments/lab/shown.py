@@ -49,6 +49,17 @@ def as_printed(record: str, number: int | None = None, without: Collection[str] 
     return lambda records: printed.table(records[record], number, without)
 
 
+def whole_pictures(records: Records) -> str:
+    """Return whole pictures of all sizes, and the parts and other ways of the largest."""
+    rows = [record["values"] for record in records["bench-pipeline"].records()]
+    largest = max((row["size"] for row in rows), key=lambda size: int(size.partition("x")[0]))
+    whole = ("one pipeline, moving", "whole picture")
+    return printed.table(
+        records["bench-pipeline"],
+        shows=lambda row: row["size"] == largest or row["way"].startswith(whole),
+    )
+
+
 TIMES = ("s", "ms", "schedule")
 """Columns of programs that measure quality, whose times say nothing: other work ran beside them."""
 
@@ -338,6 +349,17 @@ def paper_hours(records: Records) -> str:
     return f"{1100 * 2**20 * 1024 / speed / 3600:.0f}"
 
 
+def moving(by: str, way: str, column: str, digits: int) -> Callable[[Records], str]:
+    """Return what the pipeline's table says of a way of whole pictures of 512x512."""
+
+    def made(records: Records) -> str:
+        rows = [r["values"] for r in records["bench-pipeline"].records()]
+        (found,) = (r for r in rows if (r.get("by"), r.get("way"), r.get("size")) == (by, way, "512x512"))
+        return f"{number(found[column]):.{digits}f}"
+
+    return made
+
+
 # ---- the sine -------------------------------------------------------------------------------------------
 
 
@@ -494,6 +516,8 @@ FIGURES: Mapping[str, Callable[[Records], str]] = {
     "departures-clip": departure("unclipped", -1.0),
     "departures-loss": departure("summed"),
     "departures-replacement": departure("without replacement"),
+    "moving-mitsuba": moving("mitsuba", "whole picture, denoised fast", "times opencl, moving", 1),
+    "moving-ms": moving("opencl", "one pipeline, moving", "ms, median", 0),
     "oidn-fast-ms": frame_ms("oidn-fast16"),
     "oidn-high-ms": frame_ms("oidn-clean16"),
     "page-ms": frame_ms("page-16"),
@@ -501,12 +525,13 @@ FIGURES: Mapping[str, Callable[[Records], str]] = {
 }
 """Figures in sentences that are computed from several values."""
 AS_PRINTED = (
-    "bench-primitives", "bench-render", "bench-render-kernels", "exports", "feature-rays", "savings",
-    "sines-speed", "text-faults", "whole",
+    "bench-primitives", "bench-render", "bench-render-kernels", "exports", "feature-rays",
+    "savings", "sines-speed", "specialisation", "text-faults", "whole",
 )  # fmt: skip
 """Records that are shown as their command has printed them."""
 TABLES: Mapping[str, TableOf] = {
     **{name: as_printed(name) for name in AS_PRINTED},
+    "bench-pipeline": whole_pictures,
     "ablations": study("ablations", "all else as `short`"),
     **{name: bench(name) for name in ("bench-integers", "bench-paper")},
     "bench-train-paper": as_printed("bench-train", 1),

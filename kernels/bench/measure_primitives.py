@@ -52,7 +52,7 @@ NO_CACHES = {
 """Environment in which drivers reuse no kernel that they built before."""
 
 PEERS = ("mitsuba", *BY_HAND)
-"""What is measured beside them: renderers, all with trees of their own but for Numba's, which has lists."""
+"""What is measured beside them: renderers. Those of Mitsuba and Embree have trees, Numba's has lists."""
 
 EXECUTORS = ("opencl", "opengl", "c", *PEERS)
 """What is measured: executors whose kernels a driver or a compiler builds, and peers."""

@@ -26,7 +26,7 @@ BUDGET = {
     "kernels/devices": 2350,
     "kernels/run": 2900,
     "kernels/judge": 1450,
-    "kernels/bench": 4100,
+    "kernels/bench": 4700,
     "kernels/export": 3200,
     "spec/conformance": 5050,
     "cli": 300,

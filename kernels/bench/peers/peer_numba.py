@@ -282,7 +282,7 @@ def _direction(jit: Any) -> Any:
 
 
 def _weight(jit: Any) -> Any:
-    """Return the function that weights what a surface emits: 1 if it is no lamp, or the camera sees it."""
+    """Return the function that weights what a surface emits: 1 unless a lamp sample could find it too."""
 
     def weight(surface, pdf, t, dx, dy, dz, looks, lights):
         if looks[surface, 6] < F0:

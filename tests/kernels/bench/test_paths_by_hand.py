@@ -21,7 +21,7 @@ from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Variation, varied
 
 WIDTH, HEIGHT, BLOCK = 24, 16, 8
-"""A picture that is not square, whose width is no multiple of a packet's, and its blocks."""
+"""A picture that is not square, a packet and a half wide, and its blocks."""
 
 BATCHES, SPP = 24, 64
 """Independent pictures of each side, and their samples."""

@@ -7,7 +7,8 @@
    from: their first hits are compared with those of the training frames [`shown`].
 2. Every way makes its own picture of a moment, as in that benchmark: one path a pixel, of as many edges, and
    albedo and normal of that path's camera ray [`ours`, `theirs`]. Our pipeline has the network that ships,
-   which has learned from features of 16 rays, and one that has learned from what a pipeline traces.
+   which has learned from features of 16 rays, and one that has learned from what a pipeline traces. The first
+   is shown with features of four rays too, which a pipeline traces along with the path [`FEATURE_RAYS`].
 3. Open Image Denoise gets colour, albedo and normal as they come, and once such as it has denoised first.
 4. Pictures are judged display-encoded against a render of many samples. Print a Markdown table: means over
    moments and seeds with 95 % intervals, and the worst picture.
@@ -63,6 +64,9 @@ NETWORKS = {
 }
 """Our networks; all but the first are rows of `quality.py`."""
 
+FEATURE_RAYS = {"shipped": (0, 4), "best-1": (0,)}
+"""Camera rays of a pixel that a network's features are means over; 0: only the path's."""
+
 HEADS = ("picture", "PSNR, dB", "worst, dB", "SSIM", "FLIP")
 """Columns of the table."""
 
@@ -97,14 +101,17 @@ def ours(options: Namespace) -> Iterator[Pictures]:
             )
         }
         everything = moments(SCENE)
-        for text, model in ((NETWORKS[name], network(name, options)) for name in options.networks):
-            with Pipeline(device, everything[0], model, (size, size), moving=everything) as pipeline:
+        for name, rays in [(each, rays) for each in options.networks for rays in FEATURE_RAYS[each]]:
+            model, also = network(name, options), f", features of {rays} rays" if rays else ""
+            with Pipeline(
+                device, everything[0], model, (size, size), moving=everything, feature_spp=rays
+            ) as pipeline:
 
                 def picture(scene: Scene, seed: int, pipeline: Pipeline = pipeline) -> Floats:
                     pipeline.set_scene(scene)
                     return pipeline.run(seed)
 
-                yield {f"wamnet, one pipeline, {text}": picture}
+                yield {f"wamnet, one pipeline, {NETWORKS[name]}{also}": picture}
 
 
 def theirs(name: str, size: int) -> Iterator[Pictures]:

@@ -11,7 +11,7 @@ from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 
 
 def test_a_row_for_each_kind_of_picture(tmp_path, capsys, executor_named, monkeypatch):
-    """Ours by two networks; a peer that is missing has no rows, and says why."""
+    """Ours by two networks, one with more rays; a peer that is missing has no rows, and says why."""
 
     def missing(scene, size):
         raise ExecutorUnavailable("blender: not here")
@@ -23,7 +23,7 @@ def test_a_row_for_each_kind_of_picture(tmp_path, capsys, executor_named, monkey
     printed_text = capsys.readouterr()
     (table,) = printed.tables(printed_text.out)
     assert table[0] == list(moving_quality.HEADS)
-    assert [row[0].partition(",")[0] for row in table[1:]] == ["wamnet's paths", "wamnet", "wamnet"]
+    assert [row[0].partition(",")[0] for row in table[1:]] == ["wamnet's paths", "wamnet", "wamnet", "wamnet"]
     assert "no rows: blender: not here" in printed_text.err
 
 

@@ -21,7 +21,7 @@ from ...refimpl.errors import InputError
 if TYPE_CHECKING:
     from ...refimpl.light.scene import Scene, Vector
 
-SCENES = "minicubes, glossy, daylight, cornell, furnace, lone_light, empty"
+SCENES = "minicubes, glossy, vitrine, daylight, cornell, furnace, lone_light, empty"
 """Canonical scenes by name, for help texts; equal to the registry in refimpl, which they do not import."""
 
 MODELS = "minicubes, cornell, glossy"

@@ -106,5 +106,7 @@ SETS: Mapping[str, FrameSet] = {
     "minicubes-page": FrameSet("minicubes", replace(WIDE, saturation=(0.0, 0.7))),
     "cornell": FrameSet("cornell", NARROW, most=96),
     "glossy": FrameSet("glossy", NARROW, most=96),
+    "vitrine": FrameSet("vitrine", NARROW, most=96),
+    "daylight": FrameSet("daylight", NARROW, most=96),
 }
 """The sets by name."""

@@ -273,6 +273,8 @@ def _fronts(geometry: Geometry) -> Any:
     table = np.zeros((geometry.nothing + 1, 3), geometry.dtype)
     for group in geometry.groups:
         if group.fronts is not None:
+            # Numbers that a kernel is given are objects: then so are all.
+            table = table.astype(np.result_type(table, group.fronts), copy=False)
             table[group.first_id : group.first_id + len(group)] = group.fronts
     return table
 

@@ -3,8 +3,8 @@
 `minicubes` is the kind of scene that the paper describes: a room with tinted walls, 27 mini cubes of
 different colours in a 3x3x3 frame that turns with time, two coloured area lights, soft shadows. The paper
 does not give its geometry; the numbers here are decisions (spec/scenes.md). `glossy` shows metal, glass and
-a mirror on a turntable. `cornell` is a box with two turning blocks; `furnace`, `lone_light` and `empty` have
-answers in closed form."""
+a mirror on a turntable, `vitrine` lets metal and glass go round a mirror that turns. `cornell` is a box with
+two turning blocks; `furnace`, `lone_light` and `empty` have answers in closed form."""
 
 from __future__ import annotations
 
@@ -120,6 +120,45 @@ def glossy(time: float = 0.0, roughness: float = 0.22, ior: float = 1.5) -> Scen
     )
 
 
+def vitrine(time: float = 0.0, roughness: float = 0.15, ior: float = 1.5) -> Scene:
+    """Return a ball of brass and a block of glass that go round a mirror, which turns against them.
+
+    roughness is that of the brass, ior that of the glass. A matte ball lies in a corner.
+    """
+    white, ochre, blue = (0.74, 0.74, 0.72), (0.72, 0.52, 0.22), (0.22, 0.34, 0.62)
+    room = Room((-2.0, -2.0, -2.0), (2.0, 2.0, 2.0), (ochre, blue, (0.46, 0.44, 0.42), white, white, white))
+    ceiling = Light((-0.8, 1.98, -0.4), (1.6, 0.0, 0.0), (0.0, 0.0, 1.2), WARM, 60.0)
+    side = Light((-1.98, -0.4, 1.2), (0.0, 0.0, -1.4), (0.0, 1.6, 0.0), COOL, 34.0)
+    angle = 2.0 * math.pi * time / TURN_SECONDS
+    c, s, rise = math.cos(angle), math.sin(angle), 0.2 * math.sin(2.0 * angle)
+    brass = Sphere((1.15 * c, rise - 0.55, 1.15 * s), 0.45, (0.92, 0.74, 0.40), material=Conductor(roughness))
+    block = Box(
+        (-1.15 * c, -rise - 0.55, -1.15 * s),
+        (0.28, 0.46, 0.28),
+        (0.90, 0.95, 0.93),
+        _about_y(angle),
+        material=Dielectric(ior),
+    )
+    mirror = Quad(
+        (-0.55 * c, -1.7, 0.55 * s),
+        (1.1 * c, 0.0, -1.1 * s),
+        (0.0, 2.6, 0.0),
+        (0.9, 0.9, 0.9),
+        material=Mirror(),
+    )
+    coral = Sphere((-1.3, -1.65, -1.2), 0.35, (0.80, 0.24, 0.16))
+    return Scene(
+        "vitrine",
+        Camera((0.0, 0.7, 6.2), (0.0, -0.5, 0.0), vertical_fov_deg=37.0),
+        room,
+        boxes=(block,),
+        spheres=(coral, brass),
+        quads=(mirror,),
+        lights=(ceiling, side),
+        info={"time": repr(time)},
+    )
+
+
 def daylight(time: float = 0.0, sun_concentration: float = 400.0) -> Scene:
     """Return a gold ball, a glass ball and a matte block on a plain, under a sky whose sun goes round.
 
@@ -202,6 +241,7 @@ def empty(time: float = 0.0, background: float = 0.25) -> Scene:
 CANONICAL: dict[str, Callable[..., Scene]] = {
     "minicubes": minicubes,
     "glossy": glossy,
+    "vitrine": vitrine,
     "daylight": daylight,
     "cornell": cornell,
     "furnace": furnace,

@@ -76,6 +76,38 @@ def test_glossy_turns_inside_its_room_and_no_bodies_meet(time):
     assert min(b.center[1] - b.half_extent[1] for b in blocks) > top
 
 
+@pytest.mark.parametrize("time", [0.1 * k for k in range(80)])
+def test_vitrine_turns_inside_its_room_and_no_bodies_meet(time):
+    """The spheres around the bodies, and the cylinder that the mirror turns in, are disjoint."""
+    scene = scenes.vitrine(time=time)
+    (block,), (coral, brass), (mirror,) = scene.boxes, scene.spheres, scene.quads
+    around = [(block.center, math.hypot(*block.half_extent)), (brass.center, brass.radius)]
+    half = 0.5 * math.hypot(*mirror.edge_u)
+    assert math.hypot(mirror.corner[0], mirror.corner[2]) == pytest.approx(
+        half, abs=1e-12
+    )  # about the middle
+    for center, radius in around:
+        assert math.hypot(center[0], center[2]) - radius > 0.0
+        assert math.hypot(center[0], center[2]) - (radius if radius < 0.5 else math.hypot(0.28, 0.28)) > half
+        assert max(abs(c) for c in center) + radius < 2.0
+    assert math.dist(block.center, brass.center) > around[0][1] + around[1][1]
+    lowest = min(block.center[1] - block.half_extent[1], brass.center[1] - brass.radius)
+    assert lowest > coral.center[1] + coral.radius
+    assert mirror.corner[1] > -2.0
+
+
+def test_vitrine_s_materials_move_apart():
+    """An eighth of a turn later the mirror has turned against the bodies: it faces them."""
+    start, later = (scenes.canonical("vitrine", time=time, roughness=0.3, ior=1.7) for time in (0.0, 1.0))
+    materials = [part.material for part in (*start.boxes, *start.spheres, *start.quads)]
+    assert [m.kind for m in materials if m] == ["dielectric", "conductor", "mirror"]
+    assert materials[0] == Dielectric(1.7)
+    assert materials[2] == Conductor(0.3)
+    along, across = later.quads[0].edge_u, later.spheres[1].center
+    assert along[0] * across[0] + along[2] * across[2] == pytest.approx(0.0, abs=1e-12)
+    assert start.quads[0].edge_u != later.quads[0].edge_u
+
+
 def test_glossy_has_every_material_and_its_parameters():
     scene = scenes.canonical("glossy", roughness=0.5, ior=1.7)
     materials = [part.material for part in (*scene.boxes, *scene.spheres, *scene.quads)]

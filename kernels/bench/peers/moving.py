@@ -143,8 +143,8 @@ def _alike(scene: Scene, other: Scene) -> bool:
 
 
 def _colours(scene: Scene) -> list[Any]:
-    """Return the reflectances of all shapes; lights have none."""
-    return [part.reflectance for part in (*scene.boxes, *scene.spheres, *scene.quads)]
+    """Return the reflectances and the materials of all shapes; lights have none."""
+    return [(part.reflectance, part.material) for part in (*scene.boxes, *scene.spheres, *scene.quads)]
 
 
 def _changed(scene: Scene, other: Scene, made: Mapping[str, Any]) -> list[str]:

@@ -1,8 +1,8 @@
 """Mitsuba 3 as a peer of the renderer: the same picture from another renderer.
 
 1. [`open_mitsuba`] imports Mitsuba in one of its variants and adds the sensor of step 4.
-2. [`export`] turns a scene into Mitsuba's dictionary, shape by shape; [`check`] refuses what has no
-   counterpart.
+2. [`export`] turns a scene into Mitsuba's dictionary, shape by shape, with the materials and the sky of
+   mitsuba_looks.py; [`check`] refuses what has no counterpart.
 3. Transport is Mitsuba's integrator `path`: light samples and BSDF samples combined by the power heuristic,
    as in refimpl/light/transport.py, without Russian roulette. It counts edges of a path where wamnet counts
    scatterings: `max_depth` is one more. Reflectances and radiances are taken as they are (linear RGB).
@@ -23,9 +23,12 @@ from typing import Any
 import numpy as np
 
 from ....refimpl.errors import ExecutorUnavailable, InputError
+from ....refimpl.light.materials import Material
 from ....refimpl.light.scene import Box, Light, Quad, Room, Scene, Sphere
 from ....refimpl.light.shapes.quad import light_radiance
 from ....refimpl.light.transport import Settings
+from . import mitsuba_looks as looks
+from .mitsuba_looks import rgb
 
 LEAST_LLVM = 17
 """First version of LLVM that compiles Dr.Jit's code for AVX-512: 16 ends the process, for it knows no maximum
@@ -51,6 +54,7 @@ def open_mitsuba(variant: str) -> Any:
         _check_llvm()
     mi.set_variant(variant)
     mi.register_sensor("wamnet_inside", _sensor_class(mi))
+    looks.register(mi)
     return mi
 
 
@@ -73,14 +77,6 @@ def check(scene: Scene, settings: Settings) -> None:
     if settings.roulette_depth is not None or settings.strategy != "mis" or settings.heuristic != "power":
         rule = "the peer combines both strategies by the power heuristic, without roulette"
         raise InputError("settings", settings, rule, "use the default ones except for max_depth")
-    materials = [part.material for part in (*scene.boxes, *scene.spheres, *scene.quads)]
-    materials += scene.room.materials if scene.room is not None else ()
-    if any(material is not None for material in materials):
-        rule = "only matte surfaces are exported"
-        raise InputError("scene with materials", scene.name, rule, "compare a scene without")
-    if scene.environment is not None:
-        rule = "no sky is exported"
-        raise InputError("scene with a sky", scene.name, rule, "compare a scene without")
     parts: tuple[Box | Sphere | Quad | Light, ...] = (
         *scene.boxes,
         *scene.spheres,
@@ -94,6 +90,25 @@ def check(scene: Scene, settings: Settings) -> None:
         if isinstance(part, (Box, Sphere)) and _surrounds(part, scene.camera.position):
             raise InputError(
                 "camera inside", part, "Mitsuba shows solids from outside", "move the camera out"
+            )
+    _check_glass(scene)
+    if scene.environment is not None and scene.environment.sun_concentration > looks.LARGEST_TABLED:
+        rule = f"the sky's table shows lobes up to {looks.LARGEST_TABLED:g}"
+        raise InputError(
+            "sun_concentration", scene.environment.sun_concentration, rule, "make the sun softer"
+        )
+
+
+def _check_glass(scene: Scene) -> None:
+    """Refuse light that begins in glass: Mitsuba's is scaled where it leaves, ours is basic radiance."""
+    solids = (*scene.boxes, *scene.spheres)
+    glass = [part for part in solids if part.material is not None and part.material.transmits]
+    inner = [part.center for part in solids if any(part.emission)]
+    inner += [part.corner for part in (*scene.lights, *(quad for quad in scene.quads if any(quad.emission)))]
+    for part in glass:
+        if any(_surrounds(part, point) for point in inner):
+            raise InputError(
+                "glass", part, "no light may begin inside of it", "move the lamp out, or remove its emission"
             )
 
 
@@ -124,22 +139,26 @@ def export(mi: Any, scene: Scene, width: int, height: int, settings: Settings) -
     made = {"type": "scene", "integrator": path, "sensor": _sensor(mi, scene, width, height)}
     for wall, (corner, edge_u, edge_v) in enumerate(room_walls(scene.room) if scene.room else ()):
         assert scene.room is not None
-        look = _look(scene.room.reflectances[wall], scene.room.emission)
+        material = scene.room.materials[wall] if scene.room.materials else None
+        look = _look(scene.room.reflectances[wall], scene.room.emission, material)
         made[f"wall_{wall}"] = _rectangle(mi, corner, edge_u, edge_v, look)
     for i, box in enumerate(scene.boxes):
         axes = np.array(box.rotation).T * box.half_extent
-        look = _look(box.reflectance, box.emission)
+        look = _look(box.reflectance, box.emission, box.material)
         made[f"box_{i}"] = {"type": "cube", "to_world": _matrix(mi, axes, box.center), **look}
     for i, ball in enumerate(scene.spheres):
         place = {"center": list(ball.center), "radius": ball.radius}
-        made[f"sphere_{i}"] = {"type": "sphere", **place, **_look(ball.reflectance, ball.emission)}
+        look = _look(ball.reflectance, ball.emission, ball.material)
+        made[f"sphere_{i}"] = {"type": "sphere", **place, **look}
     for i, quad in enumerate(scene.quads):
         made |= _two_sided(mi, f"quad_{i}", quad)
     for i, light in enumerate(scene.lights):
         look = _look((0.0, 0.0, 0.0), light_radiance(light))
         made[f"light_{i}"] = _rectangle(mi, light.corner, light.edge_u, light.edge_v, look)
     if any(scene.background):
-        made["background"] = {"type": "constant", "radiance": _rgb(scene.background)}
+        made["background"] = {"type": "constant", "radiance": rgb(scene.background)}
+    if scene.environment is not None:
+        made["background"] = looks.emitter(mi, scene.environment)
     return made
 
 
@@ -156,12 +175,12 @@ def room_walls(room: Room) -> list[tuple[Any, Any, Any]]:
 def _two_sided(mi: Any, name: str, quad: Quad) -> dict[str, Any]:
     """Return the shape of a quad that reflects on both sides, or two shapes if it emits on both."""
     if not any(quad.emission):
-        look = {"bsdf": {"type": "twosided", "nested": _look(quad.reflectance)["bsdf"]}}
+        look = {"bsdf": {"type": "twosided", "nested": looks.bsdf(quad.reflectance, quad.material)}}
         return {name: _rectangle(mi, quad.corner, quad.edge_u, quad.edge_v, look)}
     u, v = np.array(quad.edge_u), np.array(quad.edge_v)
     normal = np.cross(u, v)
     apart = normal / np.linalg.norm(normal) * (0.5 * BACK_TO_BACK * min(np.linalg.norm(u), np.linalg.norm(v)))
-    look = _look(quad.reflectance, quad.emission)
+    look = _look(quad.reflectance, quad.emission, quad.material)
     return {
         f"{name}_front": _rectangle(mi, quad.corner + apart, u, v, look),
         f"{name}_back": _rectangle(mi, quad.corner - apart, v, u, look),
@@ -176,17 +195,14 @@ def _rectangle(mi: Any, corner: Any, edge_u: Any, edge_v: Any, look: dict[str, A
     return {"type": "rectangle", "to_world": _matrix(mi, axes, np.array(corner) + u + v), **look}
 
 
-def _look(reflectance: Any, emission: Any = (0.0, 0.0, 0.0)) -> dict[str, Any]:
+def _look(
+    reflectance: Any, emission: Any = (0.0, 0.0, 0.0), material: Material | None = None
+) -> dict[str, Any]:
     """Return a shape's material and, if it emits, its emitter."""
-    look: dict[str, Any] = {"bsdf": {"type": "diffuse", "reflectance": _rgb(reflectance)}}
+    look: dict[str, Any] = {"bsdf": looks.bsdf(reflectance, material)}
     if any(emission):
-        look["emitter"] = {"type": "area", "radiance": _rgb(emission)}
+        look["emitter"] = {"type": "area", "radiance": rgb(emission)}
     return look
-
-
-def _rgb(color: Any) -> dict[str, Any]:
-    """Return linear RGB as Mitsuba's variants *_rgb take it: unchanged."""
-    return {"type": "rgb", "value": [float(c) for c in color]}
 
 
 def _matrix(mi: Any, axes: Any, origin: Any) -> Any:

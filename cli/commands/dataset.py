@@ -37,6 +37,8 @@ wamnet dataset minicubes --frames 64 --size 256 --feature-spp 4 --executor openc
 
 wamnet dataset minicubes --frames 64 --yaw -45:45 --pitch -15:20 --saturation 0:0.7 --outside 4 -o moving
 
+wamnet dataset minicubes --frames 64 --saturation 0:0.9 --power 0.5:1.5 -o lamps
+
 wamnet dataset minicubes --frames 1000 --test 100 --size 1024 --spp 1024 -o large
 
 wamnet dataset minicubes --frames 1000 --scheduler tcp://10.0.0.1:8786 -o large
@@ -76,6 +78,14 @@ Saturation = Annotated[
         show_default="the lamps' own colours",
     ),
 ]
+Power = Annotated[
+    str | None,
+    typer.Option(
+        metavar=LIMITS,
+        help="Lamps of such factors of their own power.",
+        show_default="the lamps' own power",
+    ),
+]
 Workers = Annotated[
     int | None, typer.Option(help="Processes that share the work.", show_default="one per core")
 ]
@@ -104,6 +114,7 @@ def dataset(
     pitch: Pitch = "0:0",
     distance: Distance = "1:1",
     saturation: Saturation = None,
+    power: Power = None,
     seed: options.Seed = 0,
     parameters: options.Parameters = None,
     max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
@@ -135,7 +146,9 @@ def dataset(
     limits = {"--yaw": yaw, "--pitch": pitch, "--distance": distance, "--saturation": saturation}
     ranges = (text and options.parse_limits(option, text) for option, text in limits.items())
     request = Request(scene, chosen, *numbers, *ways, *ranges)  # type: ignore[arg-type]
-    request = replace(request, seen=seen)
+    request = replace(
+        request, seen=seen, power=None if power is None else options.parse_limits("--power", power)
+    )
     _check_workers(workers, scheduler)
     with hint_on_interrupt(lambda: f"the same command resumes where it was, in {output}"):
         make(output, request, plan(request), workers, scheduler)

@@ -70,6 +70,7 @@ class FrameSet:
             pitch_deg=self.ranges.pitch_deg,
             distance=self.ranges.distance,
             saturation=self.ranges.saturation,
+            power=self.ranges.power,
         )
         return [draw for kind, draw in frame_draws(request) if kind == split]
 

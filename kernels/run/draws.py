@@ -1,9 +1,9 @@
-"""What a data set draws for each frame, to train and for two kinds of test: a time, a camera, lamps' colours.
+"""What a data set draws for each frame, to train and for two kinds of test: a time, a camera, lamps.
 
 1. Times follow the golden-ratio sequence over the animation, which no symmetry of a scene divides: every
    stretch of it is nearly even, and a longer one only adds times [`times`].
-2. Camera and lamps are uniform in their ranges, each from random words of its own, so that none depends on
-   another or on time [`drawn`].
+2. Camera, lamps' colours and their powers are uniform in their ranges, each from random words of its own, so
+   that none depends on another or on time [`drawn`].
 3. Frames `inside` the ranges continue these sequences after the training frames. Frames `outside` leave them
    in one respect at a time, in turn: a time in an arc of the turn that training leaves out, a camera beyond
    the range of yaw, lamps of more saturation [`drawn_outside`].
@@ -30,6 +30,9 @@ DRAW_TAG = 0x44524157
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 """Step of the times as a share of the animation: the number that fractions approximate worst."""
+
+POWER_DIMENSION = 1 << 16
+"""First dimension of the lamps' powers: no scene has so many lamps that those of their colours reach it."""
 
 BEYOND_DEG = 10.0
 """Degrees of yaw beyond the range of a camera that is outside."""
@@ -66,17 +69,20 @@ def _between(limits: tuple[float, float], share: float) -> float:
 
 
 def _lamps(
-    seed: int, frame: int, limits: tuple[float, float], lights: Sequence[Light]
+    seed: int, frame: int, ranges: Ranges, lights: Sequence[Light]
 ) -> tuple[tuple[float, float, float], ...]:
-    """Return a colour for each lamp: hue anywhere, saturation within the limits."""
-    return tuple(
-        lamp_color(
-            light.color,
-            _uniform(seed, frame, 4 + 2 * n),
-            _between(limits, _uniform(seed, frame, 5 + 2 * n)),
-        )
-        for n, light in enumerate(lights)
-    )
+    """Return a colour for each lamp: any hue of a saturation in its range, times a power in its range."""
+    found = []
+    for n, light in enumerate(lights):
+        color = light.color
+        if ranges.saturation is not None:
+            share = _between(ranges.saturation, _uniform(seed, frame, 5 + 2 * n))
+            color = lamp_color(color, _uniform(seed, frame, 4 + 2 * n), share)
+        if ranges.power is not None:
+            factor = _between(ranges.power, _uniform(seed, frame, POWER_DIMENSION + n))
+            color = (factor * color[0], factor * color[1], factor * color[2])
+        found.append(color)
+    return tuple(found)
 
 
 def variation_of(seed: int, frame: int, ranges: Ranges, lights: Sequence[Light]) -> Variation:
@@ -85,8 +91,8 @@ def variation_of(seed: int, frame: int, ranges: Ranges, lights: Sequence[Light])
         _between(limits, _uniform(seed, frame, dimension))
         for dimension, limits in enumerate((ranges.yaw_deg, ranges.pitch_deg, ranges.distance), start=1)
     )
-    colors = () if ranges.saturation is None else _lamps(seed, frame, ranges.saturation, lights)
-    return Variation(yaw, pitch, distance, colors)
+    moved = ranges.saturation is not None or ranges.power is not None
+    return Variation(yaw, pitch, distance, _lamps(seed, frame, ranges, lights) if moved else ())
 
 
 def drawn(seed: int, ranges: Ranges, lights: Sequence[Light], first: int, count: int) -> list[Draw]:
@@ -128,8 +134,7 @@ def drawn_outside(
             variation = replace(variation, yaw_deg=high + BEYOND_DEG if turn % 2 else low - BEYOND_DEG)
         else:
             assert ranges.saturation is not None
-            variation = replace(
-                variation, lights=_lamps(seed, first + k, (ranges.saturation[1], 1.0), lights)
-            )
+            beyond = replace(ranges, saturation=(ranges.saturation[1], 1.0))
+            variation = replace(variation, lights=_lamps(seed, first + k, beyond, lights))
         found.append(Draw(time, variation, kind))
     return found

@@ -61,10 +61,11 @@ class Request:
 
     The animation runs from `start_s` for `seconds`, of which training leaves out the last `arc_s`;
     `parameters` are those of the canonical scene. Cameras are drawn from the ranges `yaw_deg`, `pitch_deg`
-    and `distance` (a factor), lamps' colours from the range `saturation` (None: the lamps' own). The features
-    of noisy pictures are means over `feature_spp` camera rays; 0: over the colour's one; they come from
-    `feature_sampler`, "" is an even spread. Targets have `spp` samples, those of test frames `test_spp`; 0:
-    as many. `seen`: noisy pictures have the layers of what is seen past mirrors and glass too.
+    and `distance` (a factor), lamps' colours from the range `saturation` (None: the lamps' own), factors of
+    their power from the range `power` (None: the lamps' own). The features of noisy pictures are means over
+    `feature_spp` camera rays; 0: over the colour's one; they come from `feature_sampler`, "" is an even
+    spread. Targets have `spp` samples, those of test frames `test_spp`; 0: as many. `seen`: noisy pictures
+    have the layers of what is seen past mirrors and glass too.
     """
 
     scene: str
@@ -89,23 +90,25 @@ class Request:
     saturation: Pair | None = None
     seen: bool = False
     feature_sampler: str = ""
+    power: Pair | None = None
 
     def as_data(self) -> dict[str, Any]:
-        """Return the request as JSON's types: `seen` if it is true, a source that is not the colour's."""
+        """Return the request as JSON's types: `seen` and `power` if given, a source not the colour's."""
         data = {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(self).items()}
         source = data.pop("feature_sampler") or spread(self.sampler, self.seen)
         if self.feature_spp > NOISY_SPP and source != self.sampler:
             data["feature_sampler"] = source
         lists = {k: list(v) if isinstance(v, tuple) else v for k, v in sorted(self.parameters.items())}
-        if not self.seen:
-            del data["seen"]
+        for name, given in (("seen", self.seen), ("power", self.power is not None)):
+            if not given:
+                del data[name]
         return {**data, "parameters": lists}
 
     @property
     def ranges(self) -> Ranges:
         """Return what training frames are drawn from."""
         times = (self.start_s, self.start_s + self.seconds - self.arc_s)
-        return Ranges(times, self.yaw_deg, self.pitch_deg, self.distance, self.saturation)
+        return Ranges(times, self.yaw_deg, self.pitch_deg, self.distance, self.saturation, self.power)
 
     @property
     def counts(self) -> dict[str, int]:

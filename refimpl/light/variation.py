@@ -2,7 +2,8 @@
 
 1. The camera moves on a sphere around what it looks at: yaw about the vertical, pitch towards it, distance as
    a factor of its own [`orbited`].
-2. A lamp gets another hue and saturation and keeps its brightness, the mean of its channels [`lamp_color`].
+2. A lamp gets another hue and saturation and keeps its brightness, the mean of its channels [`lamp_color`],
+   or has its power times a factor, which its colour carries: light is linear in the lamps' colours.
 3. Both together make a scene of a frame, whose `info` says what was changed [`varied`].
 4. A data set draws its frames from ranges, which a model then has learned [`Ranges`]; what of another frame
    lies outside of them is said in sentences [`outside`].
@@ -36,6 +37,9 @@ colour that is picked in eight bits is off by less."""
 SATURATION_TOLERANCE = 0.005
 """How far a saturation may be beyond its range by rounding to eight bits."""
 
+POWER_LIMITS = (2.0**-10, 2.0**10)
+"""Least and largest factor of a lamp's power: ten stops of a camera either way."""
+
 RANGES = "ranges"
 """Name of the fact, in a frame's info, that says the ranges of its data set, as JSON."""
 
@@ -59,17 +63,21 @@ AT_REST = Variation()
 
 @dataclass(frozen=True)
 class Ranges:
-    """Ranges [low, high] that frames are drawn from; `saturation` None: lamps keep their own colours."""
+    """Ranges [low, high] that frames are drawn from; `saturation` None: lamps keep their own colours.
+
+    `power` are factors of the lamps' own power; None: lamps keep it.
+    """
 
     time_s: tuple[float, float] = (0.0, TURN_SECONDS)
     yaw_deg: tuple[float, float] = (0.0, 0.0)
     pitch_deg: tuple[float, float] = (0.0, 0.0)
     distance: tuple[float, float] = (1.0, 1.0)
     saturation: tuple[float, float] | None = None
+    power: tuple[float, float] | None = None
 
     def to_json(self) -> str:
-        """Return the ranges as one line of JSON."""
-        return json.dumps(asdict(self))
+        """Return the ranges as one line of JSON, without a power that is not varied."""
+        return json.dumps({k: v for k, v in asdict(self).items() if k != "power" or v is not None})
 
 
 def check_ranges(ranges: Ranges) -> None:
@@ -86,7 +94,7 @@ def check_ranges(ranges: Ranges) -> None:
 def _limits(name: str) -> tuple[float, float]:
     """Return the least and the largest value that a range may have."""
     limits = {"yaw_deg": (-180.0, 180.0), "pitch_deg": (-STEEPEST_DEG, STEEPEST_DEG)}
-    limits |= {"distance": (0.1, 10.0), "saturation": (0.0, 1.0)}
+    limits |= {"distance": (0.1, 10.0), "saturation": (0.0, 1.0), "power": POWER_LIMITS}
     return limits.get(name, (-LARGEST_TIME_S, LARGEST_TIME_S))
 
 
@@ -164,26 +172,37 @@ def outside(ranges: Ranges, info: Mapping[str, str], lights: Sequence[Vector] = 
             told.append(f"the camera's {word} is {value:g}{unit} (learned: {low:g}{unit} to {high:g}{unit})")
     for number, color in enumerate(_colors(info.get("lights"))):
         own = lights[number] if number < len(lights) else None
-        told += _lamp_outside(number, color, own, ranges.saturation)
+        told += _lamp_outside(number, color, own, ranges)
     return told
 
 
-def _lamp_outside(
-    number: int, color: Vector, own: Vector | None, saturation: tuple[float, float] | None
-) -> list[str]:
-    """Return what of a lamp's colour was not learned."""
-    if own is None or all(math.isclose(a, b, rel_tol=1e-6) for a, b in zip(color, own, strict=True)):
+def _lamp_outside(number: int, color: Vector, own: Vector | None, ranges: Ranges) -> list[str]:
+    """Return what of a lamp's colour and power was not learned."""
+    if own is None:
         return []
-    lamp = f"lamp {number + 1}"
-    if saturation is None:
+    lamp, brightness = f"lamp {number + 1}", sum(color) / sum(own) if sum(own) > 0.0 else 1.0
+    scale = 1.0 if ranges.power is None else brightness
+    hue_kept = all(math.isclose(a, scale * b, rel_tol=1e-6) for a, b in zip(color, own, strict=True))
+    if hue_kept and ranges.power is None:
+        return []
+    if not hue_kept and ranges.saturation is None:
         return [f"{lamp} has another colour (learned: its own)"]
-    found, (low, high) = saturation_of(color), saturation
     told = []
-    if not low - SATURATION_TOLERANCE <= found <= high + SATURATION_TOLERANCE:
-        told.append(f"the saturation of {lamp} is {found:.2f} (learned: {low:.2f} to {high:.2f})")
-    if not abs(sum(color) / sum(own) - 1.0) <= BRIGHTNESS_TOLERANCE:
-        told.append(f"{lamp} is {sum(color) / sum(own):.2f} times as bright as the one that was learned")
-    return told
+    if not hue_kept and ranges.saturation is not None:
+        found, (low, high) = saturation_of(color), ranges.saturation
+        if not low - SATURATION_TOLERANCE <= found <= high + SATURATION_TOLERANCE:
+            told.append(f"the saturation of {lamp} is {found:.2f} (learned: {low:.2f} to {high:.2f})")
+    return told + _power_outside(lamp, brightness, ranges.power)
+
+
+def _power_outside(lamp: str, brightness: float, power: tuple[float, float] | None) -> list[str]:
+    """Return whether a lamp's brightness, relative to its own, was not learned."""
+    low, high = power or (1.0, 1.0)
+    if low * (1.0 - BRIGHTNESS_TOLERANCE) <= brightness <= high * (1.0 + BRIGHTNESS_TOLERANCE):
+        return []
+    if power is None:
+        return [f"{lamp} is {brightness:.2f} times as bright as the one that was learned"]
+    return [f"{lamp} is {brightness:.2f} times as bright as its own (learned: {low:g} to {high:g})"]
 
 
 def _number(text: str | None) -> float | None:

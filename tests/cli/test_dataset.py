@@ -215,6 +215,7 @@ def test_ranges_and_parameters_are_passed_on(wamnet, tmp_path) -> None:
     """Start, length, a parameter of the scene, depth, arc, camera, lamps."""
     options = ("--start", 1, "--seconds", 2, "--set", "warm=1,0.5,0.5", "--max-depth", 1)
     ranges = ("--arc", 0.5, "--yaw=-24:24", "--pitch=-8:8", "--distance", "0.9:1.1", "--saturation", "0:0.7")
+    ranges += ("--power", "0.5:2")
     assert wamnet("dataset", *TINY, *options, *ranges, "--outside", 3, "-o", "a").status == 0
     manifest = json.loads((tmp_path / "a/manifest.json").read_text())
     assert manifest["request"]["parameters"] == {"warm": [1.0, 0.5, 0.5]}
@@ -224,7 +225,7 @@ def test_ranges_and_parameters_are_passed_on(wamnet, tmp_path) -> None:
     assert [f.get("outside") for f in frames[3:]] == ["time", "camera", "lamps"]
     assert all(1.0 <= f["time_s"] < 2.5 for f in frames[:3])
     assert 2.5 <= frames[3]["time_s"] < 3.0
-    wanted = Ranges((1.0, 2.5), (-24.0, 24.0), (-8.0, 8.0), (0.9, 1.1), (0.0, 0.7))
+    wanted = Ranges((1.0, 2.5), (-24.0, 24.0), (-8.0, 8.0), (0.9, 1.1), (0.0, 0.7), (0.5, 2.0))
     for facts in frames:
         scene = canonical("minicubes", time=facts["time_s"], warm=(1.0, 0.5, 0.5))
         lights = tuple(tuple(color) for color in facts["lights"])

@@ -27,8 +27,8 @@ LINES: Sequence[str] = (
     "--workers 1 --exposure 0 -o out.png",
     "scene minicubes --time 0.5 --set time=0.5 --yaw 3 --pitch 4 --distance 2 --light 1=1,1,0 -o out.json",
     "dataset minicubes --frames 1 --test 1 --outside 1 --size 4 --spp 1 --test-spp 1 --feature-spp 2 "
-    "--start 0 --seconds 8 --arc 2 --yaw -3:3 --pitch 0:1 --distance 1:1.1 --saturation 0:0.5 --seed 1 "
-    "--max-depth 2 --executor numpy --sampler pcg4d --workers 1 -o out",
+    "--start 0 --seconds 8 --arc 2 --yaw -3:3 --pitch 0:1 --distance 1:1.1 --saturation 0:0.5 --power 0.5:2 "
+    "--seed 1 --max-depth 2 --executor numpy --sampler pcg4d --workers 1 -o out",
     "train -i frame.exr -t frame.exr --preset short --features color,depth --rank 0 --steps 1 --seed 1 "
     "--executor numpy -o out.safetensors",
     "train --dataset set --from model.safetensors --variant rank1 --steps 1 -o out.safetensors",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,6 +96,39 @@ def test_frames_inside_are_inside_and_outside_ones_are_not() -> None:
         assert all(sentence.startswith(words[draw.outside]) for sentence in told)
     yaws = [draw.variation.yaw_deg for draw in far if draw.outside == "camera"]
     assert yaws == [-34.0, 34.0, -34.0, 34.0]
+
+
+POWERED = [replace(RANGES, power=(0.25, 1.5)), replace(RANGES, saturation=None, power=(0.25, 1.5))]
+"""Ranges of power, with colours and without."""
+
+
+@pytest.mark.parametrize("ranges", POWERED, ids=["colours", "own colours"])
+def test_powers_fill_their_range_and_depend_on_nothing(ranges) -> None:
+    """Kolmogorov's test of both lamps' factors against uniform, Spearman's of one against the other; 3 tests,
+    level 1 %. Without a range of saturation, colours are the lamps' own times a factor, to an ulp or two.
+    """
+    found = draws.drawn(5, ranges, CUBES.lights, 0, 512)
+    level = 1.0 - 0.99 ** (1 / 3)
+    factors = [[sum(d.variation.lights[n]) / sum(OWN[n]) for d in found] for n in (0, 1)]
+    for values in factors:
+        assert 0.25 - 1e-12 <= min(values) <= max(values) <= 1.5 + 1e-12
+        assert stats.kstest(values, "uniform", args=(0.25, 1.25)).pvalue >= level
+    assert stats.spearmanr(*factors).pvalue >= level
+    for draw in found[:20]:
+        assert outside(ranges, varied(CUBES, draw.variation).info, OWN) == []
+        for color, own in zip(draw.variation.lights, OWN, strict=True):
+            kept = np.ptp(np.divide(color, own)) <= 2 * np.finfo(float).eps * max(np.divide(color, own))
+            assert kept == (ranges.saturation is None)
+
+
+def test_colours_do_not_depend_on_a_range_of_power() -> None:
+    """The factor is drawn by itself: hue and saturation of a frame are what they are without it.
+
+    A product and a quotient round by an ulp each, 2.2e-16 of numbers up to 1.5.
+    """
+    plain, powered = (draws.variation_of(5, 9, r, CUBES.lights) for r in (RANGES, POWERED[0]))
+    for one, other in zip(plain.lights, powered.lights, strict=True):
+        assert np.ptp(np.divide(other, one)) <= 2 * np.finfo(float).eps * 1.5
 
 
 def test_seeds_differ_and_single_values_are_exact() -> None:

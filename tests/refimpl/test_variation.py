@@ -139,6 +139,40 @@ def test_what_is_outside() -> None:
     assert told(lights=(bright, OWN[1])) == ["lamp 1 is 1.50 times as bright as the one that was learned"]
 
 
+def test_what_power_is_outside() -> None:
+    """A lamp's own colour and others, dimmer and brighter; with a range of colours and without one."""
+    powers = V.Ranges(power=(0.5, 2.0))
+
+    def told(ranges: V.Ranges, *lights) -> list[str]:
+        return V.outside(ranges, V.varied(CUBES, V.Variation(lights=lights)).info, OWN)
+
+    def times(factor: float, color) -> tuple[float, float, float]:
+        return tuple(factor * c for c in color)
+
+    colored = V.lamp_color(OWN[0], 0.3, 0.6)
+    assert told(powers, times(0.5, OWN[0]), times(2.0, OWN[1])) == []
+    assert told(powers, times(0.4, OWN[0]), times(2.1, OWN[1])) == [
+        "lamp 1 is 0.40 times as bright as its own (learned: 0.5 to 2)",
+        "lamp 2 is 2.10 times as bright as its own (learned: 0.5 to 2)",
+    ]
+    assert told(powers, colored, OWN[1]) == ["lamp 1 has another colour (learned: its own)"]
+    both = V.Ranges(saturation=(0.0, 0.7), power=(0.5, 2.0))
+    assert told(both, times(0.5, colored), OWN[1]) == []
+    assert told(both, times(3.0, colored), OWN[1]) == [
+        "lamp 1 is 3.00 times as bright as its own (learned: 0.5 to 2)"
+    ]
+
+
+def test_ranges_without_power_are_the_text_that_they_were() -> None:
+    """Models and data sets that are older than the range of power keep their digests."""
+    plain, powered = V.Ranges(saturation=(0.0, 0.5)), V.Ranges(power=(0.25, 4.0))
+    assert "power" not in plain.to_json()
+    assert V.ranges_from_json(plain.to_json()) == plain
+    assert V.ranges_from_json(powered.to_json()) == powered
+    with pytest.raises(InputError, match=r"range of power is 0.0:1.0: LOW:HIGH within 0.000976562 to 1024"):
+        V.check_ranges(V.Ranges(power=(0.0, 1.0)))
+
+
 def test_outside_without_lamps_or_facts() -> None:
     """Colours that were never varied are the lamps' own only; what nobody says is inside."""
     still = V.Ranges()

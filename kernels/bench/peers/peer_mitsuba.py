@@ -101,10 +101,11 @@ def check(scene: Scene, settings: Settings) -> None:
 
 def _check_glass(scene: Scene) -> None:
     """Refuse light that begins in glass: Mitsuba's is scaled where it leaves, ours is basic radiance."""
-    solids = (*scene.boxes, *scene.spheres)
+    solids: tuple[Box | Sphere, ...] = (*scene.boxes, *scene.spheres)
     glass = [part for part in solids if part.material is not None and part.material.transmits]
     inner = [part.center for part in solids if any(part.emission)]
-    inner += [part.corner for part in (*scene.lights, *(quad for quad in scene.quads if any(quad.emission)))]
+    inner += [light.corner for light in scene.lights]
+    inner += [quad.corner for quad in scene.quads if any(quad.emission)]
     for part in glass:
         if any(_surrounds(part, point) for point in inner):
             raise InputError(

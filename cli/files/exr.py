@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...refimpl.errors import InputError
-from ...refimpl.frame import LAYERS, SEEN, Floats, Frame, validate
+from ...refimpl.frame import HISTORY, LAYERS, SEEN, Floats, Frame, validate
 from ...refimpl.network.dataset import FARTHEST_DEPTH
 from ...refimpl.reading import check_room, refusing
 from ..common.inputs import check_input
@@ -42,6 +42,8 @@ CHANNELS: Mapping[str, tuple[str, ...]] = {
     "seen_normal": ("seen_normal.X", "seen_normal.Y", "seen_normal.Z"),
     "seen_depth": ("seen_depth.Z",),
     "seen_position": ("seen_position.X", "seen_position.Y", "seen_position.Z"),
+    "history": ("history.R", "history.G", "history.B"),
+    "history_weight": ("history_weight.V",),
 }
 """The channels that hold each layer in the files that are written here."""
 
@@ -53,7 +55,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "position": ("position", "p"),
     "direction": ("direction", "raydirection"),
     "unshadowed": ("unshadowed",),
-    **{name: (name,) for name in SEEN},
+    **{name: (name,) for name in (*SEEN, *HISTORY)},
 }
 """Names of each layer on reading, lower case, best first: as in Blender, pbrt, Mitsuba, Arnold and here."""
 

@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...refimpl import vectors
-from ...refimpl.frame import SEEN
+from ...refimpl.errors import InputError
+from ...refimpl.frame import HISTORY, SEEN
 from ...refimpl.network.dataset import (
     FEATURES,
     Normalization,
@@ -35,7 +36,11 @@ SAMPLES = "samples"
 def layers_of(features: Sequence[str]) -> tuple[str, ...]:
     """Return the layers that features are made of: the groups of planes that a path kernel has to add up."""
     check_features(features)
-    return tuple(FEATURES[name].layer for name in features)
+    layers = tuple(FEATURES[name].layer for name in features)
+    if before := [layer for layer in layers if layer in HISTORY]:
+        rule = "a path kernel makes layers of one picture, not of those before it"
+        raise InputError("features", ", ".join(before), rule, "make them with refimpl/light/history.py")
+    return layers
 
 
 def sees(features: Sequence[str]) -> bool:

@@ -105,6 +105,11 @@ def encode_light(values: Array, normalization: Normalization) -> Array:
     return to_display(values, normalization.exposure_stops)
 
 
+def encode_share(values: Array, normalization: Normalization) -> Array:
+    """Clip shares (..., 1) to [0, 1]."""
+    return np.clip(values, 0.0, 1.0)
+
+
 def encode_signed(values: Array, normalization: Normalization) -> Array:
     """Clip components of a unit vector (..., 3) to [-1, 1]; a pixel's mean may be shorter than 1."""
     return np.clip(values, -1.0, 1.0)
@@ -191,12 +196,38 @@ FIRST_HITS: Mapping[str, Feature] = {
 PAST = "past mirrors and glass: "
 """How the formulas of features begin that are of what is seen there."""
 
+PICTURES_BEFORE: Mapping[str, Feature] = {
+    feature.name: feature
+    for feature in (
+        Feature(
+            "history",
+            "history",
+            3,
+            0.0,
+            1.0,
+            encode_color,
+            "mean with the pictures before, where each surface was: " + DISPLAY_FORMULA,
+        ),
+        Feature(
+            "history_weight",
+            "history_weight",
+            1,
+            0.0,
+            1.0,
+            encode_share,
+            "share of the pictures before in that mean, 1 - 1 / (number of its samples); 0 where it is new",
+        ),
+    )
+}
+"""Features of a picture that follows others (light/history.py)."""
+
 FEATURES: Mapping[str, Feature] = {
     **FIRST_HITS,
     **{
         seen: replace(FIRST_HITS[first], name=seen, layer=seen, formula=PAST + FIRST_HITS[first].formula)
         for seen, first in SEEN.items()
     },
+    **PICTURES_BEFORE,
 }
 """Every feature that a model may use. Those of what is seen past mirrors and glass are encoded as those of
 the first hit are, by the same scales."""

@@ -13,10 +13,11 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
 from wamnet.compiler.scenes.lower_encode import SAMPLES, channel_name, layers_of, lower_encode, planes_of
 from wamnet.refimpl.errors import CompileError, InputError
-from wamnet.refimpl.network.dataset import FEATURES, FIRST_HITS, Normalization, encode_sums
+from wamnet.refimpl.network.dataset import FEATURES, FIRST_HITS, PICTURES_BEFORE, Normalization, encode_sums
 
 SCALES = Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 ALL = tuple(FIRST_HITS)
+OF_ONE_PICTURE = tuple(name for name in FEATURES if name not in PICTURES_BEFORE)
 
 
 def sums_of(samples, seed=1):
@@ -97,8 +98,8 @@ def test_the_manifest_names_what_was_made():
 def test_more_images_than_a_fragment_draws():
     """PPL-6: eight colour buffers; languages with buffers take any number."""
     with pytest.raises(CompileError, match=r"encodes 11 features: GLSL 3.30, .* at most 8 images at once"):
-        compile_encode(tuple(FEATURES), SCALES, "opengl")
-    assert len(compile_encode(tuple(FEATURES), SCALES, "opencl").images) == 11
+        compile_encode(OF_ONE_PICTURE, SCALES, "opengl")
+    assert len(compile_encode(OF_ONE_PICTURE, SCALES, "opencl").images) == 11
 
 
 def test_it_is_written_as_other_kernels_are(tmp_path):
@@ -144,3 +145,10 @@ def test_refusals():
         compile_encode(("normal",), SCALES, "opencl", planes=("normal_x",))
     with pytest.raises(CompileError, match="profile 'fast' does not exist"):
         compile_encode(ALL, SCALES, "opencl", "fast")
+
+
+@pytest.mark.parametrize("name", PICTURES_BEFORE)
+def test_features_of_pictures_before_are_refused(name):
+    """HIS-7: a path kernel makes no history."""
+    with pytest.raises(InputError, match=f"features is {name}: a path kernel makes layers of one picture"):
+        layers_of(("color", name))

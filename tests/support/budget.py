@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 
 BUDGET = {
     "refimpl": 1150,
-    "refimpl/light": 3950,
+    "refimpl/light": 4250,
     "refimpl/network": 2100,
     "compiler": 1700,
     "compiler/core": 3450,

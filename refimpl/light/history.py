@@ -46,12 +46,6 @@ from .scene import WALLS, Room, Scene, Sphere
 from .shapes import Box, Light, Quad, kinds
 from .transport import Counters
 
-LIMIT = 16
-"""Most samples that a history counts as: from then on each new one has a share of 1 / LIMIT."""
-
-LIMIT_SHOWN = 4
-"""The same for mirrors and glass where anything moves: what is seen in them moves otherwise than they do."""
-
 MOST_LIMIT = 4096
 """Largest limit: beyond it the bound on rounding would need more terms, and no light stays for so long."""
 
@@ -61,6 +55,36 @@ angle between two faces of a box."""
 
 FARTHEST_PX = 1 << 17
 """Largest displacement that is looked at, in pixels: twice the largest picture."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Most samples that a history counts as: from then on each new one has a share of 1 / limit.
+
+    `rest` is for a picture in which nothing has moved. Else light may change where nothing moves, as a shadow
+    does: `moving`; and what mirrors and glass show moves otherwise than they do: `shown`.
+    """
+
+    moving: float = 6
+    shown: float = 4
+    rest: float = 64
+
+    def __post_init__(self) -> None:
+        """Refuse limits that are not from 1 to MOST_LIMIT."""
+        for name, value in vars(self).items():
+            if not 1 <= value <= MOST_LIMIT:
+                rule = f"a number of samples from 1 to {MOST_LIMIT}"
+                raise InputError(f"limit `{name}`", value, rule, f"{Limits.moving} is usual in motion")
+
+    def of(self, moves: Motion) -> NDArray[np.float64]:
+        """Return the limit (N + 1,) of each primitive."""
+        if np.all(moves.rests):
+            return np.full(moves.rests.shape, float(self.rest))
+        return np.where(moves.shows, float(self.shown), float(self.moving))
+
+
+LIMITS = Limits()
+"""The limits that are usual."""
 
 
 class First(NamedTuple):
@@ -317,30 +341,18 @@ def begin(scene: Scene, job: Job, color: Image) -> History:
     return History(scene, first.number, first.normal, own, np.ones_like(own[..., 0]))
 
 
-def follow(
-    past: History,
-    scene: Scene,
-    job: Job,
-    color: Image,
-    limit: float = LIMIT,
-    limit_shown: float = LIMIT_SHOWN,
-) -> History:
+def follow(past: History, scene: Scene, job: Job, color: Image, limits: Limits = LIMITS) -> History:
     """Return the history after the next picture, of a linear colour (H, W, 3), of the scene as it is now.
 
-    Raises InputError for a scene with other primitives, a picture of another size, colours that are not
-    finite, and limits that are not from 1 to MOST_LIMIT.
+    Raises InputError for a scene with other primitives, a picture of another size, and colours that are not
+    finite.
     """
     _check(job, color, past)
-    for name, value in (("limit", limit), ("limit_shown", limit_shown)):
-        if not 1 <= value <= MOST_LIMIT:
-            raise InputError(name, value, f"a number of samples from 1 to {MOST_LIMIT}", f"{LIMIT} is usual")
     first, moves = first_hits(scene, job), motion(scene, past.scene, job.dtype)
     cameras = (camera_basis(camera, job.dtype) for camera in (scene.camera, past.scene.camera))
     shift = displacement(moves, *cameras, first, job.width, job.height)
-    shows = moves.shows & ~np.all(moves.rests)
-    limits = np.where(shows, limit_shown, limit).astype(job.dtype)
-    known = gathered(past, moves, first, shift)
-    mean, count = blend(known, color.astype(job.dtype), vectors.look_up(limits, first.number))
+    limit = vectors.look_up(limits.of(moves).astype(job.dtype), first.number)
+    mean, count = blend(gathered(past, moves, first, shift), color.astype(job.dtype), limit)
     return History(scene, first.number, first.normal, mean, count)
 
 
@@ -363,8 +375,9 @@ def layers_of(history: History) -> dict[str, Image]:
 def error_bound(limit: float, largest: float, dtype: DTypeLike = np.float32) -> float:
     """Return how far rounding takes a history's colours from exact ones, after any number of pictures.
 
-    largest is the largest magnitude of all samples' colours. Displacements, their fractions and what is the
-    same surface are taken as they were computed: (60 limit + 8) u largest, with u half an ulp of 1.
+    limit is the largest one that was used, largest the largest magnitude of all samples' colours.
+    Displacements, their fractions and what is the same surface are taken as they were computed:
+    (60 limit + 8) u largest, with u half an ulp of 1.
     """
     return (60.0 * limit + 8.0) * float(np.finfo(np.dtype(dtype)).eps) / 2.0 * largest
 

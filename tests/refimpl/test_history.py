@@ -21,6 +21,7 @@ from wamnet.refimpl.light.variation import Variation, varied
 
 U = {name: float(np.finfo(name).eps) / 2 for name in ("float32", "float64")}
 STEP_S = 1 / 24
+MOVING, SHOWN, REST = vars(H.LIMITS).values()
 CAMERA = Camera((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), vertical_fov_deg=90.0)
 WHITE = (0.5,) * 3
 
@@ -261,17 +262,15 @@ def test_what_was_hidden_is_new():
 def test_at_rest_a_history_is_the_running_mean_to_the_bit(name):
     """HIS-5: at edges too, where each ray may meet another surface."""
     scene, past, mean = canonical(name, time=0.7), None, None
-    for k in range(40):
+    for k in range(REST + 10):
         one, color = job(16, k), noise(k, 16, 16)
         past = H.begin(scene, one, color) if past is None else H.follow(past, scene, one, color)
-        mean = color if mean is None else mean + (color - mean) / np.float32(min(k + 1, H.LIMIT))
+        mean = color if mean is None else mean + (color - mean) / np.float32(min(k + 1, REST))
         assert np.array_equal(past.color, mean), k
-        assert (past.count == min(k + 1, H.LIMIT)).all()
-    exact = np.mean([noise(k, 16, 16).astype(np.float64) for k in range(H.LIMIT)], axis=0)
-    past = H.begin(scene, job(16), noise(0, 16, 16))
-    for k in range(1, H.LIMIT):
-        past = H.follow(past, scene, job(16, k), noise(k, 16, 16))
-    assert np.abs(past.color - exact).max() <= H.error_bound(H.LIMIT, 1.0)
+        assert (past.count == min(k + 1, REST)).all()
+        if k == REST - 1:
+            exact = np.mean([noise(i, 16, 16).astype(np.float64) for i in range(REST)], axis=0)
+            assert np.abs(past.color - exact).max() <= H.error_bound(REST, 1.0)
 
 
 def test_histories_stay_between_the_samples():
@@ -325,8 +324,9 @@ def test_what_mirrors_show_counts_less_while_anything_moves():
         # a ball behind the camera, which rests from picture 25 on
         at = replace(scene, spheres=(Sphere((0.01 * min(k, 25), 0.0, 5.0), 1.0, WHITE),))
         past = H.begin(at, one, color) if past is None else H.follow(past, at, one, color)
-        shown = min(k + 1, H.LIMIT_SHOWN) if k <= 25 else H.LIMIT_SHOWN + k - 25
-        assert (past.count[past.number == 2] == min(k + 1, H.LIMIT)).all()
+        shown = min(k + 1, SHOWN) if k <= 25 else SHOWN + k - 25
+        plain = min(k + 1, MOVING) if k <= 25 else MOVING + k - 25
+        assert (past.count[past.number == 2] == plain).all()
         assert (past.count[past.number == 1] == shown).all(), k
     assert {1, 2} == set(past.number.flat)
 
@@ -357,7 +357,11 @@ def test_pictures_that_do_not_fit_are_refused():
             H.follow(past, scene, job(8), broken)
         with pytest.raises(InputError, match="the colour at x=2, y=3"):
             H.begin(scene, job(8), broken)
-    for name in ("limit", "limit_shown"):
-        for value in (0, 0.5, H.MOST_LIMIT + 1, np.nan):
-            with pytest.raises(InputError, match=f"^{name} is .*from 1 to {H.MOST_LIMIT}"):
-                H.follow(past, scene, job(8), color, **{name: value})
+
+
+@pytest.mark.parametrize("name", vars(H.LIMITS))
+@pytest.mark.parametrize("value", [0, 0.5, H.MOST_LIMIT + 1, np.nan])
+def test_limits_beyond_the_bound_s_reach_are_refused(name, value):
+    """HIS-6."""
+    with pytest.raises(InputError, match=f"^limit `{name}` is .*from 1 to {H.MOST_LIMIT}"):
+        H.Limits(**{name: value})

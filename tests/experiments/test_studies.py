@@ -33,6 +33,7 @@ FIGURES = {
     "fig_prediction": {"prediction.png", "methods.png"},
     "flicker": {"flip.png", "rows.png"},
     "generalisation": {"orientations.png", "pictures.png"},
+    "history": set(),
     "learning_curve": {"curve.png"},
     "losses": set(),
     "lights": {"psnr.png", "color.png", "a-on-b.png", "each-frame.png"},

@@ -1,0 +1,1 @@
+"""Any renderer against scenes whose answers are known: cases, writers of scenes, how to ask, and verdicts."""

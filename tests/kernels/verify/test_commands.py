@@ -1,0 +1,178 @@
+"""How programs are asked, how they fail, and what formats cannot say (VRF-9, VRF-10)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from wamnet.cli.commands.verify.renderer import read_layers
+from wamnet.kernels.verify import renderers as R
+from wamnet.kernels.verify import run
+from wamnet.kernels.verify.case import Shot
+from wamnet.kernels.verify.cases import chosen, questions
+from wamnet.kernels.verify.judgement import FAILED, PASS, UNTESTED, Missing
+from wamnet.kernels.verify.parts import NotExpressed, parts_of
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.light.materials import Mirror
+from wamnet.refimpl.light.scene import Quad, Scene, Sphere, from_json
+from wamnet.refimpl.light.scenes import canonical, daylight, empty
+
+SHOT = Shot("a shot", empty(), size=4, spp=1)
+WRITES = "import sys; import numpy as np; np.savez(sys.argv[2], color=np.full((4, 4, 3), 0.25))"
+
+
+def by(program, *words, **more):
+    """Return a renderer that runs a Python program."""
+    command = (sys.executable, "-c", program, *(words or ("{scene}", "{output}")))
+    return R.ByCommand("test", "wamnet", command, lambda path: {}, more.pop("output", R.NPZ), **more)
+
+
+@pytest.mark.needs("programs")
+def test_a_program_that_answers():
+    found = by(WRITES).pictures(SHOT, [3, 4])
+    assert [picture["color"].shape for picture in found] == [(4, 4, 3)] * 2
+
+
+@pytest.mark.needs("programs")
+def test_one_process_for_all_pictures():
+    """{seeds} and {outputs} are lists, and placeholders within words are filled."""
+    program = (
+        "import sys, numpy as np\n"
+        "for seed, output in zip(sys.argv[1][6:].split(','), sys.argv[2].split(',')):\n"
+        "    np.savez(output, color=np.full((int(sys.argv[3]), 4, 3), float(seed)))"
+    )
+    found = by(program, "seeds={seeds}", "{outputs}", "{height}").pictures(SHOT, [3, 4])
+    assert [picture["color"][0, 0, 0] for picture in found] == [3.0, 4.0]
+
+
+@pytest.mark.needs("programs")
+@pytest.mark.parametrize(
+    ("program", "note"),
+    [
+        ("import sys; print('first'); sys.exit('no such shape')", "exit status 1: no such shape"),
+        ("import sys; sys.exit(3)", "exit status 3: nothing said"),
+        ("pass", "it ended well, and wrote no .npz where {output} said"),
+        ("import sys; open(sys.argv[2], 'w').write('no')", "its picture cannot be read"),
+    ],
+)
+def test_failures_are_told(program, note):
+    found = by(program).pictures(SHOT, [1])
+    assert isinstance(found, Missing)
+    assert found.state == FAILED
+    assert note in found.note
+
+
+@pytest.mark.needs("programs")
+def test_a_program_that_never_ends():
+    found = by("import time; time.sleep(60)", limit_s=0.5).pictures(SHOT, [1])
+    assert found == Missing(FAILED, "no answer in 0.5 s")
+
+
+@pytest.mark.needs("programs")
+def test_a_program_that_is_not_there():
+    found = R.ByCommand("x", "wamnet", ("/no/such/program", "{scene}"), lambda path: {}).pictures(SHOT, [1])
+    assert isinstance(found, Missing)
+    assert "cannot be run" in found.note
+
+
+def test_what_a_format_cannot_say_is_not_tested():
+    renderer = R.ByCommand("x", "povray", ("never", "run"), lambda path: {})
+    verdicts = run.verify(renderer, chosen(["albedo-matte", "metal-1-0"]))
+    assert {v.state for v in verdicts} == {UNTESTED}
+    assert [v.note for v in verdicts] == [
+        "format povray has no layers beside the colour",
+        "format povray has no rough metal",
+    ]
+
+
+def test_no_sky_of_directions():
+    with pytest.raises(NotExpressed, match="sky"):
+        parts_of(daylight())
+
+
+def said(form, shot):
+    """Return a shot's text, or None where a format refuses it that may."""
+    try:
+        return R.FORMATS[form].write(shot, 7)
+    except NotExpressed:
+        if form in ("povray", "luxcore"):
+            return None
+        raise
+
+
+@pytest.mark.parametrize("form", R.FORMATS)
+def test_every_shot_is_written_or_refused_in_words(form):
+    """What is written is well formed: JSON reads back, XML parses, and Python compiles."""
+    written = 0
+    for shot in run.shots_of(questions()):
+        text = said(form, shot)
+        if text is None:
+            continue
+        written += 1
+        if form == "wamnet":
+            assert from_json(text) == shot.scene
+        elif form == "mitsuba":
+            ElementTree.fromstring(text)
+            assert 'name="seed" value="7"' in text
+        elif form in ("blender", "luxcore"):
+            compile(text, shot.name, "exec")
+        else:
+            assert text.count("{") == text.count("}")
+    assert written >= 14
+
+
+def test_what_emits_and_is_no_matte_surface_is_refused():
+    ball = Sphere((0.0, 0.0, 0.0), 1.0, (0.5, 0.5, 0.5), (1.0, 1.0, 1.0), Mirror())
+    shot = Shot("odd", Scene("odd", empty().camera, spheres=(ball,)))
+    for form in ("mitsuba", "blender", "povray"):
+        with pytest.raises(NotExpressed, match="emits"):
+            R.FORMATS[form].write(shot, 1)
+
+
+def test_what_emits_on_both_sides_is_two_sheets_for_mitsuba():
+    quad = Quad((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    text = R.FORMATS["mitsuba"].write(Shot("q", Scene("q", empty().camera, quads=(quad,))), 1)
+    assert text.count('type="rectangle"') == 2
+    room = R.FORMATS["mitsuba"].write(Shot("r", canonical("furnace")), 1)
+    assert room.count('type="rectangle"') == 6
+
+
+def test_our_own_tracer_as_a_program():
+    """The command's words are filled for a renderer that has its samples on the command line."""
+    words = R.command_words("mine {scene} -o {output} --spp {samples} --seed {seed} --max-depth {depth}")
+    made = R.ByCommand("mine", "wamnet", words, lambda path: {})
+    filled = made._filled(SHOT, Path("s.json"), [(5, Path("o.exr"))])
+    assert filled == ["mine", "s.json", "-o", "o.exr", "--spp", "1", "--seed", "5", "--max-depth", "16"]
+
+
+@pytest.mark.parametrize(
+    ("command", "rule"),
+    [
+        ("mine 'half", "it is not a command"),
+        ("", "{scene} and {output}"),
+        ("mine {scene}", "{scene} and {output}"),
+    ],
+)
+def test_commands_that_cannot_ask(command, rule):
+    with pytest.raises(InputError, match=rule):
+        R.command_words(command)
+
+
+def test_unknown_renderers_are_refused():
+    with pytest.raises(InputError, match="it is unknown"):
+        R.known("arnold", "numpy", lambda path: {})
+
+
+@pytest.mark.slow
+@pytest.mark.apart
+def test_mitsuba(mitsuba):
+    """What Mitsuba 3 does differently is what its documentation says: product masking at grazing angles."""
+    found = run.verify(R.known("mitsuba", "", read_layers), questions(), pictures=6)
+    odd = {v.question.name: v for v in found if v.deviates}
+    assert all(v.confirmed for v in odd.values())
+    assert sum(v.state == PASS for v in found) >= 35
+    assert np.all([v.state != FAILED for v in found])

@@ -42,6 +42,7 @@ from .commands.compile import compile_model
 from .commands.measure import exports, pipeline, primitives
 from .commands.measure import render as measure_render
 from .commands.measure import train as measure_train
+from .commands.verify import renderer as verify_renderer
 from .common.default_command import CommandWithOthers
 from .common.terminal import tell
 
@@ -100,6 +101,7 @@ _register(view.view, view.EXAMPLES)
 _register(tune.tune, tune.EXAMPLES)
 _register(denoise.executors, denoise.EXECUTORS_EXAMPLES)
 _register(conformance.conformance, conformance.EXAMPLES)
+_register(verify_renderer.verify_renderer, verify_renderer.EXAMPLES, "verify-renderer")
 _register(demo.demo, demo.EXAMPLES)
 _register(measure_render.render, measure_render.EXAMPLES, to=benches)
 _register(measure_train.train, measure_train.EXAMPLES, to=benches)

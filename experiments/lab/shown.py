@@ -558,6 +558,8 @@ TABLES: Mapping[str, TableOf] = {
     "ranks": as_printed("ranks", without=TIMES),
     "same-bits": same.summary,
     "sines": sines,
+    "verified": as_printed("verified", 1),
+    "verified-deviations": as_printed("verified", 2),
     "sines-every": sines_every,
     "sines-octaves": as_printed("sines", 2),
     "speed-against-error": speed_against_error("bench-minicubes"),

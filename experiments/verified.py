@@ -1,0 +1,73 @@
+"""What renderers do with scenes whose answers are known: `wamnet verify-renderer` on each that is here.
+
+1. Each renderer is asked all cases [kernels/verify/run.py]; a row of the first table says for each rule how
+   many of its cases passed, and which profile explains the others.
+2. The second table has a row for each deviation, with what a smaller case with other seeds said of it.
+3. What is not installed has a row that says so: the table never passes over a renderer in silence.
+
+    python experiments/verified.py --only wamnet,mitsuba
+    python experiments/publish.py --run verified python experiments/verified.py
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from lab.command import begin
+from lab.tables import markdown
+
+from wamnet.cli.commands.verify.renderer import read_layers
+from wamnet.kernels.verify import judgement, renderers, report, run
+from wamnet.kernels.verify.case import RULES
+from wamnet.kernels.verify.cases import questions
+from wamnet.kernels.verify.judgement import Verdict
+
+NAMES = ("wamnet", *renderers.KNOWN)
+"""Renderers, in the order of the table."""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print both tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--only", type=lambda text: text.split(","), default=list(NAMES), help="renderers")
+    parser.add_argument("--executor", default="opencl", help="what traces the paths of wamnet")
+    parser.add_argument("--pictures", type=int, default=run.PICTURES, help="of each case, by other seeds")
+    options = parser.parse_args(arguments)
+    found = {}
+    for name in options.only:
+        renderer = renderers.known(name, options.executor, read_layers)
+        found[name] = run.verify(renderer, questions(), pictures=options.pictures)
+        print(f"{name}: {dict(run.counts(found[name]))}", file=sys.stderr)
+    print(markdown(["rule", *found], [[rule, *(cell(v, rule) for v in found.values())] for rule in RULES]))
+    heads = ["renderer", *report.HEADS[:2], *report.HEADS[3:]]
+    rows = []
+    for name, verdicts in found.items():
+        for verdict in verdicts:
+            if verdict.deviates:
+                shown = report.row(verdict)
+                rows.append([name, *shown[:2], *shown[3:]])
+    print(markdown(heads, rows))
+
+
+def cell(verdicts: Sequence[Verdict], rule: str) -> str:
+    """Return what a renderer does with a rule, in few words."""
+    if rule == "finite":
+        broken = sum(v.rule == rule for v in verdicts if v.deviates)
+        return f"{broken} broken" if broken else "kept" if any(v.mean for v in verdicts) else "not tested"
+    mine = [v for v in verdicts if v.question.rule == rule]
+    tested = [v for v in mine if v.state != judgement.UNTESTED]
+    odd = [v for v in tested if v.deviates]
+    if not tested:
+        return "not tested"
+    silent = f", {len(mine) - len(tested)} not tested" if len(tested) < len(mine) else ""
+    if not odd:
+        return f"{len(tested)} pass{silent}"
+    whose = {v.profile or "?" for v in odd}
+    named = f" ({', '.join(sorted(whose))})" if whose != {"?"} else ""
+    return f"**{len(odd)} of {len(tested)} deviate**{named}{silent}"
+
+
+if __name__ == "__main__":
+    begin(main)

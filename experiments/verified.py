@@ -3,7 +3,8 @@
 1. Each renderer is asked all cases [kernels/verify/run.py]; a row of the first table says for each rule how
    many of its cases passed, and which profile explains the others.
 2. The second table has a row for each deviation, with what a smaller case with other seeds said of it.
-3. What is not installed has a row that says so: the table never passes over a renderer in silence.
+3. What was found of a renderer is kept in the folder of results: an interrupted run resumes there. One that
+   is not installed fails in all cases, and its column says so.
 
     python experiments/verified.py --only wamnet,mitsuba
     python experiments/publish.py --run verified python experiments/verified.py
@@ -12,13 +13,17 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 from lab.command import begin
 from lab.tables import markdown
 
 from wamnet.cli.commands.verify.renderer import read_layers
+from wamnet.cli.files.outputs import write_text
 from wamnet.kernels.verify import judgement, renderers, report, run
 from wamnet.kernels.verify.case import RULES
 from wamnet.kernels.verify.cases import questions
@@ -34,21 +39,29 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--only", type=lambda text: text.split(","), default=list(NAMES), help="renderers")
     parser.add_argument("--executor", default="opencl", help="what traces the paths of wamnet")
     parser.add_argument("--pictures", type=int, default=run.PICTURES, help="of each case, by other seeds")
+    parser.add_argument("-o", "--output", type=Path, default=Path("out/verified"), help="folder of results")
     options = parser.parse_args(arguments)
-    found = {}
-    for name in options.only:
-        renderer = renderers.known(name, options.executor, read_layers)
-        found[name] = run.verify(renderer, questions(), pictures=options.pictures)
-        print(f"{name}: {dict(run.counts(found[name]))}", file=sys.stderr)
-    print(markdown(["rule", *found], [[rule, *(cell(v, rule) for v in found.values())] for rule in RULES]))
+    options.output.mkdir(parents=True, exist_ok=True)
+    found = {name: kept(name, options) for name in options.only}
+    cells = [[rule, *(each["cells"][rule] for each in found.values())] for rule in RULES]
+    print(markdown(["rule", *found], cells))
     heads = ["renderer", *report.HEADS[:2], *report.HEADS[3:]]
-    rows = []
-    for name, verdicts in found.items():
-        for verdict in verdicts:
-            if verdict.deviates:
-                shown = report.row(verdict)
-                rows.append([name, *shown[:2], *shown[3:]])
-    print(markdown(heads, rows))
+    print(markdown(heads, [[name, *row] for name, each in found.items() for row in each["rows"]]))
+
+
+def kept(name: str, options: argparse.Namespace) -> dict[str, Any]:
+    """Return what was found of a renderer, from the folder or by asking it."""
+    path = options.output / f"{name}.json"
+    if not path.exists():
+        renderer = renderers.known(name, options.executor, read_layers)
+        verdicts = run.verify(renderer, questions(), pictures=options.pictures)
+        print(f"{name}: {dict(run.counts(verdicts))}", file=sys.stderr)
+        shown = [report.row(verdict) for verdict in verdicts if verdict.deviates]
+        rows = [[*row[:2], *row[3:]] for row in shown]
+        data = {"cells": {rule: cell(verdicts, rule) for rule in RULES}, "rows": rows}
+        write_text(path, json.dumps(data, indent=1) + "\n")
+    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return found
 
 
 def cell(verdicts: Sequence[Verdict], rule: str) -> str:

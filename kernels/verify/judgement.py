@@ -34,10 +34,11 @@ POWER = 0.9
 FEEBLE = 0.1
 """Share of an answer that a pass must be able to tell from it."""
 
-PASS, FEEBLE_PASS, DEVIATES, INTENT, UNTESTED, FAILED = (
+PASS, FEEBLE_PASS, DEVIATES, UNCONFIRMED, INTENT, UNTESTED, FAILED = (
     "pass",
     "feeble pass",
     "deviates",
+    "not confirmed",
     "by intent",
     "not tested",
     "failed",

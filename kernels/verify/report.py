@@ -68,8 +68,8 @@ def row(verdict: Verdict) -> tuple[str, ...]:
     remarks = [verdict.note] if verdict.note else []
     if verdict.profile:
         remarks.append(f"as profile {verdict.profile}")
-    if verdict.state == DEVIATES and verdict.confirmed is not None:
-        remarks.append("confirmed" if verdict.confirmed else "NOT CONFIRMED by a smaller case")
+    if verdict.state == DEVIATES and verdict.confirmed:
+        remarks.append("confirmed")
     return verdict.rule, verdict.question.name, verdict.state, found, answer, off, "; ".join(remarks)
 
 

@@ -2,7 +2,7 @@
 
 1. Shots are rendered with PICTURES seeds each [`verify`], and judged together.
 2. What deviates is asked once more with other seeds, in a picture of half the size where the question is
-   about all of it: a deviation is confirmed if that one shows it too, to the same side [`confirmed`].
+   about all of it: a deviation counts if that one shows it too, to the same side [`confirmed`].
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .case import Question, Shot
-from .judgement import DEVIATES, SIGNIFICANCE, Missing, Picture, Verdict, judge, measure
+from .judgement import DEVIATES, SIGNIFICANCE, UNCONFIRMED, Missing, Picture, Verdict, judge, measure
 from .renderers import Renderer
 
 PICTURES = 8
@@ -55,19 +55,20 @@ def verify(
 
 
 def confirmed(renderer: Renderer, verdict: Verdict, seeds: Sequence[int]) -> Verdict:
-    """Return a deviating verdict with the word of a smaller case; others as they are."""
+    """Return a deviating verdict as a smaller case confirms it, or not; others as they are."""
     if verdict.state != DEVIATES:
         return verdict
     question = smaller(verdict.question)
     found = renderer.pictures(question.shot, [seed + AGAIN for seed in seeds])
     if isinstance(found, Missing):
-        return replace(verdict, confirmed=False)
+        return replace(verdict, state=UNCONFIRMED, confirmed=False)
     again = measure(question, verdict.answer, found)
     if not np.isfinite(again.mean).all():
         return replace(verdict, confirmed=True)
     worst = int(np.argmax(np.abs(verdict.deviation)))
     same_side = (again.mean[worst] - verdict.answer[worst]) * verdict.deviation[worst] > 0.0
-    return replace(verdict, confirmed=bool(again.p <= SIGNIFICANCE and same_side))
+    shows = bool(again.p <= SIGNIFICANCE and same_side)
+    return replace(verdict, state=DEVIATES if shows else UNCONFIRMED, confirmed=shows)
 
 
 def smaller(question: Question) -> Question:

@@ -53,7 +53,7 @@ def mesh(points, faces, look, matrix=None):
 
 
 def ball(center, radius, look):
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=512, ring_count=256, radius=radius, location=center)
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=256, ring_count=128, radius=radius, location=center)
     made = bpy.context.object
     bpy.ops.object.shade_smooth()
     made.data.materials.append(look)

@@ -60,7 +60,7 @@ def box(axes, look):
     mesh(np.array(CUBE) @ axes[:, :3].T + axes[:, 3], CUBES, look)
 
 
-def ball(center, radius, look, rings=256, segments=512):
+def ball(center, radius, look, rings=128, segments=256):
     theta = np.pi * np.arange(rings + 1) / rings
     phi = 2 * np.pi * np.arange(segments) / segments
     x, z = np.outer(np.sin(theta), np.cos(phi)), np.outer(np.sin(theta), np.sin(phi))

@@ -42,7 +42,7 @@ def test_a_program_that_breaks_rules(wamnet, tmp_path):
     assert done.status == 1
     assert "look first at rule radiance" in done.out
     assert "2 deviates" in done.out
-    assert "NOT CONFIRMED" not in done.out
+    assert "not confirmed" not in done.out
 
 
 def test_the_own_tracer_as_a_program(wamnet):

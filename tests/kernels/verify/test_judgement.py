@@ -185,6 +185,8 @@ def test_a_smaller_case_confirms(small, confirmed):
     """VRF-7: it must deviate too, and to the same side."""
     (found,) = run.verify(Drawn(0.6, small), [question()])
     assert found.confirmed is confirmed
+    assert found.deviates is confirmed
+    assert found.state == (J.DEVIATES if confirmed else J.UNCONFIRMED)
 
 
 def test_words_choose_cases():

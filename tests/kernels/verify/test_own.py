@@ -137,11 +137,11 @@ def faults():
     """Yield each fault with what it replaces and the rule that it breaks."""
     zero = lambda *given: np.zeros_like(given[3]) > 1.0  # noqa: E731 - in a table
     yield (
-        "lamps pi times as bright",
+        "light samples pi times as bright",
         transport,
         "light_radiance",
         lambda light: tuple(np.pi * c for c in radiance(light)),
-        "radiance",
+        "direct",
     )
     yield "a matte surface without pi", Lambertian, "value", matte_value(lambda c: np.pi * c), "direct"
     yield "a lost cosine", Lambertian, "value", matte_value(lambda c: 1.0 * (c > 0)), "direct"
@@ -185,12 +185,17 @@ def test_too_few_bounces():
 
 @pytest.mark.slow
 def test_no_false_alarm_in_a_hundred_seeds(executor_named):
-    """A run has an alarm with probability 0.01 at most. None is what was seen, with these seeds."""
+    """A run has an alarm with probability 0.01 at most: more than 5 of 100 have a chance of 5e-4.
+
+    A smaller case confirms a false one with probability 0.005 at most: all 100 together have 0.005.
+    """
     executor_named("opencl")
-    alarms = [
-        judgement.sentence_of(verdict)
-        for trial in range(100)
-        for verdict in run.verify(Own("opencl"), cheap(), pictures=4, seed=1000 * trial + 5)
-        if verdict.deviates
-    ]
-    assert alarms == []
+    asked = cheap()
+    each = {shot.name: Own("opencl").pictures(shot, range(400)) for shot in run.shots_of(asked)}
+    alarms = []
+    for trial in range(0, 400, 4):
+        found = {name: pictures[trial : trial + 4] for name, pictures in each.items()}
+        alarms += [(trial, v) for v in judgement.judge(asked, found) if v.deviates]
+    assert len(alarms) <= 5
+    again = [run.confirmed(Own("opencl"), v, range(trial, trial + 4)) for trial, v in alarms]
+    assert [judgement.sentence_of(v) for v in again if v.deviates] == []

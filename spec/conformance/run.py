@@ -231,7 +231,9 @@ def _nearness(
 def _as_likely(
     name: str, expected: Output, mean: Numbers, variance: Numbers, outputs: Mapping[str, Any]
 ) -> tuple[Wrong | None, float]:
-    """Hold block means of an estimated picture to those of the reference's, by Welch's test."""
+    """Hold block means of an estimated picture to those of the reference's, by Welch's test.
+
+    What a sample's variance is, the vectors say: an answer that states its own could excuse any mean with it."""
     assert expected.welch is not None
     told = {key: from_json(value, key) for key, value in expected.welch.items()}
     shape = tuple(int(side) for side in told["shape"])
@@ -239,11 +241,11 @@ def _as_likely(
         return (f"shapes {mean.shape} and {variance.shape}, not {shape}", name, "", ""), np.inf
     count, size = int(told["spp"]), int(told["block"])
     own = int(_read("spp", outputs.get("spp", expected.welch["asked"])))
-    if own < 2:
-        return (f"{own} samples per pixel have no variance", name, "", ""), np.inf
-    mean, variance = blocks.mean_and_variance(mean, variance, size)
+    if own < int(told["asked"]):
+        return (f"{own} samples per pixel, {int(told['asked'])} asked", name, "", ""), np.inf
+    mean, _ = blocks.mean_and_variance(mean, variance, size)
     wanted = from_json(expected.value, name)
-    p = welch_p(mean, variance, own, wanted, told["variance"], count)
+    p = welch_p(mean, told["variance"], own, wanted, told["variance"], count)
     level = sidak(float(told["significance"]), p.size)
     least = float(np.min(np.where(np.isnan(p), 0.0, p)))
     if least >= level:

@@ -20,6 +20,7 @@ from ....refimpl.network import siren
 from ....refimpl.network.dataset import Normalization, Window
 from ....refimpl.network.denoise import Model
 from ..case import Case, Kind, Output
+from . import rules
 from .paths import scene_text
 
 MODEL = Model(
@@ -362,6 +363,13 @@ def _scene_cases() -> list[Case]:
         read = "SCN-10" if note in SCENE_LATER else "SCN-8"
         clause = read if not bad else "SCN-6" if form else "SCN-7"
         cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note))
+    for note, content in rules.good():
+        inputs = {"text": content}
+        expected = {name: Output(v) for name, v in _scene(inputs).items()}
+        cases.append(Case(f"file.scene/{len(cases)}", "SCN-8", inputs, expected, (), note))
+    for note, content in rules.bad():
+        clause = "SCN-6" if "left out" in note or "too many" in note else "SCN-7"
+        cases.append(Case(f"file.scene/{len(cases)}", clause, {"text": content}, None, (), note))
     return cases
 
 

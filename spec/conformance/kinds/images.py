@@ -142,6 +142,10 @@ WINDOW_ROWS = (
     (1, 4, 2, "zero", 0, 0, "an image of one row"),
     (4, 4, 1, "clamp", 1, 2, "a window of one pixel"),
     (13, 13, 12, "clamp", 6, 6, "the window of the paper"),
+    (7, 12, 9, "clamp", 10, 1, "odd, above 8"),
+    (11, 5, 11, "zero", 1, 8, "odd, above 8, zeros"),
+    (3, 9, 8, "zero", 8, 0, "even, upper right corner"),
+    (4, 3, 5, "clamp", 2, 3, "odd, lower right corner, clamped"),
 )
 """Height, width, size, border, x, y and note of the cases."""
 
@@ -159,10 +163,12 @@ def _window_cases() -> list[Case]:
         )
         cases.append(Case(f"image.window/{len(cases)}", clause, inputs, expected, (), note))
     image = np.zeros((2, 2, 1), np.int64)
-    for size, border in ((0, "clamp"), (65, "clamp"), (3, "mirror")):
+    for size, border in ((0, "clamp"), (65, "clamp"), (3, "mirror"), (-1, "zero"), (2, "")):
         inputs = {"image": image, "size": size, "border": border, "x": 0, "y": 0}
         cases.append(Case(f"image.window/{len(cases)}", "DAT-9", inputs, None, (), f"{size}, {border}"))
-    return cases
+    inputs = {"image": image, "size": 64, "border": "zero", "x": 0, "y": 1}
+    expected = {"window": Output(_window(inputs)["window"])}
+    return [*cases, Case(f"image.window/{len(cases)}", "DAT-9", inputs, expected, (), "the largest window")]
 
 
 # ---- draws ------------------------------------------------------------------------------------------------
@@ -179,8 +185,13 @@ def _draws(inputs: Mapping[str, Any]) -> dict[str, Any]:
 def _draw_cases() -> list[Case]:
     """Return draws from one and from three frames."""
     cases: list[Case] = []
-    for seed, stream, shapes in ((0, 0, [(8, 8)]), (3, 19_999, [(64, 64), (1, 7), (480, 640)])):
-        inputs = {"seed": seed, "stream": stream, "count": 10, "shapes": np.array(shapes)}
+    rows = (
+        (0, 0, 10, [(8, 8)]),
+        (3, 19_999, 10, [(64, 64), (1, 7), (480, 640)]),
+        (2**31 + 5, 2**31 + 70_000, 300, [(3, 5), (700, 300), (1, 1), (1, 60_000)]),
+    )
+    for seed, stream, count, shapes in rows:
+        inputs = {"seed": seed, "stream": stream, "count": count, "shapes": np.array(shapes)}
         expected = {name: Output(value) for name, value in _draws(inputs).items()}
         cases.append(Case(f"image.draws/{len(cases)}", "DAT-8", inputs, expected))
     return cases

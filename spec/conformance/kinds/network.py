@@ -32,8 +32,17 @@ Array = NDArray[Any]
 POSTERIORI = "bounds of profile ieee at these inputs (compiler/proof/bounds.py)"
 """Where the bounds of networks come from."""
 
-SIZES = (([4, 5, 3], 3.0, 1.0), ([6, 8, 8, 3], 1.0, 10.0), ([3, 4, 4, 4, 3], 30.0, 30.0), ([2, 3], 1.0, 1.0))
+SIZES = (
+    ([4, 5, 3], 3.0, 1.0),
+    ([6, 8, 8, 3], 1.0, 10.0),
+    ([3, 4, 4, 4, 3], 30.0, 30.0),
+    ([2, 3], 1.0, 1.0),
+    ([2, 3, 4, 3, 4, 3, 2], 3.0, 1.5),
+)
 """Networks of the cases: widths, omega_0 of the first layer and of the others; the last is only affine."""
+
+DRAWN_ONLY = (([40, 28, 2], 3.0, 2.0, 2**32 - 5), ([3, 300, 1], 1.0, 30.0, 2**31 + 77))
+"""Networks with more than 1,024 weights in a layer, and more than 255 neurons, with large seeds: only drawn."""
 
 EXAMPLES = 4
 """Examples of a minibatch."""
@@ -89,8 +98,9 @@ def _init(inputs: Mapping[str, Any]) -> dict[str, Any]:
 def _init_cases() -> list[Case]:
     """Return some networks."""
     cases = []
-    for index, (widths, first, hidden) in enumerate(SIZES):
-        inputs = {"widths": np.array(widths), "omega_0_first": first, "omega_0_hidden": hidden, "seed": index}
+    rows = [(*row, index) for index, row in enumerate(SIZES)]
+    for index, (widths, first, hidden, seed) in enumerate([*rows, *DRAWN_ONLY]):
+        inputs = {"widths": np.array(widths), "omega_0_first": first, "omega_0_hidden": hidden, "seed": seed}
         expected = {
             name: Output(value, 0.0, "exact, rounded once to float32")
             for name, value in _init(inputs).items()

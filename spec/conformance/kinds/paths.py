@@ -30,12 +30,12 @@ from ....refimpl.light.transport import Counters, Path, Settings
 from ....refimpl.reading import to_dataclass
 from ..case import Case, Kind, Output
 from ..functions import SOURCE
-from .terrace import FOUNDRY, TERRACE
+from .terrace import FOUNDRY, MIRRORS, PLATE, TERRACE, YARD
 
 SCENES = ("cornell", "glossy", "daylight", "minicubes")
 """Canonical scenes whose paths are cases; each at a time of its own, [`TIME_S`]."""
 
-OWN = {scene.name: scene for scene in (TERRACE, FOUNDRY)}
+OWN = {scene.name: scene for scene in (TERRACE, FOUNDRY, YARD, MIRRORS, PLATE)}
 """Scenes of the vectors' own."""
 
 TIME_S = 1.25
@@ -274,7 +274,7 @@ class View:
     """A path: its scene and settings, its pixel, its sample.
 
     `clause` is that of the light gathered at the first vertex, and of the path's end if it ends there, where
-    the path is there for it."""
+    the path is there for it. The first of its `steps` scatterings has the number `depth`."""
 
     scene: str
     settings: Settings
@@ -282,17 +282,22 @@ class View:
     y: int
     sample: int
     clause: str = ""
+    width: int = SIZE_PX
+    height: int = SIZE_PX
+    seed: int = SEED
+    depth: int = 0
+    steps: int = 3
 
     def inputs(self) -> dict[str, Any]:
         """Return the inputs of the first step."""
         return {
             "scene": {"file": _file(self.scene)},
             "settings": asdict(self.settings),
-            "width": SIZE_PX,
-            "height": SIZE_PX,
+            "width": self.width,
+            "height": self.height,
             "x": self.x,
             "y": self.y,
-            "seed": SEED,
+            "seed": self.seed,
             "sample": self.sample,
         }
 
@@ -343,6 +348,42 @@ def _foundry() -> Iterator[View]:
         yield View(FOUNDRY.name, VARIANTS[0], x, y, 0, clause)
 
 
+OTHER_SETTINGS = (
+    Settings(),
+    Settings(strategy="light", heuristic="balance", roulette_depth=2),
+    Settings(sampler="sobol", roulette_depth=1),
+    Settings(strategy="bsdf", roulette_depth=0),
+    Settings(heuristic="balance", sampler="sobol"),
+)
+"""Settings of the paths through the yard and over mirrors, in turn."""
+
+WIDE_PX = (40, 24)
+"""Width and height of the pictures that those paths belong to."""
+
+OTHERS = (*range(24),)
+"""Numbers of those paths."""
+
+
+def _other(index: int) -> View:
+    """Return a path with any counters, also large ones, and up to six scatterings."""
+    words = rng.random_block(rng.counter(SEED), rng.counter(index), rng.counter(1), rng.counter(0))
+    place, height, seed, sample = (int(word[0]) for word in words)
+    name = MIRRORS.name if index % 6 == MIRRORS_TURN else YARD.name
+    depth = (0, 0, 3, 1 << 16, (1 << 31) - 3)[index // 2 % 5]
+    settings = OTHER_SETTINGS[index % len(OTHER_SETTINGS)]
+    x, y = place % WIDE_PX[0], height % WIDE_PX[1]
+    return View(name, settings, x, y, sample, "", *WIDE_PX, seed, depth, 6)
+
+
+MIRRORS_TURN = 5
+"""Of six paths this one is over mirrors."""
+
+
+def _others() -> Iterator[View]:
+    """Yield the paths through the yard and over mirrors."""
+    yield from map(_other, OTHERS)
+
+
 def _views(count: int) -> Iterator[View]:
     """Yield paths spread over scenes, settings and pixels."""
     for index in range(count):
@@ -369,7 +410,7 @@ class Found(NamedTuple):
 def _steps() -> Found:
     """Return the cases of all steps: paths in float64 whose states are rounded to float32 at each step."""
     found = Found([], [], [])
-    for view in (*_views(16), *_terrace(), *_foundry()):
+    for view in (*_views(16), *_terrace(), *_foundry(), *_others()):
         given = view.inputs()
         programs = programs_of(view.scene, view.settings)
         wanted = start(_with_scene(given, view))
@@ -382,10 +423,10 @@ def _steps() -> Found:
             ranges.evaluate(programs.start, _counted(given)),
         )
         kept = {name: given[name] for name in ("scene", "settings")}
-        counters = {"seed": SEED, "pixel": wanted.pop("pixel"), "sample": view.sample}
+        counters = {"seed": view.seed, "pixel": wanted.pop("pixel"), "sample": view.sample}
         one = np.ones(3)
         state: dict[str, Any] = {**wanted, "beta": one, "radiance": 0.0 * one, "pdf": transport.CAMERA_PDF}
-        for depth in range(3):
+        for depth in range(view.depth, view.depth + view.steps):
             state = {name: _rounded(state[name]) for name in PATH}
             wanted = arrive(_with_scene({**kept, **state}, view))
             sent = ranges.evaluate(programs.arrive, _flat(state, PATH))
@@ -402,7 +443,15 @@ def _steps() -> Found:
             wanted = scatter(_with_scene(inputs, view))
             flat = {**_flat(inputs, PATH), **_flat(inputs, SURFACE), **_counted(inputs)}
             sent = ranges.evaluate(programs.scatter, flat)
-            _add(found.scatter, "path.scatter", "LTR-7", inputs, wanted, sent, view.clause * (depth == 0))
+            _add(
+                found.scatter,
+                "path.scatter",
+                "LTR-7",
+                inputs,
+                wanted,
+                sent,
+                view.clause * (depth == view.depth),
+            )
             if not wanted["alive"]:
                 break
             state = wanted
@@ -461,8 +510,8 @@ def whole(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {name: np.array([vertex[name] for vertex in vertices]) for name in VERTEX}
 
 
-def followed(view: View) -> Iterator[dict[str, Range]]:
-    """Yield the ranges of each vertex of a path, as long as all decisions are sure."""
+def followed(view: View) -> Iterator[tuple[dict[str, Range], bool]]:
+    """Yield the ranges of each vertex of a path, as long as all decisions are sure, and whether it surely ends."""
     given, programs = view.inputs(), programs_of(view.scene, view.settings)
     counters = _counted({**given, "pixel": view.x + render.MAX_IMAGE_SIDE_PX * view.y})
     state = dict(ranges.evaluate(programs.start, counters))
@@ -472,12 +521,12 @@ def followed(view: View) -> Iterator[dict[str, Range]]:
             np.all(state[name].sure & state[name].known) for name in {**kinds(PATH), **kinds(SURFACE)}
         ):
             return
-        yield dict(state)
-        state = {
-            **state,
-            **ranges.evaluate(programs.scatter, {**state, **counters, "depth": rng.counter(depth)}),
-        }
-        alive = state.pop("alive")
+        sent = dict(
+            ranges.evaluate(programs.scatter, {**state, **counters, "depth": rng.counter(depth)}),
+        )
+        alive = sent.pop("alive")
+        yield dict(state), bool(np.all(alive.sure) and not np.any(alive.high))
+        state = {**state, **sent}
         if not (np.all(alive.sure) and np.all(alive.low)):
             return
 
@@ -486,17 +535,20 @@ def followed(view: View) -> Iterator[dict[str, Range]]:
 def _whole_cases() -> list[Case]:
     """Return whole paths."""
     cases: list[Case] = []
-    for view in (*_views(32), *_terrace()):
-        reach = []
-        for state in followed(view):
+    for view in (*_views(32), *_terrace(), *_others()):
+        reach, ends = list[dict[str, Range]](), False
+        for state, ends in followed(view):
             low, high, _ = _ends(state, "point", PATH["origin"][0])
             if not np.max(high - low) <= LARGEST_BOUND:
+                ends = False
                 break
             reach.append(state)
-        if len(reach) < 2:
+        if len(reach) < (1 if view.scene == YARD.name else 2):
             continue
         inputs = view.inputs()
-        inputs["settings"]["max_depth"] = len(reach) - 1
+        # Paths of the scenes that came first are cut where they are known to end; others end by themselves.
+        by_itself = ends and view.seed != SEED and len(reach) > 1
+        inputs["settings"]["max_depth"] = len(reach) - 1 + 2 * by_itself
         wanted = whole(_with_scene(inputs, view))
         expected = {}
         for name in VERTEX:

@@ -5,12 +5,16 @@
    floor.
 2. [`FOUNDRY`]: a metal as the first kind of material, a lamp seen at a grazing angle and lit by another one,
    a background, and a camera that is rolled.
+3. [`YARD`]: a room seen from outside, whose walls are of several materials and shine; blocks that share a rotation,
+   channels that reflect nothing, a black ball, and a lamp without power among others.
+4. [`MIRRORS`]: single directions only, so that light is never sampled, under a lamp and a sky.
+5. [`PLATE`]: a matte floor under a distant lamp, whose samples hardly differ.
 """
 
 from __future__ import annotations
 
 from ....refimpl.light.materials import Conductor, Dielectric, Mirror
-from ....refimpl.light.scene import Box, Camera, Light, Quad, Scene, Sky, Sphere
+from ....refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sky, Sphere
 
 TURN = ((0.8, 0.0, 0.6), (0.0, 1.0, 0.0), (-0.6, 0.0, 0.8))
 """A rotation about y."""
@@ -58,3 +62,78 @@ FOUNDRY = Scene(
     background=(0.0625, 0.125, 0.25),
 )
 """A ball of metal and a matte one over a horizontal lamp, under another lamp."""
+
+TILT = ((0.6, 0.0, -0.8), (0.48, 0.8, 0.36), (0.64, -0.6, 0.48))
+"""A rotation about no axis of the scene."""
+
+YARD = Scene(
+    "yard",
+    Camera((0.5, 1.5, 6.5), (0.0, 1.0, 0.0), (-0.5, 1.0, 0.125), 40.0),
+    Room(
+        (-2.0, 0.0, -2.5),
+        (2.5, 3.0, 2.0),
+        (
+            (0.875, 0.75, 0.5),
+            (0.25, 0.5, 0.75),
+            (0.75, 0.75, 0.625),
+            (0.5, 0.5, 0.5),
+            (0.9375, 0.875, 0.875),
+            (0.0, 0.0, 0.0),
+        ),
+        (0.015625, 0.03125, 0.0625),
+        (Conductor(0.5), None, None, Conductor(0.25), Mirror(), None),
+    ),
+    boxes=(
+        Box((0.0, 0.25, 1.25), (0.5, 0.25, 0.125), (0.0, 0.75, 0.5)),
+        *(
+            Box(
+                (0.75 * i - 1.25, 0.5, -1.0),
+                (0.1875, 0.5, 0.25),
+                (0.25 + 0.125 * i, 0.625, 0.75 - 0.125 * i),
+                TILT,
+            )
+            for i in range(4)
+        ),
+        Box((1.5, 1.25, -0.5), (0.375, 0.1875, 0.25), (0.9375, 1.0, 0.875), TURN, material=Dielectric(1.75)),
+    ),
+    spheres=(
+        Sphere((-0.75, 0.4375, 0.5), 0.4375, (1.0, 0.9375, 0.875), material=Dielectric(1.3125)),
+        Sphere((0.875, 0.375, 0.75), 0.375, (0.875, 0.0, 0.0)),
+        Sphere((-1.5, 0.25, 1.25), 0.25, (0.0, 0.0, 0.0)),
+        Sphere((0.375, 2.0, -0.75), 0.3125, (0.75, 0.875, 0.5), material=Conductor(0.125)),
+    ),
+    quads=(
+        Quad((-1.0, 1.25, -1.5), (1.0, 0.25, 0.0), (0.0, 0.75, 0.5), (0.5, 0.25, 0.75), (0.0, 0.125, 0.0)),
+        Quad(
+            (1.75, 0.0, -2.0), (0.25, 0.0, 1.5), (0.0, 1.5, 0.0), (0.875, 0.9375, 0.9375), material=Mirror()
+        ),
+    ),
+    lights=(
+        Light((-0.5, 2.875, -0.5), (0.75, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.75, 0.5), 20.0),
+        Light((2.25, 1.0, 0.5), (0.0, 0.5, 0.125), (0.0, 0.0, 0.5), (0.5, 1.0, 0.75), 0.0),
+        Light((-1.75, 1.5, 0.0), (0.0, 0.0, -0.5), (0.125, -0.75, 0.0), (0.25, 0.5, 1.0), 6.0),
+    ),
+    background=(0.25, 0.125, 0.0625),
+)
+"""A room of metal, a mirror and plaster, with blocks, balls and lamps in it."""
+
+MIRRORS = Scene(
+    "mirrors",
+    Camera((0.0, 0.75, 4.0), (0.0, 0.5, 0.0), (0.0, 1.0, 0.0), 45.0),
+    spheres=(
+        Sphere((-0.75, 0.5, 0.0), 0.5, (0.875, 0.75, 0.5), material=Mirror()),
+        Sphere((0.625, 0.5, 0.5), 0.5, (0.9375, 1.0, 0.9375), material=Dielectric(1.5)),
+    ),
+    quads=(Quad((-3.0, 0.0, -3.0), (0.0, 0.0, 6.0), (6.0, 0.0, 0.0), (0.5, 0.75, 0.75), material=Mirror()),),
+    lights=(Light((-0.5, 2.0, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.875, 0.75), 10.0),),
+    environment=Sky((0.25, 0.5, 1.0), (0.5, 0.5, 0.5), (0.125, 0.125, 0.0625)),
+)
+"""Two balls, one of glass, on a mirror."""
+
+PLATE = Scene(
+    "plate",
+    Camera((0.0, 2.0, 0.5), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 40.0),
+    quads=(Quad((-4.0, 0.0, -4.0), (0.0, 0.0, 8.0), (8.0, 0.0, 0.0), (0.75, 0.5, 0.25)),),
+    lights=(Light((1.0, 4.0, 1.0), (0.5, 0.0, 0.0), (0.0, 0.0, 0.5), (1.0, 0.75, 0.5), 40.0),),
+)
+"""A floor and a lamp."""

@@ -1,0 +1,95 @@
+"""Which clauses a piece of the reference is governed by, and whether a blamed clause is one of them.
+
+1. A clause of the spec names code: `path: names` [`named`].
+2. A mutant breaks the clauses that name its function, its class or its constant; where none does, those that
+   name the functions of its module that call it, and theirs [`Clauses.broken`].
+3. Blame is right if the blamed clause is among them, and near if it names anything of the module.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from .mutation import Mutant
+from .trial import ROOT
+
+CLAUSE = re.compile(r"^\*\*([A-Z0-9]+-\d+[a-z]?)\*\*", re.MULTILINE)
+"""How a clause begins."""
+
+CODE = re.compile(r"`((?:refimpl|compiler)/[\w/]+\.py): *([\w., ]+)`")
+"""How it names code."""
+
+
+def named(folder: Path = ROOT / "spec") -> Iterator[tuple[str, str, str]]:
+    """Yield clause, module and name of all that clauses name."""
+    for path in sorted(folder.glob("*.md")):
+        text = path.read_text(encoding="utf-8")
+        starts = list(CLAUSE.finditer(text))
+        for start, after in zip(starts, [*starts[1:], None], strict=bool(starts)) if starts else ():
+            body = text[start.end() : after.start() if after else len(text)]
+            for module, names in CODE.findall(body):
+                yield from ((start[1], module, name.strip()) for name in names.split(","))
+
+
+class Clauses:
+    """The clauses of all code that is named."""
+
+    def __init__(self) -> None:
+        self.of: dict[tuple[str, str], set[str]] = {}
+        self.modules: dict[str, set[str]] = {}
+        for clause, module, name in named():
+            self.of.setdefault((module, name), set()).add(clause)
+            self.modules.setdefault(module, set()).add(clause)
+        self._trees: dict[str, ast.Module] = {}
+
+    def near(self, mutant: Mutant, clause: str) -> bool:
+        """Tell whether a clause names anything of the mutant's module, or is of the chapter of a C function."""
+        if mutant.module.endswith(".c"):
+            return clause.partition("-")[0] in {known.partition("-")[0] for known in mutant.function.split()}
+        return clause in self.modules.get(mutant.module, ())
+
+    def broken(self, mutant: Mutant) -> set[str]:
+        """Return the clauses that a mutant breaks."""
+        if mutant.module.endswith(".c"):
+            return set(mutant.function.split())
+        tree = self._tree(mutant.module)
+        waiting = self._names(mutant, tree)
+        seen: set[str] = set()
+        while waiting:
+            found = set().union(*(self.of.get((mutant.module, name), set()) for name in waiting))
+            if found:
+                return found
+            seen |= waiting
+            plain = {name.rpartition(".")[2] for name in waiting}
+            waiting = {name for name, used in _used(tree) if used & plain} - seen
+        return self.modules.get(mutant.module, set())
+
+    def _tree(self, module: str) -> ast.Module:
+        """Return the syntax of a module."""
+        if module not in self._trees:
+            self._trees[module] = ast.parse((ROOT / module).read_text(encoding="utf-8"))
+        return self._trees[module]
+
+    @staticmethod
+    def _names(mutant: Mutant, tree: ast.Module) -> set[str]:
+        """Return the names of the function, class or constant that a mutant is in."""
+        if mutant.function:
+            return {mutant.function, mutant.function.partition(".")[0]}
+        for node in tree.body:
+            if node.lineno <= mutant.line <= (node.end_lineno or 0):
+                if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                    return {node.name}
+                return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+        return set()
+
+
+def _used(tree: ast.Module) -> Iterator[tuple[str, set[str]]]:
+    """Yield the functions and classes of a module with the names that they use."""
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names = {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+            names |= {part.attr for part in ast.walk(node) if isinstance(part, ast.Attribute)}
+            yield node.name, names

@@ -1,0 +1,169 @@
+"""Change the reference, or the C program, in one place at a time, and ask the test vectors whether they notice.
+
+    python experiments/mutants.py -o out/mutants
+    python experiments/mutants.py -o out/mutants --count 400 --seed 1
+    python experiments/mutants.py -o out/mutants refimpl/rng.py transport.py:2
+    python experiments/mutants.py -o out/mutants --c99 --count 600
+
+Words choose mutants whose name holds one; `--count` draws some by a seed. Outcomes are kept in the folder: what has
+one is not asked again, unless `--survivors` asks those that were not caught before. Tables are printed: mutants by
+module and by sort, then every survivor without a reason in records/survivors.txt.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+from lab import mutation, mutation_c, trial, trial_c
+from lab.blame import Clauses
+from lab.mutation import Mutant
+from lab.tables import markdown
+from lab.trial import Outcome
+
+from wamnet.spec.conformance import vectors
+
+REASONS = trial.ROOT / "experiments/records/survivors.txt"
+"""Survivors that no vector can tell from the reference, with the reason: `name | reason`."""
+
+C99 = "examples/c99/wamnet.c"
+"""The C program."""
+
+EVERY = 50
+"""Mutants after which progress is told."""
+
+
+def texts(c99: bool) -> dict[str, str]:
+    """Return the texts that are changed, by path."""
+    return {
+        path: (trial.ROOT / path).read_text(encoding="utf-8") for path in ([C99] if c99 else trial.paths())
+    }
+
+
+def chosen(words: Sequence[str], count: int | None, seed: int, c99: bool = False) -> list[Mutant]:
+    """Return the mutants whose name holds a word, all without words; some of them, drawn by a seed."""
+    make = mutation_c.mutants if c99 else mutation.mutants
+    every = [m for path, text in texts(c99).items() for m in make(path, text)]
+    found = [m for m in every if not words or any(word in m.name for word in words)]
+    if count is None or count >= len(found):
+        return found
+    drawn = random.Random(seed).sample(range(len(found)), count)
+    return [found[index] for index in sorted(drawn)]
+
+
+def of_reference(some: Sequence[Mutant], folder: Path) -> Iterator[Outcome | None]:
+    """Yield what comes of mutants of the reference, asked the vectors of a folder."""
+    cases, sources = trial.in_order(folder), texts(c99=False)
+    reached = trial.reach(cases)
+    yield from (trial.trial(mutant, sources[mutant.module], cases, reached) for mutant in some)
+
+
+def of_c99(some: Sequence[Mutant], folder: Path) -> Iterator[Outcome | None]:
+    """Yield what comes of mutants of the C program, asked the vectors of a folder."""
+    cases, (source,) = trial.in_order(folder), texts(c99=True).values()
+    with tempfile.TemporaryDirectory() as place:
+        lines = trial_c.reach(source, cases, Path(place))
+        yield from (trial_c.trial(mutant, source, cases, lines, Path(place)) for mutant in some)
+
+
+def asked(some: Sequence[Mutant], kept: dict[str, Outcome], path: Path, options: argparse.Namespace) -> None:
+    """Ask mutants that have no outcome yet, and add theirs to the file."""
+    again = options.survivors
+    waiting = [
+        m for m in some if m.name not in kept or (again and kept[m.name].asked and not kept[m.name].verdict)
+    ]
+    if not waiting:
+        return
+    began = time.monotonic()
+    outcomes = (of_c99 if options.c99 else of_reference)(waiting, options.vectors)
+    with path.open("a", encoding="utf-8") as file:
+        for number, (mutant, outcome) in enumerate(zip(waiting, outcomes, strict=True)):
+            # What does not compile is no program: as if nobody reached it.
+            kept[mutant.name] = outcome or Outcome(0)
+            file.write(json.dumps([mutant.name, *kept[mutant.name]]) + "\n")
+            file.flush()
+            if number % EVERY == 0:
+                seconds = time.monotonic() - began
+                print(f"{number} of {len(waiting)}, {seconds:.0f} s", file=sys.stderr, flush=True)
+
+
+def read(path: Path) -> dict[str, Outcome]:
+    """Return the outcomes in a file; of several of one mutant the last."""
+    if not path.exists():
+        return {}
+    rows = (json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
+    return {name: Outcome(*rest) for name, *rest in rows}
+
+
+def reasons(path: Path = REASONS) -> dict[str, str]:
+    """Return the reasons of survivors by name."""
+    if not path.exists():
+        return {}
+    lines = path.read_text(encoding="utf-8").splitlines()
+    rows = [line.split(" | ", 1) for line in lines if line.strip() and not line.startswith("#")]
+    return {name.strip(): reason.strip() for name, reason in rows}
+
+
+def table(first: str, rows: Mapping[str, Sequence[Mutant]], kept: Mapping[str, Outcome]) -> str:
+    """Return a table of what came of mutants, with the sum of all in the last row."""
+    known, clauses = reasons(), Clauses()
+    lines = []
+    for name, some in [*rows.items(), ("all", [m for part in rows.values() for m in part])]:
+        reached = [m for m in some if kept[m.name].asked]
+        caught = [m for m in reached if kept[m.name].verdict]
+        excused = sum(m.name in known for m in reached if not kept[m.name].verdict)
+        right = sum(kept[m.name].clause in clauses.broken(m) for m in caught)
+        near = sum(clauses.near(m, kept[m.name].clause) for m in caught)
+        share = f"{100 * len(caught) / (len(reached) - excused):.1f}" if len(reached) > excused else ""
+        parts = [f"{100 * n / len(caught):.1f}" if caught else "" for n in (right, near)]
+        lines.append([name, *map(str, (len(some), len(reached), len(caught), excused)), share, *parts])
+    heads = (first, "mutants", "reached", "caught", "nothing to tell", "caught, %", "clause, %", "module, %")
+    return markdown(heads, lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Ask mutants and print what came of them; return 1 where one survives without a reason."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("words", nargs="*", help="only mutants whose name holds one")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder of outcomes")
+    parser.add_argument("--count", type=int, help="how many, drawn at random; all without it")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the draw")
+    parser.add_argument("--vectors", type=Path, default=vectors.FOLDER, help="folder of vectors")
+    parser.add_argument("--c99", action="store_true", help="change the C program, not the reference")
+    parser.add_argument("--survivors", action="store_true", help="ask again those that were not caught")
+    options = parser.parse_args(arguments)
+    options.output.mkdir(parents=True, exist_ok=True)
+    path = options.output / ("c99.jsonl" if options.c99 else "reference.jsonl")
+    some, kept = chosen(options.words, options.count, options.seed, options.c99), read(path)
+    asked(some, kept, path, options)
+    print(table("module", _grouped(some, _place), kept))
+    print(table("change", _grouped(some, lambda m: m.operator), kept))
+    known = reasons()
+    left = [m.name for m in some if kept[m.name].asked and not kept[m.name].verdict and m.name not in known]
+    print("\n".join(f"survives: {name}" for name in left))
+    return 1 if left else 0
+
+
+def _place(mutant: Mutant) -> str:
+    """Return the module of a mutant, or the chapter of its first clause in the C program."""
+    return mutant.function.partition("-")[0] if mutant.module == C99 else mutant.module
+
+
+def _grouped(some: Sequence[Mutant], key: Callable[[Mutant], str]) -> dict[str, list[Mutant]]:
+    """Return mutants by a word of theirs."""
+    found: dict[str, list[Mutant]] = {}
+    for mutant in some:
+        found.setdefault(key(mutant), []).append(mutant)
+    return found
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,13 +1,13 @@
-"""Change the reference, or the C program, in one place at a time, and ask the test vectors whether they notice.
+"""Change the reference, or the C program, in one place at a time, and ask the vectors whether they notice.
 
     python experiments/mutants.py -o out/mutants
     python experiments/mutants.py -o out/mutants --count 400 --seed 1
     python experiments/mutants.py -o out/mutants refimpl/rng.py transport.py:2
     python experiments/mutants.py -o out/mutants --c99 --count 600
 
-Words choose mutants whose name holds one; `--count` draws some by a seed. Outcomes are kept in the folder: what has
-one is not asked again, unless `--survivors` asks those that were not caught before. Tables are printed: mutants by
-module and by sort, then every survivor without a reason in records/survivors.txt.
+Words choose mutants whose name holds one; `--count` draws some by a seed. Outcomes are kept in the folder:
+what has one is not asked again, unless `--survivors` asks those that were not caught before. Tables are
+printed: mutants by module and by sort, then every survivor without a reason in records/survivors.txt.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ class Clauses:
         self._trees: dict[str, ast.Module] = {}
 
     def near(self, mutant: Mutant, clause: str) -> bool:
-        """Tell whether a clause names anything of the mutant's module, or is of the chapter of a C function."""
+        """Tell whether a clause names anything of a module, or is of the chapter of a C function."""
         if mutant.module.endswith(".c"):
             return clause.partition("-")[0] in {known.partition("-")[0] for known in mutant.function.split()}
         return clause in self.modules.get(mutant.module, ())

@@ -71,7 +71,7 @@ WORDS_ONLY = {"InputError", "CompileError", "TypeVar", "NewType", "isinstance", 
 class Mutant(NamedTuple):
     """A change: its lines, its sort, what becomes of what, the bytes that it replaces.
 
-    `function` is the function or method that it is in, nothing for what is outside of all; `first` to `last` are
+    `function` is the function or method that it is in, nothing for what is outside; `first` to `last` are
     the lines of the statement, or of its head, that reach it.
     """
 
@@ -328,7 +328,7 @@ def _call(node: ast.Call) -> Iterator[Change]:
             second
         ):
             yield "arguments", node, _with(node, args=[*arguments[:at], second, first, *arguments[at + 2 :]])
-    for at, keyword in enumerate(node.keywords):
+    for at in range(len(node.keywords)):
         rest = [other for i, other in enumerate(node.keywords) if i != at]
         yield "argument dropped", node, _with(node, keywords=rest)
     for at, argument in enumerate(arguments):

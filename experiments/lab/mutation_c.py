@@ -2,7 +2,7 @@
 
 1. Functions have a comment above that names their clauses; what is outside of functions is left alone, and so
    are texts, comments and the lengths of arrays [`mutants`].
-2. A mutant changes one line: a number, an operator, a comparison, a condition, a width, or the line is dropped.
+2. A mutant changes one line: a number, an operator, a comparison, a condition, a width, or is dropped.
 """
 
 from __future__ import annotations
@@ -15,8 +15,10 @@ from .mutation import LOW_DIGIT, Mutant
 
 OPERATORS = {
     " + ": (" - ",), " - ": (" + ",), " * ": (" / ",), " / ": (" * ",), " % ": (" / ",), " << ": (" >> ",),
-    " >> ": (" << ",), " & ": (" | ",), " | ": (" & ",), " ^ ": (" & ",), " && ": (" || ",), " || ": (" && ",),
-    " += ": (" -= ", " = "), " -= ": (" += ",), " *= ": (" = ",), " /= ": (" *= ",), " ^= ": (" = ",), " |= ": (" = ",),
+    " >> ": (" << ",), " & ": (" | ",), " | ": (" & ",), " ^ ": (" & ",), " && ": (" || ",),
+    " || ": (" && ",),
+    " += ": (" -= ", " = "), " -= ": (" += ",), " *= ": (" = ",), " /= ": (" *= ",),
+    " ^= ": (" = ",), " |= ": (" = ",),
 }  # fmt: skip
 """What takes an operator's place, spaces around."""
 
@@ -42,7 +44,8 @@ CLAUSE = re.compile(r"\b[A-Z]{2,3}-\d+[a-z]?\b")
 """A clause in a comment."""
 
 TYPES = re.compile(
-    r"\s+(?:static |const |unsigned |struct )*(?:\w+_t|double|int|bool|size_t|char|long|v3|words|json|array)\b [*\w]"
+    r"\s+(?:static |const |unsigned |struct )*"
+    r"(?:\w+_t|double|int|bool|size_t|char|long|v3|words|json|array)\b [*\w]"
 )
 """How a declaration begins, which cannot be dropped."""
 
@@ -67,7 +70,8 @@ def _all(path: str, source: str) -> Iterator[Mutant]:
             inside = not line.rstrip().endswith(";") and "(" in line and not line.startswith("typedef")
         if inside and clauses and line[0] in " s" and '"' not in line:
             for operator, at, end, text in _changes(line):
-                detail = f"{line[at:end].strip() or 'nothing'} -> {text.strip() or 'nothing'} in {line.strip()[:70]}"
+                old, new = (piece.strip() or "nothing" for piece in (line[at:end], text))
+                detail = f"{old} -> {new} in {line.strip()[:70]}"
                 yield Mutant(
                     path, number, number, number, operator, detail, clauses, start + at, start + end, text
                 )
@@ -90,13 +94,7 @@ def _changes(line: str) -> Iterator[Piece]:
             for match in re.finditer(re.escape(old), code):
                 for text in new if isinstance(new, tuple) else (new,):
                     yield operator, match.start(), match.end(), text
-    for old, other in NAMES.items():
-        yield from (("function", m.start(), m.end(), other) for m in re.finditer(rf"\b{old}(?=\()", code))
-    for old in UNDONE:
-        yield from (("cast", m.start(), m.end(), "") for m in re.finditer(rf"\b{old}(?=\()", code))
-    for old, cuts in NARROWER.items():
-        for match in re.finditer(re.escape(old), code):
-            yield from (("width", match.start(), match.end(), cut) for cut in cuts)
+    yield from _called(code)
     for match in re.finditer(r"(?<![\w)])[-!](?=[\w(])", code):
         yield "sign", match.start(), match.end(), ""
     for match in re.finditer(r"\bif \(", code):
@@ -108,6 +106,17 @@ def _changes(line: str) -> Iterator[Piece]:
     if STATEMENT.fullmatch(code.rstrip() + "\n") and not TYPES.match(code) and "return" not in code:
         yield "dropped", len(code) - len(code.lstrip()), len(code.rstrip()), ";"
     yield from (("arguments", *exchanged) for exchanged in _exchanged(code))
+
+
+def _called(code: str) -> Iterator[Piece]:
+    """Yield functions and casts that are others, or forgotten."""
+    for old, other in NAMES.items():
+        yield from (("function", m.start(), m.end(), other) for m in re.finditer(rf"\b{old}(?=\()", code))
+    for old in UNDONE:
+        yield from (("cast", m.start(), m.end(), "") for m in re.finditer(rf"\b{old}(?=\()", code))
+    for old, cuts in NARROWER.items():
+        for match in re.finditer(re.escape(old), code):
+            yield from (("width", match.start(), match.end(), cut) for cut in cuts)
 
 
 def _number(match: re.Match[str]) -> Iterator[Piece]:

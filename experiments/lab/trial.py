@@ -1,7 +1,7 @@
 """Mutants of the reference before the judge: each in a process of its own, asked what reaches it.
 
-1. The cases of all kinds are asked in the order of blame, the most elementary kind first: the first failure is
-   the one that `wamnet conformance` says to look at first [`in_order`].
+1. The cases of all kinds are asked in the order of blame, the most elementary kind first: the first failure
+   is the one that `wamnet conformance` says to look at first [`in_order`].
 2. Which lines a case reaches is traced once; a mutant is asked only the cases that reach its statement
    [`reach`]. Lines that run as modules are imported are reached by all cases.
 3. A mutant runs in a fork of this process [`forked`]: a function gets the code of the changed text; for a
@@ -21,6 +21,7 @@ import signal
 import sys
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
@@ -50,7 +51,7 @@ Reach = Mapping[tuple[str, int], frozenset[int]]
 
 
 class Outcome(NamedTuple):
-    """What came of a mutant: the first case that failed, its clause and output, and how; nothing: it survives.
+    """What came of a mutant: the first case that failed, its clause and output, and how; else it survives.
 
     `asked` is the number of cases that reach it, 0 where none does."""
 
@@ -224,7 +225,7 @@ def _tried(mutant: Mutant, source: str, cases: Sequence[tuple[str, Case]], impor
     """Be the fork: install the mutant and ask it."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     signal.signal(signal.SIGALRM, _late)
-    sys.stderr = open(os.devnull, "w")  # noqa: SIM115 - warnings of wrong arithmetic
+    warnings.simplefilter("ignore")  # of wrong arithmetic
     try:
         signal.alarm(LIMIT_S)
         modules = install(mutant, source, import_time)

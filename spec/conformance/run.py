@@ -233,7 +233,7 @@ def _as_likely(
 ) -> tuple[Wrong | None, float]:
     """Hold block means of an estimated picture to those of the reference's, by Welch's test.
 
-    What a sample's variance is, the vectors say: an answer that states its own could excuse any mean with it."""
+    What a sample's variance is, the vectors say: an answer's own could excuse any mean."""
     assert expected.welch is not None
     told = {key: from_json(value, key) for key, value in expected.welch.items()}
     shape = tuple(int(side) for side in told["shape"])

@@ -42,7 +42,7 @@ SIZES = (
 """Networks of the cases: widths, omega_0 of the first layer and of the others; the last is only affine."""
 
 DRAWN_ONLY = (([40, 28, 2], 3.0, 2.0, 2**32 - 5), ([3, 300, 1], 1.0, 30.0, 2**31 + 77))
-"""Networks with more than 1,024 weights in a layer, and more than 255 neurons, with large seeds: only drawn."""
+"""Networks with more than 1,024 weights or 255 neurons in a layer, and large seeds: only drawn."""
 
 EXAMPLES = 4
 """Examples of a minibatch."""

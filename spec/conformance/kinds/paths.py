@@ -511,7 +511,7 @@ def whole(inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def followed(view: View) -> Iterator[tuple[dict[str, Range], bool]]:
-    """Yield the ranges of each vertex of a path, as long as all decisions are sure, and whether it surely ends."""
+    """Yield the ranges of each vertex of a path while all decisions are sure, and whether it surely ends."""
     given, programs = view.inputs(), programs_of(view.scene, view.settings)
     counters = _counted({**given, "pixel": view.x + render.MAX_IMAGE_SIDE_PX * view.y})
     state = dict(ranges.evaluate(programs.start, counters))

@@ -42,8 +42,8 @@ SIZE_PX, BLOCK_PX = 16, 4
 """Side of the picture and of a block."""
 
 RENDERED = (("cornell", BLOCK_PX), ("glossy", BLOCK_PX), ("daylight", BLOCK_PX), ("plate", SIZE_PX))
-"""Scenes and sides of blocks. The plate is there for its brightness: samples of a pixel differ by a few percent, so
-that the mean of the whole picture shows half a percent."""
+"""Scenes and sides of blocks. The plate is there for its brightness: samples of a pixel differ by a few
+percent, so that the mean of the whole picture shows half a percent."""
 
 
 # ---- denoising --------------------------------------------------------------------------------------------
@@ -197,8 +197,8 @@ KINDS = (
         _render,
         paths.files,
         "The answer may have more samples, any random numbers and be in files; `expected` holds the means of "
-        "blocks of pixels, and `welch` what else the test needs: the variance of one sample of a block is the "
-        "reference's, so other ways to sample must not be worse.",
+        "blocks of pixels, and `welch` what else the test needs: the variance of one sample of a block is "
+        "the reference's, so other ways to sample must not be worse.",
     ),
 )
 """The kinds of this module."""

@@ -1,8 +1,8 @@
 """Scenes at the limits of each rule: one of every part, changed in a place, to be read or to be refused.
 
 1. [`each`] is a small scene with one of every part and every optional field.
-2. [`GOOD`] are changes to what is just allowed, and fields that may be left out; [`BAD`] are changes to what just is not,
-   required fields left out one by one, and a key too many in every object.
+2. [`good`] are changes to what is just allowed, and fields that may be left out; [`bad`] are changes to what
+   just is not, required fields left out one by one, and a key too many in every object.
 """
 
 from __future__ import annotations
@@ -80,9 +80,10 @@ PARTS = ("room", "boxes.0", "spheres.0", "quads.0", "lights.0")
 """Places of the parts."""
 
 OPTIONAL = (
-    "camera.up", "camera.vertical_fov_deg", "room", "room.emission", "room.materials", "boxes", "boxes.0.rotation",
-    "boxes.0.emission", "boxes.0.material", "spheres.0.emission", "spheres.0.material", "spheres", "quads.0.emission",
-    "quads.0.material", "quads", "lights", "background", "info", "boxes.0.material.ior", "quads.0.material.roughness",
+    "camera.up", "camera.vertical_fov_deg", "room", "room.emission", "room.materials", "boxes",
+    "boxes.0.rotation", "boxes.0.emission", "boxes.0.material", "spheres.0.emission", "spheres.0.material",
+    "spheres", "quads.0.emission", "quads.0.material", "quads", "lights", "background", "info",
+    "boxes.0.material.ior", "quads.0.material.roughness",
 )  # fmt: skip
 """What may be left out."""
 

@@ -5,8 +5,8 @@
    floor.
 2. [`FOUNDRY`]: a metal as the first kind of material, a lamp seen at a grazing angle and lit by another one,
    a background, and a camera that is rolled.
-3. [`YARD`]: a room seen from outside, whose walls are of several materials and shine; blocks that share a rotation,
-   channels that reflect nothing, a black ball, and a lamp without power among others.
+3. [`YARD`]: a room seen from outside, whose walls are of several materials and shine; blocks that share a
+   rotation, channels that reflect nothing, a black ball, and a lamp without power among others.
 4. [`MIRRORS`]: single directions only, so that light is never sampled, under a lamp and a sky.
 5. [`PLATE`]: a matte floor under a distant lamp, whose samples hardly differ.
 """

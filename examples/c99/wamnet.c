@@ -2503,6 +2503,18 @@ static void do_random_block(const json *in) {
     answer_array("floats", (array){.axes = 1, .shape = {4}, .count = 4, .values = floats});
 }
 
+static void do_vector(const json *in) {
+    v3 a = vec_in(in, "a"), b = vec_in(in, "b"), c = vec_in(in, "c");
+    const v3 rows[3] = {a, b, c};
+    answer_number("inner", dot(a, b));
+    answer_vec("outer", cross(a, b));
+    answer_vec("unit", unit(a));
+    answer_vec("rotated", turned(rows, c));
+    answer_number("largest", largest(a));
+    answer_number("smallest", -largest(scale(a, -1)));
+    answer_vec("scaled", scale(a, b.c[0]));
+}
+
 static void do_sobol(const json *in) {
     uint32_t seed = counter(in, "seed"), pixel = counter(in, "pixel"), sample = counter(in, "sample");
     words found = sobol_block(seed, pixel, sample, counter(in, "block"));
@@ -3120,6 +3132,8 @@ static const struct {
     {"path.scatter", do_scatter},
     {"path.whole", do_whole},
     {"picture.rendered", do_rendered},
+    {"picture.exact", do_rendered},
+    {"vector", do_vector},
     {"network.init", do_init},
     {"network.forward", do_forward},
     {"network.gradient", do_gradient},

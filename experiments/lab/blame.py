@@ -3,7 +3,8 @@
 1. A clause of the spec names code: `path: names` [`named`].
 2. A mutant breaks the clauses that name its function, its class or its constant; where none does, those that
    name the functions of its module that call it, and theirs [`Clauses.broken`].
-3. Blame is right if the blamed clause is among them, and near if it names anything of the module.
+3. Blame is right if the blamed clause is among them, and near if it names anything of the module or is of the
+   chapter of one of them.
 """
 
 from __future__ import annotations
@@ -46,10 +47,11 @@ class Clauses:
         self._trees: dict[str, ast.Module] = {}
 
     def near(self, mutant: Mutant, clause: str) -> bool:
-        """Tell whether a clause names anything of a module, or is of the chapter of a C function."""
+        """Tell whether a clause names anything of a mutant's module, or is of a chapter that it breaks."""
         if mutant.module.endswith(".c"):
             return clause.partition("-")[0] in {known.partition("-")[0] for known in mutant.function.split()}
-        return clause in self.modules.get(mutant.module, ())
+        chapters = {broken.partition("-")[0] for broken in self.broken(mutant)}
+        return clause in self.modules.get(mutant.module, ()) or clause.partition("-")[0] in chapters
 
     def broken(self, mutant: Mutant) -> set[str]:
         """Return the clauses that a mutant breaks."""

@@ -64,6 +64,9 @@ UNDONE = {"abs", "sqrt", "rint", "floor", "ceil", "float32", "float64", "uint32"
           "int", "bool", "sorted", "reversed", "cumsum", "square", "normalize"}  # fmt: skip
 """Functions of one number that may be forgotten."""
 
+SYMMETRIC = {"minimum", "maximum", "min", "max", "dot", "isclose", "array_equal"}
+"""Functions whose arguments may change places."""
+
 WORDS_ONLY = {"InputError", "CompileError", "TypeVar", "NewType", "isinstance", "getattr", "hasattr", "cast"}
 """Calls that only say something, or whose arguments have types of their own."""
 
@@ -165,7 +168,7 @@ class _Walk:
                 for test in part.ifs:
                     yield self._made(("condition", test, _not(test)), header, owner)
                     yield from self._expression(test, header, owner)
-            elif isinstance(part, ast.keyword):
+            elif isinstance(part, ast.keyword) and part.arg != "strict":
                 yield from self._expression(part.value, header, owner)
             elif isinstance(part, ast.expr) and field not in ("annotation", "target"):
                 yield from self._expression(part, header, owner)
@@ -322,13 +325,14 @@ def _call(node: ast.Call) -> Iterator[Change]:
         yield "cast", node, arguments[0]
     if name == "astype" and isinstance(node.func, ast.Attribute):
         yield "cast", node, node.func.value
-    for at in range(len(arguments) - 1):
+    for at in range(len(arguments) - 1) if name not in SYMMETRIC else ():
         first, second = arguments[at : at + 2]
         if not any(isinstance(a, ast.Starred) for a in (first, second)) and ast.dump(first) != ast.dump(
             second
         ):
             yield "arguments", node, _with(node, args=[*arguments[:at], second, first, *arguments[at + 2 :]])
-    for at in range(len(node.keywords)):
+    # Where lengths agree, `strict` says nothing.
+    for at in (at for at, keyword in enumerate(node.keywords) if keyword.arg != "strict"):
         rest = [other for i, other in enumerate(node.keywords) if i != at]
         yield "argument dropped", node, _with(node, keywords=rest)
     for at, argument in enumerate(arguments):

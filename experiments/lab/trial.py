@@ -3,7 +3,7 @@
 1. The cases of all kinds are asked in the order of blame, the most elementary kind first: the first failure
    is the one that `wamnet conformance` says to look at first [`in_order`].
 2. Which lines a case reaches is traced once; a mutant is asked only the cases that reach its statement
-   [`reach`]. Lines that run as modules are imported are reached by all cases.
+   [`reach`]. What runs as modules are imported is reached by who uses what it makes (users.py).
 3. A mutant runs in a fork of this process [`forked`]: a function gets the code of the changed text; for a
    change outside of functions, or in one that an import calls, all modules are imported again [`install`].
 4. It is caught by a wrong answer, an exception, a refusal, or one that does not come in time [`asked`].
@@ -33,6 +33,7 @@ from wamnet.spec.conformance.case import Case
 from wamnet.spec.conformance.report import ELEMENTARY
 
 from .mutation import Mutant, mutated
+from .users import Users
 
 ROOT = Path(__file__).resolve().parents[2]
 """The repository's root folder."""
@@ -125,11 +126,12 @@ def _late(number: int, frame: FrameType | None) -> None:
 
 
 class Reached(NamedTuple):
-    """Cases by the lines that they reach, seconds of each case, and the functions that imports call."""
+    """Cases by the lines that they reach, their seconds, functions that imports call, users of names."""
 
     lines: Reach
     seconds: list[float]
     at_import: frozenset[tuple[str, str]]
+    users: Users
 
 
 def reach(cases: Sequence[tuple[str, Case]]) -> Reached:
@@ -142,7 +144,9 @@ def reach(cases: Sequence[tuple[str, Case]]) -> Reached:
         for path, line in row["lines"]:
             found.setdefault((path, line), set()).add(number)
     lines = {place: frozenset(some) for place, some in found.items()}
-    return Reached(lines, [row["seconds"] for row in rows], frozenset((p, f) for p, f in imported))
+    users = Users({path: (ROOT / path).read_text(encoding="utf-8") for path in names.values()})
+    seconds = [row["seconds"] for row in rows]
+    return Reached(lines, seconds, frozenset((p, f) for p, f in imported), users)
 
 
 def _imported(names: Mapping[str, str]) -> set[tuple[str, str]]:
@@ -197,9 +201,15 @@ def _lines(names: Mapping[str, str], kind: str, case: Case) -> dict[str, Any]:
 
 def forget() -> None:
     """Empty all caches of functions of the package."""
-    for some in gc.get_objects():
-        if isinstance(some, functools._lru_cache_wrapper) and some.__module__.startswith("wamnet."):
-            some.cache_clear()
+    for some in _caches():
+        some.cache_clear()
+
+
+@functools.cache
+def _caches() -> list[Any]:
+    """Return the caches of the package's functions, which are as many as its modules have."""
+    kinds = (some for some in gc.get_objects() if isinstance(some, functools._lru_cache_wrapper))
+    return [some for some in kinds if some.__module__.startswith("wamnet.")]
 
 
 # ---- a mutant ---------------------------------------------------------------------------------------------
@@ -211,8 +221,7 @@ def trial(mutant: Mutant, source: str, cases: Sequence[tuple[str, Case]], reache
     places = [(mutant.module, line) for line in range(mutant.first, mutant.last + 1)]
     numbers = sorted(set().union(*(reached.lines.get(place, ()) for place in places)))
     if import_time:
-        # Who imports a value cannot be traced: whoever reaches a line of the module may use it.
-        numbers = list(range(len(cases)))
+        numbers = sorted(set().union(*(reached.lines.get(p, ()) for p in reached.users.lines(mutant))))
     if not numbers:
         return Outcome(0)
     # Renders take longest, and tell least: they are for what nothing else reaches.

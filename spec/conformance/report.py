@@ -59,15 +59,20 @@ def counts(verdicts: Sequence[Verdict]) -> list[Kinds]:
 
 ELEMENTARY = (
     "random.",
+    "vector",
     "sampling.",
     "camera.",
     "intersection.sphere",
     "intersection.quad",
     "intersection.box",
     "intersection.",
+    "material.mirror",
+    "material.lambertian",
+    "material.conductor_value",
     "material.",
     "transport.",
     "sky.",
+    "file.",
     "path.start",
     "path.arrive",
     "path.scatter",
@@ -81,7 +86,8 @@ ELEMENTARY = (
     "whole.",
     "image.",
     "metric.",
-    "file.",
+    "picture.denoised",
+    "picture.exact",
     "picture.",
 )
 """How kinds begin, those that others are made of first: what fails there makes the others fail."""

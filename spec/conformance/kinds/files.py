@@ -225,13 +225,90 @@ BAD: Mapping[str, Callable[[], bytes]] = {
 """Files that are refused, by what is wrong with them."""
 
 
+LARGEST, SCALE = 1e12, 1e18
+"""Largest parameter (DEN-1) and scale (DAT-2)."""
+
+AT_LIMITS: Mapping[str, Callable[[], bytes]] = {
+    "scales at their upper limits": lambda: _scales(
+        exposure_stops=64, depth_scale=SCALE, position_scale=SCALE, position_center=[SCALE, -SCALE, 0]
+    ),
+    "scales at their lower limits": lambda: _scales(
+        exposure_stops=-64, depth_scale=1 / SCALE, position_scale=1 / SCALE
+    ),
+    "omega_0 at its limit": lambda: _text("omega_0_first", "1e12"),
+    "omega_0 of hidden layers at its limit": lambda: _text("omega_0_hidden", "1000000000000.0"),
+    "the largest parameter": lambda: _number(-999999995904.0),
+    "a window of one pixel, seven features": lambda: file_of(
+        replace(
+            MODEL,
+            siren=siren.init([16, 5, 4, 3, 3], 3.0, 1.0, seed=7, dtype=np.float32),
+            features=("unshadowed", "direction", "position", "depth", "normal", "albedo")[:6],
+            window=Window(1, "zero"),
+        )
+    ),
+}
+"""Files that are just allowed."""
+
+BEYOND: Mapping[str, Callable[[], bytes]] = {
+    "exposure_stops beyond 64": lambda: _scales(exposure_stops=64.0000001),
+    "exposure_stops below -64": lambda: _scales(exposure_stops=-64.0000001),
+    "a depth_scale beyond 1e18": lambda: _scales(depth_scale=1.0000001e18),
+    "a depth_scale below 1e-18": lambda: _scales(depth_scale=0.9999999e-18),
+    "a position_scale below 1e-18": lambda: _scales(position_scale=0.9999999e-18),
+    "a negative position_scale": lambda: _scales(position_scale=-1.0),
+    "a position_center beyond 1e18": lambda: _scales(position_center=[0, 0, -1.0000001e18]),
+    "a position_center of two numbers": lambda: _scales(position_center=[0, 0]),
+    "a position_center of four numbers": lambda: _scales(position_center=[0, 0, 0, 0]),
+    "omega_0 of hidden layers of 0": lambda: _text("omega_0_hidden", "0"),
+    "omega_0 below 0": lambda: _text("omega_0_first", "-3.0"),
+    "omega_0 beyond 1e12": lambda: _text("omega_0_first", "1.0000001e12"),
+    "omega_0 of hidden layers beyond 1e12": lambda: _text("omega_0_hidden", "1.0000001e12"),
+    "a parameter beyond 1e12": lambda: _number(1000000061440.0),
+    "biases of two axes": lambda: _tensor("layer0.bias", shape=[4, 1]),
+    "biases of the other axis": lambda: _tensor("layer0.bias", shape=[1, 4]),
+    "weights of one axis": lambda: _tensor("layer0.weight", shape=[108]),
+    "weights of three axes": lambda: _tensor("layer0.weight", shape=[4, 27, 1]),
+    "weights of other widths": lambda: _tensor("layer0.weight", shape=[27, 4]),
+    "a window of 65 pixels": lambda: _text("window", '{"border": "clamp", "size": 65}'),
+    "a window of true pixels": lambda: _text("window", '{"border": "clamp", "size": true}'),
+    "a border that is no text": lambda: _text("window", '{"border": 0, "size": 3}'),
+    "a window that is a list": lambda: _text("window", '["clamp", 3]'),
+    "features that are numbers": lambda: _text("features", "[1]"),
+    "features that are an object": lambda: _text("features", '{"color": 1}'),
+    "two outputs": lambda: file_of_unchecked([27, 4, 2]),
+    "four outputs": lambda: file_of_unchecked([27, 4, 4]),
+    "no omega_0_first": lambda: _text("omega_0_first", None),
+    "no omega_0_hidden": lambda: _text("omega_0_hidden", None),
+    "no window": lambda: _text("window", None),
+    "no version": lambda: _text("version", None),
+}
+"""Files that are just not."""
+
+
+def file_of_unchecked(widths: list[int]) -> bytes:
+    """Return the file with tensors of other widths, which the writer would refuse."""
+    made = siren.init(widths, 3.0, 1.0, seed=8, dtype=np.float32)
+    header, data = {"__metadata__": _parts(file_of(MODEL))[0]["__metadata__"]}, b""
+    for layer, arrays in enumerate(zip(made.weights, made.biases, strict=True)):
+        for name, array in zip(("weight", "bias"), arrays, strict=True):
+            span = [len(data), len(data) + array.nbytes]
+            header[f"layer{layer}.{name}"] = {
+                "dtype": "F32",
+                "shape": list(array.shape),
+                "data_offsets": span,
+            }
+            data += array.astype("<f4").tobytes()
+    return _joined(header, data)
+
+
 def _model_cases() -> list[Case]:
     """Return good and bad files."""
     cases: list[Case] = []
-    for note, content in [*GOOD.items(), *BAD.items()]:
+    good = {**GOOD, **AT_LIMITS}
+    for note, content in [*GOOD.items(), *BAD.items(), *AT_LIMITS.items(), *BEYOND.items()]:
         inputs = {"content": base64.b64encode(content()).decode()}
-        expected = {name: Output(value) for name, value in _model(inputs).items()} if note in GOOD else None
-        clause = "MOD-2" if note in GOOD else "MOD-6"
+        expected = {name: Output(value) for name, value in _model(inputs).items()} if note in good else None
+        clause = "MOD-2" if note in good else "MOD-6"
         cases.append(Case(f"file.model/{len(cases)}", clause, inputs, expected, (), note))
     return cases
 
@@ -366,9 +443,10 @@ def _scene_cases() -> list[Case]:
     for note, content in rules.good():
         inputs = {"text": content}
         expected = {name: Output(v) for name, v in _scene(inputs).items()}
-        cases.append(Case(f"file.scene/{len(cases)}", "SCN-8", inputs, expected, (), note))
+        clause = rules.governing(note, "SCN-8")
+        cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note))
     for note, content in rules.bad():
-        clause = "SCN-6" if "left out" in note or "too many" in note else "SCN-7"
+        clause = "RDG-3" if "left out" in note or "too many" in note else rules.governing(note, "SCN-7")
         cases.append(Case(f"file.scene/{len(cases)}", clause, {"text": content}, None, (), note))
     return cases
 

@@ -29,6 +29,51 @@ def _ray(given: Numbers, dtype: Any) -> dict[str, Any]:
     return {"origin": origin, "direction": direction}
 
 
+def _vector(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return what vectors are made into."""
+    a, b, c = (given[name] for name in "abc")
+    return {
+        "inner": vectors.dot(a, b),
+        "outer": vectors.cross(a, b),
+        "scaled": vectors.scale(a, b[..., 0]),
+        "unit": vectors.normalize(a),
+        "rotated": vectors.rotate((a, b, c), c),
+        "largest": vectors.largest(a),
+        "smallest": vectors.smallest(a),
+    }
+
+
+THREE = {name: Field(f"a vector, and a row of a matrix: {name}", 3, -4.0, 4.0) for name in "abc"}
+"""Three vectors."""
+
+VECTOR = Function(
+    "vector",
+    "Vectors: products, length, a matrix of the rows a, b, c times c",
+    "VEC-7",
+    THREE,
+    {
+        "inner": Field("a . b", clause="VEC-2"),
+        "outer": Field("a x b", 3),
+        "scaled": Field("a times the x of b", 3),
+        "unit": Field("a, of length 1", 3, clause="VEC-3"),
+        "rotated": Field("the matrix times c", 3, clause="VEC-4"),
+        "largest": Field("the largest component of a"),
+        "smallest": Field("the least component of a"),
+    },
+    _vector,
+    [
+        ("axes", {"a": (1.0, 0.0, 0.0), "b": (0.0, 1.0, 0.0), "c": (0.0, 0.0, 1.0)}),
+        ("the largest is the last one", {"a": (-3.0, 1.0, 2.0), "b": (2.0, -1.0, 0.5), "c": (1.0, 2.0, 3.0)}),
+        (
+            "the largest is in the middle",
+            {"a": (1.0, 3.0, -2.0), "b": (0.25, 4.0, 1.0), "c": (3.0, -2.0, 1.0)},
+        ),
+    ],
+    lambda u: {name: 4.0 * u[3 * i : 3 * i + 3] - 2.0 for i, name in enumerate("abc")},
+    draws=5,
+)
+"""Vectors."""
+
 RAY = Function(
     "camera.ray",
     f"Rays of a camera at {CAMERA.position} that looks at {CAMERA.look_at}, with {CAMERA.up} up, "
@@ -171,6 +216,9 @@ SPHERE = Function(
         ("through its middle", {"origin": (0.25, -0.5, 4.0), "direction": (0.0, 0.0, -1.0)}),
         ("past it", {"origin": (2.0, 2.0, 4.0), "direction": (0.0, 0.0, -1.0)}),
         ("from far away", {"origin": (0.25, -0.25, 4096.0), "direction": (0.0, 0.0, -1.0)}),
+        ("along its side", {"origin": (1.0, -0.5, 4.0), "direction": (0.0, 0.0, -1.0)}),
+        ("on it, leaving", {"origin": (1.0, -0.5, 0.125), "direction": (1.0, 0.0, 0.0)}),
+        ("on it, entering", {"origin": (1.0, -0.5, 0.125), "direction": (-1.0, 0.0, 0.0)}),
     ],
     _aimed,
 )
@@ -195,6 +243,18 @@ def _quad(given: Numbers, dtype: Any) -> dict[str, Any]:
     return {"t": quad_distance((corner, dual_u, dual_v, normal), given["origin"], given["direction"])}
 
 
+def _on_quad(a: float, b: float, y: float) -> tuple[float, float, float]:
+    """Return the point above the place a, b of the parallelogram."""
+    (x, _, z), (u_x, _, u_z), (v_x, _, v_z) = QUAD
+    return x + a * u_x + b * v_x, y, z + a * u_z + b * v_z
+
+
+EDGES = (
+    *((end, 0.5) for end in (1.0005, 0.9995, -0.0005, 0.0005)),
+    *((0.5, end) for end in (1.0005, 0.9995, -0.0005, 0.0005)),
+)
+"""Places on both sides of the parallelogram's edges."""
+
 PLANE = Function(
     "intersection.quad",
     f"The parallelogram with the corner {QUAD[0]} and the edges {QUAD[1]} and {QUAD[2]}",
@@ -210,6 +270,11 @@ PLANE = Function(
         ("parallel to it, above", {"origin": (-4.0, 0.5, 0.375), "direction": (1.0, 0.0, 0.0)}, "ISC-5"),
         ("through a corner", {"origin": (-0.5, 2.0, -0.75), "direction": (0.0, -1.0, 0.0)}),
         ("behind the ray", {"origin": (0.375, 2.0, 0.375), "direction": (0.0, 1.0, 0.0)}),
+        *(
+            (f"at a = {a}, b = {b}", {"origin": _on_quad(a, b, 2.0), "direction": (0.0, -1.0, 0.0)})
+            for a, b in EDGES
+        ),
+        ("on it, leaving", {"origin": _on_quad(0.5, 0.5, 0.25), "direction": (0.0, 1.0, 0.0)}),
     ],
     _aimed,
 )
@@ -301,5 +366,5 @@ def _discrete(u: Any, dtype: Any) -> dict[str, Any]:
     return {"index": index.astype(dtype), "probability": sampling.discrete_pdf(index, cumulative)}
 
 
-FUNCTIONS = (RAY, DISK, HEMISPHERE, CAUCHY, SAMPLE_QUAD, DISCRETE, FRAME, SPHERE, PLANE)
+FUNCTIONS = (VECTOR, RAY, DISK, HEMISPHERE, CAUCHY, SAMPLE_QUAD, DISCRETE, FRAME, SPHERE, PLANE)
 """The functions of this module."""

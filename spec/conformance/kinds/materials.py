@@ -89,7 +89,7 @@ MIRROR = Function(
     "A mirror sends a path on",
     "MIR-1",
     {**VERTEX, **CHOICES},
-    GONE_ON,
+    {**GONE_ON, "direction": GONE_ON["direction"]._replace(clause="MAT-3")},
     lambda given, dtype: _sampled(Mirror, given),
     [
         ("straight down", _at(0.5, 0.5, wo=(0.0, 1.0, 0.0))),
@@ -179,6 +179,12 @@ DIELECTRIC = Function(
         ("an index of 1: the body is not there", _at(0, 0, 0.5, ior=1.0, outside=1)),
         ("below the mean of both polarisations, above one", _at(0, 0, 0.03125, ior=1.5, outside=1), "DIE-3"),
         ("above the mean, below the other", _at(0, 0, 0.0625, ior=1.5, outside=1), "DIE-3"),
+        (
+            "nothing mirrors, and the number is 0",
+            _at(0, 0, 0.0, wo=(0.0, 1.0, 0.0), ior=1.0, outside=1),
+            "DIE-3",
+        ),
+        ("the densest glass, from within", _at(0, 0, 0.5, wo=(0.0, 1.0, 0.0), ior=4.0, outside=0)),
     ],
     lambda u: {**_vertex(u), "ior": 1.0 + u[12], "outside": round(u[13])},
 )

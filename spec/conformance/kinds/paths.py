@@ -30,12 +30,12 @@ from ....refimpl.light.transport import Counters, Path, Settings
 from ....refimpl.reading import to_dataclass
 from ..case import Case, Kind, Output
 from ..functions import SOURCE
-from .terrace import FOUNDRY, MIRRORS, PLATE, TERRACE, YARD
+from .terrace import BARE, DARK, FOUNDRY, MIRRORS, NIGHT, PLATE, TERRACE, YARD
 
 SCENES = ("cornell", "glossy", "daylight", "minicubes")
 """Canonical scenes whose paths are cases; each at a time of its own, [`TIME_S`]."""
 
-OWN = {scene.name: scene for scene in (TERRACE, FOUNDRY, YARD, MIRRORS, PLATE)}
+OWN = {scene.name: scene for scene in (TERRACE, FOUNDRY, YARD, MIRRORS, PLATE, BARE, NIGHT, DARK)}
 """Scenes of the vectors' own."""
 
 TIME_S = 1.25
@@ -152,7 +152,7 @@ def arrive(inputs: Mapping[str, Any]) -> State:
     at = world_of(inputs["scene"], inputs["settings"])
     path, surface, hit = transport.arrive(at.world, Path(**_lanes(PATH, inputs)))
     found = {**surface._asdict(), **hit._asdict()}
-    return {"radiance": path.radiance[0], **{name: found[name][0] for name in SURFACE}}
+    return {**{name: found[name][0] for name in ARRIVED}, "radiance": path.radiance[0]}
 
 
 def scatter(inputs: Mapping[str, Any]) -> State:
@@ -169,6 +169,10 @@ def scatter(inputs: Mapping[str, Any]) -> State:
     if not alive[0]:
         return {"alive": np.False_, "radiance": found.radiance[0]}
     return {"alive": np.True_, **{name: getattr(found, name)[0] for name in SCATTERED}}
+
+
+ARRIVED = ("t", "surface", "point", "normal", "reflectance")
+"""The outputs of an arrival before its light, in the order in which they are looked at."""
 
 
 # ---- bounds ---------------------------------------------------------------------------------------------
@@ -360,7 +364,7 @@ OTHER_SETTINGS = (
 WIDE_PX = (40, 24)
 """Width and height of the pictures that those paths belong to."""
 
-OTHERS = (*range(24),)
+OTHERS = (*range(46),)
 """Numbers of those paths."""
 
 
@@ -368,15 +372,14 @@ def _other(index: int) -> View:
     """Return a path with any counters, also large ones, and up to six scatterings."""
     words = rng.random_block(rng.counter(SEED), rng.counter(index), rng.counter(1), rng.counter(0))
     place, height, seed, sample = (int(word[0]) for word in words)
-    name = MIRRORS.name if index % 6 == MIRRORS_TURN else YARD.name
     depth = (0, 0, 3, 1 << 16, (1 << 31) - 3)[index // 2 % 5]
     settings = OTHER_SETTINGS[index % len(OTHER_SETTINGS)]
     x, y = place % WIDE_PX[0], height % WIDE_PX[1]
-    return View(name, settings, x, y, sample, "", *WIDE_PX, seed, depth, 6)
+    return View(IN_TURN[index % len(IN_TURN)].name, settings, x, y, sample, "", *WIDE_PX, seed, depth, 6)
 
 
-MIRRORS_TURN = 5
-"""Of six paths this one is over mirrors."""
+IN_TURN = (YARD, TERRACE, YARD, MIRRORS, YARD, BARE, NIGHT, DARK)
+"""Scenes of those paths, in turn."""
 
 
 def _others() -> Iterator[View]:
@@ -455,7 +458,29 @@ def _steps() -> Found:
             if not wanted["alive"]:
                 break
             state = wanted
+    given = _foundry_settings()
+    for clause, name, value in WRONG_SETTINGS:
+        inputs = {**given, "settings": {**given["settings"], name: value}}
+        case = Case(f"path.start/{len(found.start)}", clause, inputs, None, (), f"{name} = {value}")
+        found.start.append(case)
     return found
+
+
+def _foundry_settings() -> dict[str, Any]:
+    """Return the inputs of a path whose settings are about to be wrong."""
+    return next(_foundry()).inputs()
+
+
+WRONG_SETTINGS: tuple[tuple[str, str, Any], ...] = (
+    ("LTR-8", "max_depth", -1),
+    ("LTR-8", "max_depth", 1 << 31),
+    ("LTR-8", "roulette_depth", -1),
+    ("LTR-8", "roulette_depth", 1 << 31),
+    ("LTR-6", "strategy", "MIS"),
+    ("LTR-5", "heuristic", "cutoff"),
+    ("LTR-8", "sampler", "halton"),
+)
+"""Settings that are refused, with their clauses."""
 
 
 def _rounded(value: Any) -> Any:
@@ -531,6 +556,30 @@ def followed(view: View) -> Iterator[tuple[dict[str, Range], bool]]:
             return
 
 
+def gathered(view: View) -> tuple[Any, Any] | None:
+    """Return the ends (3,) of what a whole path gathers, or None where some decision is not sure."""
+    given, programs = view.inputs(), programs_of(view.scene, view.settings)
+    counters = _counted({**given, "pixel": view.x + render.MAX_IMAGE_SIDE_PX * view.y})
+    state = dict(ranges.evaluate(programs.start, counters))
+    for depth in range(view.settings.max_depth + 1):
+        state |= ranges.evaluate(programs.arrive, state)
+        if depth == view.settings.max_depth:
+            break
+        if not all(np.all(state[name].sure & state[name].known) for name in kinds(SURFACE)):
+            return None
+        sent = dict(
+            ranges.evaluate(programs.scatter, {**state, **counters, "depth": rng.counter(depth)}),
+        )
+        alive = sent.pop("alive")
+        state = {**state, **sent}
+        if not np.all(alive.sure):
+            return None
+        if not np.any(alive.high):
+            break
+    low, high, sure = _ends(state, "radiance", PATH["radiance"][0])
+    return (low, high) if sure else None
+
+
 @cache
 def _whole_cases() -> list[Case]:
     """Return whole paths."""
@@ -543,7 +592,7 @@ def _whole_cases() -> list[Case]:
                 ends = False
                 break
             reach.append(state)
-        if len(reach) < (1 if view.scene == YARD.name else 2):
+        if len(reach) < (2 if view.seed == SEED else 1):
             continue
         inputs = view.inputs()
         # Paths of the scenes that came first are cut where they are known to end; others end by themselves.
@@ -604,7 +653,7 @@ KINDS = (
         "path.arrive",
         "The next surface of a path, and the light that it emits",
         {**GIVEN, **OF_PATH},
-        {"radiance": "float[3], after the surface's emission", **OF_SURFACE},
+        {**OF_SURFACE, "radiance": "float[3], after the surface's emission"},
         lambda: _steps().arrive,
         arrive,
         files,

@@ -5,14 +5,17 @@
 2. A rendered picture is an estimate. The answer holds the mean of each pixel and the variance of one sample;
    both are averaged over blocks of pixels, and the blocks' means are compared by Welch's test with those of
    the reference (welch.py) [`_render_cases`].
+3. A tiny render has bounds where each of its samples is sure: those of whole paths, averaged
+   [`_exact_cases`].
 """
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +26,7 @@ from ....compiler.proof import bounds
 from ....refimpl.frame import LAYERS, Frame, validate
 from ....refimpl.light import scene as scene_module
 from ....refimpl.light.render import Job, render
+from ....refimpl.light.transport import Settings
 from ....refimpl.network import dataset, denoise, siren
 from ....refimpl.network.dataset import Normalization, Window
 from ....refimpl.network.denoise import Model
@@ -104,7 +108,11 @@ def _denoise_cases() -> list[Case]:
         "color": bad_layers(2, 2, 5)["color"],
         "model": base64.b64encode(file_of(needy)).decode(),
     }
-    return [*cases, Case(f"picture.denoised/{len(cases)}", "DAT-9", inputs, None, (), "layers are missing")]
+    cases.append(Case(f"picture.denoised/{len(cases)}", "DAT-9", inputs, None, (), "layers are missing"))
+    for note, shape in (("layers of two sizes", (2, 3, 3)), ("a layer of two channels", (2, 2, 2))):
+        other = {**inputs, "normal": np.zeros(shape)}
+        cases.append(Case(f"picture.denoised/{len(cases)}", "FRM-1", other, None, (), note))
+    return cases
 
 
 def _bound(model: Model, frame: Frame, picture: Any) -> Any:
@@ -167,6 +175,115 @@ def _render_cases() -> list[Case]:
     return cases
 
 
+# ---- rendering, to the bound ------------------------------------------------------------------------------
+
+
+OF_SAMPLES = "ranges of single precision of all samples, from step to step (compiler/proof/ranges.py)"
+"""Where the bounds of tiny pictures come from."""
+
+ROUNDED = 2.0**-22
+"""What a mean may be off by for its sum and its rounding to float32, relative: few samples are added."""
+
+
+class Exact(NamedTuple):
+    """A tiny picture of which every sample is sure: scene, settings, size, samples, seed."""
+
+    scene: str
+    settings: Settings
+    width: int
+    height: int
+    spp: int
+    seed: int
+
+
+EXACT = (
+    Exact("foundry", Settings(max_depth=2), 5, 3, 3, (1 << 31) + 1),
+    Exact("terrace", Settings(max_depth=2, heuristic="balance"), 3, 1, 2, (1 << 31) + 2),
+    Exact("yard", Settings(max_depth=1, roulette_depth=0, sampler="sobol"), 1, 3, 2, (1 << 31) + 13),
+    Exact("foundry", Settings(max_depth=0), 3, 4, 2, (1 << 31) + 1),
+)
+"""The pictures; the seeds are the first ones of which no sample has a decision that rounding could change."""
+
+
+WRONG_SIZES = (
+    ("width", 0),
+    ("width", 65537),
+    ("height", 0),
+    ("height", -1),
+    ("seed", -1),
+    ("seed", 1 << 32),
+    ("spp", 0),
+)
+"""What is refused."""
+
+
+def samples_of(exact: Exact) -> Iterator[tuple[Any, Any] | None]:
+    """Yield the ends (3,) of each sample of each pixel, row by row; None where a decision is not sure."""
+    for y, x, n in np.ndindex(exact.height, exact.width, exact.spp):
+        size = exact.width, exact.height
+        yield paths.gathered(paths.View(exact.scene, exact.settings, x, y, n, "", *size, exact.seed))
+
+
+@cache
+def _exact_cases() -> list[Case]:
+    """Return tiny pictures with the bounds of means and variances.
+
+    A sample x is off by the width w of its range at most, a mean m by the mean of the widths. A variance, the
+    sum of (x - m)^2 over n - 1, is off by the sum of 2 |x - m| e + e^2 over n - 1, e being both together.
+    """
+    cases = []
+    for index, exact in enumerate(EXACT):
+        inputs = {
+            "scene": {"file": f"scenes/{exact.scene}.json"},
+            **{name: getattr(exact, name) for name in ("width", "height", "spp", "seed")},
+            "settings": asdict(exact.settings),
+        }
+        found = _exact({**inputs, "scene": paths.scene_text(exact.scene)})
+        ends = [ends for ends in samples_of(exact) if ends is not None]
+        shape = (exact.height, exact.width, exact.spp, 3)
+        low, high = (np.array([end[side] for end in ends]).reshape(shape) for side in (0, 1))
+        mean, variance, middle = found["mean"], found["variance"], (low + high) / 2
+        of_mean = np.mean(high - low, axis=2) + ROUNDED * mean
+        off = (high - low) + of_mean[:, :, np.newaxis]
+        spread = np.abs(middle - mean[:, :, np.newaxis]) + off
+        of_variance = np.sum(2 * spread * off + off**2, axis=2) / (exact.spp - 1) + ROUNDED * variance
+        expected = {
+            "mean": Output(mean, of_mean, OF_SAMPLES),
+            "variance": Output(variance, of_variance, OF_SAMPLES),
+            "spp": Output(exact.spp),
+        }
+        cases.append(Case(f"picture.exact/{index}", "RND-1", inputs, expected, (), exact.scene))
+    for name, value in WRONG_SIZES:
+        wrong = {**cases[0].inputs, name: value}
+        cases.append(Case(f"picture.exact/{len(cases)}", "RND-6", wrong, None, (), f"{name} = {value}"))
+    return cases
+
+
+def _exact(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return mean and variance of each pixel in float64."""
+    width, height, spp, seed = (int(inputs[name]) for name in ("width", "height", "spp", "seed"))
+    job = Job(width, height, spp, seed, paths.settings_of(inputs["settings"]), "float64")
+    found = render(scene_module.from_json(inputs["scene"]), job)
+    return {"mean": found.frame["color"], "variance": found.color_variance, "spp": job.spp}
+
+
+RENDER_FIELDS = {
+    "scene": paths.SCENE_FIELD,
+    "settings": paths.SETTINGS_FIELD,
+    "width": "pixels",
+    "height": "pixels",
+    "spp": "samples per pixel",
+    "seed": "integer",
+}
+"""What a render is given, for the page."""
+
+RENDERED_FIELDS = {
+    "mean": "float[H][W][3], linear radiance",
+    "variance": "float[H][W][3], of one sample",
+    "spp": "integer",
+}
+"""What comes of it, for the page."""
+
 KINDS = (
     Kind(
         "picture.denoised",
@@ -178,21 +295,20 @@ KINDS = (
         notes="The layers that the model needs, and no others, are given; they may hold nan and inf.",
     ),
     Kind(
+        "picture.exact",
+        "A tiny render, to the bound",
+        RENDER_FIELDS,
+        RENDERED_FIELDS,
+        _exact_cases,
+        _exact,
+        paths.files,
+        "The answer has the samples asked for, numbered from 0, with the random numbers of the settings.",
+    ),
+    Kind(
         "picture.rendered",
         "A small render",
-        {
-            "scene": paths.SCENE_FIELD,
-            "settings": paths.SETTINGS_FIELD,
-            "width": "pixels",
-            "height": "pixels",
-            "spp": "samples per pixel",
-            "seed": "integer",
-        },
-        {
-            "mean": "float[H][W][3], linear radiance",
-            "variance": "float[H][W][3], of one sample",
-            "spp": "integer",
-        },
+        RENDER_FIELDS,
+        RENDERED_FIELDS,
         _render_cases,
         _render,
         paths.files,

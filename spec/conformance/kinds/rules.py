@@ -160,6 +160,10 @@ REFUSED: Mapping[str, Any] = {
     "lights": None,
     "info": {"author": 1},
     "quads.0.material.kind": 1,
+    "boxes.0.material.kind": [],
+    "boxes.0.rotation.2.2": 0.9,
+    "boxes.0.rotation.1": [-0.8, 0.6, 1e-3],
+    "room.materials.5.kind": "mirror",
 }
 """What is just not, by path."""
 
@@ -187,6 +191,19 @@ SKY_REFUSED: Mapping[str, Any] = {
 """Facts of a sky that are just not; a space at the end of a name only tells it from the one above."""
 
 
+GOVERNING = {".rotation": "BOX-1", ".edge_": "SHP-3", ".radius": "SPH-1"}
+"""Clauses of single numbers, by what a note says of them."""
+
+
+PARALLEL = (([1, 1, 0], [2, 2, 0]), ([1, 0, 1], [2, 0, 2]), ([0, 1, 1], [0, 2, 2]), ([1, 2, 3], [-1, -2, -3]))
+"""Edges that span no area."""
+
+
+def governing(note: str, otherwise: str) -> str:
+    """Return the clause that a change to a scene is about."""
+    return next((clause for part, clause in GOVERNING.items() if part in note), otherwise)
+
+
 def good() -> Iterator[tuple[str, str]]:
     """Yield notes and texts of scenes that are read."""
     yield "one of each", changed()
@@ -204,6 +221,8 @@ def bad() -> Iterator[tuple[str, str]]:
         yield f"a key too many in {path or 'the scene'}", changed((f"{path}.color2".lstrip("."), 1))
     yield from ((f"{path} = {json.dumps(value)}", changed((path, value))) for path, value in REFUSED.items())
     yield from ((_of_sky(n, value), under(n.strip(), value)) for n, value in SKY_REFUSED.items())
+    for u, v in PARALLEL:
+        yield f"quads.0.edge_u = {u}, edge_v = {v}", changed(("quads.0.edge_u", u), ("quads.0.edge_v", v))
 
 
 def _of_sky(name: str, value: Any) -> str:

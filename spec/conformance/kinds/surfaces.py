@@ -76,6 +76,11 @@ BOXES = Function(
         ("through an edge", _ray((2.75, 0.25, 0.125), (-1, 0, 0))),
         ("into a corner", _ray((2.75, 2.25, 3.125), (-1, -1, -1))),
         ("a component that is the other zero", _ray((0.25, -0.5, 4.0), (-0.0, 0.0, -1)), "ISC-5"),
+        ("on a face, leaving", _ray((0.75, -0.5, 0.125), (1, 0, 0))),
+        ("on a face, entering", _ray((0.75, -0.5, 0.125), (-1, 0, 0))),
+        ("into an edge of y and z", _ray((0.25, 2.25, 3.125), (0, -1, -1))),
+        ("into an edge of x and z", _ray((2.75, -0.5, 3.125), (-1, 0, -1))),
+        ("out of a corner", _ray((0.25, -0.25, -0.375), (0.5, 0.5, 1.5))),
     ],
     _aimed,
 )
@@ -98,7 +103,7 @@ ROOMS = Function(
     f"The room from {ROOM.low} to {ROOM.high}, seen from inside and outside",
     "SCN-2",
     RAY_FIELDS,
-    {**FOUND, "surface": Field("number of the wall; 6 where nothing is hit")},
+    {**FOUND, "surface": Field("number of the wall; 6 where nothing is hit", clause="ISC-13")},
     _met(Scene("room", EYE, ROOM)),
     [
         ("from inside to the right wall", _ray((0, 0, 0), (1, 0, 0))),
@@ -106,6 +111,11 @@ ROOMS = Function(
         ("from outside: the near wall is not there", _ray((0, 0, 8), (0, 0, -1))),
         ("from outside, past it", _ray((5, 0, 8), (0, 0, -1))),
         ("into a corner: the first axis wins", _ray((0, 0.25, 0), (2, 1.25, 3))),
+        ("on a wall, leaving", _ray((2, 0, 0), (1, 0, 0))),
+        ("into an edge of y and z", _ray((0, 0.25, 0), (0, 1.25, 3))),
+        ("to the wall in front", _ray((0, 0, 0), (0.25, 0.125, -1))),
+        ("to the left wall", _ray((0, 0, 0), (-1, 0.125, 0.25))),
+        ("to the ceiling", _ray((0, 0, 0), (0.125, 1, 0.25))),
     ],
     _aimed,
 )

@@ -8,10 +8,15 @@
 3. [`YARD`]: a room seen from outside, whose walls are of several materials and shine; blocks that share a
    rotation, channels that reflect nothing, a black ball, and a lamp without power among others.
 4. [`MIRRORS`]: single directions only, so that light is never sampled, under a lamp and a sky.
-5. [`PLATE`]: a matte floor under a distant lamp, whose samples hardly differ.
+5. [`BARE`]: a lamp and nothing else.
+6. [`NIGHT`]: three lamps under a sky that is black.
+7. [`DARK`]: lamps without power or colour.
+8. [`PLATE`]: a matte floor under a distant lamp, whose samples hardly differ.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from ....refimpl.light.materials import Conductor, Dielectric, Mirror
 from ....refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sky, Sphere
@@ -129,6 +134,38 @@ MIRRORS = Scene(
     environment=Sky((0.25, 0.5, 1.0), (0.5, 0.5, 0.5), (0.125, 0.125, 0.0625)),
 )
 """Two balls, one of glass, on a mirror."""
+
+BARE = Scene(
+    "bare",
+    Camera((0.0, 0.5, 4.0), (0.0, 0.5, 0.0), (0.0, 1.0, 0.0), 45.0),
+    lights=(Light((-1.5, -0.5, 0.0), (3.0, 0.0, 0.0), (0.0, 2.0, 0.5), (1.0, 0.875, 0.75), 10.0),),
+    background=(0.125, 0.25, 0.5),
+)
+"""A lamp and nothing that it could light."""
+
+NIGHT = Scene(
+    "night",
+    Camera((0.0, 1.0, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 45.0),
+    quads=(Quad((-4.0, 0.0, -4.0), (0.0, 0.0, 8.0), (8.0, 0.0, 0.0), (0.75, 0.5, 0.25)),),
+    lights=(
+        Light((-0.5, 1.5, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.875, 0.75), 10.0),
+        Light((2.0, 2.0, 1.0), (0.0, 0.5, 0.0), (0.0, 0.0, -0.5), (0.5, 0.875, 1.0), 5.0),
+        Light((-2.0, 0.5, 1.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.5), (1.0, 0.5, 1.0), 2.0),
+    ),
+    environment=Sky(
+        (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), sun_concentration=0.0
+    ),
+)
+"""A floor and three lamps under a sky that does not shine."""
+
+DARK = Scene(
+    "dark",
+    NIGHT.camera,
+    quads=NIGHT.quads,
+    lights=(replace(NIGHT.lights[0], power=0.0), replace(NIGHT.lights[1], color=(0.0, 0.0, 0.0))),
+    background=(0.5, 0.25, 0.125),
+)
+"""A floor under two lamps, of which neither shines."""
 
 PLATE = Scene(
     "plate",

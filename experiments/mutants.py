@@ -15,11 +15,14 @@ from __future__ import annotations
 import argparse
 import json
 import random
+import re
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from lab import mutation, mutation_c, trial, trial_c
 from lab.blame import Clauses
@@ -30,10 +33,13 @@ from lab.trial import Outcome
 from wamnet.spec.conformance import vectors
 
 REASONS = trial.ROOT / "experiments/records/survivors.txt"
-"""Survivors that no vector can tell from the reference, with the reason: `name | reason`."""
+"""Survivors that no vector can tell from the reference: `name | sort | words`, where * is any text."""
 
 C99 = "examples/c99/wamnet.c"
 """The C program."""
+
+MOST_MISSED = 0.03
+"""Largest share of mutants that may survive without a reason."""
 
 EVERY = 50
 """Mutants after which progress is told."""
@@ -53,8 +59,9 @@ def chosen(words: Sequence[str], count: int | None, seed: int, c99: bool = False
     found = [m for m in every if not words or any(word in m.name for word in words)]
     if count is None or count >= len(found):
         return found
-    drawn = random.Random(seed).sample(range(len(found)), count)
-    return [found[index] for index in sorted(drawn)]
+    # Fewer are a part of more: a run that is cut short is a draw too.
+    random.Random(seed).shuffle(found)
+    return found[:count]
 
 
 def of_reference(some: Sequence[Mutant], folder: Path) -> Iterator[Outcome | None]:
@@ -101,34 +108,67 @@ def read(path: Path) -> dict[str, Outcome]:
     return {name: Outcome(*rest) for name, *rest in rows}
 
 
-def reasons(path: Path = REASONS) -> dict[str, str]:
-    """Return the reasons of survivors by name."""
-    if not path.exists():
-        return {}
-    lines = path.read_text(encoding="utf-8").splitlines()
-    rows = [line.split(" | ", 1) for line in lines if line.strip() and not line.startswith("#")]
-    return {name.strip(): reason.strip() for name, reason in rows}
+class Reason(NamedTuple):
+    """Why no vector can tell some mutants: names that fit, one of `SORTS`, and the words for it."""
+
+    names: re.Pattern[str]
+    sort: str
+    words: str
+
+
+SORTS = {
+    "equal": "the same for all inputs, or beneath every bound",
+    "unasked": "no kind asks for what it changes",
+}
+"""Sorts of reasons."""
+
+
+def reasons(path: Path = REASONS) -> list[Reason]:
+    """Return the reasons in a file."""
+    found = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if line.strip() and not line.startswith("#"):
+            name, sort, words = (part.strip() for part in line.split(" | "))
+            assert sort in SORTS, f"{line}: a reason is one of {', '.join(SORTS)}"
+            found.append(Reason(re.compile(re.escape(name).replace(r"\*", ".*")), sort, words))
+    return found
+
+
+def excuse(mutant: Mutant, known: Sequence[Reason]) -> str:
+    """Return the sort of the reason that a mutant has, or nothing."""
+    return next((reason.sort for reason in known if reason.names.fullmatch(mutant.name)), "")
+
+
+HEADS = ("mutants", "reached", "caught", "equal", "unasked", "missed", "caught, %", "clause, %", "chapter, %")
+"""Columns: how many there are, run at all, differ in an answer, have a reason of each sort, and have none.
+Shares are of those without a reason; blame is that of wrong answers."""
 
 
 def table(first: str, rows: Mapping[str, Sequence[Mutant]], kept: Mapping[str, Outcome]) -> str:
     """Return a table of what came of mutants, with the sum of all in the last row."""
     known, clauses = reasons(), Clauses()
-    lines = []
-    for name, some in [*rows.items(), ("all", [m for part in rows.values() for m in part])]:
-        reached = [m for m in some if kept[m.name].asked]
-        caught = [m for m in reached if kept[m.name].verdict]
-        excused = sum(m.name in known for m in reached if not kept[m.name].verdict)
-        right = sum(kept[m.name].clause in clauses.broken(m) for m in caught)
-        near = sum(clauses.near(m, kept[m.name].clause) for m in caught)
-        share = f"{100 * len(caught) / (len(reached) - excused):.1f}" if len(reached) > excused else ""
-        parts = [f"{100 * n / len(caught):.1f}" if caught else "" for n in (right, near)]
-        lines.append([name, *map(str, (len(some), len(reached), len(caught), excused)), share, *parts])
-    heads = (first, "mutants", "reached", "caught", "nothing to tell", "caught, %", "clause, %", "module, %")
-    return markdown(heads, lines)
+    every = [mutant for part in rows.values() for mutant in part]
+    lines = [[name, *_row(some, kept, known, clauses)] for name, some in [*rows.items(), ("all", every)]]
+    return markdown((first, *HEADS), lines)
+
+
+def _row(
+    some: Sequence[Mutant], kept: Mapping[str, Outcome], known: Sequence[Reason], clauses: Clauses
+) -> list[str]:
+    """Return the cells of a row."""
+    reached = [m for m in some if kept[m.name].asked]
+    caught = [m for m in reached if kept[m.name].verdict]
+    sorts = Counter(excuse(m, known) for m in reached if not kept[m.name].verdict)
+    numbers = (len(some), len(reached), len(caught), *(sorts[sort] for sort in SORTS), sorts[""])
+    wrong = [m for m in caught if kept[m.name].verdict == "fail"]
+    right = sum(kept[m.name].clause in clauses.broken(m) for m in wrong)
+    near = sum(clauses.near(m, kept[m.name].clause) for m in wrong)
+    shares = (len(caught), len(caught) + sorts[""]), (right, len(wrong)), (near, len(wrong))
+    return [*map(str, numbers), *(f"{100 * part / whole:.1f}" if whole else "" for part, whole in shares)]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Ask mutants and print what came of them; return 1 where one survives without a reason."""
+    """Ask mutants and print what came of them; return 1 where too many survive without a reason."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -144,12 +184,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     path = options.output / ("c99.jsonl" if options.c99 else "reference.jsonl")
     some, kept = chosen(options.words, options.count, options.seed, options.c99), read(path)
     asked(some, kept, path, options)
+    some.sort(key=lambda m: (m.module, m.start))
     print(table("module", _grouped(some, _place), kept))
     print(table("change", _grouped(some, lambda m: m.operator), kept))
     known = reasons()
-    left = [m.name for m in some if kept[m.name].asked and not kept[m.name].verdict and m.name not in known]
-    print("\n".join(f"survives: {name}" for name in left))
-    return 1 if left else 0
+    left = [m.name for m in some if kept[m.name].asked and not kept[m.name].verdict and not excuse(m, known)]
+    print("\n".join(f"missed: {name}" for name in left))
+    return 1 if len(left) > MOST_MISSED * len(some) else 0
 
 
 def _place(mutant: Mutant) -> str:

@@ -2454,6 +2454,10 @@ static const json *json_text(const json *in, const char *name) {
     return parse(content, strlen(content));
 }
 
+static void check_omega(double omega) {
+    if (!(omega > 0 && omega <= 1e12)) refuse("omega_0 must be positive, and at most 1e12");
+}
+
 /* MOD-2, MOD-6, DEN-1 */
 static model read_model(const char *base64) {
     size_t length;
@@ -2464,9 +2468,8 @@ static model read_model(const char *base64) {
     model made = {.net = read_layers(&in)};
     made.net.omega_first = decimal(in.texts, "omega_0_first");
     made.net.omega_hidden = decimal(in.texts, "omega_0_hidden");
-    if (!(made.net.omega_first > 0 && made.net.omega_first <= 1e12 && made.net.omega_hidden > 0
-          && made.net.omega_hidden <= 1e12))
-        refuse("omega_0 must be positive, and at most 1e12");
+    check_omega(made.net.omega_first);
+    check_omega(made.net.omega_hidden);
     const json *names = list_of(json_text(in.texts, "features"), SIZE_MAX, "features");
     for (size_t i = 0; i < names->length; i++) {
         const char *name = text_of(names->items[i], "a feature");
@@ -2839,7 +2842,12 @@ static void do_init(const json *in) {
     size_t widths[MOST_LAYERS + 1];
     uint32_t seed = counter(in, "seed");
     if (given.count < 2 || given.count > MOST_LAYERS) refuse("a network has 1 to %d layers", MOST_LAYERS - 1);
-    for (size_t l = 0; l < given.count; l++) widths[l] = (size_t)clamp(given.values[l], 0, 1e6);
+    check_omega(number(in, "omega_0_first"));
+    check_omega(number(in, "omega_0_hidden"));
+    for (size_t l = 0; l < given.count; l++) {
+        if (!(given.values[l] >= 1)) refuse("a layer has one neuron at least");
+        widths[l] = (size_t)clamp(given.values[l], 0, 1e6);
+    }
     network n = new_network(given.count - 1, widths);
     for (size_t l = 0; l < n.layers; l++) {
         double wide = (double)widths[l], bound = l ? sqrt(6 / wide) / number(in, "omega_0_hidden") : 1 / wide;

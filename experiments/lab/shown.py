@@ -538,6 +538,8 @@ TABLES: Mapping[str, TableOf] = {
     "bench-train-short": as_printed("bench-train", 2),
     "claims": claims("verdicts"),
     "claims-exposures": claims("exposures"),
+    "reference-mutants": as_printed("reference-mutants", 1),
+    "reference-mutants-changes": as_printed("reference-mutants", 2),
     "demo-pictures": demo_pictures,
     "demo-runs": demo_runs,
     "departures": departures,

@@ -303,6 +303,11 @@ def _metric_cases(name: str) -> list[Case]:
             add(left, right, None, "smaller than a window")
         else:
             add(left, right, function(left, right), note)
+    if name == "ssim":
+        left, right = pictures["noisy"][:11, :11, :1], pictures["reference"][:11, :11, :1]
+        add(left, right, function(left, right), "exactly a window")
+        add(left[:10], right[:10], None, "a row less than a window")
+        add(left[:, :10], right[:, :10], None, "a column less than a window")
     one = np.full((1, 1, 3), 0.5)
     add(one, np.full((1, 2, 3), 0.5), None, "other shapes", "MET-1")
     for value in (np.nan, np.inf):

@@ -44,6 +44,17 @@ SIZES = (
 DRAWN_ONLY = (([40, 28, 2], 3.0, 2.0, 2**32 - 5), ([3, 300, 1], 1.0, 30.0, 2**31 + 77))
 """Networks with more than 1,024 weights or 255 neurons in a layer, and large seeds: only drawn."""
 
+WRONG_NETWORKS: tuple[tuple[str, Any], ...] = (
+    ("widths", np.array([4])),
+    ("widths", np.array([4, 0, 3])),
+    ("widths", np.array([4, 5, -3])),
+    ("omega_0_first", 0.0),
+    ("omega_0_hidden", -1.0),
+    ("omega_0_first", 1.0000001e12),
+    ("omega_0_hidden", 1.0000001e12),
+)
+"""What is refused."""
+
 EXAMPLES = 4
 """Examples of a minibatch."""
 
@@ -106,6 +117,10 @@ def _init_cases() -> list[Case]:
             for name, value in _init(inputs).items()
         }
         cases.append(Case(f"network.init/{index}", "SIR-5", inputs, expected))
+    for name, value in WRONG_NETWORKS:
+        inputs = {"widths": np.array([4, 5, 3]), "omega_0_first": 3.0, "omega_0_hidden": 1.0, "seed": 0}
+        wrong = {**inputs, name: value}
+        cases.append(Case(f"network.init/{len(cases)}", "SIR-5", wrong, None, (), f"{name} = {value}"))
     return cases
 
 

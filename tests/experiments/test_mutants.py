@@ -1,0 +1,118 @@
+"""Mutants by machine: which changes there are, how reasons are read, and that vectors notice a sample."""
+
+from __future__ import annotations
+
+import ast
+import shutil
+
+import mutants
+import pytest
+from lab import mutation, mutation_c, trial, trial_c
+from lab.blame import Clauses
+from lab.trial import Outcome
+
+SOURCE = '''"""Words."""
+
+LIMIT = 0.5
+"""More words."""
+
+
+def clamp(x: float, seed: int = 3) -> float:
+    """Return x, a limit at most."""
+    assert x == x
+    if x > LIMIT and not seed:
+        raise ValueError(f"{x + 1}")
+    x = x * 2.0
+    return min(x, LIMIT) - draw(seed, x, 1, 2)
+'''
+"""A module."""
+
+ELEMENTARY = ("random.", "vector", "sampling.", "camera.", "intersection.", "material.", "sky.", "encoding.")
+"""Kinds of the sample: quick ones."""
+
+SAMPLED = ("refimpl/rng.py", "refimpl/light/sampling.py", "refimpl/light/materials/", "refimpl/vectors.py")
+"""Modules of the sample, which these kinds reach."""
+
+COUNT, SEED = 100, 11
+"""Mutants of the sample, and the seed that draws them."""
+
+
+def details(operator):
+    return [m.detail for m in mutation.mutants("m.py", SOURCE) if m.operator == operator]
+
+
+def test_changes_are_those_of_a_programmer():
+    assert details("constant")[:4] == ["0.5 -> (1.0)", "0.5 -> (0.5005)", "3 -> (4)", "3 -> (2)"]
+    assert details("comparison") == ["x > LIMIT -> (x >= LIMIT)"]
+    assert details("dropped") == ['raise ValueError(f"{x + 1}") -> pass', "x = x * 2.0 -> pass"]
+    assert details("condition") == ["x > LIMIT and not seed -> (not (x > LIMIT and (not seed)))"]
+    assert "draw(seed, x, 1, 2) -> (draw(seed & 65535, x, 1, 2))" in details("width")
+    assert details("function") == ["min(x, LIMIT) -> (max(x, LIMIT))"]
+    assert details("arguments")[0] == "draw(seed, x, 1, 2) -> (draw(x, seed, 1, 2))"
+
+
+def test_every_mutant_is_another_program_with_the_same_lines():
+    found = mutation.mutants("m.py", SOURCE)
+    assert len({m.name for m in found}) == len(found)
+    texts = [mutation.mutated(m, SOURCE) for m in found]
+    assert {text.count("\n") for text in texts} == {SOURCE.count("\n")}
+    assert ast.dump(ast.parse(SOURCE)) not in {ast.dump(ast.parse(text)) for text in texts}
+
+
+def test_mutants_of_the_c_program_change_one_line():
+    (source,) = mutants.texts(c99=True).values()
+    found = mutation_c.mutants(mutants.C99, source)
+    assert len(found) > 2000
+    for m in found[::50]:
+        lines = zip(source.splitlines(), mutation.mutated(m, source).splitlines(), strict=True)
+        assert sum(a != b for a, b in lines) == 1, m.name
+
+
+def test_reasons_have_a_sort_and_fit_names():
+    known = mutants.reasons()
+    some = mutants.chosen(["dielectric.py:83:exchanged"], None, 0)
+    assert {mutants.excuse(m, known) for m in some} == {"equal"}
+    with pytest.raises(AssertionError, match="a reason is one of"):
+        mutants.reasons(trial.ROOT / "experiments/records/pending.txt")
+
+
+def test_blame_is_right_near_or_neither():
+    (mutant,) = mutants.chosen(["rng.py:56:exchanged", "rng.py:70:exchanged"], None, 0)
+    clauses = Clauses()
+    assert clauses.broken(mutant) == {"RNG-5"}
+    assert clauses.near(mutant, "RNG-3")
+    assert not clauses.near(mutant, "SMP-1")
+
+
+def test_a_table_counts_what_came(monkeypatch):
+    some = mutants.chosen(["refimpl/rng.py:70"], 3, 0)
+    came = (Outcome(2, "random.block/0", "RNG-5", "", "fail"), Outcome(2), Outcome(0))
+    kept = {m.name: outcome for m, outcome in zip(some, came, strict=True)}
+    monkeypatch.setattr(mutants, "reasons", list)
+    last = mutants.table("module", {"rng": some}, kept).splitlines()[-1]
+    assert last == "| all | 3 | 2 | 1 | 0 | 0 | 1 | 50.0 | 100.0 | 100.0 |"
+
+
+@pytest.mark.slow
+@pytest.mark.needs("programs")
+def test_a_sample_of_mutants_of_the_reference_is_caught():
+    cases = [(kind, case) for kind, case in trial.in_order() if kind.startswith(ELEMENTARY)]
+    reached, sources, known = trial.reach(cases), mutants.texts(c99=False), mutants.reasons()
+    some = [m for m in mutants.chosen(SAMPLED, None, SEED) if m.function and "invert_" not in m.function][::7]
+    came = {m: trial.trial(m, sources[m.module], cases, reached) for m in some}
+    asked = [m for m in some if came[m].asked and not mutants.excuse(m, known)]
+    missed = [m.name for m in asked if not came[m].verdict]
+    assert len(asked) >= COUNT
+    assert len(missed) <= mutants.MOST_MISSED * len(asked), missed
+
+
+@pytest.mark.slow
+@pytest.mark.needs("programs")
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not there")
+def test_a_mutant_of_the_c_program_is_caught(tmp_path):
+    (source,) = mutants.texts(c99=True).values()
+    cases = [(kind, case) for kind, case in trial.in_order() if kind.startswith(("random.", "encoding."))]
+    lines = trial_c.reach(source, cases, tmp_path)
+    some = [m for m in mutation_c.mutants(mutants.C99, source) if m.function.startswith("RNG-3")]
+    came = [trial_c.trial(m, source, cases, lines, tmp_path) for m in some]
+    assert {outcome.verdict for outcome in came if outcome} == {"fail"}

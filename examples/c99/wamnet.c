@@ -224,6 +224,7 @@ static json *parse_number(parser *p) {
         if (p->at < p->end && (*p->at == '+' || *p->at == '-')) p->at++;
         skip_digits(p);
     }
+    if (p->at - start > 1000) refuse("no JSON: a number of more than 1,000 characters");
     char *copy = get((size_t)(p->at - start) + 1, 1);
     memcpy(copy, start, (size_t)(p->at - start));
     made->number = strtod(copy, NULL);
@@ -3086,6 +3087,15 @@ static void do_model(const json *in) {
     answer_array("omega_0", (array){.axes = 1, .shape = {2}, .count = 2, .values = omegas});
 }
 
+static void do_camera_text(const json *in) {
+    const json *from = field(in, "text");
+    camera read = read_camera(parse(text_of(from, "text"), from->length));
+    answer_vec("position", read.position);
+    answer_vec("look_at", read.look_at);
+    answer_vec("up", read.up);
+    answer_number("vertical_fov_deg", read.fov);
+}
+
 static void do_scene(const json *in) {
     const json *content = field(in, "text");
     if (content->type != J_TEXT) refuse("a scene is a text");
@@ -3163,6 +3173,7 @@ static const struct {
     {"metric.relmse", do_relmse},
     {"metric.smape", do_smape},
     {"file.model", do_model},
+    {"file.camera", do_camera_text},
     {"file.scene", do_scene},
     {"picture.denoised", do_denoised},
 };

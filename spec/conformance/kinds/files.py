@@ -285,6 +285,13 @@ BEYOND: Mapping[str, Callable[[], bytes]] = {
 """Files that are just not."""
 
 
+GOVERNING = {
+    "scale": "DAT-2", "position_center": "DAT-2", "exposure_stops": "DAT-2", "pixel": "DAT-9",
+    "parameter": "DEN-1", "omega_0 ": "DEN-1", "biases": "DEN-1", "weights": "DEN-1", "outputs": "DEN-1",
+}  # fmt: skip
+"""Clauses of what is at its limit, by what a note says of it."""
+
+
 def file_of_unchecked(widths: list[int]) -> bytes:
     """Return the file with tensors of other widths, which the writer would refuse."""
     made = siren.init(widths, 3.0, 1.0, seed=8, dtype=np.float32)
@@ -306,9 +313,13 @@ def _model_cases() -> list[Case]:
     cases: list[Case] = []
     good = {**GOOD, **AT_LIMITS}
     for note, content in [*GOOD.items(), *BAD.items(), *AT_LIMITS.items(), *BEYOND.items()]:
+        later = note in AT_LIMITS or note in BEYOND
         inputs = {"content": base64.b64encode(content()).decode()}
         expected = {name: Output(value) for name, value in _model(inputs).items()} if note in good else None
         clause = "MOD-2" if note in good else "MOD-6"
+        clause = (
+            next((known for part, known in GOVERNING.items() if part in note), clause) if later else clause
+        )
         cases.append(Case(f"file.model/{len(cases)}", clause, inputs, expected, (), note))
     return cases
 

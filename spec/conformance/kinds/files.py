@@ -264,6 +264,8 @@ BEYOND: Mapping[str, Callable[[], bytes]] = {
     "omega_0 beyond 1e12": lambda: _text("omega_0_first", "1.0000001e12"),
     "omega_0 of hidden layers beyond 1e12": lambda: _text("omega_0_hidden", "1.0000001e12"),
     "a parameter beyond 1e12": lambda: _number(1000000061440.0),
+    "a parameter below -1e12": lambda: _number(-1000000061440.0),
+    "layers of which the second takes too many": lambda: file_of_unchecked([27, 4, 3], more=1),
     "biases of two axes": lambda: _tensor("layer0.bias", shape=[4, 1]),
     "biases of the other axis": lambda: _tensor("layer0.bias", shape=[1, 4]),
     "weights of one axis": lambda: _tensor("layer0.weight", shape=[108]),
@@ -288,16 +290,18 @@ BEYOND: Mapping[str, Callable[[], bytes]] = {
 GOVERNING = {
     "scale": "DAT-2", "position_center": "DAT-2", "exposure_stops": "DAT-2", "pixel": "DAT-9",
     "parameter": "DEN-1", "omega_0 ": "DEN-1", "biases": "DEN-1", "weights": "DEN-1", "outputs": "DEN-1",
+    "layers of": "DEN-1",
 }  # fmt: skip
 """Clauses of what is at its limit, by what a note says of it."""
 
 
-def file_of_unchecked(widths: list[int]) -> bytes:
+def file_of_unchecked(widths: list[int], more: int = 0) -> bytes:
     """Return the file with tensors of other widths, which the writer would refuse."""
     made = siren.init(widths, 3.0, 1.0, seed=8, dtype=np.float32)
     header, data = {"__metadata__": _parts(file_of(MODEL))[0]["__metadata__"]}, b""
     for layer, arrays in enumerate(zip(made.weights, made.biases, strict=True)):
-        for name, array in zip(("weight", "bias"), arrays, strict=True):
+        wider = (np.pad(arrays[0], ((0, 0), (0, more * layer))), arrays[1])
+        for name, array in zip(("weight", "bias"), wider, strict=True):
             span = [len(data), len(data) + array.nbytes]
             header[f"layer{layer}.{name}"] = {
                 "dtype": "F32",

@@ -90,6 +90,14 @@ SCALES = {
 }
 """The scales of the cases."""
 
+OTHER_SCALES = {
+    "exposure_stops": -1.5,
+    "depth_scale": 0.375,
+    "position_center": np.array([-0.75, 0.5, 0.25]),
+    "position_scale": 2.25,
+}
+"""Scales that lead beyond what features are clipped to."""
+
 FEATURE_ROWS = (
     *((name, "DAT-1", "scales and clips", False) for name in dataset.FEATURES if name in USUAL),
     ("position,color", "DAT-3", "features in the order in which they are named", False),
@@ -110,6 +118,12 @@ def _feature_cases() -> list[Case]:
         inputs = {**shown, "features": names, **SCALES}
         expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}
         cases.append(Case(f"image.features/{len(cases)}", clause, inputs, expected, (), note))
+    wanted = ("position", "depth", "color", "unshadowed", "normal")
+    shown = {name: v for name, v in bad_layers(3, 2, 60).items() if name in wanted}
+    names = ",".join(wanted)
+    inputs = {**shown, "features": names, **OTHER_SCALES}
+    expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}
+    cases.append(Case(f"image.features/{len(cases)}", "DAT-1", inputs, expected, (), "other scales"))
     for names, note in (
         ("color,depth", "a layer is missing"),
         ("color,color", "a feature twice"),

@@ -114,6 +114,8 @@ CONDUCTOR = Function(
         ("seen from above", _at(0.25, 0.625, wo=(0.0, 1.0, 0.0), roughness=0.25)),
         ("slanted", _at(0.25, 0.625, roughness=0.25)),
         ("as rough as can be", _at(0.75, 0.125, roughness=1.0)),
+        ("below the surface: nothing is carried", _at(0.25, 0.0, roughness=1.0)),
+        ("below it, at a grazing angle", _at(0.5625, 0.03125, wo=(0.96, 0.28, 0.0), roughness=1.0)),
     ],
     lambda u: {**_vertex(u), "roughness": 0.05 + 0.9 * u[12]},
 )

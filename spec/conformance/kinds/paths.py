@@ -458,12 +458,40 @@ def _steps() -> Found:
             if not wanted["alive"]:
                 break
             state = wanted
+    for scene, settings, direction in SENT:
+        inputs = _sent(scene, settings, direction)
+        view = View(scene, settings, 0, 0, 0)
+        wanted = arrive(_with_scene(inputs, view))
+        sent = ranges.evaluate(programs_of(scene, settings).arrive, _flat(inputs, PATH))
+        _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, sent)
     given = _foundry_settings()
     for clause, name, value in WRONG_SETTINGS:
         inputs = {**given, "settings": {**given["settings"], name: value}}
         case = Case(f"path.start/{len(found.start)}", clause, inputs, None, (), f"{name} = {value}")
         found.start.append(case)
     return found
+
+
+SENT = tuple(
+    (scene, settings, direction)
+    for scene in (NIGHT.name, TERRACE.name)
+    for settings in VARIANTS
+    for direction in ((0.0, 1.0, 0.0), (0.6, 0.64, 0.48))
+)
+"""Directions from a floor to a lamp and to the sky, by scene and settings."""
+
+
+def _sent(scene: str, settings: Settings, direction: tuple[float, ...]) -> dict[str, Any]:
+    """Return the inputs of an arrival in the middle of a path that a surface has sent in a direction."""
+    state = {
+        "origin": (0.3125, 0.875, 0.4375) if scene == TERRACE.name else (0.125, 0.0009765625, 0.25),
+        "direction": direction,
+        "beta": (0.5, 0.25, 0.75),
+        "radiance": (0.125, 0.0625, 0.5),
+        "pdf": 0.3125,
+    }
+    kept = {"scene": {"file": _file(scene)}, "settings": asdict(settings)}
+    return {**kept, **{name: _rounded(np.array(value)) for name, value in state.items()}}
 
 
 def _foundry_settings() -> dict[str, Any]:

@@ -199,6 +199,11 @@ PARALLEL = (([1, 1, 0], [2, 2, 0]), ([1, 0, 1], [2, 0, 2]), ([0, 1, 1], [0, 2, 2
 """Edges that span no area."""
 
 
+def _edges(length: float, aside: float) -> tuple[tuple[str, Any], tuple[str, Any]]:
+    """Return edges of a length, of which one is a little aside of the other."""
+    return ("quads.0.edge_u", [length, 0, 0]), ("quads.0.edge_v", [length, 0, aside])
+
+
 def governing(note: str, otherwise: str) -> str:
     """Return the clause that a change to a scene is about."""
     return next((clause for part, clause in GOVERNING.items() if part in note), otherwise)
@@ -210,6 +215,8 @@ def good() -> Iterator[tuple[str, str]]:
     yield from ((f"{path} left out", changed((path, LEFT_OUT))) for path in OPTIONAL)
     yield from ((f"{path} = {json.dumps(value)}", changed((path, value))) for path, value in ALLOWED.items())
     yield from ((_of_sky(name, value), under(name, value)) for name, value in SKY_ALLOWED.items())
+    yield "quads.0.edge_u = 1000 long, edge_v less parallel", changed(*_edges(1000, 2e-3))
+    yield "quads.0.edge_u = 0.001 long, edge_v less parallel", changed(*_edges(0.001, 2e-9))
     for concentration in (0, 1_000_000):
         yield _of_sky("sun_concentration", concentration), under("sun_concentration", concentration)
 
@@ -221,6 +228,8 @@ def bad() -> Iterator[tuple[str, str]]:
         yield f"a key too many in {path or 'the scene'}", changed((f"{path}.color2".lstrip("."), 1))
     yield from ((f"{path} = {json.dumps(value)}", changed((path, value))) for path, value in REFUSED.items())
     yield from ((_of_sky(n, value), under(n.strip(), value)) for n, value in SKY_REFUSED.items())
+    yield "quads.0.edge_u = 1000 long, edge_v nearly parallel", changed(*_edges(1000, 5e-4))
+    yield "quads.0.edge_u = 0.001 long, edge_v nearly parallel", changed(*_edges(0.001, 5e-10))
     for u, v in PARALLEL:
         yield f"quads.0.edge_u = {u}, edge_v = {v}", changed(("quads.0.edge_u", u), ("quads.0.edge_v", v))
 

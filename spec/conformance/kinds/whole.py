@@ -181,6 +181,7 @@ def _forward_cases() -> list[Case]:
         ("a factor of 25 bits", "WHO-1", replace(one, factors=(np.full(3, 2.0**24),))),
         ("rows of zeros with a factor of 25 bits", "WHO-1", _zeros(factor=2.0**24)),
         ("a factor below 0", "WHO-1", replace(one, factors=(-one.factors[0],))),
+        ("a factor of -1", "WHO-1", replace(one, factors=(np.array([1.0, -1.0, 1.0]),))),
         ("a last bias of 2^24", "WHO-1", _zeros(bias=2.0**24)),
         ("a last bias of -2^24 - 1", "WHO-1", _zeros(bias=-(2.0**24) - 1)),
         ("a hidden bias below 0", "WHO-1", _with_hidden_bias(-1.0)),
@@ -360,12 +361,14 @@ def _rounded_on_cases() -> list[Case]:
         ("the fraction 0: half a step is added before the bias is rounded", _louder(loud, 20000.0), 127),
     ]
     cases = []
+    flat = np.full((6, 8), 0.25) + np.float32(1 / 512) * np.eye(6, 8)
+    rows.append(("flat windows: a spread of one step counts", rows[0][1], 127))
     for index, (note, network, amplitude) in enumerate(rows):
         inputs = {
             **_as_inputs(network),
             "size": 2,
             "amplitude": amplitude,
-            "windows": _windows(index, network),
+            "windows": flat if note.startswith("flat") else _windows(index, network),
         }
         given = ("factor", "fraction")
         expected = {

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 
 BUDGET = {
     "refimpl": 1150,
-    "refimpl/light": 4250,
+    "refimpl/light": 4300,
     "refimpl/network": 2100,
     "compiler": 1700,
     "compiler/core": 3450,
@@ -26,10 +26,10 @@ BUDGET = {
     "kernels/devices": 2350,
     "kernels/run": 2900,
     "kernels/judge": 1475,
-    "kernels/bench": 4700,
+    "kernels/bench": 4850,
     "kernels/export": 3200,
     "kernels/verify": 2400,
-    "spec/conformance": 5050,
+    "spec/conformance": 6000,
     "cli": 300,
     "cli/commands": 5450,
     "cli/common": 1050,

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ....refimpl.errors import ExecutorUnavailable
 from ....refimpl.light.camera import camera_basis
-from ....refimpl.light.scene import Box, Scene
+from ....refimpl.light.scene import Box, Light, Quad, Scene
 from ....refimpl.light.shapes.quad import light_radiance, quad_area_pdf
 from ....refimpl.light.transport import Settings
 from . import peer_mitsuba
@@ -115,7 +115,7 @@ def scene_bytes(scene: Scene, width: int, height: int, edges: int) -> bytes:
     """Return a scene as embree_paths.c reads it."""
     basis, room = camera_basis(scene.camera, np.float32), scene.room
     walls = peer_mitsuba.room_walls(room) if room is not None else []
-    flat = (*scene.quads, *scene.lights)
+    flat: tuple[Quad | Light, ...] = (*scene.quads, *scene.lights)
     quads = [*walls, *((quad.corner, quad.edge_u, quad.edge_v) for quad in flat)]
     rows = surfaces(scene)
     counts = (len(scene.boxes), len(quads), len(scene.spheres), len(scene.lights), len(rows))
@@ -133,7 +133,8 @@ def scene_bytes(scene: Scene, width: int, height: int, edges: int) -> bytes:
 def _box_corners(box: Box) -> NDArray[np.float64]:
     """Return the corners (8, 3); bits 0, 1, 2 of a corner's number are its sides of the three axes."""
     signs = np.array([[(k >> axis & 1) * 2.0 - 1.0 for axis in range(3)] for k in range(8)])
-    return np.array(box.center) + (signs * box.half_extent) @ np.array(box.rotation)
+    corners: NDArray[np.float64] = np.array(box.center) + (signs * box.half_extent) @ np.array(box.rotation)
+    return corners
 
 
 def _quad_corners(corner: Any, edge_u: Any, edge_v: Any) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ....refimpl.errors import ExecutorUnavailable
 from ....refimpl.light.camera import camera_basis
-from ....refimpl.light.scene import Scene
+from ....refimpl.light.scene import Light, Quad, Scene
 from ....refimpl.light.shapes.quad import quad_row
 from ....refimpl.light.transport import Settings
 from . import peer_mitsuba
@@ -71,7 +71,8 @@ def tables_of(scene: Scene) -> tuple[NDArray[Any], ...]:
         (*(np.array(box.rotation) @ box.center), *box.half_extent, turns.index(box.rotation))
         for box in scene.boxes
     ]
-    quads = [np.ravel(quad_row(quad)) for quad in (*scene.quads, *scene.lights)]
+    flat: tuple[Quad | Light, ...] = (*scene.quads, *scene.lights)
+    quads = [np.ravel(quad_row(quad)) for quad in flat]
     spheres = [(*ball.center, ball.radius) for ball in scene.spheres]
     inside = [1.0] if room is not None else [0.0]
     parts = (camera, scene.background, [*low, *high, *inside], np.ravel(turns))

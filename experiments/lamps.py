@@ -75,8 +75,13 @@ LEAK = 0.05
 """Slope of the loss's picture beyond white: there the target is 1, whatever is brighter is right, and a
 derivative of 0 would keep what is wrong."""
 
-WAYS = ("regression, colours of each frame", "regression, colours of each pixel", "lamps apart")
-"""The networks."""
+WAYS = (
+    "regression, colours of each frame",
+    "regression, colours of each pixel",
+    "regression, colours and powers of each pixel",
+    "lamps apart",
+)
+"""The networks; the last is trained under colours of each pixel, and knows powers by its form."""
 
 OTHER = "Open Image Denoise"
 
@@ -199,9 +204,8 @@ def measure(study: Study, way: str, seed: int) -> Values:
     recipe = study.ground.plan.adapt(SHORT, seed=seed)
     scales = dataset.normalization_of([moment.frame for moment in train])
     own = [colors_of(k, COLORS) for k in range(len(train))]
-    network = lamp_network.fit(
-        way == WAYS[2], None if way == WAYS[1] else own, planes_of(train, scales), recipe
-    )
+    drawn = {WAYS[0]: own, WAYS[2]: POWERS}.get(way, COLORS)
+    network = lamp_network.fit(way == WAYS[3], drawn, planes_of(train, scales), recipe)
     count = sum(each.numel() for each in network.parameters())
 
     def denoise(moment: Moment, colors: Any) -> Array:

@@ -19,6 +19,7 @@ from lamps import COLORS, LEAK, STOPS
 from numpy.typing import NDArray
 
 from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.variation import Ranges
 from wamnet.refimpl.network import adam
 from wamnet.refimpl.network.train import Recipe, draw_batch, rate_at
 
@@ -71,34 +72,41 @@ def under(lights: Tensor, colors: Tensor) -> Tensor:
     return lights[..., :3] * colors[..., 0, :] + lights[..., 3:] * colors[..., 1, :]
 
 
-def drawn_colors(count: int, generator: torch.Generator) -> Tensor:
-    """Return colours (count, 2, 3) of any hue, of saturations in the range, as bright as the lamps' own."""
-    assert COLORS.saturation is not None
-    low, high = COLORS.saturation
+def drawn_colors(count: int, generator: torch.Generator, ranges: Ranges = COLORS) -> Tensor:
+    """Return colours (count, 2, 3) of any hue, and of saturations and powers in the ranges."""
+    assert ranges.saturation is not None
+    low, high = ranges.saturation
     own = torch.tensor([sum(light.color) for light in canonical("minicubes").lights], dtype=torch.float32)
     hue = 6.0 * torch.rand(count, 2, 1, generator=generator)
     saturation = low + (high - low) * torch.rand(count, 2, 1, generator=generator)
     # The hexcone: each channel falls from 1 to 1 - saturation around its own sixth.
     turn = (hue + torch.tensor([5.0, 3.0, 1.0])) % 6.0
     colors = 1.0 - saturation * torch.minimum(turn, 4.0 - turn).clamp(0.0, 1.0)
-    return colors / colors.sum(dim=-1, keepdim=True) * own[:, None]
+    bright = colors / colors.sum(dim=-1, keepdim=True) * own[:, None]
+    if ranges.power is None:
+        return bright
+    least, most = ranges.power
+    return bright * (least + (most - least) * torch.rand(count, 2, 1, generator=generator))
 
 
 def fit(
-    both: bool, own: Sequence[Any] | None, frames: Sequence[Mapping[str, NDArray[np.float32]]], recipe: Recipe
+    both: bool,
+    colors_of: Sequence[Any] | Ranges,
+    frames: Sequence[Mapping[str, NDArray[np.float32]]],
+    recipe: Recipe,
 ) -> Lit:
-    """Return a network trained on frames, under the colours `own` of each, or new ones for each pixel."""
+    """Return a network trained on frames, under colours of each, or of these ranges for each pixel."""
     data = laid_out(frames)
     network = Lit(both, data.planes["surfaces"].shape[-1], recipe)
     follow = torch.optim.Adam(network.parameters(), betas=(adam.BETA_1, adam.BETA_2), eps=adam.EPSILON)
     generator = torch.Generator().manual_seed(recipe.seed)
-    of_frames = None if own is None else torch.tensor(np.array(own), dtype=torch.float32)
     for step in range(recipe.steps):
         frame, y, x = draw_batch(recipe, step, drawn_from(data), None)
         center, row = places(data, frame, y, x)
-        colors = (
-            drawn_colors(len(frame), generator) if of_frames is None else of_frames[torch.from_numpy(frame)]
-        )
+        if isinstance(colors_of, Ranges):
+            colors = drawn_colors(len(frame), generator, colors_of)
+        else:
+            colors = torch.tensor(np.array(colors_of), dtype=torch.float32)[torch.from_numpy(frame)]
         target = encoded(under(data.planes["clean"][center], colors).clamp(0.0, 1.0))
         found = network.picture(data, center, row, colors)
         bright = torch.where(found > 1.0, 1.0 + LEAK * (found - 1.0), found)

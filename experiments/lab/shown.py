@@ -546,6 +546,8 @@ TABLES: Mapping[str, TableOf] = {
     "fig-prediction": study("fig_prediction"),
     "flicker": study("flicker"),
     "generalisation": generalisation,
+    "heads": study("heads", "camera moves"),
+    "lamps": study("lamps", "`minicubes`, camera at rest"),
     "learning-curve": learning_curve,
     "lights": study("lights"),
     "losses": study("losses", "loss"),

@@ -76,6 +76,23 @@ def test_colours_drawn_for_pixels_are_lamps_colours(networks):
         assert set(np.argmax(colors[:, k], axis=-1)) == {0, 1, 2}
 
 
+def test_powers_drawn_for_pixels_are_factors_of_the_lamps_own(networks):
+    """Colours with a range of power: the same hues from the same seed, times factors that fill the range."""
+    torch = needed("torch")
+    lamps = importlib.import_module("lamps")
+    plain, powered = (
+        networks.drawn_colors(300, torch.Generator().manual_seed(2), ranges).numpy().astype(np.float64)
+        for ranges in (lamps.COLORS, lamps.POWERS)
+    )
+    factors = powered / plain
+    # Three roundings of float32 to either side.
+    assert np.ptp(factors, axis=-1).max() <= 6 * np.finfo(np.float32).eps * 2.0
+    low, high = lamps.POWERS.power
+    # float32 rounds a product by 6e-8 of itself.
+    assert low * (1.0 - 1e-6) <= factors.min() < 0.3
+    assert 1.9 < factors.max() <= high * (1.0 + 1e-6)
+
+
 def test_frames_of_both_studies_share_no_noise(tmp_path):
     """Neither with each other nor with the other studies."""
     heads, lamps, ablations, lights = map(importlib.import_module, ("heads", "lamps", "ablations", "lights"))

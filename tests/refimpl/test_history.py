@@ -142,11 +142,63 @@ def test_a_camera_that_moves_sideways_displaces_by_distance():
 
 
 def test_what_was_behind_the_camera_is_not_known():
-    """HIS-4: the camera before looked the other way."""
-    scene = canonical("minicubes")
-    turned = replace(scene, camera=replace(scene.camera, look_at=(0.0, 0.55, 13.2)))
-    past = H.begin(turned, job(), noise(0, 24, 24))
-    assert (H.follow(past, scene, job(seed=1), noise(1, 24, 24)).count == 1.0).all()
+    """HIS-4: the camera before looked the other way, where it would see the point mirrored at itself; and a
+    pixel is not taken from there, though all else agrees."""
+    wall = Quad((-50.0, -50.0, -4.0), (100.0, 0.0, 0.0), (0.0, 100.0, 0.0), WHITE)
+    scene = Scene("wall", CAMERA, quads=(wall,))
+    turned = replace(scene, camera=replace(CAMERA, look_at=(0.0, 0.0, 1.0)))
+    first = H.first_hits(scene, job())
+    bases = [camera_basis(each.camera, np.float32) for each in (scene, turned)]
+    assert not H.displacement(H.motion(scene, turned), *bases, first, 24, 24)[2].any()
+    past, moves, first = by_hand()
+    nowhere = (*shifted(0.0, 0.0)[:2], np.zeros((2, 2), bool))
+    assert not H.gathered(past, moves, first, nowhere).count.any()
+
+
+def test_nothing_rests_where_the_camera_moves():
+    """HIS-4: an edge is then seen from another place. Otherwise what did not move by itself rests."""
+    scene = canonical("glossy")
+    aside = varied(scene, Variation(yaw_deg=1e-3))
+    assert not H.motion(scene, aside).rests.any()
+    rests = H.motion(scene, canonical("glossy", time=STEP_S)).rests
+    # walls; table, copper and block; the ball in the middle, two others; the mirror, two lamps, nothing
+    assert rests.tolist() == [True] * 6 + [False] * 3 + [True, False, False] + [True] * 4
+    shows = H.motion(scene, scene).shows
+    assert np.flatnonzero(shows).tolist() == [7, 8, 11, 12]
+
+
+def test_what_is_shown_has_the_number_of_its_primitive():
+    """HIS-1, HIS-5: the second of three boxes is a mirror; the first and the last share a rotation."""
+    angles, materials = (0.1, 0.2, 0.1), (None, Mirror(), None)
+    boxes = tuple(
+        Box((0.0, 0.0, -4.0), (1.0,) * 3, WHITE, _about_y(angle), material=material)
+        for angle, material in zip(angles, materials, strict=True)
+    )
+    scene = Scene("boxes", CAMERA, boxes=boxes)
+    assert H.motion(scene, scene).shows.tolist() == [False, True, False, False]
+
+
+def test_normals_turn_with_their_primitive_and_have_any_length():
+    """HIS-4: a box that turned by 60 degrees has the normal of 60 degrees before, and half the size: half
+    of it; a wall that grew to twice its size has a normal of half the length, which is the same side."""
+    pose = Box((0.0, 0.0, -4.0), (1.0,) * 3, WHITE, _about_y(np.radians(60.0)))
+    then = replace(pose, rotation=_about_y(0.0), half_extent=(0.5,) * 3)
+    now, before = (Scene("box", CAMERA, boxes=(box,)) for box in (pose, then))
+    own = np.array([[0.0, 0.0, 1.0]])
+    first = H.First(np.zeros(1, np.int32), own, own @ np.array(pose.rotation), own)
+    _, normal = H.point_before(H.motion(now, before, np.float64), first)
+    assert np.abs(normal - [0.0, 0.0, 0.5]).max() <= 16 * U["float64"]
+    past, moves, first = by_hand()
+    smaller = replace(moves, turn=np.broadcast_to(-0.5 * np.eye(3), (3, 3, 3)))
+    assert H.gathered(past, smaller, first, shifted(0.0, 0.0)).count.all()
+
+
+def test_pixels_without_weight_do_not_widen_the_interval():
+    """HIS-5: at a displacement of 0 only the pixel itself counts."""
+    for color in ((0.0, 4.0, 8.0, 16.0), (16.0, 8.0, 4.0, 0.0)):
+        known = H.gathered(*by_hand(color=color), shifted(0.0, 0.0))
+        assert np.array_equal(known.low, known.color)
+        assert np.array_equal(known.high, known.color)
 
 
 # ---- what is taken from where ----------------------------------------------------------------------------

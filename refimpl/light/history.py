@@ -66,7 +66,7 @@ class Limits:
     """
 
     moving: float = 6
-    shown: float = 4
+    shown: float = 2
     rest: float = 64
 
     def __post_init__(self) -> None:
@@ -121,13 +121,14 @@ class History:
     """
 
     scene: Scene
-    number: NDArray[np.int32]
+    number: Ids
     normal: Image
     color: Image
     count: Image
 
 
-class Known(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Known:
     """What the last picture knows: the mean colour (..., 3), count (...), and the least and largest colours.
 
     Where it knows nothing, colour and count are 0, and low and high are infinite: nothing is between them.
@@ -179,7 +180,8 @@ def motion(scene: Scene, before: Scene, dtype: DTypeLike = np.float32) -> Motion
     rows = [_moved(_pose(now), _pose(then)) for now, then in zip(parts, parts_before, strict=True)]
     rows.append(_moved(_AT_REST, _AT_REST))
     turn, center, shift = (np.array(column, np.float64).astype(dtype) for column in zip(*rows, strict=True))
-    rests = ~(turn.any(axis=(1, 2)) | shift.any(axis=1)) & (scene.camera == before.camera)
+    moved = turn.any(axis=(1, 2)) | shift.any(axis=1) | (scene.camera != before.camera)
+    rests: NDArray[np.bool_] = np.logical_not(moved)
     return Motion(turn, center, shift, rests, _shows(scene))
 
 
@@ -330,7 +332,8 @@ def same_surface(past: History, moves: Motion, first: First, pixel: tuple[Ids, I
     length = np.sqrt(vectors.dot(before, before))
     side = vectors.dot(before, normal) >= SAME_SIDE * length
     rest: Truths = vectors.look_up(moves.rests, first.number) & vectors.look_up(moves.rests, number)
-    return ((number == first.number) & side) | rest
+    same: Truths = ((number == first.number) & side) | rest
+    return same
 
 
 def begin(scene: Scene, job: Job, color: Image) -> History:
@@ -349,8 +352,8 @@ def follow(past: History, scene: Scene, job: Job, color: Image, limits: Limits =
     """
     _check(job, color, past)
     first, moves = first_hits(scene, job), motion(scene, past.scene, job.dtype)
-    cameras = (camera_basis(camera, job.dtype) for camera in (scene.camera, past.scene.camera))
-    shift = displacement(moves, *cameras, first, job.width, job.height)
+    basis, basis_before = (camera_basis(each.camera, job.dtype) for each in (scene, past.scene))
+    shift = displacement(moves, basis, basis_before, first, job.width, job.height)
     limit = vectors.look_up(limits.of(moves).astype(job.dtype), first.number)
     mean, count = blend(gathered(past, moves, first, shift), color.astype(job.dtype), limit)
     return History(scene, first.number, first.normal, mean, count)

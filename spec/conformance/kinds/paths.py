@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -22,7 +22,7 @@ from ....compiler.proof import ranges
 from ....compiler.proof.ranges import Range
 from ....compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, Values, kinds, lower_scene
 from ....refimpl import rng
-from ....refimpl.light import camera, render, scenes, transport
+from ....refimpl.light import camera, render, transport
 from ....refimpl.light import scene as scene_module
 from ....refimpl.light.intersection import Hit, materials_by_id, reflecting
 from ....refimpl.light.materials import Dielectric
@@ -30,22 +30,21 @@ from ....refimpl.light.transport import Counters, Path, Settings
 from ....refimpl.reading import to_dataclass
 from ..case import Case, Kind, Output
 from ..functions import SOURCE
-from .terrace import BARE, DARK, FOUNDRY, MIRRORS, NIGHT, PLATE, TERRACE, YARD
-
-SCENES = ("cornell", "glossy", "daylight", "minicubes")
-"""Canonical scenes whose paths are cases; each at a time of its own, [`TIME_S`]."""
-
-OWN = {scene.name: scene for scene in (TERRACE, FOUNDRY, YARD, MIRRORS, PLATE, BARE, NIGHT, DARK)}
-"""Scenes of the vectors' own."""
-
-TIME_S = 1.25
-"""Time of the scenes in their animation."""
-
-SIZE_PX = 16
-"""Width and height of the images that the paths belong to."""
-
-SEED = 20
-"""Seed of their random numbers."""
+from .views import (
+    SEED,
+    SENT,
+    WRONG_SETTINGS,
+    View,
+    files,
+    foundry,
+    foundry_settings,
+    midway,
+    others,
+    rounded,
+    scene_text,
+    terrace,
+    views,
+)
 
 LARGEST_BOUND = 0.01
 """Whole paths end where the point of a vertex has a larger bound, in scene units."""
@@ -70,23 +69,6 @@ class World(NamedTuple):
 
     world: transport.World
     basis: camera.CameraBasis
-
-
-def scene_text(name: str) -> str:
-    """Return the JSON of a scene of these cases."""
-    if name in OWN:
-        return scene_module.to_json(OWN[name])
-    return scene_module.to_json(scenes.canonical(name, time=TIME_S))
-
-
-def files() -> dict[str, bytes]:
-    """Return the scene files."""
-    return {_file(name): scene_text(name).encode() for name in (*SCENES, *OWN)}
-
-
-def _file(name: str) -> str:
-    """Return the name of a scene's file."""
-    return f"scenes/{name}.json"
 
 
 def settings_of(data: Mapping[str, Any]) -> Settings:
@@ -273,129 +255,6 @@ def _expected(
 # ---- cases ----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class View:
-    """A path: its scene and settings, its pixel, its sample.
-
-    `clause` is that of the light gathered at the first vertex, and of the path's end if it ends there, where
-    the path is there for it. The first of its `steps` scatterings has the number `depth`."""
-
-    scene: str
-    settings: Settings
-    x: int
-    y: int
-    sample: int
-    clause: str = ""
-    width: int = SIZE_PX
-    height: int = SIZE_PX
-    seed: int = SEED
-    depth: int = 0
-    steps: int = 3
-
-    def inputs(self) -> dict[str, Any]:
-        """Return the inputs of the first step."""
-        return {
-            "scene": {"file": _file(self.scene)},
-            "settings": asdict(self.settings),
-            "width": self.width,
-            "height": self.height,
-            "x": self.x,
-            "y": self.y,
-            "seed": self.seed,
-            "sample": self.sample,
-        }
-
-
-VARIANTS = (
-    Settings(),
-    Settings(strategy="light", heuristic="balance", sampler="sobol"),
-    Settings(roulette_depth=0, heuristic="balance"),
-    Settings(strategy="bsdf"),
-)
-"""Settings of the cases, in turn."""
-
-
-PLACES = (
-    (6, 13, "ENV-4"),  # the floor, half of whose light samples go to the sky
-    (2, 5, ""),  # a lamp from behind
-    (9, 8, ""),  # a ball of glass
-    (6, 3, ""),  # a ball that emits
-    (8, 11, "DIE-6"),  # the floor, behind glass as lamps see it
-    (12, 8, ""),  # a block that emits
-    (5, 9, ""),  # a block of glass
-    (11, 2, ""),  # a lamp
-    (7, 8, ""),  # rough metal
-    (3, 8, ""),  # a matte block
-    (1, 6, ""),  # a mirror
-    (9, 12, ""),  # the floor
-)
-"""Columns and rows of pixels of the terrace, and the clause that the light at what is seen there shows."""
-
-
-FLAT = (
-    (8, 9, "SHD-1"),  # a lamp at a grazing angle, where the scene's first kind is a metal
-    (3, 8, ""),  # metal
-    (0, 0, ""),  # the background
-)
-"""Columns and rows of pixels of the foundry, and their clauses."""
-
-
-def _terrace() -> Iterator[View]:
-    """Yield paths over the terrace."""
-    for index, (x, y, clause) in enumerate(PLACES):
-        yield View(TERRACE.name, VARIANTS[index % len(VARIANTS)], x, y, index % 3, clause)
-
-
-def _foundry() -> Iterator[View]:
-    """Yield paths over the foundry."""
-    for x, y, clause in FLAT:
-        yield View(FOUNDRY.name, VARIANTS[0], x, y, 0, clause)
-
-
-OTHER_SETTINGS = (
-    Settings(),
-    Settings(strategy="light", heuristic="balance", roulette_depth=2),
-    Settings(sampler="sobol", roulette_depth=1),
-    Settings(strategy="bsdf", roulette_depth=0),
-    Settings(heuristic="balance", sampler="sobol"),
-)
-"""Settings of the paths through the yard and over mirrors, in turn."""
-
-WIDE_PX = (40, 24)
-"""Width and height of the pictures that those paths belong to."""
-
-OTHERS = (*range(46),)
-"""Numbers of those paths."""
-
-
-def _other(index: int) -> View:
-    """Return a path with any counters, also large ones, and up to six scatterings."""
-    words = rng.random_block(rng.counter(SEED), rng.counter(index), rng.counter(1), rng.counter(0))
-    place, height, seed, sample = (int(word[0]) for word in words)
-    depth = (0, 0, 3, 1 << 16, (1 << 31) - 3)[index // 2 % 5]
-    settings = OTHER_SETTINGS[index % len(OTHER_SETTINGS)]
-    x, y = place % WIDE_PX[0], height % WIDE_PX[1]
-    return View(IN_TURN[index % len(IN_TURN)].name, settings, x, y, sample, "", *WIDE_PX, seed, depth, 6)
-
-
-IN_TURN = (YARD, TERRACE, YARD, MIRRORS, YARD, BARE, NIGHT, DARK)
-"""Scenes of those paths, in turn."""
-
-
-def _others() -> Iterator[View]:
-    """Yield the paths through the yard and over mirrors."""
-    yield from map(_other, OTHERS)
-
-
-def _views(count: int) -> Iterator[View]:
-    """Yield paths spread over scenes, settings and pixels."""
-    for index in range(count):
-        words = rng.random_block(rng.counter(SEED), rng.counter(index), rng.counter(0), rng.counter(0))
-        x, y = (int(word[0]) % SIZE_PX for word in words[:2])
-        name = SCENES[index % len(SCENES)]
-        yield View(name, VARIANTS[index // len(SCENES) % len(VARIANTS)], x, y, index % 3)
-
-
 def _with_scene(inputs: Mapping[str, Any], view: View) -> dict[str, Any]:
     """Return inputs as the reference takes them: the scene's text for its file."""
     return {**inputs, "scene": scene_text(view.scene)}
@@ -413,7 +272,7 @@ class Found(NamedTuple):
 def _steps() -> Found:
     """Return the cases of all steps: paths in float64 whose states are rounded to float32 at each step."""
     found = Found([], [], [])
-    for view in (*_views(16), *_terrace(), *_foundry(), *_others()):
+    for view in (*views(16), *terrace(), *foundry(), *others()):
         given = view.inputs()
         programs = programs_of(view.scene, view.settings)
         wanted = start(_with_scene(given, view))
@@ -430,17 +289,17 @@ def _steps() -> Found:
         one = np.ones(3)
         state: dict[str, Any] = {**wanted, "beta": one, "radiance": 0.0 * one, "pdf": transport.CAMERA_PDF}
         for depth in range(view.depth, view.depth + view.steps):
-            state = {name: _rounded(state[name]) for name in PATH}
+            state = {name: rounded(state[name]) for name in PATH}
             wanted = arrive(_with_scene({**kept, **state}, view))
             sent = ranges.evaluate(programs.arrive, _flat(state, PATH))
             _add(found.arrive, "path.arrive", "LTR-2", {**kept, **state}, wanted, sent)
-            surface = {name: _rounded(wanted[name]) for name in SURFACE}
+            surface = {name: rounded(wanted[name]) for name in SURFACE}
             inputs = {
                 **kept,
                 **counters,
                 "depth": depth,
                 **state,
-                "radiance": _rounded(wanted["radiance"]),
+                "radiance": rounded(wanted["radiance"]),
                 **surface,
             }
             wanted = scatter(_with_scene(inputs, view))
@@ -459,63 +318,17 @@ def _steps() -> Found:
                 break
             state = wanted
     for scene, settings, direction in SENT:
-        inputs = _sent(scene, settings, direction)
+        inputs = midway(scene, settings, direction)
         view = View(scene, settings, 0, 0, 0)
         wanted = arrive(_with_scene(inputs, view))
-        sent = ranges.evaluate(programs_of(scene, settings).arrive, _flat(inputs, PATH))
-        _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, sent)
-    given = _foundry_settings()
+        reach = ranges.evaluate(programs_of(scene, settings).arrive, _flat(inputs, PATH))
+        _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, reach)
+    given = foundry_settings()
     for clause, name, value in WRONG_SETTINGS:
         inputs = {**given, "settings": {**given["settings"], name: value}}
         case = Case(f"path.start/{len(found.start)}", clause, inputs, None, (), f"{name} = {value}")
         found.start.append(case)
     return found
-
-
-SENT = tuple(
-    (scene, settings, direction)
-    for scene in (NIGHT.name, TERRACE.name)
-    for settings in VARIANTS
-    for direction in ((0.0, 1.0, 0.0), (0.6, 0.64, 0.48))
-)
-"""Directions from a floor to a lamp and to the sky, by scene and settings."""
-
-
-def _sent(scene: str, settings: Settings, direction: tuple[float, ...]) -> dict[str, Any]:
-    """Return the inputs of an arrival in the middle of a path that a surface has sent in a direction."""
-    state = {
-        "origin": (0.3125, 0.875, 0.4375) if scene == TERRACE.name else (0.125, 0.0009765625, 0.25),
-        "direction": direction,
-        "beta": (0.5, 0.25, 0.75),
-        "radiance": (0.125, 0.0625, 0.5),
-        "pdf": 0.3125,
-    }
-    kept = {"scene": {"file": _file(scene)}, "settings": asdict(settings)}
-    return {**kept, **{name: _rounded(np.array(value)) for name, value in state.items()}}
-
-
-def _foundry_settings() -> dict[str, Any]:
-    """Return the inputs of a path whose settings are about to be wrong."""
-    return next(_foundry()).inputs()
-
-
-WRONG_SETTINGS: tuple[tuple[str, str, Any], ...] = (
-    ("LTR-8", "max_depth", -1),
-    ("LTR-8", "max_depth", 1 << 31),
-    ("LTR-8", "roulette_depth", -1),
-    ("LTR-8", "roulette_depth", 1 << 31),
-    ("LTR-6", "strategy", "MIS"),
-    ("LTR-5", "heuristic", "cutoff"),
-    ("LTR-8", "sampler", "halton"),
-)
-"""Settings that are refused, with their clauses."""
-
-
-def _rounded(value: Any) -> Any:
-    """Return numbers rounded to float32, in float64."""
-    if np.asarray(value).dtype.kind == "f":
-        return np.asarray(value, np.float32).astype(np.float64)
-    return value
 
 
 def _add(
@@ -612,7 +425,7 @@ def gathered(view: View) -> tuple[Any, Any] | None:
 def _whole_cases() -> list[Case]:
     """Return whole paths."""
     cases: list[Case] = []
-    for view in (*_views(32), *_terrace(), *_others()):
+    for view in (*views(32), *terrace(), *others()):
         reach, ends = list[dict[str, Range]](), False
         for state, ends in followed(view):
             low, high, _ = _ends(state, "point", PATH["origin"][0])

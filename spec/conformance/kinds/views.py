@@ -1,0 +1,228 @@
+"""The paths that are cases: scenes and pictures, pixels, settings and counters.
+
+1. The first ones are spread over canonical scenes [`views`]; those through scenes of the vectors' own follow,
+   placed by hand [`terrace`], [`foundry`], or with large counters and depths in a picture that is not square
+   [`others`].
+2. Some arrivals are placed too, in the middle of a path [`SENT`]. Wrong settings are refused
+   [`WRONG_SETTINGS`].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ....refimpl import rng
+from ....refimpl.light import scene as scene_module
+from ....refimpl.light import scenes
+from ....refimpl.light.transport import Settings
+from .terrace import BARE, DARK, FOUNDRY, MIRRORS, NIGHT, PLATE, TERRACE, YARD
+
+SCENES = ("cornell", "glossy", "daylight", "minicubes")
+"""Canonical scenes whose paths are cases; each at a time of its own, [`TIME_S`]."""
+
+OWN = {scene.name: scene for scene in (TERRACE, FOUNDRY, YARD, MIRRORS, PLATE, BARE, NIGHT, DARK)}
+"""Scenes of the vectors' own."""
+
+TIME_S = 1.25
+"""Time of the scenes in their animation."""
+
+SIZE_PX = 16
+"""Width and height of the images that the paths belong to."""
+
+SEED = 20
+"""Seed of their random numbers."""
+
+
+def scene_text(name: str) -> str:
+    """Return the JSON of a scene of these cases."""
+    if name in OWN:
+        return scene_module.to_json(OWN[name])
+    return scene_module.to_json(scenes.canonical(name, time=TIME_S))
+
+
+def files() -> dict[str, bytes]:
+    """Return the scene files."""
+    return {scene_file(name): scene_text(name).encode() for name in (*SCENES, *OWN)}
+
+
+def scene_file(name: str) -> str:
+    """Return the name of a scene's file."""
+    return f"scenes/{name}.json"
+
+
+# ---- paths ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class View:
+    """A path: its scene and settings, its pixel, its sample.
+
+    `clause` is that of the light gathered at the first vertex, and of the path's end if it ends there, where
+    the path is there for it. The first of its `steps` scatterings has the number `depth`."""
+
+    scene: str
+    settings: Settings
+    x: int
+    y: int
+    sample: int
+    clause: str = ""
+    width: int = SIZE_PX
+    height: int = SIZE_PX
+    seed: int = SEED
+    depth: int = 0
+    steps: int = 3
+
+    def inputs(self) -> dict[str, Any]:
+        """Return the inputs of the first step."""
+        return {
+            "scene": {"file": scene_file(self.scene)},
+            "settings": asdict(self.settings),
+            "width": self.width,
+            "height": self.height,
+            "x": self.x,
+            "y": self.y,
+            "seed": self.seed,
+            "sample": self.sample,
+        }
+
+
+VARIANTS = (
+    Settings(),
+    Settings(strategy="light", heuristic="balance", sampler="sobol"),
+    Settings(roulette_depth=0, heuristic="balance"),
+    Settings(strategy="bsdf"),
+)
+"""Settings of the cases, in turn."""
+
+
+PLACES = (
+    (6, 13, "ENV-4"),  # the floor, half of whose light samples go to the sky
+    (2, 5, ""),  # a lamp from behind
+    (9, 8, ""),  # a ball of glass
+    (6, 3, ""),  # a ball that emits
+    (8, 11, "DIE-6"),  # the floor, behind glass as lamps see it
+    (12, 8, ""),  # a block that emits
+    (5, 9, ""),  # a block of glass
+    (11, 2, ""),  # a lamp
+    (7, 8, ""),  # rough metal
+    (3, 8, ""),  # a matte block
+    (1, 6, ""),  # a mirror
+    (9, 12, ""),  # the floor
+)
+"""Columns and rows of pixels of the terrace, and the clause that the light at what is seen there shows."""
+
+
+FLAT = (
+    (8, 9, "SHD-1"),  # a lamp at a grazing angle, where the scene's first kind is a metal
+    (3, 8, ""),  # metal
+    (0, 0, ""),  # the background
+)
+"""Columns and rows of pixels of the foundry, and their clauses."""
+
+
+def terrace() -> Iterator[View]:
+    """Yield paths over the terrace."""
+    for index, (x, y, clause) in enumerate(PLACES):
+        yield View(TERRACE.name, VARIANTS[index % len(VARIANTS)], x, y, index % 3, clause)
+
+
+def foundry() -> Iterator[View]:
+    """Yield paths over the foundry."""
+    for x, y, clause in FLAT:
+        yield View(FOUNDRY.name, VARIANTS[0], x, y, 0, clause)
+
+
+OTHER_SETTINGS = (
+    Settings(),
+    Settings(strategy="light", heuristic="balance", roulette_depth=2),
+    Settings(sampler="sobol", roulette_depth=1),
+    Settings(strategy="bsdf", roulette_depth=0),
+    Settings(heuristic="balance", sampler="sobol"),
+)
+"""Settings of the paths through the yard and over mirrors, in turn."""
+
+WIDE_PX = (40, 24)
+"""Width and height of the pictures that those paths belong to."""
+
+OTHERS = (*range(46),)
+"""Numbers of those paths."""
+
+
+def _other(index: int) -> View:
+    """Return a path with any counters, also large ones, and up to six scatterings."""
+    words = rng.random_block(rng.counter(SEED), rng.counter(index), rng.counter(1), rng.counter(0))
+    place, height, seed, sample = (int(word[0]) for word in words)
+    depth = (0, 0, 3, 1 << 16, (1 << 31) - 3)[index // 2 % 5]
+    settings = OTHER_SETTINGS[index % len(OTHER_SETTINGS)]
+    x, y = place % WIDE_PX[0], height % WIDE_PX[1]
+    return View(IN_TURN[index % len(IN_TURN)].name, settings, x, y, sample, "", *WIDE_PX, seed, depth, 6)
+
+
+IN_TURN = (YARD, TERRACE, YARD, MIRRORS, YARD, BARE, NIGHT, DARK)
+"""Scenes of those paths, in turn."""
+
+
+def others() -> Iterator[View]:
+    """Yield the paths through the yard and over mirrors."""
+    yield from map(_other, OTHERS)
+
+
+def views(count: int) -> Iterator[View]:
+    """Yield paths spread over scenes, settings and pixels."""
+    for index in range(count):
+        words = rng.random_block(rng.counter(SEED), rng.counter(index), rng.counter(0), rng.counter(0))
+        x, y = (int(word[0]) % SIZE_PX for word in words[:2])
+        name = SCENES[index % len(SCENES)]
+        yield View(name, VARIANTS[index // len(SCENES) % len(VARIANTS)], x, y, index % 3)
+
+
+# ---- arrivals ---------------------------------------------------------------------------------------------
+
+SENT = tuple(
+    (scene, settings, direction)
+    for scene in (NIGHT.name, TERRACE.name)
+    for settings in VARIANTS
+    for direction in ((0.0, 1.0, 0.0), (0.6, 0.64, 0.48))
+)
+"""Directions from a floor to a lamp and to the sky, by scene and settings."""
+
+
+def midway(scene: str, settings: Settings, direction: tuple[float, ...]) -> dict[str, Any]:
+    """Return the inputs of an arrival in the middle of a path that a surface has sent in a direction."""
+    state = {
+        "origin": (0.3125, 0.875, 0.4375) if scene == TERRACE.name else (0.125, 0.0009765625, 0.25),
+        "direction": direction,
+        "beta": (0.5, 0.25, 0.75),
+        "radiance": (0.125, 0.0625, 0.5),
+        "pdf": 0.3125,
+    }
+    kept = {"scene": {"file": scene_file(scene)}, "settings": asdict(settings)}
+    return {**kept, **{name: rounded(np.array(value)) for name, value in state.items()}}
+
+
+def foundry_settings() -> dict[str, Any]:
+    """Return the inputs of a path whose settings are about to be wrong."""
+    return next(foundry()).inputs()
+
+
+WRONG_SETTINGS: tuple[tuple[str, str, Any], ...] = (
+    ("LTR-8", "max_depth", -1),
+    ("LTR-8", "max_depth", 1 << 31),
+    ("LTR-8", "roulette_depth", -1),
+    ("LTR-8", "roulette_depth", 1 << 31),
+    ("LTR-6", "strategy", "MIS"),
+    ("LTR-5", "heuristic", "cutoff"),
+    ("LTR-8", "sampler", "halton"),
+)
+"""Settings that are refused, with their clauses."""
+
+
+def rounded(value: Any) -> Any:
+    """Return numbers rounded to float32, in float64."""
+    if np.asarray(value).dtype.kind == "f":
+        return np.asarray(value, np.float32).astype(np.float64)
+    return value

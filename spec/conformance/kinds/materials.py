@@ -9,6 +9,7 @@ import numpy as np
 from ....refimpl.light import environment, transport
 from ....refimpl.light.intersection import reflecting
 from ....refimpl.light.materials import Conductor, Dielectric, Lambertian, Mirror
+from ....refimpl.light.materials.dielectric import fresnel
 from ....refimpl.light.materials.material import Site
 from ....refimpl.light.scene import Sky
 from ..functions import Field, Function, Numbers
@@ -161,6 +162,24 @@ def _valued(given: Numbers) -> dict[str, Any]:
     return {"value": color * factor[..., np.newaxis], "pdf": Conductor.pdf(site, wi, cosine)}
 
 
+def _beside() -> list[tuple[str, Numbers, str]]:
+    """Return vertices whose number is a fiftieth beside the mirrored share, at several angles and indices."""
+    rows = []
+    for x, y, ior, outside in (
+        (0.8, 0.6, 1.5, 1),
+        (0.96, 0.28, 1.25, 1),
+        (0.28, 0.96, 2.0, 0),
+        (0.6, 0.8, 1.125, 0),
+    ):
+        ratio = 1.0 / ior if outside else ior
+        far = np.sqrt((1.0 - ratio) * (1.0 + ratio) + (ratio * y) ** 2)
+        share = float(fresnel(np.float64(y), far, np.float64(ratio)))
+        for factor in (0.98, 1.02):
+            note = f"{factor:g} of the mirrored share, cosine {y:g}, index {ior:g}"
+            rows.append((note, _at(0, 0, factor * share, wo=(x, y, 0.0), ior=ior, outside=outside), "DIE-3"))
+    return rows
+
+
 DIELECTRIC = Function(
     "material.dielectric",
     "Glass sends a path on: mirrored or refracted",
@@ -181,6 +200,7 @@ DIELECTRIC = Function(
         ("an index of 1: the body is not there", _at(0, 0, 0.5, ior=1.0, outside=1)),
         ("below the mean of both polarisations, above one", _at(0, 0, 0.03125, ior=1.5, outside=1), "DIE-3"),
         ("above the mean, below the other", _at(0, 0, 0.0625, ior=1.5, outside=1), "DIE-3"),
+        *_beside(),
         (
             "nothing mirrors, and the number is 0",
             _at(0, 0, 0.0, wo=(0.0, 1.0, 0.0), ior=1.0, outside=1),

@@ -172,6 +172,7 @@ def _forward_cases() -> list[Case]:
         ("a fraction of 0 digits", "WHO-6", plain, np.array([127, 90, -64, -5])),
         ("colours of 2^31 - 1", "WHO-6", most, np.full(4, INPUT_LEVELS)),
         ("colours of 1 - 2^31", "WHO-6", most, np.full(4, -INPUT_LEVELS)),
+        ("the largest last bias", "WHO-1", replace(one, biases=(np.full(3, 2.0**24 - 1.0),)), np.zeros(4)),
         ("the least last bias", "WHO-1", replace(one, biases=(np.full(3, -(2.0**24)),)), np.zeros(4)),
     ):
         rows.append((note, clause, network, n))

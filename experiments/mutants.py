@@ -42,7 +42,7 @@ MOST_MISSED = 0.03
 """Largest share of mutants that may survive without a reason."""
 
 EVERY = 50
-"""Mutants after which progress is told."""
+"""Mutants after which progress is reported."""
 
 
 def texts(c99: bool) -> dict[str, str]:
@@ -91,7 +91,7 @@ def asked(some: Sequence[Mutant], kept: dict[str, Outcome], path: Path, options:
     outcomes = (of_c99 if options.c99 else of_reference)(waiting, options.vectors)
     with path.open("a", encoding="utf-8") as file:
         for number, (mutant, outcome) in enumerate(zip(waiting, outcomes, strict=True)):
-            # What does not compile is no program: as if nobody reached it.
+            # What does not compile counts as not reached.
             kept[mutant.name] = outcome or Outcome(0)
             file.write(json.dumps([mutant.name, *kept[mutant.name]]) + "\n")
             file.flush()

@@ -35,7 +35,7 @@ NARROWER = {"(uint32_t)": ("(uint16_t)", "(uint8_t)", "0x7fffffffu & (uint32_t)"
 """What cuts a width."""
 
 NUMBER = re.compile(r"(?<![\w.\[])(\d+\.?\d*(?:e[+-]?\d+)?|0x[0-9a-fA-F]+)(u?)(?![\w.\]])")
-"""A number that is no length or index in brackets of its own."""
+"""A number that is neither length nor index in brackets of its own."""
 
 STATEMENT = re.compile(r"\s+(?:[\w.\->\[\]*+ ]+ [-+*/|&^]?= |\+\+|--|\w+\()[^{}]*;\s*(?:/\*.*\*/)?")
 """A line that is one assignment or one call."""

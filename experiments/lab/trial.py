@@ -3,7 +3,7 @@
 1. The cases of all kinds are asked in the order of blame, the most elementary kind first: the first failure
    is the one that `wamnet conformance` says to look at first [`in_order`].
 2. Which lines a case reaches is traced once; a mutant is asked only the cases that reach its statement
-   [`reach`]. What runs as modules are imported is reached by who uses what it makes (users.py).
+   [`reach`]. What runs as modules are imported is reached by those who use what it makes (users.py).
 3. A mutant runs in a fork of this process [`forked`]: a function gets the code of the changed text; for a
    change outside of functions, or in one that an import calls, all modules are imported again [`install`].
 4. It is caught by a wrong answer, an exception, a refusal, or one that does not come in time [`asked`].
@@ -106,7 +106,7 @@ def forked(task: Callable[[], Any]) -> Any:
             with os.fdopen(write, "w") as pipe:
                 json.dump(task(), pipe)
             status = 0
-        except BaseException:  # noqa: BLE001 - whatever it is, the parent must not go on here
+        except BaseException:  # noqa: BLE001 - whatever it is, the parent must not return here
             traceback.print_exc()
         finally:
             os._exit(status)
@@ -276,7 +276,7 @@ def asked(modules: Modules, kind: str, case: Case) -> list[str] | None:
 
 
 def install(mutant: Mutant, source: str, import_time: bool) -> Modules:
-    """Put a mutant in the place of what it changes; return the modules that answer and judge."""
+    """Put a mutant instead of what it changes; return the modules that answer and judge."""
     filename = str(ROOT / mutant.module)
     code = compile(mutated(mutant, source), filename, "exec", dont_inherit=True)
     if import_time:

@@ -2,7 +2,7 @@
 
 1. The program is built once with gcc's counters of lines, and each kind asked, so that a mutant is asked
    only the kinds that reach its line [`reach`].
-2. A mutant is compiled without optimisation; one that does not compile is none. It is asked until a case
+2. A mutant is compiled without optimisation; one that does not compile is left out. It is asked until a case
    fails, the most elementary kind first [`trial`].
 """
 

@@ -1,7 +1,7 @@
 """Who uses what a module makes as it is imported: the lines that name it, and those that name its users.
 
 A constant is read where no tracer sees it, so that text decides: a line that names it uses it. What is made
-of it as modules are imported is used by who names that [`Users.lines`].
+of it as modules are imported is used by those who name that [`Users.lines`].
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Users:
         """Return the lines that use what the statement of a mutant makes."""
         top = self._top(mutant.module, mutant.line)
         if isinstance(top, ast.ClassDef):
-            # Fields and their defaults are used by who makes the class: its module's functions at least.
+            # Fields and their defaults are used by those who make the class: its module's functions at least.
             last = self.trees[mutant.module].body[-1].end_lineno or 0
             own = {(mutant.module, line) for line in range(1, last + 1)}
             return own | self._users({top.name})

@@ -273,7 +273,7 @@ BEYOND: Mapping[str, Callable[[], bytes]] = {
     "weights of other widths": lambda: _tensor("layer0.weight", shape=[27, 4]),
     "a window of 65 pixels": lambda: _text("window", '{"border": "clamp", "size": 65}'),
     "a window of true pixels": lambda: _text("window", '{"border": "clamp", "size": true}'),
-    "a border that is no text": lambda: _text("window", '{"border": 0, "size": 3}'),
+    "a border that is a number": lambda: _text("window", '{"border": 0, "size": 3}'),
     "a window that is a list": lambda: _text("window", '["clamp", 3]'),
     "features that are numbers": lambda: _text("features", "[1]"),
     "features that are an object": lambda: _text("features", '{"color": 1}'),

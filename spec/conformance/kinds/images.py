@@ -120,6 +120,7 @@ def _feature_cases() -> list[Case]:
         cases.append(Case(f"image.features/{len(cases)}", clause, inputs, expected, (), note))
     wanted = ("position", "depth", "color", "unshadowed", "normal")
     shown = {name: v for name, v in bad_layers(3, 2, 60).items() if name in wanted}
+    shown["normal"] = single(-1.5 * shown["normal"])
     names = ",".join(wanted)
     inputs = {**shown, "features": names, **OTHER_SCALES}
     expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}

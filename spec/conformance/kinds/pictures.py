@@ -302,7 +302,7 @@ KINDS = (
         _exact_cases,
         _exact,
         paths.files,
-        "The answer has the samples asked for, numbered from 0, with the random numbers of the settings.",
+        "The answer has the requested samples, numbered from 0, with the random numbers of the settings.",
     ),
     Kind(
         "picture.rendered",

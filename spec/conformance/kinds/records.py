@@ -83,7 +83,7 @@ NO_RECORD = {
     "no position": _text(position=None),
     "no look_at": _text(look_at=None),
     "a number as text": _text(vertical_fov_deg="45"),
-    "a truth value for a number": _text(vertical_fov_deg=True),
+    "a boolean for a number": _text(vertical_fov_deg=True),
     "a list for a number": _text(vertical_fov_deg=[45]),
     "null for a number": _raw("45", "null"),
     "a number for a list": _text(up=1),
@@ -91,7 +91,7 @@ NO_RECORD = {
     "two numbers for three": _text(up=[0, 1]),
     "four numbers for three": _text(up=[0, 1, 0, 0]),
     "a text in a list": _text(up=[0, "1", 0]),
-    "a truth value in a list": _text(up=[False, True, False]),
+    "a boolean in a list": _text(up=[False, True, False]),
     "a number beyond 1e12": _text(position=[0, 0, 1.0000001e12]),
 }
 """Texts that are JSON and no camera."""

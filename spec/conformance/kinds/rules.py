@@ -230,6 +230,7 @@ def bad() -> Iterator[tuple[str, str]]:
     yield from ((_of_sky(n, value), under(n.strip(), value)) for n, value in SKY_REFUSED.items())
     yield "quads.0.edge_u = 1000 long, edge_v nearly parallel", changed(*_edges(1000, 5e-4))
     yield "quads.0.edge_u = 0.001 long, edge_v nearly parallel", changed(*_edges(0.001, 5e-10))
+    yield "a sky and a background of one channel", changed(("environment", SKY), ("background", [0, 0.5, 0]))
     for u, v in PARALLEL:
         yield f"quads.0.edge_u = {u}, edge_v = {v}", changed(("quads.0.edge_u", u), ("quads.0.edge_v", v))
 

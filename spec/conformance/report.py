@@ -68,7 +68,6 @@ ELEMENTARY = (
     "intersection.",
     "material.mirror",
     "material.lambertian",
-    "material.conductor_value",
     "material.",
     "transport.",
     "sky.",

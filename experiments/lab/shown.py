@@ -539,7 +539,6 @@ TABLES: Mapping[str, TableOf] = {
     "claims": claims("verdicts"),
     "claims-exposures": claims("exposures"),
     "reference-mutants": as_printed("reference-mutants", 1),
-    "reference-mutants-changes": as_printed("reference-mutants", 2),
     "demo-pictures": demo_pictures,
     "demo-runs": demo_runs,
     "departures": departures,

@@ -75,10 +75,11 @@ def cell(verdicts: Sequence[Verdict], rule: str) -> str:
     if not tested:
         return "not tested"
     silent = f", {len(mine) - len(tested)} not tested" if len(tested) < len(mine) else ""
+    feeble = sum(v.state in (judgement.FEEBLE_PASS, judgement.UNCONFIRMED) for v in tested)
     if not odd:
-        return f"{len(tested)} pass{silent}"
-    whose = {v.profile or "?" for v in odd}
-    named = f" ({', '.join(sorted(whose))})" if whose != {"?"} else ""
+        return f"{len(tested)} pass{f', {feeble} of them feeble' if feeble else ''}{silent}"
+    whose = {v.profile or "none known" for v in odd}
+    named = f" ({', '.join(sorted(whose))})" if whose != {"none known"} else ""
     return f"**{len(odd)} of {len(tested)} deviate**{named}{silent}"
 
 

@@ -27,11 +27,16 @@ TANGENT: Vector = (0.8, 0.0, -0.6)
 CAMERA = Camera((3.36, 1.8, 0.48), (0.0, 0.0, 0.0), vertical_fov_deg=40.0)
 """Three units along the normal and 2.4 along the tangent: 39 degrees to the wall, which fills the picture."""
 
-WALL_SIZE = 16
-"""Pixels along each side of these pictures."""
+WALL_SIZE = 64
+"""Pixels along each side of these pictures: small ones, for a renderer may look at one point of each only."""
 
-CORNER = (0, 0, 3, 3)
-"""A block in a corner of the picture."""
+CORNER = (0, 0, 1, 1)
+"""The pixel in a corner of the picture: in a block of several, answers would differ."""
+
+IN_PIXEL = 0.015
+"""Slack of distances, and half of that of points: at the corner distances change by 1.6 and 0.9 per cent a
+pixel along its sides, points by twice that, and a layer that is not a mean over a pixel is of any point of
+it. Distances along the view are 11 per cent off."""
 
 MATTE: Vector = (0.2, 0.5, 0.8)
 """Reflectance of a matte wall: its channels differ."""
@@ -66,7 +71,7 @@ def _vector(values: object) -> Vector:
 def _shot(name: str, **parts: object) -> Shot:
     """Return a picture with layers."""
     scene = Scene(name, CAMERA, **parts)  # type: ignore[arg-type]
-    return Shot(name, scene, WALL_SIZE, spp=16, layers=True)
+    return Shot(name, scene, WALL_SIZE, spp=4, layers=True)
 
 
 def walls() -> Iterator[Question]:
@@ -83,8 +88,8 @@ def walls() -> Iterator[Question]:
     distance, along, point = answers.plane_hits(CAMERA, WALL_SIZE, CORNER, np.array(NORMAL))
     source = "rays against a plane, the mean over the block's pixels"
     intents = {"depth-along-view": (along,)}
-    yield Question("depth", "depth", shot, (distance,), source, "depth", CORNER, intents=intents)
-    yield Question("position", "position", shot, _vector(point), source, "position", CORNER)
+    yield Question("depth", "depth", shot, (distance,), source, "depth", CORNER, IN_PIXEL, intents)
+    yield Question("position", "position", shot, _vector(point), source, "position", CORNER, 2 * IN_PIXEL)
 
 
 def materials() -> Iterator[Question]:
@@ -124,7 +129,7 @@ def lamps() -> Iterator[Question]:
     u, v = np.cross(TANGENT, NORMAL), np.array(TANGENT)
     shines = Light(_vector(-2.0 * (u + v)), _vector(4.0 * u), _vector(4.0 * v), (1.0, 1.0, 1.0), 10.0)
     shot = _shot("layers-lamp", lights=(shines,))
-    middle = (6, 6, 4, 4)
+    middle = (24, 24, 16, 16)
     yield Question("normal-lamp", "normals", shot, NORMAL, "a lamp is a surface", "normal", middle)
 
 

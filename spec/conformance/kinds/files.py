@@ -21,7 +21,7 @@ from ....refimpl.network.dataset import Normalization, Window
 from ....refimpl.network.denoise import Model
 from ..case import Case, Kind, Output
 from . import rules
-from .paths import scene_text
+from .views import scene_text
 
 MODEL = Model(
     siren.init([27, 4, 3], 3.0, 1.0, seed=5, dtype=np.float32),

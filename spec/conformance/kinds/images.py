@@ -118,10 +118,10 @@ def _feature_cases() -> list[Case]:
         inputs = {**shown, "features": names, **SCALES}
         expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}
         cases.append(Case(f"image.features/{len(cases)}", clause, inputs, expected, (), note))
-    wanted = ("position", "depth", "color", "unshadowed", "normal")
-    shown = {name: v for name, v in bad_layers(3, 2, 60).items() if name in wanted}
+    all_of = ("position", "depth", "color", "unshadowed", "normal")
+    shown = {name: v for name, v in bad_layers(3, 2, 60).items() if name in all_of}
     shown["normal"] = single(-1.5 * shown["normal"])
-    names = ",".join(wanted)
+    names = ",".join(all_of)
     inputs = {**shown, "features": names, **OTHER_SCALES}
     expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}
     cases.append(Case(f"image.features/{len(cases)}", "DAT-1", inputs, expected, (), "other scales"))

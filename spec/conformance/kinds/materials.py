@@ -164,7 +164,7 @@ def _valued(given: Numbers) -> dict[str, Any]:
 
 def _beside() -> list[tuple[str, Numbers, str]]:
     """Return vertices whose number is a fiftieth beside the mirrored share, at several angles and indices."""
-    rows = []
+    rows: list[tuple[str, Numbers, str]] = []
     for x, y, ior, outside in (
         (0.8, 0.6, 1.5, 1),
         (0.96, 0.28, 1.25, 1),
@@ -173,7 +173,7 @@ def _beside() -> list[tuple[str, Numbers, str]]:
     ):
         ratio = 1.0 / ior if outside else ior
         far = np.sqrt((1.0 - ratio) * (1.0 + ratio) + (ratio * y) ** 2)
-        share = float(fresnel(np.float64(y), far, np.float64(ratio)))
+        share = float(fresnel(np.array(y), np.array(far), np.array(ratio)))
         for factor in (0.98, 1.02):
             note = f"{factor:g} of the mirrored share, cosine {y:g}, index {ior:g}"
             rows.append((note, _at(0, 0, factor * share, wo=(x, y, 0.0), ior=ior, outside=outside), "DIE-3"))

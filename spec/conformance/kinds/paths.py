@@ -442,8 +442,8 @@ def _whole_cases() -> list[Case]:
         wanted = whole(_with_scene(inputs, view))
         expected = {}
         for name in VERTEX:
-            ends = {**PATH, **SURFACE}[name][0]
-            sides = [_ends(state, name, ends)[:2] for state in reach]
+            parts = {**PATH, **SURFACE}[name][0]
+            sides = [_ends(state, name, parts)[:2] for state in reach]
             low, high = (np.reshape([side[i] for side in sides], wanted[name].shape) for i in (0, 1))
             bound = np.maximum(high - wanted[name], wanted[name] - low)
             expected[name] = Output(wanted[name], bound if name != "surface" else 0.0, CHAIN)

@@ -32,7 +32,7 @@ from ....refimpl.network.dataset import Normalization, Window
 from ....refimpl.network.denoise import Model
 from .. import blocks
 from ..case import Case, Kind, Output
-from . import paths
+from . import paths, views
 from .files import file_of, model_from
 from .images import LAYER_FIELDS, ULP, bad_layers, frame_of
 
@@ -156,7 +156,7 @@ def _render_cases() -> list[Case]:
             "seed": 1000 + index,
             "settings": settings,
         }
-        found = _render({**own, "scene": paths.scene_text(name)})
+        found = _render({**own, "scene": views.scene_text(name)})
         mean, variance = blocks.mean_and_variance(
             found["mean"].astype(np.float64), found["variance"], block_px
         )
@@ -221,7 +221,7 @@ def samples_of(exact: Exact) -> Iterator[tuple[Any, Any] | None]:
     """Yield the ends (3,) of each sample of each pixel, row by row; None where a decision is not sure."""
     for y, x, n in np.ndindex(exact.height, exact.width, exact.spp):
         size = exact.width, exact.height
-        yield paths.gathered(paths.View(exact.scene, exact.settings, x, y, n, "", *size, exact.seed))
+        yield paths.gathered(views.View(exact.scene, exact.settings, x, y, n, "", *size, exact.seed))
 
 
 @cache
@@ -238,7 +238,7 @@ def _exact_cases() -> list[Case]:
             **{name: getattr(exact, name) for name in ("width", "height", "spp", "seed")},
             "settings": asdict(exact.settings),
         }
-        found = _exact({**inputs, "scene": paths.scene_text(exact.scene)})
+        found = _exact({**inputs, "scene": views.scene_text(exact.scene)})
         ends = [ends for ends in samples_of(exact) if ends is not None]
         shape = (exact.height, exact.width, exact.spp, 3)
         low, high = (np.array([end[side] for end in ends]).reshape(shape) for side in (0, 1))
@@ -301,7 +301,7 @@ KINDS = (
         RENDERED_FIELDS,
         _exact_cases,
         _exact,
-        paths.files,
+        views.files,
         "The answer has the requested samples, numbered from 0, with the random numbers of the settings.",
     ),
     Kind(
@@ -311,7 +311,7 @@ KINDS = (
         RENDERED_FIELDS,
         _render_cases,
         _render,
-        paths.files,
+        views.files,
         "The answer may have more samples, any random numbers and be in files; `expected` holds the means of "
         "blocks of pixels, and `welch` what else the test needs: the variance of one sample of a block is "
         "the reference's, so other ways to sample must not be worse.",

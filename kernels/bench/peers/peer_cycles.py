@@ -44,16 +44,7 @@ PARTS = ("numbers", "rendering", "reading")
 
 def check(scene: Scene, settings: Settings) -> None:
     """Refuse a scene or settings that Cycles would show differently."""
-    peer_mitsuba.check(scene, settings)
-    if scene.environment is not None:
-        raise InputError(
-            "scene with a sky", scene.name, "no sky is given to Cycles", "measure a scene without"
-        )
-    materials = [part.material for part in (*scene.boxes, *scene.spheres, *scene.quads)]
-    materials += scene.room.materials if scene.room is not None else ()
-    if any(material is not None for material in materials):
-        rule = "only matte surfaces are given to Cycles"
-        raise InputError("scene with materials", scene.name, rule, "measure a scene without")
+    peer_mitsuba.check_matte(scene, settings, "Cycles")
     wall = scene.room is not None and any(scene.room.emission)
     if scene.spheres or wall or any(any(part.emission) for part in (*scene.boxes, *scene.quads)):
         rule = "only matte boxes, quads and walls that do not emit, and lights, are given to Cycles"

@@ -2,7 +2,7 @@
 
 1. The program is embree_paths.c beside this file. [`Embree`] compiles it, gives it a scene as a file of
    numbers [`scene_bytes`], and asks it for pictures by a line of text each; the process ends with the object.
-2. A scene is what Mitsuba's export takes: matte surfaces, lamps and a room [`peer_mitsuba.check`]. Boxes are
+2. A scene is matte surfaces, lamps and a room [`peer_mitsuba.check_matte`]. Boxes are
    12 triangles each, as `cube` of Mitsuba; a camera outside a room sees it from where its rays enter.
 3. Rays and shadow rays are Embree's; what is done between is loops over the packet's lanes in plain C.
 
@@ -50,7 +50,7 @@ class Embree:
     def __init__(self, scene: Scene, width: int, height: int, settings: Settings | None = None) -> None:
         """Compile and start it; ExecutorUnavailable says what is missing, InputError what is not exported."""
         settings = settings or Settings()
-        peer_mitsuba.check(scene, settings)
+        peer_mitsuba.check_matte(scene, settings, "Embree")
         self._shape = (height, width, 3)
         with tempfile.TemporaryDirectory(prefix="wamnet-embree-") as name:
             folder = Path(name)

@@ -99,6 +99,19 @@ def check(scene: Scene, settings: Settings) -> None:
         )
 
 
+def check_matte(scene: Scene, settings: Settings, peer: str) -> None:
+    """Refuse, for a peer that knows matte surfaces only, what it or Mitsuba would show differently."""
+    check(scene, settings)
+    if scene.environment is not None:
+        rule = f"no sky is given to {peer}"
+        raise InputError("scene with a sky", scene.name, rule, "measure a scene without")
+    materials = [part.material for part in (*scene.boxes, *scene.spheres, *scene.quads)]
+    materials += scene.room.materials if scene.room is not None else ()
+    if any(material is not None for material in materials):
+        rule = f"only matte surfaces are given to {peer}"
+        raise InputError("scene with materials", scene.name, rule, "measure a scene without")
+
+
 def _check_glass(scene: Scene) -> None:
     """Refuse light that begins in glass: Mitsuba's is scaled where it leaves, ours is basic radiance."""
     solids: tuple[Box | Sphere, ...] = (*scene.boxes, *scene.spheres)

@@ -43,7 +43,7 @@ class Numba:
     def __init__(self, scene: Scene, width: int, height: int, settings: Settings | None = None) -> None:
         """Compile them; ExecutorUnavailable says that Numba is missing, InputError what is not exported."""
         settings = settings or Settings()
-        peer_mitsuba.check(scene, settings)
+        peer_mitsuba.check_matte(scene, settings, "Numba")
         try:
             import numba
         except ImportError:

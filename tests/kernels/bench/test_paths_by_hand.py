@@ -110,9 +110,12 @@ def test_a_program_that_has_ended_is_reported():
 
 
 @EACH
-def test_what_they_would_show_differently_is_refused(kind):
-    with pytest.raises(InputError, match="only matte surfaces are exported"):
-        BY_HAND[kind](scenes.glossy(), WIDTH, HEIGHT)
+@pytest.mark.parametrize(
+    ("name", "message"), [("glossy", "only matte surfaces are given"), ("daylight", "no sky is given")]
+)
+def test_what_they_would_show_differently_is_refused(kind, name, message):
+    with pytest.raises(InputError, match=message):
+        BY_HAND[kind](getattr(scenes, name)(), WIDTH, HEIGHT)
 
 
 def test_without_numba_it_says_so(monkeypatch):

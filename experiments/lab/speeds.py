@@ -41,7 +41,7 @@ SPEED_SHORT = {
     ("window6+rank12", "opencl tile16"): "wamnet, window of 6 pixels and rank 12",
     ("window8+rank16", "opencl tile16"): "wamnet, window of 8 pixels and rank 16",
     ("whole", "opencl fft32"): "wamnet, first layer from spectra (`fft32`)",
-    ("whole", "c fft32"): "wamnet, the same in C, by GCC",
+    ("whole", "c fft32"): "wamnet, spectra (`fft32`) in C, by GCC",
     ("whole", "opencl tile16"): "wamnet, register tiles (`tile16`)",
     ("exact", "opencl tile16"): "wamnet, the same bits everywhere (profile `exact`)",
     ("whole", "opencl plain"): "wamnet, the kernel that is made to be read (`plain`)",
@@ -73,11 +73,12 @@ def speed_short(record: str) -> TableOf:
     def table(records: Records) -> str:
         found = speed_against_error(record)(records).splitlines()
         heads, _, *rows = ([cell.strip() for cell in row.split("|")[1:-1]] for row in found)
-        shown = []
-        for row in rows:
+        shown: list[list[str]] = []
+        for row in rows:  # of a kernel that is in front too, the first
             cells = dict(zip(heads, row, strict=True))
             form, way = cells["form"].removesuffix(" *"), cells["executor, schedule"]
-            if name := SPEED_SHORT.get((form, way)):
+            name = SPEED_SHORT.get((form, way))
+            if name and all(name != other for other, *_ in shown):
                 checked = text_checked(form, way, cells[SPEED_COLUMNS[-1]])
                 shown.append([name, way, *(cells[column] for column in SPEED_COLUMNS), checked])
         return tables.markdown(["by", "schedule", *SPEED_COLUMNS, "text checked"], shown)

@@ -43,7 +43,10 @@ def test_nothing_is_near_a_tie(case, monkeypatch) -> None:
 
 @pytest.mark.parametrize("case", KIND.make(), ids=lambda case: case.id)
 def test_inputs_do_not_vary_alike(case) -> None:
-    """The order of two inputs of the same variance is free, and would change what is chosen."""
+    """The order of two inputs of the same variance is free, and would change what is chosen.
+
+    Where no input varies at all it is not: what is left of the covariance hands nothing on.
+    """
     numbers = whole.steps_of(np.asarray(case.inputs["windows"]))
     variances = np.sort(numbers.var(axis=0))
-    assert (np.diff(variances) > 2.0**-12 * variances[1:]).all()
+    assert not variances.any() or (np.diff(variances) > 2.0**-12 * variances[1:]).all()

@@ -134,9 +134,15 @@ def reasons(path: Path = REASONS) -> list[Reason]:
     return found
 
 
+def reason_of(mutant: Mutant, known: Sequence[Reason]) -> Reason | None:
+    """Return the first reason that fits a mutant."""
+    return next((reason for reason in known if reason.names.fullmatch(mutant.name)), None)
+
+
 def excuse(mutant: Mutant, known: Sequence[Reason]) -> str:
     """Return the sort of the reason that a mutant has, or nothing."""
-    return next((reason.sort for reason in known if reason.names.fullmatch(mutant.name)), "")
+    found = reason_of(mutant, known)
+    return found.sort if found else ""
 
 
 HEADS = ("mutants", "reached", "caught", "equal", "unasked", "missed", "caught, %", "clause, %", "chapter, %")

@@ -22,7 +22,7 @@ import sys
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType, FrameType, FunctionType, ModuleType
@@ -230,8 +230,22 @@ def trial(mutant: Mutant, source: str, cases: Sequence[tuple[str, Case]], reache
     return Outcome(len(numbers), *(found if found is not None else ("", "", "", "killed", "")))
 
 
+def failures(mutant: Mutant, source: str, cases: Sequence[tuple[str, Case]]) -> list[list[str] | None]:
+    """Ask a mutant all cases: of each return what [`asked`] does, case, clause, output, verdict and text."""
+    found: list[list[str] | None] | None = forked(lambda: list(_asked_all(mutant, source, cases, True)))
+    return [[case.id, case.clause, "", "killed", ""] for _, case in cases] if found is None else found
+
+
 def _tried(mutant: Mutant, source: str, cases: Sequence[tuple[str, Case]], import_time: bool) -> list[str]:
-    """Be the fork: install the mutant and ask it."""
+    """Be the fork: return the first failure of a mutant."""
+    every = _asked_all(mutant, source, cases, import_time)
+    return next((failed for failed in every if failed is not None), [""] * 5)
+
+
+def _asked_all(
+    mutant: Mutant, source: str, cases: Sequence[tuple[str, Case]], import_time: bool
+) -> Iterator[list[str] | None]:
+    """Be the fork: install the mutant, and yield what failed of each case."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     signal.signal(signal.SIGALRM, _late)
     warnings.simplefilter("ignore")  # of wrong arithmetic
@@ -239,15 +253,15 @@ def _tried(mutant: Mutant, source: str, cases: Sequence[tuple[str, Case]], impor
         signal.alarm(LIMIT_S)
         modules = install(mutant, source, import_time)
     except BaseException as error:  # noqa: BLE001 - it fails whatever is asked
-        kind, case = cases[0]
-        return [case.id, case.clause, "", "crash", f"{type(error).__name__} as it is imported"]
+        signal.alarm(0)
+        text = f"{type(error).__name__} as it is imported"
+        yield from ([case.id, case.clause, "", "crash", text] for _, case in cases)
+        return
     for kind, case in cases:
         signal.alarm(LIMIT_S)
         failed = asked(modules, kind, case)
         signal.alarm(0)
-        if failed is not None:
-            return failed
-    return ["", "", "", "", ""]
+        yield failed
 
 
 Modules = tuple[ModuleType, ModuleType]

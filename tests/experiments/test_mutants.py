@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import shutil
 
+import mutant
 import mutants
 import pytest
 from lab import mutation, mutation_c, trial, trial_c
@@ -118,3 +119,58 @@ def test_a_mutant_of_the_c_program_is_caught(tmp_path):
     some = [m for m in mutation_c.mutants(mutants.C99, source) if m.function.startswith("RNG-3")]
     came = [trial_c.trial(m, source, cases, lines, tmp_path) for m in some]
     assert {outcome.verdict for outcome in came if outcome} == {"fail"}
+
+
+# ---- one mutant -----------------------------------------------------------------------------------------
+
+BEHIND = "sphere.py:*:(discriminant > 0.0) & (t_far > 0.0) -> (discriminant > 0.0)"
+"""A sphere behind the ray is met."""
+
+
+@pytest.mark.needs("programs")
+def test_one_mutant_is_shown_with_those_who_see_it(capsys):
+    mutant.main([BEHIND, "-k", "intersection"])
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].endswith(", governed by ISC-6")
+    assert said[1].startswith("- return np.where((discriminant > 0.0) & (t_far > 0.0), ")
+    assert said[2].startswith("+ return np.where((discriminant > 0.0), ")
+    asked = sum(kind.startswith("intersection.") for kind, _ in trial.in_order())
+    assert said[3] == f"3 of {asked} cases see it:"
+    assert said[4] == "  intersection.sphere: 2 of 16 cases, blamed on ISC-6"
+    assert said[5] == "  intersection.nearest: 1 of 12 cases, blamed on ISC-1"
+    assert said[6] == "look first at ISC-6: intersection.sphere/1 (away from it)"
+
+
+@pytest.mark.needs("programs")
+def test_a_survivor_is_shown_with_its_reason_or_as_missed(capsys):
+    mutant.main(["sphere.py:*:b < 0.0 -> (b <= 0.0)", "-k", "intersection.sphere"])
+    assert capsys.readouterr().out.splitlines()[-1].startswith("equal: at b = 0 ")
+    mutant.main([BEHIND, "-k", "intersection.sphere/2"])
+    assert capsys.readouterr().out.splitlines()[-2:] == [
+        "0 of 1 cases see it",
+        "missed: a case, or a reason, is still to be written",
+    ]
+
+
+@pytest.mark.needs("programs")
+def test_a_mutant_that_cannot_be_imported_fails_each_case():
+    (some,) = mutants.chosen(["sphere.py:25:constant"], None, 0)
+    broken = some._replace(start=0, end=0, text="raise SystemExit\n")
+    (source,) = (text for path, text in mutants.texts(c99=False).items() if path == some.module)
+    asked = mutant.cases(["random.block"])
+    failures = trial.failures(broken, source, asked)
+    assert [failed and failed[3] for failed in failures] == ["crash"] * len(asked)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["sphere.py:*:comparison"], "not of 6; "),
+        (["sphere.py:no such"], "not of 0; the name of a module"),
+        ([BEHIND, "-k", "no-such-case"], "no case fits"),
+    ],
+)
+def test_what_names_no_mutant_or_several_is_refused(capsys, words, said):
+    with pytest.raises(SystemExit, match="2"):
+        mutant.main(words)
+    assert said in " ".join(capsys.readouterr().err.split())

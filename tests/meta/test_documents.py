@@ -2,7 +2,10 @@
 
 1. Fenced `sh` and `python` blocks of one document run in their order, in one empty folder, with the package's
    commands first on PATH: a block may use the files of those before it [`test_commands_of_a_document`].
-2. A block after `<!-- not run: reason -->` is left out and reported, with its reason, as a skipped test. Only
+2. A block after `<!-- in a clone -->` runs in the repository's root, and writes nothing there.
+3. What a block prints must be the `text` block that follows it after `<!-- printed -->`, to the letter;
+   `pytest --update-golden tests/meta/test_documents.py` writes it.
+4. A block after `<!-- not run: reason -->` is left out and reported, with its reason, as a skipped test. Only
    set-up may be marked so, for CI runs that itself [`SETUP`].
 """
 
@@ -28,25 +31,40 @@ SETUP = re.compile(
 )
 """Commands that need not run here: they make the environment of this test, or CI calls them itself."""
 
-BLOCK = re.compile(r"(?:<!-- not run: (.+?) -->\s*)?^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-"""An optional mark, then a fenced block."""
+BLOCK = re.compile(
+    r"(?:<!-- (?:not run: (?P<reason>.+?)|(?P<clone>in a clone)) -->\s*)?"
+    r"^```(?P<language>sh|python)\n(?P<text>.*?)^```$"
+    r"(?:\s*<!-- printed -->\s*```text\n(?P<printed>.*?)^```$)?",
+    re.MULTILINE | re.DOTALL,
+)
+"""An optional mark, then a fenced block, then perhaps what it prints."""
 
 SECONDS_AT_MOST = 300
 """When a command counts as hanging; no command of a document should take a tenth of it."""
 
 
 class Block(NamedTuple):
-    """A fenced block: where it starts, why it is not run (or None), its language and its text."""
+    """A fenced block: where it starts, why it is not run (or None), its language and its text; whether it
+    runs in the repository's root, and what it prints (or None)."""
 
     where: str
     reason: str | None
     language: str
     text: str
+    clone: bool = False
+    printed: str | None = None
 
 
 def blocks(name: str, text: str) -> list[Block]:
     return [
-        Block(f"{name}:{text.count(chr(10), 0, m.start(2)) + 1}", m[1], m[2], m[3])
+        Block(
+            f"{name}:{text.count(chr(10), 0, m.start('language')) + 1}",
+            m["reason"],
+            m["language"],
+            m["text"],
+            m["clone"] is not None,
+            m["printed"],
+        )
         for m in BLOCK.finditer(text)
     ]
 
@@ -57,8 +75,9 @@ def commands(block: Block) -> list[str]:
     return [line for line in lines if line and not line.startswith("#")]
 
 
-def run(block: Block, folder: Path) -> None:
-    """Run a block in a folder; on failure say the place, the text and the last lines of the output."""
+def run(block: Block, folder: Path) -> str:
+    """Run a block in a folder, and return what it prints; on failure say the place, the text and the last
+    lines of the output."""
     program = {"sh": ["bash", "-euo", "pipefail", "-c"], "python": [sys.executable, "-c"]}[block.language]
     environment = os.environ | {
         "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
@@ -66,7 +85,7 @@ def run(block: Block, folder: Path) -> None:
     }
     done = subprocess.run(
         [*program, block.text],
-        cwd=folder,
+        cwd=ROOT if block.clone else folder,
         env=environment,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
@@ -78,6 +97,7 @@ def run(block: Block, folder: Path) -> None:
     if done.returncode:
         tail = "\n".join(done.stdout.splitlines()[-30:])
         pytest.fail(f"{block.where} ends with status {done.returncode}:\n{block.text}\n{tail}", pytrace=False)
+    return done.stdout
 
 
 ALL = {
@@ -87,12 +107,23 @@ ALL = {
 """The blocks of each document."""
 
 
+def rewrite(path: Path, block: Block, printed: str) -> None:
+    """Put what a block has printed into its document."""
+    before, after = f"```{block.language}\n{block.text}```", path.read_text()
+    start = after.index(str(block.printed), after.index(before) + len(before))
+    path.write_text(after[:start] + printed + after[start + len(str(block.printed)) :])
+
+
 @pytest.mark.parametrize("document", ALL)
 @pytest.mark.needs("programs")
-def test_commands_of_a_document(document: str, tmp_path: Path) -> None:
+def test_commands_of_a_document(document: str, tmp_path: Path, pytestconfig: pytest.Config) -> None:
     for block in ALL[document]:
         if block.reason is None:
-            run(block, tmp_path)
+            found = run(block, tmp_path)
+            if block.printed is not None and pytestconfig.getoption("--update-golden"):
+                rewrite(ROOT / document, block, found)
+            elif block.printed is not None:
+                assert found == block.printed, f"{block.where} prints something else than the page shows"
     assert ALL[document] or document != "README.md", "README.md shows at least one command"
 
 
@@ -136,6 +167,37 @@ def test_blocks_are_found_and_share_a_folder(tmp_path: Path) -> None:
     assert commands(found[0]) == ["make demo"]
     run(found[1], tmp_path)
     run(found[2], tmp_path)
+
+
+PRINTING = """
+```sh
+echo other
+```
+
+<!-- in a clone -->
+```sh
+ls pyproject.toml
+```
+
+<!-- printed -->
+```text
+setup.cfg
+```
+"""
+"""A document that shows what a command prints, and is wrong."""
+
+
+@pytest.mark.needs("programs")
+def test_what_is_printed_is_found_and_written(tmp_path: Path) -> None:
+    first, second = blocks("x.md", PRINTING)
+    assert (first.clone, first.printed) == (False, None)
+    assert (second.clone, second.printed) == (True, "setup.cfg\n")
+    printed = run(second, tmp_path)
+    assert printed == "pyproject.toml\n"
+    (tmp_path / "x.md").write_text(PRINTING)
+    rewrite(tmp_path / "x.md", second, printed)
+    assert blocks("x.md", (tmp_path / "x.md").read_text())[1].printed == printed
+    assert (tmp_path / "x.md").read_text() == PRINTING.replace("setup.cfg", "pyproject.toml")
 
 
 @pytest.mark.parametrize("text", ["false", "false | cat", "echo $NO_SUCH_VARIABLE"])

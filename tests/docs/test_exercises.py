@@ -94,8 +94,44 @@ WRONG = {
             r"right in NumPy perhaps, but convert .* float32 is exact up to 2\^24",
         ),
     ],
+    "ex11_suite": [
+        (" & (behind < 1e30)", "", "6 cases of intersection.sphere see it: at most 4"),
+        ("normal=-surface.normal", "normal=surface.normal", "no case sees a fault; ISC-8"),
+        ("np.where(depth > 0, 1 / np.maximum(depth, 1e-9), 0)", "1 / depth", "the rule misses is blamed"),
+        (" & (linear < 0.8)", "", r"encoding.display/\d+ sees what you hid"),
+    ],
 }
 """Of each exercise: a piece of the right answer, a wrong one in its place, and what the grader must say."""
+
+BLAMED_WRONGLY = [
+    [
+        ("np.where((found == 1e30) & (behind < 1e30), -behind, found)", "found", "no case sees .*; ISC-6 is"),
+        ("np.abs(a), axis=-1, keepdims=True)", "a * a, axis=-1, keepdims=True) ** 0.5", "VEC-3 is to be"),
+        ("np.ones_like(hit.t)", "right(world, path, hit, surface)", "no case sees a fault; LTR-2 is"),
+        ("1 / np.maximum(depth, 1e-9)", "2 * depth", "depth times distance is 1 up to .*: write one over"),
+        ("found + 0.02", "found + 0.002", "0 of 1000 values are off by 0.01: at least 50"),
+    ],
+    [
+        (
+            "np.where((found == 1e30) & (behind < 1e30), -behind, found)",
+            "np.stack([found] * 2)",
+            "ValueError",
+        ),
+        (
+            "a / np.sum(np.abs(a), axis=-1, keepdims=True)",
+            "np.where(a == 3, 0.9, right(a))",
+            "rays are right",
+        ),
+        ("np.ones_like(hit.t)", "1 // 0", "ZeroDivisionError"),
+        ('"depth": np.where', '"normal": np.where', "the rule .* is blamed; depth is to be"),
+        ("0.6", "0.9", "linear = 0.9 does not see what you hid"),
+    ],
+    [
+        ("np.ones_like(hit.t)", "np.ones_like(hit.t) + path.missing", "AttributeError"),
+        ("found + 0.02", "found + 0.02 * (np.size(linear) > 1)", "linear = 0.6 does not see what you hid"),
+    ],
+]
+"""The same for the exercise of blame, several pieces at once: the grader must say all."""
 
 ROUNDS = max(len(found) for found in WRONG.values())
 
@@ -103,15 +139,24 @@ NO_TESTS, FAILED = 5, 1
 """Exit statuses of pytest."""
 
 
-def graded(*options: str) -> tuple[int, dict[str, str], str]:
-    """Return the exit status of all graders, their verdicts by exercise, and all that was said."""
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(EXERCISES), *options]
+def graded(*options: str, only: str = "") -> tuple[int, dict[str, str], str]:
+    """Return the exit status of all graders, or of one, verdicts by exercise, and all that was said."""
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        str(EXERCISES / only),
+        *options,
+    ]
     done = subprocess.run(
         command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False, stdin=subprocess.DEVNULL
     )
     assert done.returncode in (0, FAILED), done.stdout + done.stderr
     verdicts = dict(re.findall(r"^(ex\d\w+): (.*)$", done.stdout, re.MULTILINE))
-    assert sorted(verdicts) == NAMES, done.stdout
+    assert sorted(verdicts) == ([only] if only else NAMES), done.stdout
     return done.returncode, verdicts, done.stdout
 
 
@@ -151,6 +196,19 @@ def test_wrong_answers_fail_with_a_reason(tmp_path, number):
             f"{name} passed {WRONG[name][number % len(WRONG[name])]}\n{said}"
         )
         assert re.search(reason, verdicts[name]), f"{name}: {verdicts[name]}"
+
+
+@pytest.mark.parametrize("pieces", BLAMED_WRONGLY)
+def test_faults_that_are_blamed_wrongly_are_told(tmp_path, pieces):
+    answer = (SOLUTIONS / "ex11_suite.py").read_text()
+    for old, new, _ in pieces:
+        assert answer.count(old) == 1, f"{old!r} is gone"
+        answer = answer.replace(old, new)
+    (tmp_path / "ex11_suite.py").write_text(answer)
+    status, verdicts, said = graded("--solutions", str(tmp_path), only="ex11_suite")
+    assert status == FAILED, said
+    assert verdicts["ex11_suite"].startswith(f"{7 - len(pieces)} of 7 checks, not yet; ")
+    assert [reason for *_, reason in pieces if not re.search(reason, said)] == [], said
 
 
 def test_an_answer_that_is_not_there_is_told(tmp_path):

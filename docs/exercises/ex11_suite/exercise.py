@@ -1,8 +1,8 @@
 """Break a renderer so that a given clause is blamed; then hide a fault, and write the case that finds it.
 
-The grader puts a function of yours in the place of one of the reference, asks a part of the suite, and reads
-who is blamed: the clause of the most elementary kind that fails. Your function gets the right one, and then
-what the right one gets. Return what a programmer's mistake would give: numbers, and no exception. Look into
+The grader replaces a function of the reference by yours, asks a part of the suite, and reads who is blamed:
+the clause of the most elementary kind that fails. Your function gets the right one, and then what the right
+one gets. Return what a programmer's mistake would give: numbers, and no exception. Look into
 `spec/vectors` as much as you like: a suite has no secrets. Guide: how the suite is made. Clauses: CNF-3,
 CNF-11, CNF-13.
 """
@@ -15,7 +15,7 @@ from typing import Any
 def break_sphere(right: Any, center: Any, radius: Any, origin: Any, direction: Any) -> Any:
     """Return distances (...) so that ISC-6 is blamed, by at most 4 of the 16 cases of intersection.sphere.
 
-    In the place of `refimpl/light/shapes/sphere.py: sphere_distance`.
+    Replaces `refimpl/light/shapes/sphere.py: sphere_distance`.
     """
     raise NotImplementedError("break_sphere")
 
@@ -23,7 +23,7 @@ def break_sphere(right: Any, center: Any, radius: Any, origin: Any, direction: A
 def break_surface(right: Any, geometry: Any, hit: Any, origin: Any, direction: Any) -> Any:
     """Return a surface (right(...)._replace(...)) so that ISC-8 is blamed.
 
-    In the place of `refimpl/light/intersection.py: surface_at`.
+    Replaces `refimpl/light/intersection.py: surface_at`.
     """
     raise NotImplementedError("break_surface")
 
@@ -31,7 +31,7 @@ def break_surface(right: Any, geometry: Any, hit: Any, origin: Any, direction: A
 def break_camera(right: Any, a: Any) -> Any:
     """Return vectors (..., 3) so that cases of camera.ray fail, and still not the camera is blamed: VEC-3 is.
 
-    In the place of `refimpl/vectors.py: normalize`.
+    Replaces `refimpl/vectors.py: normalize`.
     """
     raise NotImplementedError("break_camera")
 
@@ -39,8 +39,8 @@ def break_camera(right: Any, a: Any) -> Any:
 def break_path(right: Any, world: Any, path: Any, hit: Any, surface: Any) -> Any:
     """Return weights (...) so that every function is right by itself, and only paths are wrong.
 
-    In the place of `refimpl/light/transport.py: emission_weight`: how much of a lamp counts that a path meets
-    by chance. LTR-2 is to be blamed.
+    Replaces `refimpl/light/transport.py: emission_weight`: how much of a lamp counts that a path meets by
+    chance. LTR-2 is to be blamed.
     """
     raise NotImplementedError("break_path")
 
@@ -56,8 +56,8 @@ def break_picture(picture: Any) -> Any:
 def hide(right: Any, linear: Any, exposure_stops: float = 0.0) -> Any:
     """Return display-encoded values (...) that pass every case of encoding.display, and are wrong.
 
-    Of a thousand values of linear, spread evenly over [0, 1], at least fifty must be off by 0.01 or more. In
-    the place of `refimpl/encoding.py: to_display`.
+    Of a thousand values of linear, spread evenly over [0, 1], at least fifty must be off by 0.01 or more.
+    Replaces `refimpl/encoding.py: to_display`.
     """
     raise NotImplementedError("hide")
 

@@ -42,7 +42,7 @@ LEAST_SEEN, LEAST_OFF, LEAST_SHARE = 0.01, 1000, 50
 """What is hidden must be off by so much, and of so many values at so many."""
 
 RULES = ("finite", "misses", "albedo", "normals", "depth", "position")
-"""Rules that pictures of layers are asked for."""
+"""Rules that pictures of layers must keep."""
 
 PICTURES = 4
 """Pictures of each scene, the fewest that judges take."""
@@ -64,7 +64,7 @@ def forget():
 
 @pytest.fixture
 def plant(monkeypatch):
-    """Give a function that puts a wrong function in the place of a right one, wherever it is looked up."""
+    """Give a function that replaces a right function by a wrong one, wherever it is looked up."""
 
     def planted(right, wrong):
         forget()

@@ -123,7 +123,10 @@ def test_commands_of_a_document(document: str, tmp_path: Path, pytestconfig: pyt
             if block.printed is not None and pytestconfig.getoption("--update-golden"):
                 rewrite(ROOT / document, block, found)
             elif block.printed is not None:
-                assert found == block.printed, f"{block.where} prints something else than the page shows"
+                assert found == block.printed, (
+                    f"{block.where} prints something else than the page shows: if that is meant, run "
+                    "pytest --update-golden tests/meta/test_documents.py, and read the difference"
+                )
     assert ALL[document] or document != "README.md", "README.md shows at least one command"
 
 

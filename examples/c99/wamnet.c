@@ -2819,7 +2819,8 @@ static v3 trace(const world *w, uint32_t width, uint32_t height, uint32_t x, uin
 static void do_rendered(const json *in) {
     world w = world_in(in);
     uint32_t width = side(in, "width"), height = side(in, "height"), seed = counter(in, "seed");
-    uint32_t spp = (uint32_t)whole_of(field(in, "spp"), 2, 65536, "spp");
+    uint32_t spp = (uint32_t)whole_of(field(in, "spp"), 1, 4294967295.0, "spp");
+    uint32_t others = spp > 1 ? spp - 1 : 1; /* one sample differs from nothing: its variance is 0 */
     size_t shape[3] = {height, width, 3};
     array mean = new_array(3, shape), variance = new_array(3, shape);
     for (uint32_t y = 0; y < height; y++)
@@ -2830,7 +2831,7 @@ static void do_rendered(const json *in) {
                     size_t at = ((size_t)y * width + x) * 3 + c;
                     double off = color.c[c] - mean.values[at];
                     mean.values[at] += off / (n + 1);
-                    variance.values[at] += off * (color.c[c] - mean.values[at]) / (spp - 1);
+                    variance.values[at] += off * (color.c[c] - mean.values[at]) / others;
                 }
             }
     answer_array("mean", mean);

@@ -95,6 +95,13 @@ def _text(name: str, value: str | None) -> bytes:
     return _joined(header, data)
 
 
+def _without_texts() -> tuple[Header, bytes]:
+    """Return header and data of the file, the header without its texts."""
+    header, data = _parts(file_of(MODEL))
+    del header["__metadata__"]
+    return header, data
+
+
 def _tensor(name: str, **changes: Any) -> bytes:
     """Return the file with an entry of a tensor changed."""
     header, data = _parts(file_of(MODEL))
@@ -283,6 +290,7 @@ BEYOND: Mapping[str, Callable[[], bytes]] = {
     "no omega_0_hidden": lambda: _text("omega_0_hidden", None),
     "no window": lambda: _text("window", None),
     "no version": lambda: _text("version", None),
+    "no text at all": lambda: _joined(*_without_texts()),
 }
 """Files that are just not."""
 
@@ -455,14 +463,13 @@ def _scene_cases() -> list[Case]:
         read = "SCN-10" if note in SCENE_LATER else "SCN-8"
         clause = read if not bad else "SCN-6" if form else "SCN-7"
         cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note))
-    for note, content in rules.good():
-        inputs = {"text": content}
-        expected = {name: Output(v) for name, v in _scene(inputs).items()}
-        clause = rules.governing(note, "SCN-8")
-        cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note))
-    for note, content in rules.bad():
-        clause = "RDG-3" if "left out" in note or "too many" in note else rules.governing(note, "SCN-7")
-        cases.append(Case(f"file.scene/{len(cases)}", clause, {"text": content}, None, (), note))
+    for found, bad in ((rules.good(), False), (rules.bad(), True), (rules.last_good(), False)):
+        for note, content in found:
+            inputs = {"text": content}
+            expected = None if bad else {name: Output(v) for name, v in _scene(inputs).items()}
+            form = bad and ("left out" in note or "too many" in note)
+            clause = "RDG-3" if form else rules.governing(note, "SCN-7" if bad else "SCN-8")
+            cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note))
     return cases
 
 

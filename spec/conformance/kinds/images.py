@@ -323,8 +323,10 @@ def _metric_cases(name: str) -> list[Case]:
         add(left, right, function(left, right), "exactly a window")
         add(left[:10], right[:10], None, "a row less than a window")
         add(left[:, :10], right[:, :10], None, "a column less than a window")
+        add(left[..., 0], right[..., 0], None, "two axes")
     one = np.full((1, 1, 3), 0.5)
     add(one, np.full((1, 2, 3), 0.5), None, "other shapes", "MET-1")
+    add(one[:0, 0, 0], one[:0, 0, 0], None, "no number", "MET-1")
     for value in (np.nan, np.inf):
         add(np.where(one > 0, [value, 0.5, 0.5], one), one, None, f"{value} in a picture", "MET-1")
     return cases

@@ -90,13 +90,20 @@ DENOISED = (
 """Features, window, hidden widths, height and width, the colour that pictures are near, note."""
 
 
+def _denoised() -> Iterator[tuple[Model, dict[str, Any], str]]:
+    """Yield models, the layers that they are given, and notes."""
+    for index, (features, window, widths, size, around, note) in enumerate(DENOISED):
+        wanted = {dataset.FEATURES[name].layer for name in features}
+        layers = {name: v for name, v in bad_layers(*size, 90 + 10 * index).items() if name in wanted}
+        yield _model(features, window, widths, index, around), layers, note
+    deep = _model(("depth",), Window(2, "clamp"), [4], len(DENOISED), MIDDLE)
+    yield deep, {"depth": np.full((1, 1, 1), 0.25)}, "a frame of one number"
+
+
 def _denoise_cases() -> list[Case]:
     """Return denoised pictures with bounds."""
     cases = []
-    for index, (features, window, widths, size, around, note) in enumerate(DENOISED):
-        model = _model(features, window, widths, index, around)
-        wanted = {dataset.FEATURES[name].layer for name in features}
-        layers = {name: v for name, v in bad_layers(*size, 90 + 10 * index).items() if name in wanted}
+    for index, (model, layers, note) in enumerate(_denoised()):
         inputs = {**layers, "model": base64.b64encode(file_of(model)).decode()}
         picture = _denoise(inputs)["picture"]
         bound = _bound(model, frame_of(layers), picture)
@@ -109,8 +116,13 @@ def _denoise_cases() -> list[Case]:
         "model": base64.b64encode(file_of(needy)).decode(),
     }
     cases.append(Case(f"picture.denoised/{len(cases)}", "DAT-9", inputs, None, (), "layers are missing"))
-    for note, shape in (("layers of two sizes", (2, 3, 3)), ("a layer of two channels", (2, 2, 2))):
-        other = {**inputs, "normal": np.zeros(shape)}
+    wide = np.zeros((2, 3, 3))
+    for note, changes in (
+        ("layers of two sizes", {"normal": wide}),
+        ("a layer of two channels", {"normal": np.zeros((2, 2, 2))}),
+        ("a layer of two axes", {"color": wide, "normal": np.zeros((2, 3))}),
+    ):
+        other = {**inputs, **changes}
         cases.append(Case(f"picture.denoised/{len(cases)}", "FRM-1", other, None, (), note))
     return cases
 
@@ -201,6 +213,8 @@ EXACT = (
     Exact("terrace", Settings(max_depth=2, heuristic="balance"), 3, 1, 2, (1 << 31) + 2),
     Exact("yard", Settings(max_depth=1, roulette_depth=0, sampler="sobol"), 1, 3, 2, (1 << 31) + 13),
     Exact("foundry", Settings(max_depth=0), 3, 4, 2, (1 << 31) + 1),
+    Exact("foundry", Settings(max_depth=1), 2, 2, 1, (1 << 31) + 1),
+    Exact("foundry", Settings(max_depth=0), 1, 1, 65, (1 << 31) + 1),
 )
 """The pictures; the seeds are the first ones of which no sample has a decision that rounding could change."""
 
@@ -213,6 +227,7 @@ WRONG_SIZES = (
     ("seed", -1),
     ("seed", 1 << 32),
     ("spp", 0),
+    ("spp", (1 << 32) + 1),
 )
 """What is refused."""
 
@@ -229,7 +244,8 @@ def _exact_cases() -> list[Case]:
     """Return tiny pictures with the bounds of means and variances.
 
     A sample x is off by the width w of its range at most, a mean m by the mean of the widths. A variance, the
-    sum of (x - m)^2 over n - 1, is off by the sum of 2 |x - m| e + e^2 over n - 1, e being both together.
+    sum of (x - m)^2 over n - 1, is off by the sum of 2 |x - m| e + e^2 over n - 1, e being both together; of
+    one sample it is 0.
     """
     cases = []
     for index, exact in enumerate(EXACT):
@@ -246,7 +262,7 @@ def _exact_cases() -> list[Case]:
         of_mean = np.mean(high - low, axis=2) + ROUNDED * mean
         off = (high - low) + of_mean[:, :, np.newaxis]
         spread = np.abs(middle - mean[:, :, np.newaxis]) + off
-        of_variance = np.sum(2 * spread * off + off**2, axis=2) / (exact.spp - 1) + ROUNDED * variance
+        of_variance = np.sum(2 * spread * off + off**2, axis=2) / max(exact.spp - 1, 1) + ROUNDED * variance
         expected = {
             "mean": Output(mean, of_mean, OF_SAMPLES),
             "variance": Output(variance, of_variance, OF_SAMPLES),

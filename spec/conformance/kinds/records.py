@@ -93,6 +93,7 @@ NO_RECORD = {
     "a text in a list": _text(up=[0, "1", 0]),
     "a boolean in a list": _text(up=[False, True, False]),
     "a number beyond 1e12": _text(position=[0, 0, 1.0000001e12]),
+    "an integer beyond the largest double": _text(position=[0, 0, 10**400]),
 }
 """Texts that are JSON and no camera."""
 

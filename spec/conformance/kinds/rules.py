@@ -233,6 +233,17 @@ def bad() -> Iterator[tuple[str, str]]:
     yield "a sky and a background of one channel", changed(("environment", SKY), ("background", [0, 0.5, 0]))
     for u, v in PARALLEL:
         yield f"quads.0.edge_u = {u}, edge_v = {v}", changed(("quads.0.edge_u", u), ("quads.0.edge_v", v))
+    yield "spheres.0.radius = -0.5", changed(("spheres.0.radius", -0.5))
+    yield (
+        "camera: up along a view between two axes",
+        changed(("camera.look_at", [1, 2, 4]), ("camera.up", [2, 2, 0])),
+    )
+
+
+def last_good() -> Iterator[tuple[str, str]]:
+    """Yield notes and texts of scenes that are read and come last: those before keep their numbers."""
+    skew = [[1, 0, 0], [1e-6, 1, 0], [0, 0, 1]]
+    yield f"boxes.0.rotation = {skew}, as far off as may be", changed(("boxes.0.rotation", skew))
 
 
 def _of_sky(name: str, value: Any) -> str:

@@ -29,7 +29,7 @@ BUDGET = {
     "kernels/bench": 4850,
     "kernels/export": 3200,
     "kernels/verify": 2400,
-    "spec/conformance": 6050,
+    "spec/conformance": 6150,
     "cli": 300,
     "cli/commands": 5450,
     "cli/common": 1050,

@@ -217,7 +217,7 @@ WRONG_SETTINGS: tuple[tuple[str, str, Any], ...] = (
     ("LTR-6", "strategy", "MIS"),
     ("LTR-5", "heuristic", "cutoff"),
     ("LTR-8", "sampler", "halton"),
-    ("RDG-3", "roulette_depth", 1.5),
+    ("LTR-8", "roulette_depth", 1.5),
 )
 """Settings that are refused, with their clauses."""
 

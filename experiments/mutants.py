@@ -5,9 +5,10 @@
     python experiments/mutants.py -o out/mutants refimpl/rng.py transport.py:2
     python experiments/mutants.py -o out/mutants --c99 --count 600
 
-Words choose mutants whose name holds one; `--count` draws some by a seed. Outcomes are kept in the folder:
-what has one is not asked again, unless `--survivors` asks those that were not caught before. Tables are
-printed: mutants by module and by sort, then every survivor without a reason in records/survivors.txt.
+Words choose mutants whose name holds one, or whose change, which has a function in place of the line;
+`--count` draws some by a seed. Outcomes are kept in the folder: what has one is not asked again, unless
+`--survivors` asks those that were not caught before. Tables are printed: mutants by module and by sort, then
+every survivor without a reason in records/survivors.txt.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,7 +35,7 @@ from lab.trial import Outcome
 from wamnet.spec.conformance import vectors
 
 REASONS = trial.ROOT / "experiments/records/survivors.txt"
-"""Survivors that no vector can tell from the reference: `name | sort | words`, where * is any text."""
+"""Survivors that no vector can tell from the reference: `change | count | sort | words` ([`Reason`])."""
 
 C99 = "examples/c99/wamnet.c"
 """The C program."""
@@ -53,10 +55,10 @@ def texts(c99: bool) -> dict[str, str]:
 
 
 def chosen(words: Sequence[str], count: int | None, seed: int, c99: bool = False) -> list[Mutant]:
-    """Return the mutants whose name holds a word, all without words; some of them, drawn by a seed."""
+    """Return the mutants whose name or change holds a word, all without words; some, drawn by a seed."""
     make = mutation_c.mutants if c99 else mutation.mutants
     every = [m for path, text in texts(c99).items() for m in make(path, text)]
-    found = [m for m in every if not words or any(word in m.name for word in words)]
+    found = [m for m in every if not words or any(word in m.name or word in m.change for word in words)]
     if count is None or count >= len(found):
         return found
     # Fewer are a part of more: a run that is cut short is a draw too.
@@ -109,9 +111,14 @@ def read(path: Path) -> dict[str, Outcome]:
 
 
 class Reason(NamedTuple):
-    """Why no vector can tell some mutants: names that fit, one of `SORTS`, and the words for it."""
+    """Why no vector can tell some mutants.
 
-    names: re.Pattern[str]
+    `changes` fits all of their [`Mutant.change`], * is any text; `count` is how many mutants of all there are
+    it fits, which a test asks: one more, and somebody must look at it. `sort` is one of [`SORTS`].
+    """
+
+    changes: re.Pattern[str]
+    count: int
     sort: str
     words: str
 
@@ -128,21 +135,35 @@ def reasons(path: Path = REASONS) -> list[Reason]:
     found = []
     for line in path.read_text(encoding="utf-8").splitlines():
         if line.strip() and not line.startswith("#"):
-            name, sort, words = (part.strip() for part in line.split(" | "))
+            # A change may hold the sign between columns.
+            change, count, sort, words = (part.strip() for part in line.rsplit(" | ", 3))
             assert sort in SORTS, f"{line}: a reason is one of {', '.join(SORTS)}"
-            found.append(Reason(re.compile(re.escape(name).replace(r"\*", ".*")), sort, words))
+            pattern = re.compile(re.escape(change).replace(r"\*", ".*"))
+            found.append(Reason(pattern, int(count), sort, words))
     return found
 
 
 def reason_of(mutant: Mutant, known: Sequence[Reason]) -> Reason | None:
     """Return the first reason that fits a mutant."""
-    return next((reason for reason in known if reason.names.fullmatch(mutant.name)), None)
+    return next((reason for reason in known if reason.changes.fullmatch(mutant.change)), None)
 
 
 def excuse(mutant: Mutant, known: Sequence[Reason]) -> str:
     """Return the sort of the reason that a mutant has, or nothing."""
     found = reason_of(mutant, known)
     return found.sort if found else ""
+
+
+def faults(some: Sequence[Mutant], known: Sequence[Reason]) -> list[str]:
+    """Return what is wrong: reasons that fit more or fewer mutants than they say, or one of another."""
+    fits = [[m.change for m in some if reason.changes.fullmatch(m.change)] for reason in known]
+    wrong = [
+        f"{reason.changes.pattern} fits {len(found)} mutants, not {reason.count}: look at {found[:3]}"
+        for reason, found in zip(known, fits, strict=True)
+        if len(found) != reason.count
+    ]
+    several = [change for change, count in Counter(chain(*fits)).items() if count > 1]
+    return wrong + [f"{change} has more than one reason" for change in several]
 
 
 HEADS = ("mutants", "reached", "caught", "equal", "unasked", "missed", "caught, %", "clause, %", "chapter, %")
@@ -194,8 +215,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(table("module", _grouped(some, _place), kept))
     print(table("change", _grouped(some, lambda m: m.operator), kept))
     known = reasons()
-    left = [m.name for m in some if kept[m.name].asked and not kept[m.name].verdict and not excuse(m, known)]
-    print("\n".join(f"missed: {name}" for name in left))
+    left = [m for m in some if kept[m.name].asked and not kept[m.name].verdict and not excuse(m, known)]
+    print("\n".join(f"missed: {m.change} (line {m.line})" for m in left))
     return 1 if len(left) > MOST_MISSED * len(some) else 0
 
 

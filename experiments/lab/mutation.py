@@ -5,7 +5,9 @@
    in place of its neighbour; operands and arguments exchanged or left out; a condition turned round; a
    statement or a cast dropped; a counter cut to 8, 15, 16 or 31 bits.
 2. A mutant's name is `module:line:operator:what`, the same in every run. Lines keep their numbers.
-3. Nothing is changed where no program can behave otherwise, or where only words differ: annotations,
+3. What is known of a mutant binds to its change, `module:place:operator:what` [`Mutant.change`], which stays
+   as it is when lines above are added: the place is the function that it is in, or the name that is assigned.
+4. Nothing is changed where no program can behave otherwise, or where only words differ: annotations,
    docstrings, assertions, the texts of errors.
 """
 
@@ -14,7 +16,7 @@ from __future__ import annotations
 import ast
 import copy
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 WIDTHS = (0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF)
@@ -75,7 +77,7 @@ class Mutant(NamedTuple):
     """A change: its lines, its sort, what becomes of what, the bytes that it replaces.
 
     `function` is the function or method that it is in, nothing for what is outside; `first` to `last` are
-    the lines of the statement, or of its head, that reach it.
+    the lines of the statement, or of its head, that reach it. `change` is what no line number is part of.
     """
 
     module: str
@@ -88,6 +90,7 @@ class Mutant(NamedTuple):
     start: int
     end: int
     text: str
+    change: str = ""
 
     @property
     def name(self) -> str:
@@ -97,12 +100,34 @@ class Mutant(NamedTuple):
 
 def mutants(module: str, source: str) -> list[Mutant]:
     """Return all mutants of a module in the order of its text; names that repeat are numbered."""
+    walk = _Walk(module, source)
+    places = {line: place for lines, place in _places(walk.tree.body, "") for line in lines}
+    return numbered((mutant, mutant.function or places.get(mutant.line, "")) for mutant in walk.all())
+
+
+def numbered(some: Iterable[tuple[Mutant, str]]) -> list[Mutant]:
+    """Return mutants, each given with its place, with their changes; what repeats gets numbers."""
     found, seen = [], Counter[str]()
-    for mutant in _Walk(module, source).all():
-        seen[mutant.name] += 1
-        again = f" ({seen[mutant.name]})" if seen[mutant.name] > 1 else ""
-        found.append(mutant._replace(detail=mutant.detail + again))
+    for mutant, place in some:
+        change = f"{mutant.module}:{place}:{mutant.operator}:{mutant.detail}"
+        seen.update((mutant.name, change))
+        name, change = (
+            f"{text} ({seen[text]})" if seen[text] > 1 else text for text in (mutant.name, change)
+        )
+        found.append(mutant._replace(detail=mutant.detail + name[len(mutant.name) :], change=change))
     return found
+
+
+def _places(body: Sequence[ast.stmt], owner: str) -> Iterator[tuple[range, str]]:
+    """Yield the lines of what is outside of functions, and its place: `NAME`, `Class.field`, `f()`."""
+    for node in body:
+        if isinstance(node, ast.ClassDef):
+            yield from _places(node.body, f"{owner}{node.name}.")
+        elif isinstance(node, ast.FunctionDef):
+            yield range(node.lineno, node.body[0].lineno), f"{owner}{node.name}()"
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            target = node.target if isinstance(node, ast.AnnAssign) else node.targets[0]
+            yield range(node.lineno, (node.end_lineno or 0) + 1), f"{owner}{ast.unparse(target)}"
 
 
 def mutated(mutant: Mutant, source: str) -> str:

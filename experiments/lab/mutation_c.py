@@ -8,10 +8,9 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator
 
-from .mutation import LOW_DIGIT, Mutant
+from .mutation import LOW_DIGIT, Mutant, numbered
 
 OPERATORS = {
     " + ": (" - ",), " - ": (" + ",), " * ": (" / ",), " / ": (" * ",), " % ": (" / ",), " << ": (" >> ",),
@@ -52,12 +51,7 @@ TYPES = re.compile(
 
 def mutants(path: str, source: str) -> list[Mutant]:
     """Return the mutants of a program; `function` names the clauses of the comment above."""
-    found, seen = [], Counter[str]()
-    for mutant in _all(path, source):
-        seen[mutant.name] += 1
-        again = f" ({seen[mutant.name]})" if seen[mutant.name] > 1 else ""
-        found.append(mutant._replace(detail=mutant.detail + again))
-    return found
+    return numbered((mutant, mutant.function) for mutant in _all(path, source))
 
 
 def _all(path: str, source: str) -> Iterator[Mutant]:

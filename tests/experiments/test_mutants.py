@@ -69,18 +69,58 @@ def test_mutants_of_the_c_program_change_one_line():
         assert sum(a != b for a, b in lines) == 1, m.name
 
 
-def test_reasons_have_a_sort_and_fit_names(tmp_path):
+def test_changes_are_named_by_the_place_that_they_are_in_not_by_lines():
+    found = mutation.mutants("m.py", SOURCE)
+    moved = mutation.mutants("m.py", SOURCE.replace("LIMIT = 0.5", "\n\nLIMIT = 0.5"))
+    assert [m.change for m in moved] == [m.change for m in found]
+    assert [m.name for m in moved] != [m.name for m in found]
+    assert len({m.change for m in found}) == len(found)
+    places = {m.change.split(":")[1] for m in found}
+    assert places == {"LIMIT", "clamp()", "clamp"}
+
+
+def test_changes_in_a_class_are_named_by_its_fields():
+    source = "class Job:\n    seed: int = 7\n    kind = -1.0\n\n    def f(self, a=2): return a + 3\n"
+    found = [m.change for m in mutation.mutants("m.py", source)]
+    assert "m.py:Job.seed:constant:7 -> (8)" in found
+    assert "m.py:Job.kind:sign:-1.0 -> (1.0)" in found
+    assert "m.py:Job.f:operand dropped:a + 3 -> (a)" in found
+
+
+def test_reasons_have_a_sort_and_fit_changes(tmp_path):
     known = mutants.reasons()
-    some = mutants.chosen(["dielectric.py:83:exchanged:ratio"], None, 0)
+    some = mutants.chosen(["dielectric.py:fresnel:exchanged:ratio"], None, 0)
     assert {mutants.excuse(m, known) for m in some} == {"equal"}
     other = tmp_path / "reasons.txt"
-    other.write_text("dielectric.py:* | boring | nobody asks\n", encoding="utf-8")
+    other.write_text("dielectric.py:* | 3 | boring | nobody asks\n", encoding="utf-8")
     with pytest.raises(AssertionError, match="a reason is one of"):
         mutants.reasons(other)
 
 
+def test_each_reason_fits_as_many_mutants_as_it_says():
+    assert mutants.faults(mutants.chosen([], None, 0), mutants.reasons()) == []
+
+
+def test_reasons_that_fit_nothing_more_than_they_say_or_what_has_one_are_wrong(tmp_path):
+    path = tmp_path / "reasons.txt"
+    rows = ("m.py:gone:* | 1", "m.py:clamp:comparison:* | 1", "m.py:LIMIT:* | 1", "m.py:LIMIT:*(1.0) | 1")
+    path.write_text("".join(f"{row} | equal | words\n" for row in rows), encoding="utf-8")
+    wrong = mutants.faults(mutation.mutants("m.py", SOURCE), mutants.reasons(path))
+    assert len(wrong) == 3
+    assert "fits 0 mutants, not 1" in wrong[0]
+    assert "fits 2 mutants, not 1" in wrong[1]
+    assert wrong[2] == "m.py:LIMIT:constant:0.5 -> (1.0) has more than one reason"
+
+
+def test_a_reason_may_hold_the_sign_between_columns(tmp_path):
+    path = tmp_path / "reasons.txt"
+    path.write_text("m.py:f:operand dropped:a | b -> (a) | 1 | equal | b is 0\n", encoding="utf-8")
+    (mutant, *_) = mutation.mutants("m.py", "def f(a, b):\n    return a | b\n")[1:]
+    assert mutants.excuse(mutant, mutants.reasons(path)) == "equal"
+
+
 def test_blame_is_right_near_or_neither():
-    mutant, *_ = mutants.chosen(["rng.py:70:exchanged"], None, 0)
+    mutant, *_ = mutants.chosen(["rng.py:uniform_floats:exchanged"], None, 0)
     clauses = Clauses()
     assert clauses.broken(mutant) == {"RNG-5"}
     assert clauses.near(mutant, "RNG-3")
@@ -88,7 +128,7 @@ def test_blame_is_right_near_or_neither():
 
 
 def test_a_table_counts_what_came(monkeypatch):
-    some = mutants.chosen(["refimpl/rng.py:70"], 3, 0)
+    some = mutants.chosen(["refimpl/rng.py:uniform_floats:"], 3, 0)
     came = (Outcome(2, "random.block/0", "RNG-5", "", "fail"), Outcome(2), Outcome(0))
     kept = {m.name: outcome for m, outcome in zip(some, came, strict=True)}
     monkeypatch.setattr(mutants, "reasons", list)

@@ -35,7 +35,7 @@ from lab.trial import Outcome
 from wamnet.spec.conformance import vectors
 
 REASONS = trial.ROOT / "experiments/records/survivors.txt"
-"""Survivors that no vector can tell from the reference: `change | count | sort | words` ([`Reason`])."""
+"""Survivors that no vector can tell from the reference: `change | number | sort | words` ([`Reason`])."""
 
 C99 = "examples/c99/wamnet.c"
 """The C program."""
@@ -113,12 +113,12 @@ def read(path: Path) -> dict[str, Outcome]:
 class Reason(NamedTuple):
     """Why no vector can tell some mutants.
 
-    `changes` fits all of their [`Mutant.change`], * is any text; `count` is how many mutants of all there are
-    it fits, which a test asks: one more, and somebody must look at it. `sort` is one of [`SORTS`].
+    `changes` fits all of their [`Mutant.change`], * is any text; `number` is how many of all mutants it fits,
+    which a test asks: one more, and somebody must look at it. `sort` is one of [`SORTS`].
     """
 
     changes: re.Pattern[str]
-    count: int
+    number: int
     sort: str
     words: str
 
@@ -136,10 +136,10 @@ def reasons(path: Path = REASONS) -> list[Reason]:
     for line in path.read_text(encoding="utf-8").splitlines():
         if line.strip() and not line.startswith("#"):
             # A change may hold the sign between columns.
-            change, count, sort, words = (part.strip() for part in line.rsplit(" | ", 3))
+            change, number, sort, words = (part.strip() for part in line.rsplit(" | ", 3))
             assert sort in SORTS, f"{line}: a reason is one of {', '.join(SORTS)}"
             pattern = re.compile(re.escape(change).replace(r"\*", ".*"))
-            found.append(Reason(pattern, int(count), sort, words))
+            found.append(Reason(pattern, int(number), sort, words))
     return found
 
 
@@ -158,9 +158,9 @@ def faults(some: Sequence[Mutant], known: Sequence[Reason]) -> list[str]:
     """Return what is wrong: reasons that fit more or fewer mutants than they say, or one of another."""
     fits = [[m.change for m in some if reason.changes.fullmatch(m.change)] for reason in known]
     wrong = [
-        f"{reason.changes.pattern} fits {len(found)} mutants, not {reason.count}: look at {found[:3]}"
+        f"{reason.changes.pattern} fits {len(found)} mutants, not {reason.number}: look at {found[:3]}"
         for reason, found in zip(known, fits, strict=True)
-        if len(found) != reason.count
+        if len(found) != reason.number
     ]
     several = [change for change, count in Counter(chain(*fits)).items() if count > 1]
     return wrong + [f"{change} has more than one reason" for change in several]

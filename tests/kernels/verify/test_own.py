@@ -20,7 +20,7 @@ CHEAP = 16
 
 
 def cheap(names=None, fine=""):
-    """Return the questions of these rules, or all, with few samples; those of rule `fine` with all of them."""
+    """Return the questions of these rules, or all, with few samples; of rule `fine` with all of them."""
     return [
         q if q.rule == fine else replace(q, shot=replace(q.shot, spp=min(q.shot.spp, CHEAP)))
         for q in questions()

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -59,6 +60,9 @@ COSTLY = {
 }
 """Markers of tests that take long, with what is said where they are left out."""
 
+THINNED = "one of several cases of this test runs, make long runs all"
+"""What is said of cases left out of a test whose cases all take long together."""
+
 _state_key = pytest.StashKey[dict[str, str]]()
 """Where a run keeps "ok (device)" or "MISSING: reason" of each executor that it has requested, by name."""
 
@@ -84,6 +88,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[_state_key] = {}
     for marker, reason in COSTLY.items():
         config.addinivalue_line("markers", f"{marker}: {reason}")
+    config.addinivalue_line("markers", f"thinned(every): {THINNED}")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -95,6 +100,22 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for marker in left_out:
             if item.get_closest_marker(marker):
                 item.add_marker(pytest.mark.skip(reason=f"{marker}: {COSTLY[marker]}"))
+    _thin(items)
+
+
+def _thin(items: list[pytest.Item]) -> None:
+    """Leave out all but each so many cases of a test that is marked so, in their order.
+
+    The number should have no divisor in common with how many values a parameter has: each of them then
+    remains in some case.
+    """
+    seen: Counter[str] = Counter()
+    for item in items:
+        if (mark := item.get_closest_marker("thinned")) is not None:
+            name = item.nodeid.partition("[")[0]
+            if seen[name] % mark.args[0]:
+                item.add_marker(pytest.mark.skip(reason=f"thinned: {THINNED}"))
+            seen[name] += 1
 
 
 # ---- executors ------------------------------------------------------------------------------------------

@@ -27,6 +27,7 @@ def grouped(request, tmp_path_factory):
     return parts(planned(folder, request.param, "groupdot", border="clamp"))
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize(
     ("target", "schedule", "compilers"),
     [

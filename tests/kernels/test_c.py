@@ -108,6 +108,7 @@ def bordered(request, kit):
     return program, images, expected
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize(("schedule", "way"), TILES)
 def test_tiles_are_clean_and_exact(executor_named, bordered, tmp_path, schedule, way):
     """No access leaves an array, at any border; the bits are those of the interpreter (KER-16, PRO-11)."""
@@ -117,6 +118,7 @@ def test_tiles_are_clean_and_exact(executor_named, bordered, tmp_path, schedule,
     assert np.array_equal(found.view(np.uint32), bordered[2].view(np.uint32))
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("options", [["-O0"], ["-O3"]], ids=["not optimised", "optimised"])
 @pytest.mark.parametrize(("schedule", "way"), TILES)
 def test_tiles_that_may_be_fused_are_near(executor_named, bordered, tmp_path, schedule, way, options):

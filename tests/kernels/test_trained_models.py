@@ -153,6 +153,7 @@ KERNELS = [
 """Every executor, schedule and profile that promises a bound."""
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize(("way", "schedule", "profile"), KERNELS)
 def test_error_is_within_the_bound(executor_named, name, way, schedule, profile):

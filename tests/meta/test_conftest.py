@@ -142,6 +142,30 @@ def test_tests_that_take_long_are_left_out_loudly(run, pytester, monkeypatch, pr
         result.stdout.fnmatch_lines([f"SKIPPED*{text}"])
 
 
+THINNED = """
+import pytest
+
+@pytest.mark.thinned(3)
+@pytest.mark.parametrize("a", "xy")
+@pytest.mark.parametrize("b", [1, 2, 3, 4])
+def test_cases(a, b):
+    print(f"case {b} {a}")
+"""
+
+
+@pytest.mark.parametrize(("profile", "passed"), [("ci", 3), ("long", 8)])
+def test_cases_of_a_thinned_test_are_left_out_loudly(run, pytester, monkeypatch, profile, passed):
+    """A number that shares no divisor with the two values of `a` leaves both of them."""
+    pytester.makepyfile(THINNED)
+    monkeypatch.setenv("HYPOTHESIS_PROFILE", profile)
+    result = run("", "-ra", "-s", "--slow")
+    result.assert_outcomes(passed=passed, skipped=8 - passed)
+    ran = [line.split("case ")[1].split() for line in result.outlines if "case " in line]
+    assert {a for _, a, *_ in ran} == {"x", "y"}
+    if passed < 8:
+        result.stdout.fnmatch_lines(["SKIPPED*: thinned: one of several cases *make long runs all"])
+
+
 APART = """
 import os
 import sys

@@ -49,6 +49,7 @@ STRATEGIES = [
 ]
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize(("strategy", "heuristic"), STRATEGIES)
 @pytest.mark.parametrize(
     "name", [*(pytest.param(n, marks=LONG) for n in ("minicubes", "cornell")), "lone_light"]

@@ -83,6 +83,8 @@ def run(block: Block, folder: Path) -> str:
         "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
         "COLUMNS": "120",
     }
+    # CI sets it against imports from the working folder; a reader's script finds the modules beside it.
+    environment.pop("PYTHONSAFEPATH", None)
     done = subprocess.run(
         [*program, block.text],
         cwd=ROOT if block.clone else folder,

@@ -181,7 +181,7 @@ def test_on_a_running_scheduler(wamnet, tmp_path) -> None:
     assert content(tmp_path / "two") == content(tmp_path / "one")
 
 
-@pytest.mark.thinned(2)
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize(("sent", "workers"), [(signal.SIGINT, 1), (signal.SIGINT, 2), (signal.SIGKILL, 2)])
 def test_an_interrupted_process_is_gone_on_with(wamnet, tmp_path, sent, workers) -> None:
     """The whole group is interrupted, or only the process killed; nothing that was done is redone."""

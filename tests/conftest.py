@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -106,16 +106,29 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def _thin(items: list[pytest.Item]) -> None:
     """Leave out all but each so many cases of a test that is marked so, in their order.
 
-    The number should have no divisor in common with how many values a parameter has: each of them then
-    remains in some case.
+    Each value of each parameter remains in some case: where those do not hold it, others are added. Fewer are
+    added if the number has no divisor in common with how many values a parameter has.
     """
-    seen: Counter[str] = Counter()
+    tests = defaultdict[str, list[pytest.Item]](list)
     for item in items:
-        if (mark := item.get_closest_marker("thinned")) is not None:
-            name = item.nodeid.partition("[")[0]
-            if seen[name] % mark.args[0]:
+        if item.get_closest_marker("thinned"):
+            tests[item.nodeid.partition("[")[0]].append(item)
+    for cases in tests.values():
+        (every,) = next(cases[0].iter_markers("thinned")).args
+        kept = cases[::every]
+        missing = set().union(*map(_values, cases)).difference(*map(_values, kept))
+        while missing:
+            kept.append(max(cases, key=lambda item: len(_values(item) & missing)))
+            missing -= _values(kept[-1])
+        for item in cases:
+            if item not in kept:
                 item.add_marker(pytest.mark.skip(reason=f"thinned: {THINNED}"))
-            seen[name] += 1
+
+
+def _values(item: pytest.Item) -> set[tuple[str, str]]:
+    """Return the values that a case has of the parameters of its test."""
+    callspec = getattr(item, "callspec", None)
+    return set() if callspec is None else {(name, repr(value)) for name, value in callspec.params.items()}
 
 
 # ---- executors ------------------------------------------------------------------------------------------

@@ -140,7 +140,6 @@ def test_texts_of_the_schedules_compute_what_is_certified(target, schedule, tmp_
     assert check_text(tmp_path / NAME)["sums"] == 3 * 48 * 24
 
 
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [

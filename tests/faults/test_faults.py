@@ -41,7 +41,6 @@ def test_a_fault_of_another_user_loses_nothing(open_to_all) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize("name", list(faults.CASES))
 def test_faults_at_every_command(open_to_all, name) -> None:
     """One at each: make faults runs hundreds."""

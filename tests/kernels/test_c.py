@@ -108,7 +108,7 @@ def bordered(request, kit):
     return program, images, expected
 
 
-@pytest.mark.thinned(2)
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize(("schedule", "way"), TILES)
 def test_tiles_are_clean_and_exact(executor_named, bordered, tmp_path, schedule, way):
     """No access leaves an array, at any border; the bits are those of the interpreter (KER-16, PRO-11)."""

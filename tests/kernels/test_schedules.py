@@ -101,7 +101,7 @@ def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, 
     executor._built.clear()
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.thinned(5)
 @pytest.mark.parametrize(("target", "schedule"), LADDER)
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 def test_the_paper_s_network(executor_named, kit, target, schedule, border):

@@ -51,7 +51,7 @@ def reads(path):
 
 
 def exported(target, where, schedule, **options):
-    """Return an export, or nothing where a target or a schedule cannot hold the model."""
+    """Return an export; skip where a target or a schedule cannot hold the model."""
     try:
         return export(Request(random_model(), target, weights=where, schedule=schedule, **options))
     except ExecutorUnavailable as error:
@@ -59,7 +59,7 @@ def exported(target, where, schedule, **options):
     except (CompileError, InputError) as error:
         if not re.search("it cannot hold this model|a compiler that keeps operations in order", str(error)):
             raise
-    return None
+        pytest.skip(str(error))
 
 
 def agrees(made, folder):
@@ -79,8 +79,7 @@ def agrees(made, folder):
 @pytest.mark.parametrize(("target", "where", "schedule"), WAYS)
 def test_it_says_what_certify_does(target, where, schedule, variant, tmp_path):
     """CER-1, TXT-7: the certified bound, and whether the text is read, for whatever can be exported."""
-    if made := exported(target, where, schedule, variant=variant):
-        agrees(made, tmp_path)
+    agrees(exported(target, where, schedule, variant=variant), tmp_path)
 
 
 @pytest.mark.parametrize("variant", ["full", "whole8"])
@@ -93,9 +92,9 @@ def test_it_says_so_of_other_profiles(target, profile, variant, tmp_path):
             exported(target, "", "plain", variant=variant, profile=profile)
         return
     made = exported(target, "", "plain", variant=variant, profile=profile)
-    if made and made.manifest["certificate"] is None:
+    if made.manifest["certificate"] is None:
         assert "There is no certificate: nothing is promised of the sine" in proof_of(made)
-    elif made:
+    else:
         agrees(made, tmp_path)
 
 

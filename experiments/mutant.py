@@ -62,8 +62,8 @@ def changed(mutant: Mutant, source: str) -> Iterator[str]:
             yield from (f"- {old.strip()}", f"+ {new.strip()}")
 
 
-def told(mutant: Mutant, source: str, asked: Asked, failures: Failures) -> Iterator[str]:
-    """Yield the lines of a report."""
+def told(mutant: Mutant, source: str, asked: Asked, failures: Failures, whole: bool) -> Iterator[str]:
+    """Yield the lines of a report; only the `whole` suite can miss a mutant, not some of its cases."""
     yield f"{mutant.module}:{mutant.line}, governed by {', '.join(sorted(Clauses().broken(mutant)))}"
     yield from changed(mutant, source)
     seen = [(kind, failed) for (kind, _), failed in zip(asked, failures, strict=True) if failed]
@@ -71,7 +71,8 @@ def told(mutant: Mutant, source: str, asked: Asked, failures: Failures) -> Itera
     if not seen:
         reason = mutants.reason_of(mutant, mutants.reasons())
         missed = "missed: a case, or a reason, is still to be written"
-        yield f"{reason.sort}: {reason.words}" if reason else missed
+        others = "other cases may see it: ask without -k"
+        yield f"{reason.sort}: {reason.words}" if reason else missed if whole else others
         return
     for kind in dict.fromkeys(kind for kind, _ in seen):
         blamed = [failed[1] for found, failed in seen if found == kind]
@@ -99,7 +100,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except InputError as error:
         parser.error(str(error))
     source = mutants.texts(c99=False)[mutant.module]
-    print("\n".join(told(mutant, source, asked, trial.failures(mutant, source, asked))))
+    failures = trial.failures(mutant, source, asked)
+    print("\n".join(told(mutant, source, asked, failures, not options.words)))
 
 
 if __name__ == "__main__":

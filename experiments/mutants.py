@@ -6,8 +6,8 @@
     python experiments/mutants.py -o out/mutants --c99 --count 600
 
 Words choose mutants whose name holds one, or whose change, which has a function in place of the line;
-`--count` draws some by a seed. Outcomes are kept in the folder: what has one is not asked again, unless
-`--survivors` asks those that were not caught before. Tables are printed: mutants by module and by sort, then
+`--count` draws some by a seed. Outcomes are kept in the folder, and a mutant that has one is not asked again;
+with `--survivors` those that were not caught are. It prints tables of mutants by module and by sort, then
 every survivor without a reason in records/survivors.txt.
 """
 

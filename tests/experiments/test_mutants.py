@@ -188,13 +188,21 @@ def test_a_survivor_is_shown_with_its_reason_or_as_missed(capsys):
     mutant.main([BEHIND, "-k", "intersection.sphere/2"])
     assert capsys.readouterr().out.splitlines()[-2:] == [
         "0 of 1 cases see it",
-        "missed: a case, or a reason, is still to be written",
+        "other cases may see it: ask without -k",
     ]
 
 
 @pytest.mark.needs("programs")
+def test_a_mutant_that_the_whole_suite_does_not_see_is_missed():
+    (some,) = mutants.chosen(["sphere.py:sphere_distance:comparison:b < 0.0 -> (b <= 0.0)"], None, 0)
+    unknown = some._replace(change="m.py:f:constant:1 -> (2)")
+    said = list(mutant.told(unknown, mutants.texts(c99=False)[some.module], [], [], whole=True))
+    assert said[-1] == "missed: a case, or a reason, is still to be written"
+
+
+@pytest.mark.needs("programs")
 def test_a_mutant_that_cannot_be_imported_fails_each_case():
-    (some,) = mutants.chosen(["sphere.py:25:constant"], None, 0)
+    (some,) = mutants.chosen(["sphere.py:Sphere.closed:constant"], None, 0)
     broken = some._replace(start=0, end=0, text="raise SystemExit\n")
     (source,) = (text for path, text in mutants.texts(c99=False).items() if path == some.module)
     asked = mutant.cases(["random.block"])

@@ -3,11 +3,13 @@
 PoCL asks LLVM for the processor's name and hands the name to its compiler. LLVM 14, in the wheel of PoCL
 3.0, answers "generic" for processors that it does not know (AMD's since 2022, for example), and its
 compiler then refuses every kernel: "unknown target CPU 'generic'" (PoCL's issue 1049). No option or
-variable of PoCL 3 changes the name.
+variable of PoCL 3 changes the name. AMD's Zen 4, which has AVX-512, it takes for its predecessor: PoCL then
+links its library for AVX-512 into kernels for a processor without, and LLVM ends the process on some of them
+("Cannot select").
 
 1. Nothing is done unless the device's record, as long as the C library says it is [`_allocated`], holds
-   exactly one pointer to the text "generic" [`name_the_processor`]: a PoCL that knows the processor, or a
-   later one, is left alone.
+   exactly one pointer to a name that is wrong [`name_the_processor`], [`MISTAKEN`]: a PoCL that knows the
+   processor, or a later one, is left alone.
 2. That pointer is set to the name of the instruction set level that the processor has [`level`]: the levels
    of the x86-64 psABI, which LLVM knows since version 12 and which promise no instruction that is missing.
 """
@@ -23,8 +25,9 @@ from pathlib import Path
 PLATFORM = "Portable Computing Language"
 """PoCL's name among OpenCL's platforms."""
 
-UNKNOWN = b"generic\0"
-"""What LLVM calls a processor that it does not know."""
+MISTAKEN: Mapping[bytes, str] = {b"generic\0": "x86-64", b"znver3\0": "x86-64-v4"}
+"""Names that LLVM 14 gives to processors that it does not know, and the level from which they are wrong: a
+real Zen 3 has no AVX-512."""
 
 RECORD_BYTES = 1024
 """How far into a device's record the pointer is looked for: PoCL 3.0 has it at 640 of 1024 bytes."""
@@ -37,20 +40,23 @@ LEVELS: Mapping[str, frozenset[str]] = {
 }
 """Levels of the x86-64 psABI, lowest first, and the flags of /proc/cpuinfo that each adds to those before."""
 
+_ORDER = {name: number for number, name in enumerate(LEVELS)}
+
 
 def name_the_processor(record: int) -> bool:
     """Give the device with its record at address `record` a processor name, if it has none; say whether."""
     if platform.machine().lower() not in ("x86_64", "amd64"):
         return False  # elsewhere "generic" is a name that the compiler takes
-    readable = _readable()
+    readable, reached = _readable(), level(_flags())
     words = range(record, record + min(RECORD_BYTES, _allocated(record)) // 8 * 8, 8)
-    found = [word for word in words if _inside(word, readable) and _points_to_unknown(word, readable)]
+    wrong = [name for name, least in MISTAKEN.items() if _ORDER[least] <= _ORDER[reached]]
+    found = [word for word in words if _inside(word, readable) and _points_to(word, wrong, readable)]
     if len(found) != 1:
         return False
     # The C library's own copy of the text: PoCL may free it when the process ends.
     copy = ctypes.CDLL(None).strdup
     copy.restype, copy.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
-    ctypes.c_uint64.from_address(found[0]).value = copy(level(_flags()).encode())
+    ctypes.c_uint64.from_address(found[0]).value = copy(reached.encode())
     return True
 
 
@@ -69,10 +75,10 @@ def _allocated(address: int) -> int:
     return int(usable(address))
 
 
-def _points_to_unknown(word: int, readable: list[tuple[int, int]]) -> bool:
-    """Return whether the eight bytes at `word` are the address of the text "generic"."""
+def _points_to(word: int, texts: list[bytes], readable: list[tuple[int, int]]) -> bool:
+    """Return whether the eight bytes at `word` are the address of one of some texts."""
     address = ctypes.c_uint64.from_address(word).value
-    return _inside(address, readable) and ctypes.string_at(address, len(UNKNOWN)) == UNKNOWN
+    return _inside(address, readable) and any(ctypes.string_at(address, len(text)) == text for text in texts)
 
 
 def _inside(address: int, readable: list[tuple[int, int]]) -> bool:

@@ -38,6 +38,18 @@ def test_an_unknown_processor_gets_the_name_of_its_level(monkeypatch):
     assert ctypes.string_at(words[4]) == b"x86-64-v3"
 
 
+def test_a_successor_that_is_taken_for_its_predecessor_gets_its_level(monkeypatch):
+    """Zen 4 as Zen 3: by its name without AVX-512, which PoCL's own library then uses even so."""
+    monkeypatch.setattr(pocl_cpu.platform, "machine", lambda: "x86_64")
+    every = frozenset().union(*pocl_cpu.LEVELS.values())
+    monkeypatch.setattr(pocl_cpu, "_flags", lambda: every - {"avx512f"})
+    words, _kept = record(b"znver3")
+    assert not pocl_cpu.name_the_processor(ctypes.addressof(words)), "a real Zen 3 keeps its name"
+    monkeypatch.setattr(pocl_cpu, "_flags", lambda: every)
+    assert pocl_cpu.name_the_processor(ctypes.addressof(words))
+    assert ctypes.string_at(words[3]) == b"x86-64-v4"
+
+
 @pytest.mark.parametrize("texts", [(b"znver3-name",), (b"generic-not",), (b"generic", b"generic")])
 def test_anything_else_is_left_alone(texts):
     words, _kept = record(*texts)

@@ -36,7 +36,7 @@ SAMPLES = "samples"
 def layers_of(features: Sequence[str]) -> tuple[str, ...]:
     """Return the layers that features are made of: the groups of planes that a path kernel has to add up."""
     check_features(features)
-    layers = tuple(FEATURES[name].layer for name in features)
+    layers = tuple(dict.fromkeys(FEATURES[name].layer for name in features))
     if before := [layer for layer in layers if layer in HISTORY]:
         rule = "a path kernel makes layers of one picture, not of those before it"
         raise InputError("features", ", ".join(before), rule, "make them with refimpl/light/history.py")

@@ -48,6 +48,7 @@ from ...refimpl.light.shapes.quad import quad_area_pdf
 from ...refimpl.light.transport import Settings
 from ...refimpl.light.variation import RANGES, ranges_from_json
 from ...refimpl.network import factored
+from ...refimpl.network.dataset import FEATURES
 from ...refimpl.network.denoise import Model, check_model, learned_feature_spp
 from ...refimpl.network.whole import INPUT_LEVELS
 from .denoise_on import images_of
@@ -192,9 +193,9 @@ def _features(models: Sequence[Model]) -> tuple[str, ...]:
 
 
 def drawn_together(features: Sequence[str]) -> list[tuple[str, ...]]:
-    """Return the features in parts whose planes fit into the colour buffers; colour is in the first part."""
+    """Return the features in parts whose planes fit into the buffers; those of colour are in the first."""
     parts: list[tuple[str, ...]] = [()]
-    for name in sorted(features, key=lambda name: name != "color"):
+    for name in sorted(features, key=lambda name: FEATURES[name].layer != "color"):
         if len(planes_of((*parts[-1], name))) > 4 * MOST_BUFFERS:
             parts.append(())
         parts[-1] = (*parts[-1], name)

@@ -57,6 +57,11 @@ NORMALIZATION_LIMITS: Mapping[str, tuple[float, float]] = {
 """Least and largest value of a normalization's numbers; beyond 2^64 there is no picture."""
 
 
+HIGHLIGHT_STOPS = -4.0
+"""Exposure of `highlights` less that of `color`: of one path a pixel, most of the light is in few pixels that
+are far brighter than white, which `color` clips."""
+
+
 @dataclass(frozen=True)
 class Normalization:
     """Scales that bring a scene's numbers near [-1, 1]; part of the model, the same for all its frames.
@@ -93,6 +98,11 @@ class Feature:
 def encode_color(values: Array, normalization: Normalization) -> Array:
     """Encode linear radiance (..., 3) for display, to [0, 1]."""
     return to_display(values, normalization.exposure_stops)
+
+
+def encode_highlights(values: Array, normalization: Normalization) -> Array:
+    """Encode linear radiance (..., 3) for a display that is four stops less sensitive, to [0, 1]."""
+    return to_display(values, normalization.exposure_stops + HIGHLIGHT_STOPS)
 
 
 def encode_albedo(values: Array, normalization: Normalization) -> Array:
@@ -188,6 +198,15 @@ FIRST_HITS: Mapping[str, Feature] = {
             1.0,
             encode_light,
             "the lamps' radiance off the first hit, were it matt and nothing in between: " + DISPLAY_FORMULA,
+        ),
+        Feature(
+            "highlights",
+            "color",
+            3,
+            0.0,
+            1.0,
+            encode_highlights,
+            "sRGB of (linear radiance * 2^({exposure_stops!r} - 4)) clipped to 0 .. 1: what color clips",
         ),
     )
 }

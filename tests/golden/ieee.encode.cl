@@ -1,6 +1,6 @@
 /*
  * wamnet encoding of features, OpenCL C 1.2. Generated: change the compiler, not this text.
- * program   bb08bcea5568b36251df0e3a9f3727da
+ * program   cf07bdfe96991f4423c0748c87bd0d5b
  * images    color: 3 channels in [0.0, 1.0], sRGB of (linear radiance * 2^0.5) clipped to 0 .. 1 (IEC 61966-2-1)
  *           normal: 3 channels in [-1.0, 1.0], unit normal in world space towards the ray's origin, mean over samples; 0 where nothing is hit
  *           albedo: 3 channels in [0.0, 1.0], linear reflectance clipped to 0 .. 1, mean over samples; 0 where nothing is hit
@@ -8,6 +8,7 @@
  *           position: 3 channels in [-1.0, 1.0], (world position - (0.1, -0.2, 0.3)) / 6.0, clipped to -1 .. 1; a miss is at 0
  *           direction: 3 channels in [-1.0, 1.0], unit direction of the camera ray in world space
  *           unshadowed: 3 channels in [0.0, 1.0], the lamps' radiance off the first hit, were it matt and nothing in between: sRGB of (linear radiance * 2^0.5) clipped to 0 .. 1 (IEC 61966-2-1)
+ *           highlights: 3 channels in [0.0, 1.0], sRGB of (linear radiance * 2^(0.5 - 4)) clipped to 0 .. 1: what color clips
  * bound     at given sums: see the rules for each operation
  * arguments sums: float, one plane of plane_stride numbers for each of:
  *           color_r, color_g, color_b, normal_x, normal_y, normal_z, albedo_r, albedo_g, albedo_b, depth,
@@ -26,6 +27,7 @@ __kernel void wamnet_encode(
     __global float *restrict image_position,
     __global float *restrict image_direction,
     __global float *restrict image_unshadowed,
+    __global float *restrict image_highlights,
     int width,
     int height,
     int row_stride,
@@ -210,6 +212,42 @@ __kernel void wamnet_encode(
     float t181 = fmin(t178, 1.0f);
     float t182 = fmin(t179, 1.0f);
     float t183 = fmin(t180, 1.0f);
+    float t185 = t20 * 0.0883883461f;
+    float t186 = t21 * 0.0883883461f;
+    float t187 = t22 * 0.0883883461f;
+    float t188 = fmax(t185, 0.0f);
+    float t189 = fmax(t186, 0.0f);
+    float t190 = fmax(t187, 0.0f);
+    float t191 = fmin(t188, 1.0f);
+    float t192 = fmin(t189, 1.0f);
+    float t193 = fmin(t190, 1.0f);
+    float t194 = fmax(t191, 0.00313080009f);
+    float t195 = fmax(t192, 0.00313080009f);
+    float t196 = fmax(t193, 0.00313080009f);
+    float t197 = exp2(0.416666657f * log2(t194));
+    float t198 = exp2(0.416666657f * log2(t195));
+    float t199 = exp2(0.416666657f * log2(t196));
+    float t200 = 1.05499995f * t197;
+    float t201 = 1.05499995f * t198;
+    float t202 = 1.05499995f * t199;
+    float t203 = t200 - 0.0549999997f;
+    float t204 = t201 - 0.0549999997f;
+    float t205 = t202 - 0.0549999997f;
+    bool t206 = t191 <= 0.00313080009f;
+    bool t207 = t192 <= 0.00313080009f;
+    bool t208 = t193 <= 0.00313080009f;
+    float t209 = 12.9200001f * t191;
+    float t210 = 12.9200001f * t192;
+    float t211 = 12.9200001f * t193;
+    float t212 = t206 ? t209 : t203;
+    float t213 = t207 ? t210 : t204;
+    float t214 = t208 ? t211 : t205;
+    float t215 = fmax(t212, 0.0f);
+    float t216 = fmax(t213, 0.0f);
+    float t217 = fmax(t214, 0.0f);
+    float t218 = fmin(t215, 1.0f);
+    float t219 = fmin(t216, 1.0f);
+    float t220 = fmin(t217, 1.0f);
     image_color[pixel * 3 + 0] = t64;
     image_color[pixel * 3 + 1] = t65;
     image_color[pixel * 3 + 2] = t66;
@@ -229,4 +267,7 @@ __kernel void wamnet_encode(
     image_unshadowed[pixel * 3 + 0] = t181;
     image_unshadowed[pixel * 3 + 1] = t182;
     image_unshadowed[pixel * 3 + 2] = t183;
+    image_highlights[pixel * 3 + 0] = t218;
+    image_highlights[pixel * 3 + 1] = t219;
+    image_highlights[pixel * 3 + 2] = t220;
 }

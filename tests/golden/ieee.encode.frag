@@ -1,6 +1,6 @@
 /*
  * wamnet encoding of features, GLSL 3.30, fragment shader. Generated: change the compiler, not this text.
- * program   bb08bcea5568b36251df0e3a9f3727da
+ * program   cf07bdfe96991f4423c0748c87bd0d5b
  * images    color: 3 channels in [0.0, 1.0], sRGB of (linear radiance * 2^0.5) clipped to 0 .. 1 (IEC 61966-2-1)
  *           normal: 3 channels in [-1.0, 1.0], unit normal in world space towards the ray's origin, mean over samples; 0 where nothing is hit
  *           albedo: 3 channels in [0.0, 1.0], linear reflectance clipped to 0 .. 1, mean over samples; 0 where nothing is hit
@@ -8,6 +8,7 @@
  *           position: 3 channels in [-1.0, 1.0], (world position - (0.1, -0.2, 0.3)) / 6.0, clipped to -1 .. 1; a miss is at 0
  *           direction: 3 channels in [-1.0, 1.0], unit direction of the camera ray in world space
  *           unshadowed: 3 channels in [0.0, 1.0], the lamps' radiance off the first hit, were it matt and nothing in between: sRGB of (linear radiance * 2^0.5) clipped to 0 .. 1 (IEC 61966-2-1)
+ *           highlights: 3 channels in [0.0, 1.0], sRGB of (linear radiance * 2^(0.5 - 4)) clipped to 0 .. 1: what color clips
  * bound     at given sums: see the rules for each operation
  * arguments sums_0, sums_1, ...: RGBA textures of 32-bit floats; component c of sums_k is number 4 k + c of
  *           color_r, color_g, color_b, normal_x, normal_y, normal_z, albedo_r, albedo_g, albedo_b, depth,
@@ -36,6 +37,7 @@ layout(location = 3) out vec4 image_depth;
 layout(location = 4) out vec4 image_position;
 layout(location = 5) out vec4 image_direction;
 layout(location = 6) out vec4 image_unshadowed;
+layout(location = 7) out vec4 image_highlights;
 uniform int sample_count;
 
 void main()
@@ -211,6 +213,42 @@ void main()
     PRECISE float t181 = min(t178, 1.0f);
     PRECISE float t182 = min(t179, 1.0f);
     PRECISE float t183 = min(t180, 1.0f);
+    PRECISE float t185 = t20 * 0.0883883461f;
+    PRECISE float t186 = t21 * 0.0883883461f;
+    PRECISE float t187 = t22 * 0.0883883461f;
+    PRECISE float t188 = max(t185, 0.0f);
+    PRECISE float t189 = max(t186, 0.0f);
+    PRECISE float t190 = max(t187, 0.0f);
+    PRECISE float t191 = min(t188, 1.0f);
+    PRECISE float t192 = min(t189, 1.0f);
+    PRECISE float t193 = min(t190, 1.0f);
+    PRECISE float t194 = max(t191, 0.00313080009f);
+    PRECISE float t195 = max(t192, 0.00313080009f);
+    PRECISE float t196 = max(t193, 0.00313080009f);
+    PRECISE float t197 = pow(t194, 0.416666657f);
+    PRECISE float t198 = pow(t195, 0.416666657f);
+    PRECISE float t199 = pow(t196, 0.416666657f);
+    PRECISE float t200 = 1.05499995f * t197;
+    PRECISE float t201 = 1.05499995f * t198;
+    PRECISE float t202 = 1.05499995f * t199;
+    PRECISE float t203 = t200 - 0.0549999997f;
+    PRECISE float t204 = t201 - 0.0549999997f;
+    PRECISE float t205 = t202 - 0.0549999997f;
+    bool t206 = t191 <= 0.00313080009f;
+    bool t207 = t192 <= 0.00313080009f;
+    bool t208 = t193 <= 0.00313080009f;
+    PRECISE float t209 = 12.9200001f * t191;
+    PRECISE float t210 = 12.9200001f * t192;
+    PRECISE float t211 = 12.9200001f * t193;
+    PRECISE float t212 = t206 ? t209 : t203;
+    PRECISE float t213 = t207 ? t210 : t204;
+    PRECISE float t214 = t208 ? t211 : t205;
+    PRECISE float t215 = max(t212, 0.0f);
+    PRECISE float t216 = max(t213, 0.0f);
+    PRECISE float t217 = max(t214, 0.0f);
+    PRECISE float t218 = min(t215, 1.0f);
+    PRECISE float t219 = min(t216, 1.0f);
+    PRECISE float t220 = min(t217, 1.0f);
     image_color[0] = t64;
     image_color[1] = t65;
     image_color[2] = t66;
@@ -230,4 +268,7 @@ void main()
     image_unshadowed[0] = t181;
     image_unshadowed[1] = t182;
     image_unshadowed[2] = t183;
+    image_highlights[0] = t218;
+    image_highlights[1] = t219;
+    image_highlights[2] = t220;
 }

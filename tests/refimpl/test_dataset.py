@@ -129,7 +129,7 @@ def test_feature_ranges_channels_and_order() -> None:
     scales = Normalization(depth_scale=1.5, position_scale=1.5)
     image = dataset.feature_image(frame, tuple(FEATURES), scales)
     assert image.dtype == np.float32
-    assert image.shape == (5, 4, dataset.channels_of(tuple(FEATURES))) == (5, 4, 33)
+    assert image.shape == (5, 4, dataset.channels_of(tuple(FEATURES))) == (5, 4, 36)
     first = 0
     for feature in FEATURES.values():
         assert feature.channels == LAYERS[feature.layer].channels
@@ -137,8 +137,9 @@ def test_feature_ranges_channels_and_order() -> None:
         assert np.array_equal(part, dataset.feature_image(frame, (feature.name,), scales))
         assert part.min() >= feature.low
         assert part.max() <= feature.high
-        # Layers reach beyond the range, so the clip is seen; the interior is seen too.
-        assert (part == feature.high).any()
+        # Layers reach beyond the range, so the clip is seen; the interior is seen too. White is far below
+        # what `highlights` clips.
+        assert (part == feature.high).any() or feature.name == "highlights"
         assert ((part > feature.low) & (part < feature.high)).any()
         first += feature.channels
 
@@ -166,6 +167,8 @@ def test_features_by_hand() -> None:
         "position": [0.0, 0.5, -1.0],
         "direction": [0.0, -1.0, 0.5],
         "unshadowed": [0.0, 1.0, 1.0],  # exposed as colour is
+        # Two stops more and four less: 0, and a quarter of 0.25 and 9 by the curve of IEC 61966-2-1.
+        "highlights": [0.0, np.float32(1.055 * 0.0625 ** (1 / 2.4) - 0.055), 1.0],
     }
     for name, values in expected.items():
         assert dataset.feature_image(frame, (name,), scales)[0, 0].tolist() == values

@@ -24,12 +24,11 @@ from pathlib import Path
 from typing import Any
 
 from lab import command, tables
-from lab.frames import Pair, Shot
+from lab.frames import Pair, Shot, past_mirrors
 from lab.ground import PLANS, Cost, Ground, inputs, judged, measure_all, told, write_table
 from lab.results import Results, Values
 from lab.sets import SETS
 from lab.tables import Column
-from seen import named_as_first_hits
 
 from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
 from wamnet.refimpl.encoding import to_display
@@ -198,7 +197,7 @@ def measure_other(scenes: Scenes, row: Row, seed: int) -> Values:
     test = scenes.of(row.scene).test
     pictures = []
     for noisy, _ in test:
-        frame = named_as_first_hits(noisy) if row.features != "first hit" else noisy
+        frame = past_mirrors(noisy) if row.features != "first hit" else noisy
         pictures.append(to_display(filtered(frame, prefiltered(frame), True)))
     return told(judged(pictures, test))
 

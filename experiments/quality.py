@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 from lab import command, figures, intervals, results, scores, tables, training
-from lab.frames import Pair, Shot, frames, noisy, reference
+from lab.frames import Pair, Shot, frames, noisy, past_mirrors, reference
 from lab.results import PER_FRAME, Results, Values
 from lab.sets import SETS, Counts, compared
 
@@ -46,6 +46,7 @@ from wamnet.kernels.run.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Floats, Frame
+from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.train import BEST, SHORT, Recipe
 
@@ -80,10 +81,23 @@ PLANS: Mapping[str, Plan] = {
 LAMPS = ("color", "normal", "albedo", "position", "unshadowed")
 """What a network sees that shall follow the lamps."""
 
+PAST = ("color", "seen_normal", "seen_albedo", "seen_position")
+"""The features of `short`, past mirrors and glass."""
+
+BRIGHT = ("color", "highlights", *PAST[1:])
+"""The same, and how bright is what colour clips."""
+
+NARROW = replace(BEST, features=BRIGHT, window=Window(8), widths=(64,) * 4)
+"""Fewer taps for wider layers: what mirrors and glass show is remembered, not averaged."""
+
 RECIPES: Mapping[str, Recipe] = {
     "short": SHORT,
     "best": BEST,
     "page": replace(BEST, features=LAMPS, steps=60_000),
+    "past": replace(BEST, features=PAST),
+    "bright": replace(BEST, features=BRIGHT),
+    "narrow": NARROW,
+    "hard": replace(NARROW, steps=120_000),
     "page48": replace(BEST, features=LAMPS, steps=60_000, widths=(48,) * 4),
 }
 """Recipes of the rows by name."""
@@ -94,7 +108,8 @@ class Row:
     """A way to a picture: `rays` of its features; a recipe of ours, or how Open Image Denoise is called.
 
     `aux`: how its auxiliaries are: "" none are given, `noisy`, `prefiltered`, or `clean`. `of`: the set whose
-    frames a network has learned from, if not that of the test.
+    frames a network has learned from, if not that of the test. `past`: features are also of what is seen past
+    mirrors and glass, which frames of some sets have; Open Image Denoise gets these in place of the others.
     """
 
     text: str
@@ -103,6 +118,7 @@ class Row:
     quality: str = ""
     aux: str = ""
     of: str = ""
+    past: bool = False
 
 
 ROWS: Mapping[str, Row] = {
@@ -115,19 +131,39 @@ ROWS: Mapping[str, Row] = {
     "oidn-clean1": Row("Open Image Denoise, high, 1 ray, declared clean", 1, quality="high", aux="clean"),
     "oidn-clean16": Row(f"Open Image Denoise, high, clean, {RAYS} rays", RAYS, quality="high", aux="clean"),
     "oidn-fast16": Row(f"Open Image Denoise, fast, clean, {RAYS} rays", RAYS, quality="fast", aux="clean"),
+    "oidn-past-clean16": Row(
+        f"Open Image Denoise, high, clean, {RAYS} rays past mirrors and glass",
+        RAYS,
+        "",
+        "high",
+        "clean",
+        past=True,
+    ),
+    "oidn-past-prefiltered16": Row(
+        f"Open Image Denoise, high, prefiltered, {RAYS} rays past mirrors and glass",
+        RAYS,
+        quality="high",
+        aux="prefiltered",
+        past=True,
+    ),
     "short-1": Row("wamnet, short, features of 1 ray", 1, "short"),
     "best-1": Row("wamnet, best, features of 1 ray", 1, "best"),
     "best-16": Row(f"wamnet, best, {RAYS} rays", RAYS, "best"),
     "page-16": Row(f"wamnet, the page's inputs and steps, {RAYS} rays", RAYS, "page"),
     "page48-16": Row(f"wamnet, the same with 48 neurons a layer, {RAYS} rays", RAYS, "page48"),
+    "past-16": Row(f"wamnet, best, {RAYS} rays past mirrors and glass", RAYS, "past", past=True),
+    "bright-16": Row("the same, and how bright is what colour clips", RAYS, "bright", past=True),
+    "narrow-16": Row("the same, 8 x 8 pixels, 64 neurons a layer", RAYS, "narrow", past=True),
+    "hard-16": Row("the same, four times as many steps", RAYS, "hard", past=True),
     "shipped": Row(f"wamnet, the network of the page, {RAYS} rays", RAYS, "page", of=SHIPPED_SET),
 }
 """The rows by name."""
 
 TIMED = ("oidn-fast16", "oidn-clean16", "page-16")
-"""Rows whose time is taken."""
+HARD_TIMED = ("oidn-past-clean16", "oidn-past-prefiltered16", "hard-16")
+"""Rows whose time is taken, ours last: of most sets, and of scenes with mirrors, metal and glass."""
 
-SHOWN = ("input", "oidn-clean16", "page-16")
+SHOWN = ("input", "oidn-clean16", "oidn-past-prefiltered16", "page-16", "hard-16")
 """Rows that are shown beside the reference."""
 
 COLUMNS = (
@@ -174,7 +210,8 @@ class Bench:
     def tests(self, seed: int, rays: int, split: str = TEST) -> list[Pair]:
         """Return the test frames with the noise of a seed; their references are the same for all."""
         found = self._frames(list(map(noisy, self._shots(split, rays, seed + 1))))
-        clean = self._frames([reference(s, self.plan.test_spp) for s in self._shots(split, 1)])
+        spp = self.plan.test_spp * SETS[self.name].cleaner
+        clean = self._frames([reference(s, spp) for s in self._shots(split, 1)])
         return list(zip(found, clean, strict=True))
 
     def renders(self, spp: int) -> list[Frame]:
@@ -237,6 +274,7 @@ def denoised(
 
 def oidn(row: Row, frame: Frame) -> Floats:
     """Return the radiance that Open Image Denoise makes of a frame."""
+    frame = past_mirrors(frame) if row.past else frame
     if row.aux == "prefiltered":
         return filtered(frame, prefiltered(frame, row.quality), True, row.quality)
     return filtered(frame, frame if row.aux else None, row.aux == "clean", row.quality)
@@ -262,7 +300,8 @@ def timed(bench: Bench, kept: Results, rounds: int) -> None:
     if kept.get("times", 0) is not None:
         return
     frame = bench.tests(0, RAYS)[0][0]
-    model, _ = bench.model(ROWS["page-16"], 0)
+    *peers, ours = HARD_TIMED if SETS[bench.name].seen else TIMED
+    model, _ = bench.model(ROWS[ours], 0)
     with open_executor(bench.executor) as device:
         size = (frame.height, frame.width)
         plan = tune.choose(device, plan_model(model, device.name), size, rounds).plan
@@ -270,10 +309,10 @@ def timed(bench: Bench, kept: Results, rounds: int) -> None:
         device.build(kernel, size)
         images = images_of(model, frame)
         ways: dict[str, Callable[[], Any]] = {
-            row: partial(lambda row: to_display(oidn(ROWS[row], frame)), row) for row in TIMED[:-1]
+            row: partial(lambda row: to_display(oidn(ROWS[row], frame)), row) for row in peers
         }
-        ways["page-16"] = lambda: device.run(kernel, images_of(model, frame))
-        ways["page-16, encoded features given"] = lambda: device.run(kernel, images)
+        ways[ours] = lambda: device.run(kernel, images_of(model, frame))
+        ways[f"{ours}, encoded features given"] = lambda: device.run(kernel, images)
         found = in_turns({name: _done(way) for name, way in ways.items()}, rounds)
     values = {name: list(times.seconds) for name, times in found.items()}
     kept.put("times", 0, {"device": device.device, "schedule": plan.asked, "seconds": values})
@@ -321,7 +360,13 @@ def configuration(name: str, split: str, row: str) -> str:
     return f"{name}, {split}: {row}"
 
 
-OURS = {"best-1": (1,), **dict.fromkeys(("best-16", "page-16", "page48-16", "shipped"), (1, RAYS))}
+HARD_ROWS = ("past-16", "bright-16", "narrow-16", "hard-16")
+"""Rows for scenes with mirrors, metal and glass, each with one idea more."""
+
+OURS = {
+    "best-1": (1,),
+    **dict.fromkeys(("best-16", "page-16", "page48-16", "shipped", *HARD_ROWS), (1, RAYS)),
+}
 """Rows of ours that are compared with Open Image Denoise, and the rays of what it may be given then."""
 
 
@@ -333,7 +378,7 @@ def ahead(kept: Results, name: str, split: str, rows: Sequence[str]) -> str:
         found = {
             peer: kept.per_pose(configuration(name, split, peer), "psnr")
             for peer in rows
-            if ROWS[peer].quality and ROWS[peer].rays in rays
+            if ROWS[peer].quality and ROWS[peer].rays in rays and (ROWS[ours].past or not ROWS[peer].past)
         }
         found = {peer: values for peer, values in found.items() if len(values) == len(own)}
         if not own or not found:
@@ -387,6 +432,7 @@ def work(options: argparse.Namespace) -> None:
             for row in options.only
             for split in SPLITS
             if not (ROWS[row].of and SETS[ROWS[row].of].scene != bench.scene)
+            and (SETS[name].seen or not ROWS[row].past)
         }
         results.fill(kept, ways, options.seeds, name)
         drawn(bench, options.output / f"{name}.png", options.only)

@@ -3,7 +3,8 @@
 1. What is wanted is data: a scene at a time with its parameters, a size, samples, a seed [`Shot`].
 2. Its file is named after all that determines its pixels, and ends in the SHA-256 of its bytes, so that file
    and checksum appear in one step [`path_of`]. One that was damaged is rendered again [`find`].
-3. Whatever is missing is rendered by a device or by the reference, with progress [`render_all`].
+3. Whatever is missing is rendered by a device or by the reference, with progress [`render_all`]. Shots of one
+   scene that differ only in numbers share a kernel: compiling one for each takes longer than their pictures.
 
 A frame depends on the version of this package: whoever changes light transport without a new version
 empties the folder. A new layer makes new files by itself.
@@ -24,8 +25,9 @@ from wamnet.cli.files.dataset_files import sum_of
 from wamnet.kernels.run.draws import times
 from wamnet.kernels.run.frame_plan import version
 from wamnet.kernels.run.render_frame import render_frame
+from wamnet.kernels.run.render_on import Frames
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.frame import SEEN, Frame
 from wamnet.refimpl.light.render import Job, feature_job, render_info
 from wamnet.refimpl.light.scene import Scene, scene_digest
 from wamnet.refimpl.light.scenes import canonical
@@ -108,6 +110,7 @@ def render_all(folder: Path, shots: Iterable[Shot], executor: str = "opencl") ->
     there = {id(shot): find(folder, shot, executor) for shot in wanted}
     left = [shot for shot in wanted if there[id(shot)] is None]
     samples = sum(shot.job.samples for shot in left)
+    kernels = Frames([shot.build() for shot in left])
     with (
         hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"),
         progress(f"rendering {len(left)} frames", samples) as advance,
@@ -115,31 +118,41 @@ def render_all(folder: Path, shots: Iterable[Shot], executor: str = "opencl") ->
         for shot in left:
             # A shot that appears twice in the list is there by now.
             known = find(folder, shot, executor)
-            there[id(shot)] = known or _render(folder, shot, executor, advance)
+            there[id(shot)] = known or _render(folder, shot, executor, kernels, advance)
     return [path for shot in wanted if (path := there[id(shot)]) is not None]
 
 
-def _render(folder: Path, shot: Shot, executor: str, advance: Any) -> Path:
+def _render(folder: Path, shot: Shot, executor: str, kernels: Frames, advance: Any) -> Path:
     """Render a shot and give its file the name that ends in its checksum.
 
     Where the same colour is there with features of its own rays, only the others' first hits are traced.
     """
     scene, plain = shot.build(), find(folder, replace(shot, feature_spp=0, seen=False), executor)
     if (of_features := feature_job(shot.job)) is not None and plain is not None:
-        hits = render_frame(executor, scene, of_features, workers=None, on_progress=advance).frame
+        hits = _rendered(executor, scene, of_features, kernels, advance)
         layers = {**hits.layers, "color": exr.read_frame(plain)["color"]}
         frame = Frame(layers, render_info(scene, shot.job))
     else:
-        frame = render_frame(executor, scene, shot.job, workers=None, on_progress=advance).frame
+        frame = _rendered(executor, scene, shot.job, kernels, advance)
     name = path_of(folder, shot, executor)
     new = folder / f".{name.name}.exr"
     exr.write_frame(new, frame)
     return new.replace(folder / f"{name.name}.{sum_of(new).sha256}.exr")
 
 
+def _rendered(executor: str, scene: Scene, job: Job, kernels: Frames, advance: Any) -> Frame:
+    """Return the frame of a job; the reference compiles nothing."""
+    return render_frame(executor, scene, job, workers=None, on_progress=advance, frames=kernels).frame
+
+
 def frames(folder: Path, shots: Iterable[Shot], executor: str = "opencl") -> list[Frame]:
     """Return the frames of all shots, rendered where they are not there."""
     return [exr.read_frame(path) for path in render_all(folder, shots, executor)]
+
+
+def past_mirrors(frame: Frame) -> Frame:
+    """Return a frame whose layers of the first hit are those past mirrors and glass."""
+    return Frame({**frame.layers, **{first: frame[seen] for seen, first in SEEN.items()}}, frame.info)
 
 
 def reference(shot: Shot, spp: int) -> Shot:

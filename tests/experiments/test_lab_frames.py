@@ -11,9 +11,10 @@ import pytest
 from lab import frames
 from lab.frames import Shot
 
+from wamnet.kernels.run import render_on
 from wamnet.kernels.run.frame_plan import version
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.frame import USUAL
+from wamnet.refimpl.frame import SEEN, USUAL
 from wamnet.refimpl.light import render as driver
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scene import scene_digest
@@ -109,6 +110,35 @@ def test_times_continue_one_sequence_and_repeat_no_pose():
     assert [*train, *test] == frames.split_times(28, 0, 8.0, start=1.0)[0]
     poses = np.sort(np.array([*train, *test]) % 2.0) * 45.0
     assert np.diff([*poses, poses[0] + 90.0]).min() >= 1.0
+
+
+def test_shots_that_differ_in_numbers_share_a_kernel(tmp_path, executor_named, monkeypatch):
+    """Compiling one for each took longer than tracing them; pictures are those of a kernel of constants."""
+    executor_named("opencl")
+    compiled, real = [], render_on.compile_path
+
+    def counted(*given, **options):
+        compiled.append(given)
+        return real(*given, **options)
+
+    shots = [Shot("cornell", time=time, size=6, seed=4) for time in (0.5, 1.0, 1.5)]
+    alone = [frames.frames(tmp_path / "alone", [shot], "opencl")[0] for shot in shots]
+    monkeypatch.setattr(render_on, "compile_path", counted)
+    together = frames.frames(tmp_path / "together", shots, "opencl")
+    assert len(compiled) == 1
+    for one, other in zip(alone, together, strict=True):
+        # Constants are folded in float64, inputs are not: features of first hits differ by some ulps.
+        assert np.abs(one["normal"] - other["normal"]).max() <= 16 * np.finfo(np.float32).eps
+
+
+def test_what_a_denoiser_of_first_hits_is_given_past_mirrors():
+    """Layers keep their names, colour stays."""
+    shot = Shot("glossy", size=6, seed=4, seen=True)
+    found = render(shot.build(), shot.job).frame
+    named = frames.past_mirrors(found)
+    assert np.array_equal(named["color"], found["color"])
+    assert all(np.array_equal(named[first], found[seen]) for seen, first in SEEN.items())
+    assert not np.array_equal(named["position"], found["position"])
 
 
 def test_a_colour_that_is_there_gets_other_features(tmp_path):

@@ -83,6 +83,7 @@ def test_the_whole_way(tmp_path, capsys):
         "input",
         "best-16",
         "shipped",
+        "past-16",  # no frame of this set has its layers
         "--seeds",
         "0",
         "1",
@@ -109,6 +110,29 @@ def test_the_whole_way(tmp_path, capsys):
     quality.main(options)
     assert (tmp_path / "quality.md").read_text() == text
     assert (tmp_path / "quality.json").read_bytes() == before
+
+
+def test_both_denoisers_see_past_mirrors(monkeypatch, tmp_path):
+    """Frames of such sets have these layers, by which one sees; the other gets them by its own names."""
+    bench = quality.Bench("glossy", TOY, tmp_path, "numpy")
+    (shot, *_), rows = bench._shots("test", quality.RAYS), quality.ROWS
+    assert shot.seen
+    assert all(rows[row].past for row in quality.HARD_ROWS)
+    for name in quality.HARD_ROWS:
+        features = quality.RECIPES[rows[name].recipe].features
+        assert {f for f in features if f not in ("color", "highlights")} == set(quality.PAST[1:])
+    one = np.ones((2, 2, 3), np.float32)
+    layers = {name: one * k for k, name in enumerate(("color", "albedo", "normal", "position"))}
+    layers |= {f"seen_{name}": 10.0 + layers[name] for name in ("albedo", "normal", "position")}
+    layers |= dict.fromkeys(("depth", "seen_depth"), one[..., :1])
+    given = []
+    monkeypatch.setattr(quality, "filtered", lambda *parts: given.append(parts) or parts[0]["color"])
+    quality.oidn(rows["oidn-past-clean16"], Frame(layers))
+    ((colour, aux, clean, how),) = given
+    assert (clean, how) == (True, "high")
+    assert np.array_equal(colour["color"], layers["color"])
+    assert np.array_equal(aux["albedo"], layers["seen_albedo"])
+    assert np.array_equal(aux["normal"], layers["seen_normal"])
 
 
 def test_gaps_are_to_the_best_peer_with_the_same_features(tmp_path):

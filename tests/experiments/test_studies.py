@@ -37,7 +37,6 @@ FIGURES = {
     "learning_curve": {"curve.png"},
     "losses": set(),
     "lights": {"psnr.png", "color.png", "a-on-b.png", "each-frame.png"},
-    "seen": set(),
 }
 """The experiments, and figures that each must leave."""
 

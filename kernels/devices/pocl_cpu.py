@@ -41,6 +41,7 @@ LEVELS: Mapping[str, frozenset[str]] = {
 """Levels of the x86-64 psABI, lowest first, and the flags of /proc/cpuinfo that each adds to those before."""
 
 _ORDER = {name: number for number, name in enumerate(LEVELS)}
+"""Number of each level, the lowest first."""
 
 
 def name_the_processor(record: int) -> bool:

@@ -28,7 +28,7 @@ BUDGET = {
     "kernels/judge": 1475,
     "kernels/bench": 4850,
     "kernels/export": 3200,
-    "kernels/verify": 2400,
+    "kernels/verify": 2500,
     "spec/conformance": 6150,
     "cli": 300,
     "cli/commands": 5450,

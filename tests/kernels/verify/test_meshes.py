@@ -1,0 +1,70 @@
+"""Scenes as triangles, for formats that have nothing else: every part of every shot, and planted faults."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from triangles import ReadSurface, shape_differences, volume, wanted
+
+from wamnet.kernels.verify.cases import questions
+from wamnet.kernels.verify.parts import NotExpressed, meshes_of, parts_of, sky_of
+from wamnet.kernels.verify.run import shots_of
+from wamnet.refimpl.light.materials import Mirror
+from wamnet.refimpl.light.scene import Quad, Scene
+from wamnet.refimpl.light.scenes import empty
+
+SHOTS = {shot.name: shot for shot in shots_of(questions())}
+SHAPES = ("layers-wall", "layers-glass", "glass-ball-1.5")
+"""Shots of one sheet, one box that is turned, and one sphere."""
+
+
+def surface(mesh):
+    """Return a mesh as it is read of a file."""
+    points, normals = mesh.points.astype(float), mesh.normals.astype(float)
+    look = (mesh.look.kind, mesh.look.reflectance, mesh.look.emission, mesh.look.number)
+    return ReadSurface(points, normals, mesh.corners, *look, mesh.front, mesh.thick)
+
+
+@pytest.mark.parametrize("name", SHOTS)
+def test_meshes_are_the_parts(name):
+    scene = SHOTS[name].scene
+    found = [surface(mesh) for mesh in meshes_of(parts_of(scene))]
+    for part, want in zip(found, wanted(scene), strict=True):
+        assert [*shape_differences(part, want)] == []
+        assert part.front == want.front
+
+
+@pytest.mark.parametrize("fault", ["a point", "a normal", "the order", "a hole"])
+@pytest.mark.parametrize("name", SHAPES)
+def test_faults_are_found(name, fault):
+    """A point or a normal that is off by a ten-thousandth, triangles in the other order, one too few."""
+    scene = SHOTS[name].scene
+    (found,) = map(surface, meshes_of(parts_of(scene)))
+    (want,) = wanted(scene)
+    if fault == "a point":
+        found.points[0] *= 1.0 + 1e-4
+    elif fault == "a normal":
+        found.normals[0] *= 1.0 + 1e-4
+    elif fault == "the order":
+        found.corners = found.corners[:, ::-1]
+    else:
+        found.corners = found.corners[1:]
+    assert [*shape_differences(found, want)]
+
+
+def test_a_sky_surrounds_all():
+    """A cube that faces inwards, four times as far as the farthest point; a black sky is nothing."""
+    scene = SHOTS["matte-floor"].scene
+    meshes = meshes_of(parts_of(scene))
+    sky = [surface(mesh) for mesh in sky_of(scene, meshes)]
+    assert np.abs([side.points for side in sky]).max() == 80.0
+    # A mean of three points and a third are rounded, and the twelve terms of the sum.
+    assert abs(sum(map(volume, sky)) / 160.0**3 + 1.0) <= 64 * 2.0**-53
+    assert {(side.color, side.emission, side.front) for side in sky} == {((0.0,) * 3, (1.0,) * 3, True)}
+    assert sky_of(SHOTS["lamp-below"].scene, []) == []
+
+
+def test_what_emits_and_is_no_matte_surface_is_refused():
+    quad = Quad((0.0,) * 3, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.5,) * 3, (1.0,) * 3, Mirror())
+    with pytest.raises(NotExpressed, match="mirror that emits"):
+        meshes_of(parts_of(Scene("odd", empty().camera, quads=(quad,))))

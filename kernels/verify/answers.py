@@ -3,7 +3,8 @@
 1. Direct light of a rectangle and of a sphere [`rectangle_irradiance`], [`sphere_irradiance`].
 2. Glass: Fresnel's share [`fresnel`], a pane with all that goes back and forth in it [`pane`], and what a
    matte floor close below a wide pane shows under a white sky [`floor_below_pane`].
-3. Metal that is a microscopic landscape of mirrors: what it shows of a white sky [`rough_metal`].
+3. Metal that is a microscopic landscape of mirrors: what it shows of a white sky [`rough_metal`]; a mirror's
+   colour where it fades to white [`schlick`].
 4. Camera rays against a plane, for the layers of a picture [`plane_hits`].
 
 Every formula is written a second time here: nothing of the renderer's own code is asked, except its camera's
@@ -12,6 +13,7 @@ definition of a pixel.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -52,6 +54,11 @@ def rectangle_irradiance(x: float, z: float, rectangle: Rectangle, height: float
 def sphere_irradiance(radius: float, distance: float) -> float:
     """Return the irradiance of a surface that faces a sphere of radiance 1: pi (radius / distance)^2."""
     return float(np.pi * (radius / distance) ** 2)
+
+
+def schlick(reflectance: Sequence[float], cosine: float) -> tuple[float, ...]:
+    """Return a colour of metal at an angle: r + (1 - r) (1 - cosine)^5 (Schlick 1994, equation 15)."""
+    return tuple(r + (1.0 - r) * (1.0 - cosine) ** 5 for r in reflectance)
 
 
 def sine_inside(cosine: float, ior: float) -> float:

@@ -112,6 +112,9 @@ PROFILES: Mapping[str, Profile] = {
     "no-caustics": Profile("Light that glass or mirrors bring to matte surfaces is left out."),
     "separable-masking": Profile("Masking of rough metal is the product of both directions' own."),
     "compensates": Profile("Rough metal gets back what single scattering loses."),
+    "schlick-metals": Profile(
+        "Colours of metal and mirrors fade to white at grazing angles by Schlick's formula."
+    ),
     "two-sided-lamps": Profile("Lamps emit from both sides."),
     "far-misses": Profile("Depth is at least 1e9 where nothing is hit."),
     "depth-along-view": Profile("Depth is the distance along the view."),

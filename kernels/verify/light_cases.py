@@ -178,7 +178,8 @@ def mirrors() -> Iterator[Question]:
     scene = Scene("mirror", look((-2.0 * run, 2.0 * rise, 0.0), (0.0, 0.0, 0.0)), quads=(mirror, shown))
     answer = (1.8, 1.2, 0.6)
     source = "reflectance times the radiance of what is at the mirrored angle, and nothing else emits"
-    yield Question("mirror", "mirror", Shot("mirror", scene, spp=16), answer, source)
+    fades = {"schlick-metals": tuple(2.0 * r for r in answers.schlick(tint, 0.5))}
+    yield Question("mirror", "mirror", Shot("mirror", scene, spp=16), answer, source, intents=fades)
     # A periscope: down to a mirror at 45 degrees, along to another, and up into the sky.
     first = Quad((-1.0, -1.0, -1.0), (0.0, 0.0, 2.0), (2.0, 2.0, 0.0), (0.9, 0.6, 0.3), material=Mirror())
     second = Quad((-4.0, 1.0, -1.0), (2.0, -2.0, 0.0), (0.0, 0.0, 2.0), (0.5, 0.8, 0.9), material=Mirror())
@@ -189,7 +190,10 @@ def mirrors() -> Iterator[Question]:
         background=WHITE,
     )
     source = "the product of both reflectances, under a white sky"
-    yield Question("mirrors-two", "mirror", Shot("mirrors-two", scene, spp=16), (0.45, 0.48, 0.27), source)
+    both = [answers.schlick(quad.reflectance, math.sqrt(0.5)) for quad in (first, second)]
+    fades = {"schlick-metals": tuple(a * b for a, b in zip(*both, strict=True))}
+    answer = (0.45, 0.48, 0.27)
+    yield Question("mirrors-two", "mirror", Shot("mirrors-two", scene, spp=16), answer, source, intents=fades)
 
 
 def metals() -> Iterator[Question]:

@@ -29,7 +29,7 @@ from ...refimpl.light.render import Job
 from ...refimpl.light.scene import to_json
 from ...refimpl.light.transport import Settings
 from ..run.render_frame import render_frame
-from . import write_blender, write_luxcore, write_mitsuba, write_povray
+from . import write_blender, write_gltf, write_luxcore, write_mitsuba, write_povray
 from .case import Shot
 from .judgement import FAILED, UNTESTED, Missing, Picture
 from .parts import NotExpressed
@@ -52,10 +52,14 @@ Read = Callable[[Path], Picture]
 
 @dataclass(frozen=True)
 class Format:
-    """A form of scene files: the end of their names, and what writes a shot for a seed."""
+    """A form of scene files: the end of their names, and what writes a shot for a seed.
+
+    `intents`: profiles by which its words are meant, whoever reads them.
+    """
 
     suffix: str
     write: Callable[[Shot, int], str]
+    intents: tuple[str, ...] = ()
 
 
 def _own_scene(shot: Shot, seed: int) -> str:
@@ -70,6 +74,7 @@ FORMATS: Mapping[str, Format] = {
     "blender": Format(write_blender.SUFFIX, write_blender.write),
     "povray": Format(write_povray.SUFFIX, write_povray.write),
     "luxcore": Format(write_luxcore.SUFFIX, write_luxcore.write),
+    "gltf": Format(write_gltf.SUFFIX, write_gltf.write, ("schlick-metals",)),
 }
 """Forms of scene files by name: a new one is a module and a line here."""
 
@@ -81,6 +86,10 @@ class Renderer(Protocol):
     def name(self) -> str:
         """Return what it is."""
 
+    @property
+    def intents(self) -> tuple[str, ...]:
+        """Return the profiles that the form of its scenes implies."""
+
     def pictures(self, shot: Shot, seeds: Sequence[int]) -> Sequence[Picture] | Missing:
         """Return a picture for each seed, or why there are none."""
 
@@ -91,6 +100,7 @@ class Own:
 
     executor: str = "numpy"
     finish: Callable[[Picture], Picture] = field(default=lambda picture: picture)
+    intents: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -124,6 +134,11 @@ class ByCommand:
     output: str = EXR
     limit_s: float = LIMIT_S
     more: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def intents(self) -> tuple[str, ...]:
+        """Return the profiles that the form of its scenes implies."""
+        return FORMATS[self.form].intents
 
     def pictures(self, shot: Shot, seeds: Sequence[int]) -> Sequence[Picture] | Missing:
         """Return a picture for each seed, or why there are none."""

@@ -44,13 +44,16 @@ def verify(
     profiles: Collection[str] = (),
     advance: Callable[[float], Any] = lambda _: None,
 ) -> list[Verdict]:
-    """Return the verdicts about a renderer; `advance` is called after each shot."""
+    """Return the verdicts about a renderer; `advance` is called after each shot.
+
+    What the form of its scenes means is expected, as under a profile that was named.
+    """
     seeds = range(seed, seed + pictures)
     found: dict[str, Sequence[Picture] | Missing] = {}
     for shot in shots_of(questions):
         found[shot.name] = renderer.pictures(shot, seeds)
         advance(1)
-    verdicts = judge(questions, found, profiles)
+    verdicts = judge(questions, found, {*profiles, *renderer.intents})
     return [confirmed(renderer, verdict, seeds) for verdict in verdicts]
 
 

@@ -66,6 +66,21 @@ def test_scenes_are_written_with_their_answers(wamnet, tmp_path):
     ]
 
 
+def test_answers_are_those_that_a_form_means(wamnet, tmp_path):
+    """A tinted mirror in glTF fades to white at grazing angles: 2 (0.9 + 0.1 / 32) in red."""
+    folder = tmp_path / "scenes"
+    done = wamnet(
+        "verify-renderer", "--format", "gltf", "--write", folder, "-k", "mirror", "-k", "miss-depth"
+    )
+    assert (done.status, done.err) == (0, "")
+    assert "not written: layers-miss: format gltf has no sky that is not a surface" in done.out
+    answers = {
+        answer["name"]: answer["answer"] for answer in json.loads((folder / "answers.json").read_text())
+    }
+    assert answers["mirror"][0] == 2.0 * (0.9 + (1.0 - 0.9) / 32.0)
+    assert json.loads((folder / "mirror.gltf").read_text())["asset"]["version"] == "2.0"
+
+
 @pytest.mark.parametrize(
     ("words", "rule"),
     [

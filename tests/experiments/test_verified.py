@@ -13,6 +13,7 @@ class Half:
     """Half as much light as there should be, and no layers."""
 
     name = "half"
+    intents = ()
 
     def pictures(self, shot, seeds):
         if shot.display:

@@ -38,7 +38,7 @@ Name = Annotated[
     typer.Option(
         "--renderer",
         metavar="NAME",
-        help="A renderer that wamnet knows: wamnet, mitsuba, cycles, cycles-as-it-comes or povray.",
+        help="A renderer that wamnet knows: wamnet, mitsuba, cycles, cycles-as-it-comes, luxcore or povray.",
         show_default=False,
     ),
 ]
@@ -57,7 +57,7 @@ Form = Annotated[
     typer.Option(
         "--format",
         metavar="NAME",
-        help="Form of the scene files: wamnet, mitsuba, blender or povray.",
+        help="Form of the scene files: wamnet, mitsuba, blender, povray, luxcore or gltf.",
         show_default=False,
     ),
 ]
@@ -145,7 +145,7 @@ def verify_renderer(
         verdicts = run.verify(
             asked, questions, pictures=pictures, seed=seed, profiles=profiles, advance=advance
         )
-    about = {"pictures": pictures, "seed": seed, "profiles": profiles}
+    about = {"pictures": pictures, "seed": seed, "profiles": [*profiles, *asked.intents]}
     if as_json is not None:
         write_text(as_json, report.to_json(asked.name, verdicts, about))
     if markdown is not None:
@@ -220,6 +220,7 @@ def _write_scenes(folder: Path, form: str, questions: Sequence[Question]) -> Non
     """Write the scene files of all shots, and answers.json."""
     import json
 
+    from ....kernels.verify.judgement import expected
     from ....kernels.verify.parts import NotExpressed
     from ....kernels.verify.renderers import FORMATS
     from ....kernels.verify.run import shots_of
@@ -227,7 +228,12 @@ def _write_scenes(folder: Path, form: str, questions: Sequence[Question]) -> Non
     check_new_folder(folder)
     answers = [
         {"name": q.name, "rule": q.rule, "scene": q.shot.name, "layer": q.layer, "block": q.block}
-        | {"answer": q.answer, "source": q.source, "slack": q.slack * q.scale, "size": q.shot.size}
+        | {
+            "answer": expected(q, FORMATS[form].intents)[0],
+            "source": q.source,
+            "slack": q.slack * q.scale,
+            "size": q.shot.size,
+        }
         | {"samples": q.shot.spp, "depth": q.shot.depth}
         for q in questions
     ]

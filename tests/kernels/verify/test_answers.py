@@ -36,6 +36,14 @@ def test_a_far_rectangle_is_area_over_distance_squared():
     assert abs(found * 1e6 - 1.0) <= 1e-6
 
 
+def test_schlick_at_its_ends():
+    """The colour itself straight on, white at grazing angles, and a 32nd of the way at 60 degrees."""
+    gold = (1.0, 0.75, 0.25)
+    assert answers.schlick(gold, 1.0) == gold
+    assert answers.schlick(gold, 0.0) == (1.0, 1.0, 1.0)
+    assert answers.schlick(gold, 0.5) == (1.0, 0.75 + 0.25 / 32, 0.25 + 0.75 / 32)
+
+
 def test_fresnel_at_normal_incidence_and_at_brewster_s_angle():
     """((n - 1) / (n + 1))^2; at tan theta = n only one polarisation is mirrored, by cos^2 2 theta."""
     assert answers.fresnel(1.0, 1.5) == pytest.approx(0.04, rel=1e-12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
@@ -14,7 +15,7 @@ from wamnet.kernels.verify import renderers as R
 from wamnet.kernels.verify import run
 from wamnet.kernels.verify.case import Shot
 from wamnet.kernels.verify.cases import chosen, questions
-from wamnet.kernels.verify.judgement import FAILED, PASS, UNTESTED, Missing
+from wamnet.kernels.verify.judgement import DEVIATES, FAILED, PASS, UNTESTED, Missing
 from wamnet.kernels.verify.parts import NotExpressed, parts_of
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.materials import Mirror
@@ -89,6 +90,26 @@ def test_what_a_format_cannot_say_is_not_tested():
     ]
 
 
+def test_what_a_format_means_is_expected():
+    """A tinted mirror in glTF fades to white: its plain colour, 7 per cent off, deviates."""
+
+    def shows(*color):
+        picture = f"np.broadcast_to(np.array({color}), (int(sys.argv[3]),) * 2 + (3,))"
+        program = f"import sys; import numpy as np; np.savez(sys.argv[2], color={picture})"
+        command = (sys.executable, "-c", program, "{scene}", "{output}", "{width}")
+        renderer = R.ByCommand("test", "gltf", command, lambda path: {}, R.NPZ)
+        (verdict,) = [
+            v for v in run.verify(renderer, chosen(["mirror"]), pictures=4) if v.question.name == "mirror"
+        ]
+        return verdict
+
+    fades = [2.0 * (r + (1.0 - r) / 32.0) for r in (0.9, 0.6, 0.3)]
+    found = shows(*fades)
+    assert (found.state, found.profile, found.answer) == (PASS, "schlick-metals", tuple(fades))
+    found = shows(1.8, 1.2, 0.6)
+    assert (found.state, found.confirmed) == (DEVIATES, True)
+
+
 def test_no_sky_of_directions():
     with pytest.raises(NotExpressed, match="sky"):
         parts_of(daylight())
@@ -99,7 +120,7 @@ def said(form, shot):
     try:
         return R.FORMATS[form].write(shot, 7)
     except NotExpressed:
-        if form in ("povray", "luxcore"):
+        if form in ("povray", "luxcore", "gltf"):
             return None
         raise
 
@@ -120,6 +141,9 @@ def test_every_shot_is_written_or_refused_in_words(form):
             assert 'name="seed" value="7"' in text
         elif form in ("blender", "luxcore"):
             compile(text, shot.name, "exec")
+        elif form == "gltf":
+            assert '"seed": 7' in text
+            json.loads(text)
         else:
             assert text.count("{") == text.count("}")
     assert written >= 14
@@ -128,7 +152,7 @@ def test_every_shot_is_written_or_refused_in_words(form):
 def test_what_emits_and_is_no_matte_surface_is_refused():
     ball = Sphere((0.0, 0.0, 0.0), 1.0, (0.5, 0.5, 0.5), (1.0, 1.0, 1.0), Mirror())
     shot = Shot("odd", Scene("odd", empty().camera, spheres=(ball,)))
-    for form in ("mitsuba", "blender", "povray"):
+    for form in ("mitsuba", "blender", "povray", "gltf"):
         with pytest.raises(NotExpressed, match="emits"):
             R.FORMATS[form].write(shot, 1)
 

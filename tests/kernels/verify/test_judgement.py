@@ -166,6 +166,7 @@ class Drawn:
     """A renderer of one mean for large pictures and another one for small ones."""
 
     name = "drawn"
+    intents = ()
 
     def __init__(self, large, small):
         self.means = {SIZE: large, SIZE // 2: small}

@@ -267,6 +267,15 @@ KNOWN: Mapping[str, Known] = {
         EXR,
         "pip install --no-deps bpy",
     ),
+    "cycles-gltf": Known(
+        "gltf",
+        (
+            *(sys.executable, "-m", f"{__package__}.gltf_process", "{seeds}", "{outputs}"),
+            *("{scene}", "{width}", "{samples}", "{depth}"),
+        ),
+        EXR,
+        "pip install --no-deps bpy",
+    ),
     "luxcore": Known(
         "luxcore", (sys.executable, "{scene}", "{seeds}", "{outputs}"), NPZ, "pip install pyluxcore"
     ),

@@ -38,7 +38,8 @@ Name = Annotated[
     typer.Option(
         "--renderer",
         metavar="NAME",
-        help="A renderer that wamnet knows: wamnet, mitsuba, cycles, cycles-as-it-comes, luxcore or povray.",
+        help="A renderer that wamnet knows: wamnet, mitsuba, cycles, cycles-as-it-comes, cycles-gltf, "
+        "luxcore or povray.",
         show_default=False,
     ),
 ]

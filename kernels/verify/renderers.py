@@ -29,7 +29,7 @@ from ...refimpl.light.render import Job
 from ...refimpl.light.scene import to_json
 from ...refimpl.light.transport import Settings
 from ..run.render_frame import render_frame
-from . import write_blender, write_gltf, write_luxcore, write_mitsuba, write_povray
+from . import write_blender, write_gltf, write_luxcore, write_mitsuba, write_povray, write_three
 from .case import Shot
 from .judgement import FAILED, UNTESTED, Missing, Picture
 from .parts import NotExpressed
@@ -75,6 +75,7 @@ FORMATS: Mapping[str, Format] = {
     "povray": Format(write_povray.SUFFIX, write_povray.write),
     "luxcore": Format(write_luxcore.SUFFIX, write_luxcore.write),
     "gltf": Format(write_gltf.SUFFIX, write_gltf.write, ("schlick-metals",)),
+    "three": Format(write_three.SUFFIX, write_three.write, ("schlick-metals",)),
 }
 """Forms of scene files by name: a new one is a module and a line here."""
 

@@ -1,7 +1,7 @@
 """A shot as a glTF 2.0 file (.gltf, its buffer inside).
 
-1. Surfaces are triangles in world space with normals. Lamps and walls have a front only (`doubleSided`
-   false); other sheets have two sides. glTF has no lamps with an area: what emits is a surface
+1. Surfaces are triangles in world space with normals. Lamps, walls and bodies have a front only
+   (`doubleSided` false); other sheets have two sides. glTF has no lamps with an area: what emits is a surface
    (`emissiveFactor`, with `KHR_materials_emissive_strength` above 1).
 2. Matte is the metallic-roughness material without its specular part (`KHR_materials_specular`, factor 0).
    Metal and mirrors are metallic 1; glTF's roughness is the root of alpha. Their colour fades to white at

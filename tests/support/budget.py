@@ -28,7 +28,7 @@ BUDGET = {
     "kernels/judge": 1475,
     "kernels/bench": 4850,
     "kernels/export": 3200,
-    "kernels/verify": 2750,
+    "kernels/verify": 2900,
     "spec/conformance": 6150,
     "cli": 300,
     "cli/commands": 5460,

@@ -181,13 +181,13 @@ def box_differences(found, box):
 
 
 def look_differences(found, want, emission_slack):
-    """Yield what of a material is wrong; a root that is squared is off by two roundings."""
+    """Yield what of a material is wrong; a number that is converted and back is off by a few roundings."""
     kinds = {Mirror: "mirror", Conductor: "metal", Dielectric: "glass"}
     kind = kinds.get(type(want.material), "matte")
     if found.kind != kind:
         yield f"{found.kind} and not {kind}"
     number = want.material.parameter if kind in ("metal", "glass") else 0.0
-    if np.abs(found.number - number) > 4 * U64 * number:
+    if np.abs(found.number - number) > 16 * U64 * number:
         yield "roughness or index"
     if np.abs(np.subtract(found.color, want.color)).max() > U32:
         yield "reflectance"

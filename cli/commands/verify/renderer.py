@@ -58,7 +58,7 @@ Form = Annotated[
     typer.Option(
         "--format",
         metavar="NAME",
-        help="Form of the scene files: wamnet, mitsuba, blender, povray, luxcore or gltf.",
+        help="Form of the scene files: wamnet, mitsuba, blender, povray, luxcore, gltf or three.",
         show_default=False,
     ),
 ]

@@ -120,7 +120,7 @@ def said(form, shot):
     try:
         return R.FORMATS[form].write(shot, 7)
     except NotExpressed:
-        if form in ("povray", "luxcore", "gltf"):
+        if form in ("povray", "luxcore", "gltf", "three"):
             return None
         raise
 
@@ -141,7 +141,7 @@ def test_every_shot_is_written_or_refused_in_words(form):
             assert 'name="seed" value="7"' in text
         elif form in ("blender", "luxcore"):
             compile(text, shot.name, "exec")
-        elif form == "gltf":
+        elif form in ("gltf", "three"):
             assert '"seed": 7' in text
             json.loads(text)
         else:
@@ -152,7 +152,7 @@ def test_every_shot_is_written_or_refused_in_words(form):
 def test_what_emits_and_is_no_matte_surface_is_refused():
     ball = Sphere((0.0, 0.0, 0.0), 1.0, (0.5, 0.5, 0.5), (1.0, 1.0, 1.0), Mirror())
     shot = Shot("odd", Scene("odd", empty().camera, spheres=(ball,)))
-    for form in ("mitsuba", "blender", "povray", "gltf"):
+    for form in ("mitsuba", "blender", "povray", "gltf", "three"):
         with pytest.raises(NotExpressed, match="emits"):
             R.FORMATS[form].write(shot, 1)
 

@@ -1220,19 +1220,29 @@ typedef struct {
 /* ISC-5 */
 static double guarded(double x) { return fabs(x) >= 1e-15 ? x : x < 0 ? -1e-15 : 1e-15; }
 
-/* ISC-3: the slabs that a ray enters last and leaves first; of equal ones the first axis (ISC-8). */
-static bool meet_slabs(v3 center, v3 half, v3 o, v3 d, double *near, double *far, int *in, int *out) {
-    *near = -DBL_MAX;
-    *far = DBL_MAX;
+/* ISC-3: where a ray enters and leaves each slab. */
+static void slabs(v3 center, v3 half, v3 o, v3 d, v3 *enter, v3 *leave) {
     for (int k = 0; k < 3; k++) {
         double i = 1 / guarded(d.c[k]);
         double middle = (center.c[k] - o.c[k]) * i, reach = half.c[k] * fabs(i);
-        if (middle - reach > *near) {
-            *near = middle - reach;
+        enter->c[k] = middle - reach;
+        leave->c[k] = middle + reach;
+    }
+}
+
+/* ISC-4, ISC-8: the slabs that a ray enters last and leaves first; of equal ones the first axis. */
+static bool meet_slabs(v3 center, v3 half, v3 o, v3 d, double *near, double *far, int *in, int *out) {
+    v3 enter, leave;
+    slabs(center, half, o, d, &enter, &leave);
+    *near = -DBL_MAX;
+    *far = DBL_MAX;
+    for (int k = 0; k < 3; k++) {
+        if (enter.c[k] > *near) {
+            *near = enter.c[k];
             *in = k;
         }
-        if (middle + reach < *far) {
-            *far = middle + reach;
+        if (leave.c[k] < *far) {
+            *far = leave.c[k];
             *out = k;
         }
     }
@@ -1476,8 +1486,10 @@ static v3 visible_normal(double u0, double u1, v3 wo, double alpha) {
     return unit(vec(alpha * n.c[0], alpha * n.c[1], fmax(n.c[2], 0)));
 }
 
-static v3 above(v3 local) { return vec(local.c[0], local.c[1], fmax(local.c[2], 0)); }
+/* CDR-2, CDR-3: wo is 1e-7 above the surface at least. */
+static v3 above(v3 local) { return vec(local.c[0], local.c[1], fmax(local.c[2], 1e-7)); }
 
+/* CDR-3 */
 static scattered sample_conductor(const site *s, double u0, double u1) {
     double alpha = s->made_of.value;
     v3 wo = above(to_local(s->wo, s->normal)), m = visible_normal(u0, u1, wo, alpha), wi = mirrored(wo, m);
@@ -1493,14 +1505,20 @@ static double fresnel(double r, double c, double behind) {
     return behind == 0 && r > 1 ? 1 : 0.5 * (across * across + along * along);
 }
 
-/* DIE-2, DIE-4 */
+/* DIE-2 */
+static v3 refracted(v3 wo, v3 normal, double r, double c, double *behind) {
+    *behind = sqrt(fmax(0, (1 - r) * (1 + r) + r * c * (r * c)));
+    return unit(sub(scale(normal, r * c - *behind), scale(wo, r)));
+}
+
+/* DIE-4 */
 static scattered sample_dielectric(const site *s, double u_choice) {
     double r = s->outside ? 1 / s->made_of.value : s->made_of.value, c = clamp(dot(s->normal, s->wo), 0, 1);
-    double behind = sqrt(fmax(0, (1 - r) * (1 + r) + r * c * (r * c)));
+    double behind;
+    v3 through = refracted(s->wo, s->normal, r, c, &behind);
     if (u_choice < fresnel(r, c, behind))
         return (scattered){mirrored(s->wo, s->normal), s->reflectance, MISS, false};
-    v3 refracted = sub(scale(s->normal, r * c - behind), scale(s->wo, r));
-    return (scattered){unit(refracted), s->reflectance, MISS, true};
+    return (scattered){through, s->reflectance, MISS, true};
 }
 
 /* LAM-1, MIR-1 and the two above */
@@ -1562,12 +1580,20 @@ typedef struct {
     double pdf;
 } path;
 
-/* CAM-1, CAM-2, CAM-3 */
+/* CAM-1: forward, right and up. */
+static double axes(const camera *c, v3 axis[3]) {
+    axis[0] = unit(sub(c->look_at, c->position));
+    axis[1] = unit(cross(axis[0], c->up));
+    axis[2] = cross(axis[1], axis[0]);
+    return tan(c->fov * PI / 360);
+}
+
+/* CAM-2, CAM-3 */
 static v3 camera_direction(const camera *c, double width, double height, double x, double y) {
-    v3 forward = unit(sub(c->look_at, c->position)), right = unit(cross(forward, c->up));
-    v3 up = cross(right, forward);
-    double reach = tan(c->fov * PI / 360) / height;
-    return unit(add(add(forward, scale(right, (2 * x - width) * reach)), scale(up, (height - 2 * y) * reach)));
+    v3 axis[3];
+    double reach = axes(c, axis) / height;
+    v3 aside = scale(axis[1], (2 * x - width) * reach), up = scale(axis[2], (height - 2 * y) * reach);
+    return unit(add(add(axis[0], aside), up));
 }
 
 /* RNG-4 */
@@ -1697,8 +1723,11 @@ static bool scatter(const world *w, path *p, const hit *h, v3 reflectance, uint3
 /* ENC-1 */
 static double srgb_encode(double x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055; }
 
-/* ENC-4, ENC-5 */
-static double to_display(double linear, double stops) { return srgb_encode(clamp(linear * exp2(stops), 0, 1)); }
+/* ENC-4 */
+static double exposed(double linear, double stops) { return linear * exp2(stops); }
+
+/* ENC-5 */
+static double to_display(double linear, double stops) { return srgb_encode(clamp(exposed(linear, stops), 0, 1)); }
 
 static const char *const FEATURES[] = {"color",    "albedo",    "normal",    "depth",
                                        "position", "direction", "unshadowed"};
@@ -2507,6 +2536,24 @@ static void do_random_block(const json *in) {
     answer_array("floats", (array){.axes = 1, .shape = {4}, .count = 4, .values = floats});
 }
 
+static void do_pcg4d(const json *in) {
+    words v = {{counter(in, "x"), counter(in, "y"), counter(in, "z"), counter(in, "w")}};
+    answer_wholes("words", pcg4d(v).w, 4);
+}
+
+static void do_float(const json *in) { answer_number("float", uniform(counter(in, "word"))); }
+
+static void do_scrambled(const json *in) {
+    uint32_t found = scrambled(counter(in, "fraction"), counter(in, "key"));
+    answer_wholes("words", &found, 1);
+}
+
+static void do_point(const json *in) {
+    uint32_t found[4];
+    for (int d = 0; d < 4; d++) found[d] = sobol(counter(in, "index"), d);
+    answer_wholes("words", found, 4);
+}
+
 static void do_vector(const json *in) {
     v3 a = vec_in(in, "a"), b = vec_in(in, "b"), c = vec_in(in, "c");
     const v3 rows[3] = {a, b, c};
@@ -2567,6 +2614,21 @@ static void do_tangents(const json *in) {
     answer_vec("bitangent", other);
 }
 
+static void do_to_world(const json *in) {
+    v3 vector = vec_in(in, "vector"), normal = vec_in(in, "normal");
+    answer_vec("world", to_world(vector, normal));
+    answer_vec("local", to_local(vector, normal));
+}
+
+static void do_axes(const json *in) {
+    camera c = {vec_in(in, "position"), vec_in(in, "look_at"), vec_in(in, "up"), number(in, "vertical_fov_deg")};
+    v3 axis[3];
+    answer_number("tan_half_fov", axes(&c, axis));
+    answer_vec("forward", axis[0]);
+    answer_vec("right", axis[1]);
+    answer_vec("up", axis[2]);
+}
+
 static void do_camera(const json *in) {
     camera c = {vec(0.5, 1, 4), vec(0, -0.2, 0), UP, 41};
     answer_vec("origin", c.position);
@@ -2599,6 +2661,13 @@ static void meet(const json *in, const scene *s, bool normal, bool surface_too) 
     answer_number("t", h.t);
     if (normal) answer_vec("normal", h.normal);
     if (surface_too) answer_number("surface", (double)h.id);
+}
+
+static void do_slabs(const json *in) {
+    v3 enter, leave;
+    slabs(TEST_BOX.center, TEST_BOX.half, vec_in(in, "origin"), vec_in(in, "direction"), &enter, &leave);
+    answer_vec("enter", enter);
+    answer_vec("leave", leave);
 }
 
 static void do_sphere(const json *in) {
@@ -2643,6 +2712,28 @@ static void answer_scattered(const json *in, const site *s) {
     answer_number("pdf", found.pdf);
 }
 
+static void do_ggx(const json *in) { answer_number("density", ggx(vec_in(in, "m"), number(in, "roughness"))); }
+
+static void do_schlick(const json *in) {
+    answer_vec("reflected", schlick(vec_in(in, "reflectance"), number(in, "cosine")));
+}
+
+static void do_visible_normal(const json *in) {
+    double u0 = number(in, "u0"), u1 = number(in, "u1"), alpha = number(in, "roughness");
+    answer_vec("m", visible_normal(u0, u1, vec_in(in, "wo"), alpha));
+}
+
+static void do_refracted(const json *in) {
+    v3 wo = vec_in(in, "wo"), normal = vec_in(in, "normal");
+    double behind;
+    answer_vec("direction", refracted(wo, normal, number(in, "ratio"), clamp(dot(wo, normal), 0, 1), &behind));
+    answer_number("cosine", behind);
+}
+
+static void do_fresnel(const json *in) {
+    answer_number("share", fresnel(number(in, "ratio"), number(in, "cosine"), number(in, "behind")));
+}
+
 static void do_lambertian(const json *in) {
     site s = site_in(in, (material){0});
     answer_scattered(in, &s);
@@ -2682,6 +2773,21 @@ static const part TERRACE_LAMPS[2] = {{.corner = {{0.25, 1.75, 0.25}}, .edge_u =
                                        .edge_v = {{0, 0, 0.5}}, .color = {{1, 0.75, 0.5}}, .power = 12},
                                       {.corner = {{-1.25, 1, 0.25}}, .edge_u = {{0, 0.5, 0}},
                                        .edge_v = {{0.5, 0, 0.125}}, .color = {{0.25, 0.5, 1}}, .power = 4}};
+
+static void do_lamp(const json *in) {
+    part lamp = {.edge_u = vec_in(in, "edge_u"), .edge_v = vec_in(in, "edge_v"), .color = vec_in(in, "color")};
+    lamp.power = number(in, "power");
+    answer_vec("radiance", light_radiance(&lamp));
+}
+
+static void do_light_pdf(const json *in) {
+    world w = {.from = {.lights = {get(2, sizeof(part)), 2}, .above = {.given = true}}};
+    memcpy(w.from.lights.items, TERRACE_LAMPS, sizeof TERRACE_LAMPS);
+    weigh_lights(&w);
+    double square = number(in, "square"), cosine = number(in, "cosine");
+    answer_number("lamp_0", light_pdf(&w, 0, square, cosine));
+    answer_number("lamp_1", light_pdf(&w, 1, square, cosine));
+}
 
 static void do_unshadowed(const json *in) {
     parts lamps = {get(2, sizeof(part)), 2};
@@ -2975,6 +3081,12 @@ static void do_whole_rounded_on(const json *in) {
     answer_rounded(&made);
 }
 
+static void do_srgb(const json *in) { answer_number("encoded", srgb_encode(number(in, "linear"))); }
+
+static void do_exposed(const json *in) {
+    answer_number("exposed", exposed(number(in, "linear"), number(in, "exposure_stops")));
+}
+
 static void do_display(const json *in) { answer_number("encoded", to_display(number(in, "linear"), 0)); }
 
 static void do_sine(const json *in) { answer_number("sin", emitted_sine(number(in, "x"))); }
@@ -3122,7 +3234,11 @@ static const struct {
     const char *name;
     void (*answer)(const json *in);
 } KINDS[] = {
+    {"random.pcg4d", do_pcg4d},
+    {"random.float", do_float},
     {"random.block", do_random_block},
+    {"random.scrambled", do_scrambled},
+    {"random.point", do_point},
     {"random.sobol", do_sobol},
     {"sampling.concentric_disk", do_disk},
     {"sampling.cosine_hemisphere", do_hemisphere},
@@ -3130,18 +3246,28 @@ static const struct {
     {"sampling.quad", do_quad},
     {"sampling.discrete", do_discrete},
     {"sampling.tangent_frame", do_tangents},
+    {"sampling.to_world", do_to_world},
+    {"camera.axes", do_axes},
     {"camera.ray", do_camera},
+    {"intersection.slabs", do_slabs},
     {"intersection.sphere", do_sphere},
     {"intersection.quad", do_plane},
     {"intersection.box", do_box},
     {"intersection.turned_box", do_turned_box},
     {"intersection.room", do_room},
     {"intersection.nearest", do_nearest},
+    {"material.ggx", do_ggx},
+    {"material.schlick", do_schlick},
+    {"material.visible_normal", do_visible_normal},
+    {"material.refracted", do_refracted},
+    {"material.fresnel", do_fresnel},
     {"material.lambertian", do_lambertian},
     {"material.mirror", do_mirror},
     {"material.conductor", do_conductor},
     {"material.conductor_value", do_conductor_value},
     {"material.dielectric", do_dielectric},
+    {"transport.lamp", do_lamp},
+    {"transport.light_pdf", do_light_pdf},
     {"transport.mis_weight", do_mis},
     {"transport.unshadowed", do_unshadowed},
     {"sky.radiance", do_sky_radiance},
@@ -3163,6 +3289,8 @@ static const struct {
     {"whole.forward", do_whole_forward},
     {"whole.rounded", do_whole_rounded},
     {"whole.rounded_on", do_whole_rounded_on},
+    {"encoding.srgb", do_srgb},
+    {"encoding.exposed", do_exposed},
     {"encoding.display", do_display},
     {"sine", do_sine},
     {"image.features", do_features},

@@ -23,7 +23,7 @@ from ...refimpl.errors import InputError
 from ...refimpl.reading import parse_json, plain_name, read_file, refusing
 from .numbers import from_file, from_json, rounded_up, to_json
 
-VERSION = "1.5.0"
+VERSION = "1.6.0"
 """Version of format, behaviour and cases."""
 
 FORMAT = "wamnet-vectors"
@@ -50,7 +50,9 @@ class Output:
 
 @dataclass(frozen=True)
 class Case:
-    """One question to a program, and the answer. `expected` None: the program must refuse the input."""
+    """One question to a program, and the answer. `expected` None: the program must refuse the input.
+
+    `refusal`: what is blamed where it refuses a valid one, if that is not the case's clause."""
 
     id: str
     clause: str
@@ -58,18 +60,21 @@ class Case:
     expected: Mapping[str, Output] | None
     flags: tuple[str, ...] = ()
     note: str = ""
+    refusal: str = ""
 
     @property
     def clauses(self) -> tuple[str, ...]:
-        """Return the clauses that a deviation may be blamed on: that of the case, and those of outputs."""
-        own = (output.clause for output in (self.expected or {}).values() if output.clause)
-        return (self.clause, *own)
+        """Return the clauses that a deviation may be blamed on: those of the case, and those of outputs."""
+        own = (output.clause for output in (self.expected or {}).values())
+        return (self.clause, *(clause for clause in (*own, self.refusal) if clause))
 
     def to_json(self) -> dict[str, Any]:
         """Return the case in the form of JSON."""
         data: dict[str, Any] = {"id": self.id, "clause": self.clause, "flags": list(self.flags)}
         if self.note:
             data["note"] = self.note
+        if self.refusal:
+            data["refusal"] = self.refusal
         data |= {"valid": self.expected is not None, "input": to_json(dict(self.inputs))}
         if self.expected is not None:
             data["expected"] = {name: _output_json(output) for name, output in self.expected.items()}
@@ -144,7 +149,8 @@ def _case(data: Mapping[str, Any], folder: Path) -> Case:
         expected = {name: _output(o) for name, o in data["expected"].items()}
     flags, note = tuple(data["flags"]), data.get("note", "")
     inputs = {name: _placed(value, folder) for name, value in data["input"].items()}
-    return Case(str(data["id"]), str(data["clause"]), inputs, expected, flags, note)
+    refusal = str(data.get("refusal", ""))
+    return Case(str(data["id"]), str(data["clause"]), inputs, expected, flags, note, refusal)
 
 
 def _output(data: Mapping[str, Any]) -> Output:

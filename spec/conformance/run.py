@@ -144,7 +144,7 @@ def judge(kind: str, case: Case, answer: Mapping[str, Any]) -> Verdict:
         return Verdict(case.id, kind, case.clause, PASS if refused else FAIL, text)
     if refused:
         text = f"a valid input was refused: {str(answer['refused'])[:200]}"
-        return Verdict(case.id, kind, case.clause, FAIL, text)
+        return Verdict(case.id, kind, case.refusal or case.clause, FAIL, text)
     outputs = answer.get("output")
     if not isinstance(outputs, dict):
         return Verdict(case.id, kind, case.clause, GARBAGE, "the answer has no output")

@@ -94,6 +94,7 @@ def _case_schema() -> dict[str, Any]:
             "clause": {"$ref": "#/$defs/clause"},
             "flags": {"type": "array", "items": {"enum": ["undecided", "statistical"]}, "uniqueItems": True},
             "note": {"type": "string", "minLength": 1},
+            "refusal": {"$ref": "#/$defs/clause"},
             "valid": {"type": "boolean"},
             "input": {"type": "object", "minProperties": 1},
             "expected": {

@@ -14,7 +14,7 @@ from wamnet.refimpl.light import camera, environment, intersection, sampling, tr
 from wamnet.refimpl.light.materials import conductor, dielectric
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import adam, dataset, siren
-from wamnet.spec.conformance import blocks, case, program, run, vectors
+from wamnet.spec.conformance import blocks, case, program, report, run, vectors
 from wamnet.spec.conformance.functions import Field, Function
 from wamnet.spec.conformance.kinds import FUNCTIONS, KINDS, paths
 from wamnet.spec.conformance.numbers import from_json, to_json
@@ -71,7 +71,7 @@ MUTANTS = {
         "random.block",
         "RNG-3",
     ),
-    "floats of 23 bits": (rng, "MANTISSA_BITS", 23, "random.block", "RNG-3"),
+    "floats of 23 bits": (rng, "MANTISSA_BITS", 23, "random.float", "RNG-5"),
     "gamma of 2.2": (encoding, "GAMMA", 2.2, "encoding.display", "ENC-5"),
     "epsilon of 1e-7": (adam, "EPSILON", 1e-7, "adam.step", "ADM-1"),
     "beta_2 of 0.99": (adam, "BETA_2", 0.99, "adam.run", "ADM-1"),
@@ -156,6 +156,46 @@ def test_mutants_of_the_reference_are_caught_and_blamed(monkeypatch, name):
         monkeypatch.setattr(adam.step, "__defaults__", (adam.BETA_1, value, adam.EPSILON))
     failed = {v.clause for v in judged(kind, program.of_reference) if v.failed}
     assert clause in failed
+
+
+@pytest.mark.parametrize(
+    ("kind", "note", "clause"),
+    [
+        ("file.camera", "as JSON is written", "RDG-3"),
+        ("file.camera", "a key in escapes", "RDG-2"),
+        ("file.scene", "camera only", "SCN-6"),
+        ("file.scene", "a sphere: its .radius", "SPH-1"),
+        ("file.scene", "background left out", "SCN-6"),
+        ("picture.exact", "terrace", "RND-6"),
+    ],
+)
+def test_a_valid_input_that_is_refused_is_blamed_on_the_rule(kind, note, clause):
+    _, cases = case.load(vectors.FOLDER / f"{kind}.json")
+    found = next(c for c in cases if c.note == note)
+    verdict = run.judge(kind, found, {"refused": "no"})
+    assert (verdict.verdict, verdict.clause) == ("fail", clause)
+    assert clause in found.clauses
+
+
+MADE_OF = (
+    ("random.pcg4d", "random.block"),
+    ("random.scrambled", "random.sobol"),
+    ("random.point", "random.sobol"),
+    ("sampling.to_world", "sampling.cosine_hemisphere"),
+    ("camera.axes", "camera.ray"),
+    ("intersection.slabs", "intersection.box"),
+    ("material.ggx", "material.conductor"),
+    ("material.fresnel", "material.dielectric"),
+    ("transport.light_pdf", "path.arrive"),
+    ("encoding.srgb", "encoding.display"),
+)
+"""Kinds of functions that clauses share, and kinds that are made of them."""
+
+
+@pytest.mark.parametrize(("part", "whole"), MADE_OF)
+def test_what_a_kind_is_made_of_is_looked_at_first(part, whole):
+    verdicts = [run.Verdict(f"{kind}/0", kind, "CNF-1", "fail") for kind in (whole, part)]
+    assert report.first_blamed(verdicts).kind == part
 
 
 def test_a_biased_render_is_caught(monkeypatch):

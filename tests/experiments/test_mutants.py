@@ -98,7 +98,8 @@ def test_reasons_have_a_sort_and_fit_changes(tmp_path):
 
 
 def test_each_reason_fits_as_many_mutants_as_it_says():
-    assert mutants.faults(mutants.chosen([], None, 0), mutants.reasons()) == []
+    every = mutants.chosen([], None, 0) + mutants.chosen([], None, 0, c99=True)
+    assert mutants.faults(every, mutants.reasons()) == []
 
 
 def test_reasons_that_fit_nothing_more_than_they_say_or_what_has_one_are_wrong(tmp_path):

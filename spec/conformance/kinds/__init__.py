@@ -17,6 +17,7 @@ KINDS: Mapping[str, Kind] = {
     kind.name: kind
     for kind in (
         *numbers.KINDS,
+        *light.KINDS,
         *paths.KINDS,
         *network.KINDS,
         *images.KINDS,

@@ -7,7 +7,7 @@ import hashlib
 import json
 import struct
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -296,8 +296,8 @@ BEYOND: Mapping[str, Callable[[], bytes]] = {
 
 
 GOVERNING = {
-    "scale": "DAT-2", "position_center": "DAT-2", "exposure_stops": "DAT-2", "pixel": "DAT-9",
-    "parameter": "DEN-1", "omega_0 ": "DEN-1", "biases": "DEN-1", "weights": "DEN-1", "outputs": "DEN-1",
+    "scale": "MOD-6", "position_center": "MOD-6", "exposure_stops": "MOD-6", "pixel": "DAT-9",
+    "parameter": "MOD-6", "omega_0 ": "MOD-6", "biases": "DEN-1", "weights": "DEN-1", "outputs": "DEN-1",
     "layers of": "DEN-1",
 }  # fmt: skip
 """Clauses of what is at its limit, by what a note says of it."""
@@ -332,7 +332,8 @@ def _model_cases() -> list[Case]:
         clause = (
             next((known for part, known in GOVERNING.items() if part in note), clause) if later else clause
         )
-        cases.append(Case(f"file.model/{len(cases)}", clause, inputs, expected, (), note))
+        refusal = "" if note not in good else "DAT-1" if "features" in note else "MOD-6"
+        cases.append(Case(f"file.model/{len(cases)}", clause, inputs, expected, (), note, refusal))
     return cases
 
 
@@ -456,21 +457,35 @@ FIRST_OF_VALUES = "an angle of 180 degrees"
 def _scene_cases() -> list[Case]:
     """Return good and bad scenes."""
     cases, names = list[Case](), list(SCENE_BAD)
+    _add_scenes(cases, rules.first_good(), bad=False)
     for note, text in [*SCENE_GOOD.items(), *SCENE_BAD.items(), *SCENE_LATER.items()]:
         inputs, bad = {"text": text()}, note in SCENE_BAD
         expected = None if bad else {name: Output(v) for name, v in _scene(inputs).items()}
         form = bad and names.index(note) < names.index(FIRST_OF_VALUES)
         read = "SCN-10" if note in SCENE_LATER else "SCN-8"
         clause = read if not bad else "SCN-6" if form else "SCN-7"
-        cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note))
-    for found, bad in ((rules.good(), False), (rules.bad(), True), (rules.last_good(), False)):
-        for note, content in found:
-            inputs = {"text": content}
-            expected = None if bad else {name: Output(v) for name, v in _scene(inputs).items()}
-            form = bad and ("left out" in note or "too many" in note)
-            clause = "RDG-3" if form else rules.governing(note, "SCN-7" if bad else "SCN-8")
-            cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note))
+        refusal = "" if bad else "SCN-7"
+        cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note, refusal))
+    for found, bad in (
+        (rules.good(), False),
+        (rules.bad(), True),
+        (rules.last_good(), False),
+        (rules.last_bad(), True),
+    ):
+        _add_scenes(cases, found, bad)
     return cases
+
+
+def _add_scenes(cases: list[Case], found: Iterator[tuple[str, str]], bad: bool) -> None:
+    """Append scenes of notes and texts, which are read or to be refused."""
+    for note, content in found:
+        inputs = {"text": content}
+        own = "SCN-6" if "left out" in note else "SCN-8"
+        expected = None if bad else {name: Output(v, clause=own) for name, v in _scene(inputs).items()}
+        form = bad and ("left out" in note or "too many" in note)
+        clause = "RDG-3" if form else rules.governing(note, "SCN-7" if bad else "SCN-8")
+        refusal = "" if bad else rules.refusal(note)
+        cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note, refusal))
 
 
 KINDS = (

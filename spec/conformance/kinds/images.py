@@ -117,7 +117,7 @@ def _feature_cases() -> list[Case]:
         shown = {n: v if bad else v[1:] for n, v in layers.items() if n in wanted}  # bad ones are in row 0
         inputs = {**shown, "features": names, **SCALES}
         expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}
-        cases.append(Case(f"image.features/{len(cases)}", clause, inputs, expected, (), note))
+        cases.append(Case(f"image.features/{len(cases)}", clause, inputs, expected, (), note, "DAT-9"))
     all_of = ("position", "depth", "color", "unshadowed", "normal")
     shown = {name: v for name, v in bad_layers(3, 2, 60).items() if name in all_of}
     shown["normal"] = single(-1.5 * shown["normal"])
@@ -176,7 +176,7 @@ def _window_cases() -> list[Case]:
         clause = (
             "DAT-5" if "corner" in note or "an image" in note else "DAT-6" if "taps row" in note else "DAT-4"
         )
-        cases.append(Case(f"image.window/{len(cases)}", clause, inputs, expected, (), note))
+        cases.append(Case(f"image.window/{len(cases)}", clause, inputs, expected, (), note, "DAT-9"))
     image = np.zeros((2, 2, 1), np.int64)
     for size, border in ((0, "clamp"), (65, "clamp"), (3, "mirror"), (-1, "zero"), (2, "")):
         inputs = {"image": image, "size": size, "border": border, "x": 0, "y": 0}
@@ -295,6 +295,7 @@ def _small() -> list[tuple[str, Array, Array]]:
             np.array([[[0.5, 0.5, 0.5 + 2**-24]]]),
         ),
         ("negative and huge radiance", np.array([[[-2.0, 1e6, 0.0]]]), np.array([[[1.0, 1e-3, 0.0]]])),
+        ("a negative reference", np.array([[[0.25, -0.5, -2.0]]]), np.array([[[-0.5, -0.75, 1.0]]])),
     ]
 
 

@@ -2,17 +2,93 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ....refimpl import vectors
 from ....refimpl.light import camera, sampling
-from ....refimpl.light.scene import Camera
-from ....refimpl.light.shapes.quad import quad_distance
-from ....refimpl.light.shapes.shape import MISS
-from ....refimpl.light.shapes.sphere import sphere_distance
+from ....refimpl.light.scene import Camera, Light, Quad, Sphere
+from ....refimpl.light.shapes.quad import light_radiance, quad_row
+from ....refimpl.light.shapes.shape import BLACK, MISS
+from ..case import Case, Kind, Output
 from ..functions import Field, Function, Numbers
+
+ROUNDED = "float64, rounded once to float32"
+"""Where bounds of numbers come from that are computed once for a scene: with a margin, one ulp."""
+
+
+def layout_kind(
+    name: str,
+    title: str,
+    clause: str,
+    inputs: Mapping[str, str],
+    outputs: Mapping[str, str],
+    call: Callable[[Mapping[str, Any]], dict[str, Any]],
+    rows: Sequence[tuple[Any, ...]],
+) -> Kind:
+    """Return a kind of numbers that are computed once for a scene, in float64; each row has all inputs."""
+
+    def cases() -> list[Case]:
+        found = []
+        for index, row in enumerate(rows):
+            given = {key: np.asarray(value, np.float64) for key, value in zip(inputs, row, strict=True)}
+            ulps = {key: np.maximum(2.0**-23 * np.abs(value), 2.0**-26) for key, value in call(given).items()}
+            expected = {key: Output(value, ulps[key], ROUNDED) for key, value in call(given).items()}
+            found.append(Case(f"{name}/{index}", clause, given, expected))
+        return found
+
+    return Kind(name, title, inputs, outputs, cases, call)
+
+
+def _axes(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a camera's rays are made of."""
+    place, at, up = (tuple(map(float, given[name])) for name in ("position", "look_at", "up"))
+    basis = camera.camera_basis(Camera(place, at, up, float(given["vertical_fov_deg"])))  # type: ignore[arg-type]
+    return {name: np.asarray(getattr(basis, name)) for name in ("forward", "right", "up", "tan_half_fov")}
+
+
+AXES = layout_kind(
+    "camera.axes",
+    "The axes of a camera",
+    "CAM-1",
+    {**dict.fromkeys(("position", "look_at", "up"), "float[3]"), "vertical_fov_deg": "float, degrees"},
+    {**dict.fromkeys(("forward", "right", "up"), "float[3], unit"), "tan_half_fov": "float, tan(fov/2)"},
+    _axes,
+    (
+        ((0.0, 0.0, 0.0), (0.0, 0.0, -2.0), (0.0, 1.0, 0.0), 90.0),
+        ((0.5, 1.0, 4.0), (0.0, -0.25, 0.0), (0.25, 1.0, 0.5), 40.0),
+        ((3.0, -2.0, 1.0), (-1.0, 0.5, 2.0), (0.0, 0.0, 3.0), 100.0),
+    ),
+)
+"""Cameras."""
+
+
+def _lamp(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the radiance of a lamp."""
+    u, v, color = (tuple(map(float, given[name])) for name in ("edge_u", "edge_v", "color"))
+    lamp = Light((0.0, 0.0, 0.0), u, v, color, float(given["power"]))  # type: ignore[arg-type]
+    return {"radiance": np.array(light_radiance(lamp))}
+
+
+LAMP = layout_kind(
+    "transport.lamp",
+    "The radiance of a lamp",
+    "SCN-5",
+    {**dict.fromkeys(("edge_u", "edge_v", "color"), "float[3]"), "power": "float, W"},
+    {"radiance": "float[3], W/(sr m^2)"},
+    _lamp,
+    (
+        ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0), 1.0),
+        ((2.0, 0.0, 0.5), (0.25, -1.5, 0.0), (1.0, 0.75, 0.25), 12.0),
+        ((0.5, 0.25, 0.0), (1.0, -0.25, 3.0), (0.0, 0.5, 2.0), 3.5),
+    ),
+)
+"""Lamps."""
+
+KINDS = (AXES, LAMP)
+"""Kinds of this module that are not functions which executors run."""
 
 CAMERA = Camera((0.5, 1.0, 4.0), (0.0, -0.2, 0.0), (0.0, 1.0, 0.0), 41.0)
 """The camera of all camera rays: it looks down and to the left."""
@@ -62,6 +138,7 @@ VECTOR = Function(
     },
     _vector,
     [
+        ("of six primes", {"a": (2.0, 3.0, 5.0), "b": (7.0, 11.0, 13.0), "c": (17.0, 19.0, 23.0)}),
         ("axes", {"a": (1.0, 0.0, 0.0), "b": (0.0, 1.0, 0.0), "c": (0.0, 0.0, 1.0)}),
         ("the largest is the last one", {"a": (-3.0, 1.0, 2.0), "b": (2.0, -1.0, 0.5), "c": (1.0, 2.0, 3.0)}),
         (
@@ -176,6 +253,28 @@ def _unit(u: np.ndarray) -> np.ndarray:
     return np.asarray(v / np.sqrt(v @ v), np.float32)
 
 
+TURNED = Function(
+    "sampling.to_world",
+    "Directions from local to world terms, and back",
+    "SMP-6",
+    {"vector": Field("a vector", 3, -2.0, 2.0), "normal": Field("unit normal", 3, -1.0)},
+    {
+        "world": Field("the vector, taken for a local one, in world terms", 3),
+        "local": Field("the vector, taken for one of the world, in local terms", 3),
+    },
+    lambda given, dtype: {
+        "world": sampling.to_world(given["vector"], given["normal"]),
+        "local": sampling.to_local(given["vector"], given["normal"]),
+    },
+    [
+        ("up", {"vector": (2.0, 0.75, 0.5), "normal": (0.0, 0.0, 1.0)}),
+        ("along x", {"vector": (2.0, 0.75, 0.5), "normal": (1.0, 0.0, 0.0)}),
+    ],
+    lambda u: {"vector": 2.0 * u[3:6] - 1.0, "normal": _unit(u)},
+    draws=4,
+)
+"""The frame of a normal."""
+
 RAY_FIELDS = {
     "origin": Field("where the ray starts", 3, -5_000.0, 5_000.0),
     "direction": Field("unit direction", 3, -1.0),
@@ -191,8 +290,9 @@ SPHERE_CENTER, SPHERE_RADIUS = (0.25, -0.5, 0.125), 0.75
 
 def _sphere(given: Numbers, dtype: Any) -> dict[str, Any]:
     """Return the distance of the sphere."""
-    center, radius = np.asarray(SPHERE_CENTER, dtype), dtype(SPHERE_RADIUS)
-    return {"t": sphere_distance(center, radius, given["origin"], given["direction"])}
+    row = Sphere(SPHERE_CENTER, SPHERE_RADIUS, BLACK).row
+    rounded = tuple(np.asarray(part, dtype) for part in row)
+    return {"t": Sphere.distance(rounded, given["origin"], given["direction"])}
 
 
 def _aimed(u: np.ndarray) -> dict[str, Any]:
@@ -230,17 +330,8 @@ QUAD = ((-0.5, 0.25, -0.75), (1.5, 0.0, 0.25), (0.25, 0.0, 2.0))
 
 def _quad(given: Numbers, dtype: Any) -> dict[str, Any]:
     """Return the distance of the parallelogram."""
-    corner, u, v = (np.array(part, np.float64) for part in QUAD)
-    normal = vectors.cross(u, v)
-    square = vectors.dot(normal, normal)
-    rows = (
-        corner,
-        vectors.cross(v, normal) / square,
-        vectors.cross(normal, u) / square,
-        vectors.normalize(normal),
-    )
-    corner, dual_u, dual_v, normal = (np.asarray(part, dtype) for part in rows)
-    return {"t": quad_distance((corner, dual_u, dual_v, normal), given["origin"], given["direction"])}
+    row = tuple(np.asarray(part, dtype) for part in quad_row(Quad(*QUAD, BLACK)))
+    return {"t": Quad.distance(row, given["origin"], given["direction"])}
 
 
 def _on_quad(a: float, b: float, y: float) -> tuple[float, float, float]:
@@ -366,5 +457,5 @@ def _discrete(u: Any, dtype: Any) -> dict[str, Any]:
     return {"index": index.astype(dtype), "probability": sampling.discrete_pdf(index, cumulative)}
 
 
-FUNCTIONS = (VECTOR, RAY, DISK, HEMISPHERE, CAUCHY, SAMPLE_QUAD, DISCRETE, FRAME, SPHERE, PLANE)
+FUNCTIONS = (VECTOR, RAY, DISK, HEMISPHERE, CAUCHY, SAMPLE_QUAD, DISCRETE, FRAME, TURNED, SPHERE, PLANE)
 """The functions of this module."""

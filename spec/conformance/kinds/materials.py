@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from ....refimpl.light import environment, transport
 from ....refimpl.light.intersection import reflecting
 from ....refimpl.light.materials import Conductor, Dielectric, Lambertian, Mirror
-from ....refimpl.light.materials.dielectric import fresnel
+from ....refimpl.light.materials.conductor import distribution, sample_visible_normal, schlick
+from ....refimpl.light.materials.dielectric import fresnel, refract
 from ....refimpl.light.materials.material import Site
 from ....refimpl.light.scene import Sky
+from ....refimpl.vectors import dot
 from ..functions import Field, Function, Numbers
-from .light import UNIFORM, _unit
+from .light import UNIFORM, _pair, _unit
 from .terrace import TERRACE
 
 VERTEX = {
@@ -104,6 +106,68 @@ MIRROR = Function(
 ROUGHNESS = Field("GGX's alpha", 0, 0.001)
 """Roughness of a metal."""
 
+LOCAL = {"roughness": ROUGHNESS}
+"""What a microscopic mirror depends on."""
+
+GGX = Function(
+    "material.ggx",
+    "The density of the normals of microscopic mirrors",
+    "CDR-1",
+    {"m": Field("unit normal in local terms", 3, -1.0), **LOCAL},
+    {"density": Field("D(m), 1/sr")},
+    lambda given, dtype: {"density": distribution(given["m"], given["roughness"])},
+    [
+        ("the surface's own normal", {"m": (0.0, 0.0, 1.0), "roughness": 0.5}),
+        ("as rough as can be", {"m": SLANT, "roughness": 1.0}),
+        ("two horizontal parts", {"m": (0.48, 0.6, 0.64), "roughness": 0.25}),
+    ],
+    lambda u: {"m": _unit(u), "roughness": 0.05 + 0.9 * u[3]},
+    draws=4,
+)
+"""GGX."""
+
+SCHLICK = Function(
+    "material.schlick",
+    "The reflectance of a metal at an angle",
+    "CDR-4",
+    {"reflectance": VERTEX["reflectance"], "cosine": Field("wo . m")},
+    {"reflected": Field("F", 3)},
+    lambda given, dtype: {"reflected": schlick(given["reflectance"], given["cosine"])},
+    [
+        ("from above", {"reflectance": GOLD, "cosine": 1.0}),
+        ("along the surface", {"reflectance": GOLD, "cosine": 0.0}),
+        ("at 60 degrees", {"reflectance": GOLD, "cosine": 0.5}),
+    ],
+    lambda u: {"reflectance": u[:3], "cosine": u[3]},
+    draws=3,
+)
+"""Schlick's approximation."""
+
+VISIBLE = Function(
+    "material.visible_normal",
+    "A normal of a microscopic mirror as seen from wo",
+    "CDR-3",
+    {**UNIFORM, "wo": Field("unit direction in local terms, above the surface", 3, -1.0), **LOCAL},
+    {"m": Field("unit normal in local terms", 3)},
+    lambda given, dtype: {
+        "m": sample_visible_normal(given["u0"], given["u1"], given["wo"], given["roughness"])
+    },
+    [
+        ("from above", {"u0": 0.25, "u1": 0.625, "wo": (0.0, 0.0, 1.0), "roughness": 0.25}),
+        ("slanted", {"u0": 0.25, "u1": 0.625, "wo": (0.48, 0.6, 0.64), "roughness": 0.5}),
+    ],
+    lambda u: {**_pair(u), "wo": _raised(u[2:]), "roughness": 0.05 + 0.9 * u[5]},
+    draws=4,
+)
+"""Heitz's normals."""
+
+
+def _raised(u: Any) -> Any:
+    """Return a unit vector above the surface, in local terms."""
+    found = _unit(u)
+    return found * np.sign(found[2])
+
+
 CONDUCTOR = Function(
     "material.conductor",
     "A rough metal sends a path on",
@@ -137,6 +201,10 @@ CONDUCTOR_VALUE = Function(
         ("the mirrored direction", {**_at(0, 0), "wi": (-0.6, 0.8, 0.0), "roughness": 0.25}),
         ("back where it came from", {**_at(0, 0), "wi": SLANT, "roughness": 0.5}),
         ("off the lobe", {**_at(0, 0), "wi": (0.0, 0.6, 0.8), "roughness": 0.0625}),
+        (
+            "seen along the surface: its height counts as 1e-7",
+            {**_at(0, 0, wo=(1.0, 0.0, 0.0)), "wi": (-1.0, 1e-6, 0.0), "roughness": 1.0},
+        ),
     ],
     lambda u: {**_vertex(u), "wi": _above(u), "roughness": 0.05 + 0.9 * u[12]},
     draws=4,
@@ -162,8 +230,12 @@ def _valued(given: Numbers) -> dict[str, Any]:
     return {"value": color * factor[..., np.newaxis], "pdf": Conductor.pdf(site, wi, cosine)}
 
 
+NEAR = 1.5
+"""The index at which numbers are also much nearer to the mirrored share."""
+
+
 def _beside() -> list[tuple[str, Numbers, str]]:
-    """Return vertices whose number is a fiftieth beside the mirrored share, at several angles and indices."""
+    """Return vertices whose number is a fiftieth beside the mirrored share, or less, at several angles."""
     rows: list[tuple[str, Numbers, str]] = []
     for x, y, ior, outside in (
         (0.8, 0.6, 1.5, 1),
@@ -174,11 +246,55 @@ def _beside() -> list[tuple[str, Numbers, str]]:
         ratio = 1.0 / ior if outside else ior
         far = np.sqrt((1.0 - ratio) * (1.0 + ratio) + (ratio * y) ** 2)
         share = float(fresnel(np.array(y), np.array(far), np.array(ratio)))
-        for factor in (0.98, 1.02):
+        for factor in (0.98, 1.02, *((0.9998, 1.0002) if ior == NEAR else ())):
             note = f"{factor:g} of the mirrored share, cosine {y:g}, index {ior:g}"
             rows.append((note, _at(0, 0, factor * share, wo=(x, y, 0.0), ior=ior, outside=outside), "DIE-3"))
     return rows
 
+
+REFRACTED = Function(
+    "material.refracted",
+    "The refracted direction, and its cosine",
+    "DIE-2",
+    {name: VERTEX[name] for name in ("wo", "normal")} | {"ratio": Field("r = n_near/n_far", 0, 0.25, 4.0)},
+    {"direction": Field("unit direction behind the surface", 3), "cosine": Field("c'")},
+    lambda given, dtype: _refracted(given),
+    [
+        ("in", {"wo": SLANT, "normal": (0.0, 1.0, 0.0), "ratio": 0.625}),
+        ("out", {"wo": (0.28, 0.96, 0.0), "normal": (0.0, 1.0, 0.0), "ratio": 1.5}),
+        ("a ratio of 1", {"wo": SLANT, "normal": (0.0, 1.0, 0.0), "ratio": 1.0}),
+    ],
+    lambda u: {**{name: _vertex(u)[name] for name in ("wo", "normal")}, "ratio": 0.5 + 0.5 * u[6]},
+    draws=4,
+)
+"""Snell's law."""
+
+
+def _refracted(given: Numbers) -> dict[str, Any]:
+    """Return the direction behind a surface, and its cosine."""
+    site = Site(given["wo"], given["normal"], *(None,) * 5)
+    cosine = np.minimum(np.maximum(dot(site.wo, site.normal), 0.0), 1.0)
+    direction, behind = refract(site, cosine, given["ratio"])
+    return {"direction": direction, "cosine": behind}
+
+
+MIRRORED_SHARE = Function(
+    "material.fresnel",
+    "The share of light that glass mirrors",
+    "DIE-3",
+    {"cosine": Field("c"), "behind": Field("c', behind the surface"), "ratio": Field("r", 0, 0.25, 4.0)},
+    {"share": Field("F")},
+    lambda given, dtype: {"share": fresnel(given["cosine"], given["behind"], given["ratio"])},
+    [
+        ("in", {"cosine": 0.6, "behind": 0.85, "ratio": 0.625}),
+        ("out", {"cosine": 0.96, "behind": 0.90625, "ratio": 1.5}),
+        ("total reflection", {"cosine": 0.25, "behind": 0.0, "ratio": 1.5}),
+        ("along the surface, in", {"cosine": 0.0, "behind": 0.75, "ratio": 0.625}),
+    ],
+    lambda u: {"cosine": u[0], "behind": u[1], "ratio": 0.25 + 3.0 * u[2]},
+    draws=4,
+)
+"""Fresnel's equations."""
 
 DIELECTRIC = Function(
     "material.dielectric",
@@ -212,6 +328,16 @@ DIELECTRIC = Function(
 )
 """Glass."""
 
+NO_SETTINGS = cast(transport.Settings, None)
+"""Settings where nobody reads any."""
+
+
+class Heuristic(NamedTuple):
+    """All that a weight asks settings for."""
+
+    heuristic: str
+
+
 MIS = Function(
     "transport.mis_weight",
     "Weights of two techniques",
@@ -219,7 +345,7 @@ MIS = Function(
     {"pdf": Field("density of the technique", 0, 0.0, 2e30), "other": Field("of the other one", 0, 0.0, 1e6)},
     {"balance": Field("weight by the balance heuristic"), "power": Field("by the power heuristic")},
     lambda given, dtype: {
-        name: transport.mis_weight(transport.Settings(heuristic=name), given["pdf"], given["other"])
+        name: transport.mis_weight(cast(Any, Heuristic(name)), given["pdf"], given["other"])
         for name in transport.HEURISTICS
     },
     [
@@ -227,6 +353,7 @@ MIS = Function(
         ("the other one cannot find it", {"pdf": 0.25, "other": 0.0}),
         ("a camera ray", {"pdf": 1e30, "other": 3.0}),
         ("three to one: 3/4 and 9/10", {"pdf": 3.0, "other": 1.0}),
+        ("a density of 0 counts as 1e-15", {"pdf": 0.0, "other": 1e-16}),
     ],
     lambda u: {"pdf": 4.0 * u[0], "other": 4.0 * u[1]},
     draws=4,
@@ -288,7 +415,7 @@ SKY_SAMPLE = Function(
 
 def _unshadowed(given: Numbers, dtype: Any) -> dict[str, Any]:
     """Return the light of the terrace's lamps at points of its surfaces."""
-    world = transport.build(TERRACE, transport.Settings(), dtype)
+    world = transport.build(TERRACE, NO_SETTINGS, dtype)
     surface = reflecting(given["point"], given["normal"], given["reflectance"])
     return {"unshadowed": transport.unshadowed(world, surface)}
 
@@ -297,6 +424,32 @@ def _lit(point: Any, normal: Any) -> dict[str, Any]:
     """Return the inputs of a point of a surface."""
     return {"point": point, "normal": normal, "reflectance": GOLD}
 
+
+def _light_pdf(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return the densities of both lamps of the terrace."""
+    lights = transport.build(TERRACE, NO_SETTINGS, dtype).lights
+    assert lights is not None
+    square, cosine = given["square"], given["cosine"]
+    index = np.zeros_like(square, np.int32)
+    return {f"lamp_{k}": transport.light_pdf(lights, index + np.int32(k), square, cosine) for k in (0, 1)}
+
+
+LIGHT_PDF = Function(
+    "transport.light_pdf",
+    "Densities of points of both lamps of scenes/terrace.json, half of whose light samples go to the sky",
+    "LTR-3",
+    {"square": Field("s^2", 0, 0.0, 100.0), "cosine": Field("cos_l")},
+    {"lamp_0": Field("q of the first lamp, 1/sr"), "lamp_1": Field("q of the second")},
+    _light_pdf,
+    [
+        ("at right angles", {"square": 4.0, "cosine": 1.0}),
+        ("aslant", {"square": 0.5, "cosine": 0.25}),
+        ("along the lamp: a cosine of 0 counts as 1e-15", {"square": 1e-15, "cosine": 0.0}),
+    ],
+    lambda u: {"square": 4.0 * u[0], "cosine": u[1]},
+    draws=3,
+)
+"""Light samples' densities."""
 
 UNSHADOWED = Function(
     "transport.unshadowed",
@@ -321,6 +474,12 @@ UNSHADOWED = Function(
 """Light without shadows."""
 
 FUNCTIONS = (
+    GGX,
+    SCHLICK,
+    VISIBLE,
+    REFRACTED,
+    MIRRORED_SHARE,
+    LIGHT_PDF,
     LAMBERTIAN,
     MIRROR,
     CONDUCTOR,

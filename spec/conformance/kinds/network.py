@@ -144,7 +144,9 @@ def activations(network: Siren, x: Any) -> dict[str, Any]:
 
 def _forward(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the activations of one input vector."""
-    found = activations(_from_inputs(inputs), np.asarray(inputs["x"], np.float64)[np.newaxis])
+    network, x = _from_inputs(inputs), np.asarray(inputs["x"], np.float64)[np.newaxis]
+    found = activations(network, x)
+    found[f"layer_{len(network.weights) - 1}"] = siren.forward(network, x)
     return {name: value[0] for name, value in found.items()}
 
 
@@ -191,11 +193,12 @@ def _gradient_cases() -> list[Case]:
         step = step_of(partial(siren.forward, network), widths[0], widths[-1], EXAMPLES)
         errors = sum_errors(step, x, target)
         expected = {}
-        for name, value in _gradient(inputs).items():
+        # The loss comes last: what is wrong with its derivatives is not of its own clause.
+        for name, value in sorted(_gradient(inputs).items(), key=lambda item: item[0] == "loss"):
             if name == "loss":
                 # The mean of all squares is their sums' sum over their number: 8 more roundings at most.
                 error = float(errors[SQUARES].sum()) / target.size + gamma(8) * value
-                expected[name] = Output(value, error, POSTERIORI)
+                expected[name] = Output(value, error, POSTERIORI, clause="TRN-3")
                 continue
             array = inputs[name.removeprefix("d")]
             owner = next(n for n, p in step.program.parameters.items() if np.array_equal(p, array))

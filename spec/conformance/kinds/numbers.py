@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -23,8 +23,8 @@ COUNTERS = ("seed", "pixel", "sample", "block")
 
 def _block(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the words and floats of a block."""
-    words = rng.random_block(*(rng.counter(int(inputs[name])) for name in COUNTERS))
-    floats = [rng.uniform_floats(word, np.float64) for word in words]
+    counters = [rng.counter(int(inputs[name])) for name in COUNTERS]
+    words, floats = rng.random_block(*counters), rng.uniforms(*counters, np.float64)
     return {"words": [int(w[0]) for w in words], "floats": np.array([f[0] for f in floats])}
 
 
@@ -43,10 +43,81 @@ def _blocks() -> list[Case]:
     found = []
     for index, (note, values) in enumerate(rows):
         inputs = dict(zip(COUNTERS, values, strict=True))
-        expected = {name: Output(value) for name, value in _block(inputs).items()}
+        expected = {name: Output(value, clause=OF_BLOCK[name]) for name, value in _block(inputs).items()}
         found.append(Case(f"random.block/{index}", "RNG-3", inputs, expected, (), note))
     return found
 
+
+OF_BLOCK = {"words": "", "floats": "RNG-6"}
+"""Clauses of the outputs of a block where they are not the block's."""
+
+
+def word_kind(
+    name: str, title: str, clause: str, inputs: Mapping[str, str], count: int, call: Callable[..., Any]
+) -> Kind:
+    """Return a kind of words of 32 bits: `call` maps arrays of one word each to a list of `count` words."""
+
+    def answer(given: Mapping[str, Any]) -> dict[str, Any]:
+        words = call(*(rng.counter(int(given[name])) for name in inputs))
+        return {"words": [int(word[0]) for word in words]}
+
+    def cases() -> list[Case]:
+        ends = [(n,) * len(inputs) for n in (0, LAST, 1)]
+        rows = [*ends, *(tuple(map(int, drawn(name, i, len(inputs)) * 2**32)) for i in range(6))]
+        given = [dict(zip(inputs, row, strict=True)) for row in rows]
+        return [
+            Case(f"{name}/{index}", clause, one, {"words": Output(answer(one)["words"])})
+            for index, one in enumerate(given)
+        ]
+
+    return Kind(name, title, inputs, {"words": f"integer[{count}] below 2^32"}, cases, answer)
+
+
+WORD = "integer below 2^32"
+"""What a word is, for the page."""
+
+HASH = word_kind("random.pcg4d", "The hash of four words", "RNG-2", dict.fromkeys("xyzw", WORD), 4, rng.pcg4d)
+"""PCG4D."""
+
+SCRAMBLED = word_kind(
+    "random.scrambled",
+    "A fraction of 2^32 under the permutation that a key names",
+    "SOB-2",
+    {"fraction": WORD, "key": WORD},
+    1,
+    lambda fraction, key: [sobol.scramble(fraction, key)],
+)
+"""Owen's scrambling."""
+
+POINT = word_kind(
+    "random.point",
+    "A Sobol point, not scrambled, as fractions of 2^32",
+    "SOB-1",
+    {"index": WORD},
+    4,
+    lambda index: [sobol.sobol(index, dimension) for dimension in range(4)],
+)
+"""Sobol's points."""
+
+
+def _float(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the float of a word."""
+    return {"float": np.float64(rng.uniform_floats(rng.counter(int(inputs["word"])), np.float64)[0])}
+
+
+def _floats() -> list[Case]:
+    """Return words at the ends, around the bits that count, and others."""
+    words = [0, 255, 256, LAST, LAST - 255, *(int(u * 2**32) for u in drawn("random.float", 0, 4))]
+    return [
+        Case(f"random.float/{i}", "RNG-5", {"word": word}, {"float": Output(_float({"word": word})["float"])})
+        for i, word in enumerate(words)
+    ]
+
+
+FLOAT = Kind(
+    "random.float", "A word as a float", {"word": WORD}, {"float": "float in [0, 1)"}, _floats, _float
+)
+"""24 bits of a word."""
 
 BLOCK = Kind(
     "random.block",
@@ -94,6 +165,52 @@ def _scalar(u: np.ndarray, low: float, high: float) -> float:
     """Return the first of uniform numbers, stretched to a range."""
     return float(low + (high - low) * u[0])
 
+
+TRANSFER = Function(
+    "encoding.srgb",
+    "Linear values in [0, 1] by the transfer function of sRGB",
+    "ENC-1",
+    {"linear": Field("linear value")},
+    {"encoded": Field("encoded value in [0, 1]")},
+    lambda given, dtype: {"encoded": encoding.srgb_encode(given["linear"])},
+    [
+        ("black", {"linear": 0.0}),
+        ("white", {"linear": 1.0}),
+        ("where the line meets the curve, below", {"linear": 0.0031308}),
+        ("where the line meets the curve, above", {"linear": 0.0031309}),
+    ],
+    lambda u: {"linear": u[0]},
+)
+"""The transfer function by itself."""
+
+
+def _exposed(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return exposed radiance."""
+    stops = float(inputs["exposure_stops"])
+    return {"exposed": np.float64(encoding.expose(np.float64(inputs["linear"]), stops))}
+
+
+def _exposures() -> list[Case]:
+    """Return stops of either sign, whole and not."""
+    rows = ((0.5, 0.0), (0.5, 1.0), (0.75, -2.0), (3.0, 0.5), (0.1875, -1.25), (0.0, 64.0), (2.0, -64.0))
+    found = []
+    for index, (linear, stops) in enumerate(rows):
+        inputs = {"linear": linear, "exposure_stops": stops}
+        value = _exposed(inputs)["exposed"]
+        expected = {"exposed": Output(value, 2.0**-22 * value, "a power, rounded to float32, and a product")}
+        found.append(Case(f"encoding.exposed/{index}", "ENC-4", inputs, expected))
+    return found
+
+
+EXPOSED = Kind(
+    "encoding.exposed",
+    "Linear radiance, exposed",
+    {"linear": "float", "exposure_stops": "float"},
+    {"exposed": "float"},
+    _exposures,
+    _exposed,
+)
+"""Exposure."""
 
 SRGB = Function(
     "encoding.display",
@@ -190,8 +307,8 @@ SINE = Function(
 )
 """The sine of the network; its contract is the emitted sine's."""
 
-KINDS = (BLOCK, SOBOL)
+KINDS = (HASH, FLOAT, BLOCK, SCRAMBLED, POINT, SOBOL, EXPOSED)
 """Kinds of this module that are not functions of floats."""
 
-FUNCTIONS = (SRGB, SINE, ADAM)
+FUNCTIONS = (TRANSFER, SRGB, SINE, ADAM)
 """Those that are."""

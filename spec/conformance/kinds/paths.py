@@ -30,6 +30,7 @@ from ....refimpl.light.transport import Counters, Path, Settings
 from ....refimpl.reading import to_dataclass
 from ..case import Case, Kind, Output
 from ..functions import SOURCE
+from .terrace import MIRRORS
 from .views import (
     SEED,
     SENT,
@@ -38,10 +39,13 @@ from .views import (
     files,
     foundry,
     foundry_settings,
+    glass,
     midway,
     others,
+    picks,
     rounded,
     scene_text,
+    tall,
     terrace,
     views,
 )
@@ -219,10 +223,11 @@ WITH_ROULETTE = {"alive": "LTR-9", "beta": "LTR-9"}
 
 def _clauses(kind: str, inputs: Mapping[str, Any]) -> Mapping[str, str]:
     """Return the clauses of a case's outputs where they are not the case's own."""
-    if kind != "path.scatter":
-        return CLAUSES[kind]
-    found = dict(CLAUSES[kind])
     name = str(inputs["scene"]["file"]).removeprefix("scenes/").removesuffix(".json")
+    # Of single directions only: no light is sampled, and all weights are 1.
+    found = {**CLAUSES[kind], **({"radiance": "SHD-4"} if name == MIRRORS.name else {})}
+    if kind != "path.scatter":
+        return found
     materials = materials_by_id(scene_module.from_json(scene_text(name)))
     number = int(inputs["surface"])
     if number < len(materials) and isinstance(materials[number][0], Dielectric):
@@ -272,7 +277,7 @@ class Found(NamedTuple):
 def _steps() -> Found:
     """Return the cases of all steps: paths in float64 whose states are rounded to float32 at each step."""
     found = Found([], [], [])
-    for view in (*views(16), *terrace(), *foundry(), *others()):
+    for view in (*views(16), *terrace(), *foundry(), *others(), *glass(), *tall(), *picks()):
         given = view.inputs()
         programs = programs_of(view.scene, view.settings)
         wanted = start(_with_scene(given, view))
@@ -346,7 +351,7 @@ def _add(
     expected = _expected(wanted, found, clauses)
     if expected is not None:
         note = f"{inputs['settings']['strategy']}, {inputs['settings']['sampler']}"
-        cases.append(Case(f"{kind}/{len(cases)}", clause, dict(inputs), expected, (), note))
+        cases.append(Case(f"{kind}/{len(cases)}", clause, dict(inputs), expected, (), note, "LTR-8"))
 
 
 # ---- whole paths ----------------------------------------------------------------------------------------

@@ -109,7 +109,7 @@ def _denoise_cases() -> list[Case]:
         bound = _bound(model, frame_of(layers), picture)
         text = "bounds of profile ieee at these pixels, features being one ulp off (compiler/proof/bounds.py)"
         expected = {"picture": Output(picture, bound, text)}
-        cases.append(Case(f"picture.denoised/{index}", "DEN-2", inputs, expected, (), note))
+        cases.append(Case(f"picture.denoised/{index}", "DEN-2", inputs, expected, (), note, "FRM-5"))
     needy = _model(("color", "normal"), Window(2, "clamp"), [4], 0, MIDDLE)
     inputs = {
         "color": bad_layers(2, 2, 5)["color"],
@@ -265,10 +265,10 @@ def _exact_cases() -> list[Case]:
         of_variance = np.sum(2 * spread * off + off**2, axis=2) / max(exact.spp - 1, 1) + ROUNDED * variance
         expected = {
             "mean": Output(mean, of_mean, OF_SAMPLES),
-            "variance": Output(variance, of_variance, OF_SAMPLES),
+            "variance": Output(variance, of_variance, OF_SAMPLES, clause="RND-4"),
             "spp": Output(exact.spp),
         }
-        cases.append(Case(f"picture.exact/{index}", "RND-1", inputs, expected, (), exact.scene))
+        cases.append(Case(f"picture.exact/{index}", "RND-1", inputs, expected, (), exact.scene, "RND-6"))
     for name, value in WRONG_SIZES:
         wrong = {**cases[0].inputs, name: value}
         cases.append(Case(f"picture.exact/{len(cases)}", "RND-6", wrong, None, (), f"{name} = {value}"))

@@ -209,6 +209,34 @@ def governing(note: str, otherwise: str) -> str:
     return next((clause for part, clause in GOVERNING.items() if part in note), otherwise)
 
 
+REFUSING = {"left out": "SCN-6", ".material": "SCN-7", "sky": "SCN-9", "camera only": "SCN-6"}
+"""Clauses that a refusal of a scene is blamed on, by what a note says of it; else the rules of numbers."""
+
+
+def refusal(note: str) -> str:
+    """Return the clause that the refusal of a scene that is valid is blamed on."""
+    found = next((clause for part, clause in REFUSING.items() if part in note), "SCN-7")
+    return governing(note, found)
+
+
+def first_good() -> Iterator[tuple[str, str]]:
+    """Yield notes and texts of the least scenes that have a part of one kind."""
+    head = {name: each()[name] for name in ("format", "version", "name")}
+    camera = {"position": [0, 0, 4], "look_at": [0, 0, 0]}
+    plain = {"reflectance": [0.5, 0.5, 0.5]}
+    edges = {"corner": [0, 0, 0], "edge_u": [1, 0, 0], "edge_v": [0, 2, 0]}
+    parts: dict[str, dict[str, Any]] = {
+        "camera only": {},
+        "a sphere: its .radius": {"spheres": [{"center": [0, 0, 0], "radius": 1, **plain}]},
+        "a quad: its .edge_u and .edge_v": {"quads": [{**edges, **plain}]},
+        "a lamp: its .edge_u and .edge_v": {"lights": [{**edges, "color": [1, 1, 1], "power": 1}]},
+        "a box: its .rotation": {"boxes": [each()["boxes"][0]]},
+        "a room": {"room": {"low": [-1, -1, -1], "high": [1, 1, 1], "reflectances": [[0.5] * 3] * 6}},
+        "a sky": {"environment": SKY},
+    }
+    yield from ((note, json.dumps({**head, "camera": camera, **part})) for note, part in parts.items())
+
+
 def good() -> Iterator[tuple[str, str]]:
     """Yield notes and texts of scenes that are read."""
     yield "one of each", changed()
@@ -244,6 +272,26 @@ def last_good() -> Iterator[tuple[str, str]]:
     """Yield notes and texts of scenes that are read and come last: those before keep their numbers."""
     skew = [[1, 0, 0], [1e-6, 1, 0], [0, 0, 1]]
     yield f"boxes.0.rotation = {skew}, as far off as may be", changed(("boxes.0.rotation", skew))
+    yield (
+        f"boxes.0.rotation.2 = {LONG_AXES[0]}, nearly too long",
+        changed(("boxes.0.rotation.2", LONG_AXES[0])),
+    )
+    yield "quads.0.material.roughness = 1", changed(("quads.0.material.roughness", 1))
+
+
+def last_bad() -> Iterator[tuple[str, str]]:
+    """Yield notes and texts of scenes that are refused and come last."""
+    for half in ("\ud800", "\udfff"):
+        yield f"name = {json.dumps(half)}", changed(("name", half))
+    yield f"boxes.0.rotation.2 = {LONG_AXES[1]}, just too long", changed(("boxes.0.rotation.2", LONG_AXES[1]))
+    yield (
+        "camera: up along a view from a place off all axes",
+        changed(("camera.position", [2, 3, 5]), ("camera.look_at", [3, 4, 6]), ("camera.up", [1, 1, 1])),
+    )
+
+
+LONG_AXES = ([0, 0, 1.0000004999], [0, 0, 1.0000005002])
+"""Axes whose squared lengths are just within 1e-6 of 1, and just not."""
 
 
 def _of_sky(name: str, value: Any) -> str:

@@ -8,6 +8,8 @@ import numpy as np
 
 from ....refimpl.light import intersection
 from ....refimpl.light.scene import Box, Camera, Quad, Room, Scene, Sphere
+from ....refimpl.light.shapes.box import slabs
+from ....refimpl.light.shapes.shape import inverse
 from ..functions import Field, Function, Numbers
 from .light import RAY_FIELDS, T, _aimed
 
@@ -20,7 +22,10 @@ EYE = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0))
 HALVES = ((0.8, 0.6, 0.0), (-0.6, 0.8, 0.0), (0.0, 0.0, 1.0))
 """A rotation about z."""
 
-BOX = Box((0.25, -0.5, 0.125), (0.5, 0.75, 1.0), GRAY)
+LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+"""The rotation of what is parallel to the axes."""
+
+BOX = Box((0.25, -0.5, 0.125), (0.5, 0.75, 1.0), GRAY, LEVEL)
 """The box of all rays."""
 
 TURNED = Box((0.25, -0.5, 0.125), (0.5, 0.75, 1.0), GRAY, HALVES)
@@ -32,7 +37,7 @@ ROOM = Room((-2.0, -1.0, -3.0), (2.0, 1.5, 3.0), (GRAY,) * 6)
 MIXED = Scene(
     "mixed",
     EYE,
-    boxes=(Box((0.0, -0.5, 0.0), (1.0, 0.5, 1.0), GRAY),),
+    boxes=(Box((0.0, -0.5, 0.0), (1.0, 0.5, 1.0), GRAY, LEVEL),),
     spheres=(Sphere((0.0, 0.5, 0.0), 0.5, GRAY),),
     quads=(Quad((-1.0, 1.0, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), GRAY),),
 )
@@ -59,6 +64,34 @@ def _ray(origin: Any, direction: Any) -> dict[str, Any]:
     vector = np.array(direction, np.float64)
     return {"origin": origin, "direction": vector / np.sqrt(vector @ vector)}
 
+
+def _slabs(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return where a ray enters and leaves each slab."""
+    half = np.asarray(BOX.half_extent, dtype)
+    enter, leave = slabs(np.asarray(BOX.center, dtype), half, given["origin"], inverse(given["direction"]))
+    return {"enter": enter, "leave": leave}
+
+
+SLABS = Function(
+    "intersection.slabs",
+    f"The slabs of the box around {BOX.center} with the half extents {BOX.half_extent}",
+    "ISC-3",
+    RAY_FIELDS,
+    {
+        "enter": Field("distances at which the ray enters the slabs of x, y and z", 3),
+        "leave": Field("distances at which it leaves them", 3),
+    },
+    _slabs,
+    [
+        ("at right angles to no slab", _ray((3.0, 2.0, 4.0), (-2, -1, -2))),
+        ("from inside", _ray((0.5, -0.25, 0.5), (2, -1, 2))),
+        ("parallel to two slabs, outside one", _ray((2.0, -0.5, 4.0), (0, 0, -1)), "ISC-5"),
+        ("a component that is the other zero", _ray((0.5, -0.25, 4.0), (-0.0, 0.0, -1)), "ISC-5"),
+    ],
+    _aimed,
+    draws=4,
+)
+"""Rays and slabs."""
 
 BOXES = Function(
     "intersection.box",
@@ -141,5 +174,5 @@ NEAREST = Function(
 )
 """Rays and a scene."""
 
-FUNCTIONS = (BOXES, TURNED_BOXES, ROOMS, NEAREST)
+FUNCTIONS = (SLABS, BOXES, TURNED_BOXES, ROOMS, NEAREST)
 """The functions of this module."""

@@ -12,6 +12,7 @@
 6. [`NIGHT`]: three lamps under a sky that is black.
 7. [`DARK`]: lamps without power or colour.
 8. [`PLATE`]: a matte floor under a distant lamp, whose samples hardly differ.
+9. [`LENS`], [`PANE`] and [`BUBBLE`]: glass as the first of two kinds of material, the second, and by itself.
 """
 
 from __future__ import annotations
@@ -174,3 +175,31 @@ PLATE = Scene(
     lights=(Light((1.0, 4.0, 1.0), (0.5, 0.0, 0.0), (0.0, 0.0, 0.5), (1.0, 0.75, 0.5), 40.0),),
 )
 """A floor and a lamp."""
+
+BALL = Sphere((0.0, 0.75, 0.0), 0.5, (0.875, 0.9375, 1.0), material=Dielectric(1.5))
+"""A ball of glass."""
+
+LENS = Scene(
+    "lens",
+    Camera((0.0, 0.875, 4.0), (0.0, 0.5, 0.0), (0.0, 1.0, 0.0), 40.0),
+    spheres=(BALL,),
+    quads=(Quad((-4.0, 0.0, -4.0), (0.0, 0.0, 8.0), (8.0, 0.0, 0.0), (0.75, 0.5, 0.25)),),
+    lights=(Light((-0.5, 2.5, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.875, 0.75), 10.0),),
+    background=(0.125, 0.25, 0.5),
+)
+"""A ball of glass over a matte floor."""
+
+PANE = replace(
+    LENS,
+    name="pane",
+    boxes=(Box((0.0, -0.125, 0.0), (2.0, 0.125, 2.0), (0.25, 0.5, 0.75)),),
+    quads=(),
+    background=(0.0, 0.0, 0.0),
+    environment=Sky(
+        (0.015625, 0.03125, 0.0625), (0.03125,) * 3, (0.015625,) * 3, sun_irradiance=(0.25, 0.125, 0.0)
+    ),
+)
+"""The same ball over a matte block, which comes first, under a sky whose light sums up to less than 1."""
+
+BUBBLE = replace(LENS, name="bubble", quads=(), lights=())
+"""The ball by itself."""

@@ -16,15 +16,18 @@ from typing import Any
 import numpy as np
 
 from ....refimpl import rng
+from ....refimpl.light import render, scenes, transport
 from ....refimpl.light import scene as scene_module
-from ....refimpl.light import scenes
 from ....refimpl.light.transport import Settings
-from .terrace import BARE, DARK, FOUNDRY, MIRRORS, NIGHT, PLATE, TERRACE, YARD
+from .terrace import BARE, BUBBLE, DARK, FOUNDRY, LENS, MIRRORS, NIGHT, PANE, PLATE, TERRACE, YARD
 
 SCENES = ("cornell", "glossy", "daylight", "minicubes")
 """Canonical scenes whose paths are cases; each at a time of its own, [`TIME_S`]."""
 
-OWN = {scene.name: scene for scene in (TERRACE, FOUNDRY, YARD, MIRRORS, PLATE, BARE, NIGHT, DARK)}
+OWN = {
+    scene.name: scene
+    for scene in (TERRACE, FOUNDRY, YARD, MIRRORS, PLATE, BARE, NIGHT, DARK, LENS, PANE, BUBBLE)
+}
 """Scenes of the vectors' own."""
 
 TIME_S = 1.25
@@ -171,6 +174,59 @@ def others() -> Iterator[View]:
     yield from map(_other, OTHERS)
 
 
+GLASS = tuple((scene.name, x, y) for scene in (LENS, PANE, BUBBLE) for x, y in ((8, 7), (7, 6), (8, 13)))
+"""Scenes with a ball of glass, and pixels that show the ball and what is below it."""
+
+PICKED = {TERRACE.name: (6, 13), NIGHT.name: (8, 13), FOUNDRY.name: (11, 8)}
+"""Pixels that show what is lit by several lamps, or by a lamp and the sky."""
+
+BESIDE = (-(2.0**-12), 2.0**-12)
+"""How far beside a threshold a path's number is at most: a change by a thousandth is seen."""
+
+
+def glass() -> Iterator[View]:
+    """Yield paths that meet a ball of glass, or what is below it."""
+    for index, (scene, x, y) in enumerate(GLASS):
+        yield View(scene, VARIANTS[index % 2], x, y, index)
+
+
+def tall() -> Iterator[View]:
+    """Yield paths through pixels whose counters have all 32 bits."""
+    for index, scene in enumerate((NIGHT, YARD)):
+        yield View(scene.name, VARIANTS[index], 20, 40_000, index, "", 40, 1 << 16, steps=1)
+
+
+def thresholds(scene: str) -> Iterator[tuple[float, str]]:
+    """Yield the numbers at which the choice of a light sample changes, and clauses.
+
+    The choices are sky or lamp, sun or sky, and which lamp."""
+    world = transport.build(OWN[scene], Settings(), np.float64)
+    assert world.lights is not None
+    low = 0.0
+    if world.environment is not None:
+        low = transport.SKY_SHARE
+        sun = low * float(world.environment.sun_share)
+        yield from ((number, "ENV-4") for number in (low, sun) if number > 0.0)
+    yield from ((low + (1.0 - low) * float(bound), "LTR-3") for bound in world.lights.cumulative[:-1])
+
+
+def picks() -> Iterator[View]:
+    """Yield paths whose first light sample is chosen just beside a threshold."""
+    for scene, (x, y) in PICKED.items():
+        for number, clause in thresholds(scene):
+            for beside in BESIDE:
+                low, high = sorted((number + beside, number + beside / 8))
+                yield View(scene, VARIANTS[0], x, y, sample_between(low, high, x, y), clause, steps=1)
+
+
+def sample_between(low: float, high: float, x: int, y: int) -> int:
+    """Return the first sample of a pixel whose number that chooses a light lies between two numbers."""
+    samples = np.arange(1 << 16, dtype=np.uint32)
+    pixel = render.pixel_counter(np.array(x), np.array(y))
+    numbers, *_ = rng.uniforms(rng.counter(SEED), pixel, samples, rng.counter(1), np.float64)
+    return int(np.flatnonzero((low < numbers) & (numbers < high))[0])
+
+
 def views(count: int) -> Iterator[View]:
     """Yield paths spread over scenes, settings and pixels."""
     for index in range(count):
@@ -182,19 +238,35 @@ def views(count: int) -> Iterator[View]:
 
 # ---- arrivals ---------------------------------------------------------------------------------------------
 
-SENT = tuple(
-    (scene, settings, direction)
-    for scene in (NIGHT.name, TERRACE.name)
-    for settings in VARIANTS
-    for direction in ((0.0, 1.0, 0.0), (0.6, 0.64, 0.48))
+SENT = (
+    *(
+        (scene, settings, direction)
+        for scene in (NIGHT.name, TERRACE.name)
+        for settings in VARIANTS
+        for direction in ((0.0, 1.0, 0.0), (0.6, 0.64, 0.48))
+    ),
+    *(
+        (NIGHT.name, settings, direction)
+        for settings in VARIANTS[:2]
+        for direction in ((0.63, 0.758, 0.168), (-0.862, 0.304, 0.406))
+    ),
+    (BARE.name, VARIANTS[0], (0.0, 0.28, 0.96)),
 )
-"""Directions from a floor to a lamp and to the sky, by scene and settings."""
+"""Directions from a floor to a lamp and to the sky, by scene and settings; then to the second lamp and to the
+third, and to the back of a lamp that nothing is beside."""
+
+ORIGINS = {
+    TERRACE.name: (0.3125, 0.875, 0.4375),
+    NIGHT.name: (0.125, 0.0009765625, 0.25),
+    BARE.name: (0.125, -0.25, -2.0),
+}
+"""Where these directions begin."""
 
 
 def midway(scene: str, settings: Settings, direction: tuple[float, ...]) -> dict[str, Any]:
     """Return the inputs of an arrival in the middle of a path that a surface has sent in a direction."""
     state = {
-        "origin": (0.3125, 0.875, 0.4375) if scene == TERRACE.name else (0.125, 0.0009765625, 0.25),
+        "origin": ORIGINS[scene],
         "direction": direction,
         "beta": (0.5, 0.25, 0.75),
         "radiance": (0.125, 0.0625, 0.5),

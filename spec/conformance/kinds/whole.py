@@ -173,6 +173,7 @@ def _forward_cases() -> list[Case]:
         ("colours of 2^31 - 1", "WHO-6", most, np.full(4, INPUT_LEVELS)),
         ("colours of 1 - 2^31", "WHO-6", most, np.full(4, -INPUT_LEVELS)),
         ("the largest last bias", "WHO-1", replace(one, biases=(np.full(3, 2.0**24 - 1.0),)), np.zeros(4)),
+        ("the largest factor", "WHO-1", _zeros(factor=2.0**24 - 1.0), np.zeros(4)),
         ("the least last bias", "WHO-1", replace(one, biases=(np.full(3, -(2.0**24)),)), np.zeros(4)),
     ):
         rows.append((note, clause, network, n))
@@ -198,7 +199,9 @@ def _forward_cases() -> list[Case]:
     cases: list[Case] = []
     for note, clause, network, n in rows:
         inputs = {**_inputs_of(network), "n": integers(n)}
-        cases.append(Case(f"whole.forward/{len(cases)}", clause, inputs, exact(_forward(inputs)), (), note))
+        refusal = "" if clause == "WHO-1" else "WHO-1"
+        case = Case(f"whole.forward/{len(cases)}", clause, inputs, exact(_forward(inputs)), (), note, refusal)
+        cases.append(case)
     for note, clause, network in refused:
         inputs = {**_inputs_of(network), "n": np.zeros(network.widths[0], np.int64)}
         cases.append(Case(f"whole.forward/{len(cases)}", clause, inputs, None, (), note))
@@ -231,10 +234,11 @@ def _with_hidden_bias(value: float) -> Whole:
 
 
 def _wide() -> Whole:
-    """Return a network whose last sums may be 2^24 with 10 bits; if all inputs agree, they are smaller."""
+    """Return a network of which one of the last sums may be 2^24; if all inputs agree, it is smaller."""
     last = np.full((3, 259), float(WEIGHT_LEVELS))
     last[:, 1::2] *= -1.0
     last[:, 0] = -(-EXACT // 511) - 258 * WEIGHT_LEVELS
+    last[::2] = 0.0
     weights, ones = (np.ones((259, 1)), last), (np.ones(259), np.ones(3))
     return Whole(weights, tuple(0 * some for some in ones), 1.0, 1.0, factors=ones, amplitude=511)
 
@@ -286,12 +290,14 @@ def _rounded_cases() -> list[Case]:
         ("colours beyond all fractions", "WHO-7", _louder(one, 1e6), 2, 127),
         ("an amplitude without a sine", "WHO-1", one, 2, 255),
         ("windows that the first layer does not have", "WHO-8", one, 3, 127),
+        ("windows of no tap", "WHO-8", one, 0, 127),
     ]
     cases = []
     for index, (note, clause, network, size, amplitude) in enumerate([*rows, *refused]):
         inputs = {**_as_inputs(network), "size": size, "amplitude": amplitude}
         expected = exact(_rounded(inputs)) if index < len(rows) else None
-        cases.append(Case(f"whole.rounded/{index}", clause, inputs, expected, (), note))
+        refusal = "" if expected is None else "WHO-3"
+        cases.append(Case(f"whole.rounded/{index}", clause, inputs, expected, (), note, refusal))
     return cases
 
 

@@ -48,12 +48,25 @@ class Users:
             found |= places
             tops = (self._top(path, line) for path, line in places)
             names = set().union(*(_names(top) for top in tops if isinstance(top, ast.Assign | ast.AnnAssign)))
-        return found
+        return found.union(*(self._of_field(path, line) for path, line in found))
+
+    def _of_field(self, path: str, line: int) -> set[Place]:
+        """Return the lines of a class where a line is a field of it: who makes one uses the default."""
+        top = self._top(path, line)
+        if not isinstance(top, ast.ClassDef):
+            return set()
+        is_field = any(isinstance(n, ast.AnnAssign) and n.lineno <= line <= _last(n) for n in top.body)
+        return {(path, own) for own in range(top.lineno, _last(top) + 1)} if is_field else set()
 
     def _top(self, module: str, line: int) -> ast.stmt | None:
         """Return the statement of a module, outside of all others, that has a line."""
         body = self.trees[module].body
-        return next((node for node in body if _first(node) <= line <= (node.end_lineno or 0)), None)
+        return next((node for node in body if _first(node) <= line <= _last(node)), None)
+
+
+def _last(node: ast.stmt) -> int:
+    """Return the last line of a statement."""
+    return node.end_lineno or node.lineno
 
 
 def _first(node: ast.stmt) -> int:

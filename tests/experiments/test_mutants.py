@@ -11,6 +11,7 @@ import pytest
 from lab import mutation, mutation_c, trial, trial_c
 from lab.blame import Clauses
 from lab.trial import Outcome
+from lab.users import Users
 
 SOURCE = '''"""Words."""
 
@@ -160,6 +161,14 @@ def test_a_mutant_of_the_c_program_is_caught(tmp_path):
     some = [m for m in mutation_c.mutants(mutants.C99, source) if m.function.startswith("RNG-3")]
     came = [trial_c.trial(m, source, cases, lines, tmp_path) for m in some]
     assert {outcome.verdict for outcome in came if outcome} == {"fail"}
+
+
+def test_a_default_is_used_by_the_methods_of_its_class():
+    source = (
+        "FULL = 1.0\n\n\nclass Job:\n    share: float = FULL\n\n    def f(self):\n        return self.share\n"
+    )
+    constant = mutation.mutants("m.py", source)[0]
+    assert Users({"m.py": source}).lines(constant) == {("m.py", line) for line in (1, 4, 5, 6, 7, 8)}
 
 
 # ---- one mutant -----------------------------------------------------------------------------------------

@@ -460,11 +460,12 @@ def _scene_cases() -> list[Case]:
     _add_scenes(cases, rules.first_good(), bad=False)
     for note, text in [*SCENE_GOOD.items(), *SCENE_BAD.items(), *SCENE_LATER.items()]:
         inputs, bad = {"text": text()}, note in SCENE_BAD
-        expected = None if bad else {name: Output(v) for name, v in _scene(inputs).items()}
+        own = "SCN-6" if "left out" in note else ""
+        expected = None if bad else {name: Output(v, clause=own) for name, v in _scene(inputs).items()}
         form = bad and names.index(note) < names.index(FIRST_OF_VALUES)
         read = "SCN-10" if note in SCENE_LATER else "SCN-8"
         clause = read if not bad else "SCN-6" if form else "SCN-7"
-        refusal = "" if bad else "SCN-7"
+        refusal = "" if bad else "RDG-2" if "letters" in note else "SCN-7"
         cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note, refusal))
     for found, bad in (
         (rules.good(), False),

@@ -3230,6 +3230,15 @@ static void do_denoised(const json *in) {
 
 /* ---- protocol: CNF-8, CNF-9 ----------------------------------------------------------------------------- */
 
+static void do_sky_share(const json *in) {
+    sky s = {.given = true, .sun_direction = UP};
+    s.zenith = vec_in(in, "zenith");
+    s.horizon = vec_in(in, "horizon");
+    s.ground = vec_in(in, "ground");
+    s.sun_irradiance = vec_in(in, "sun_irradiance");
+    answer_number("share", weigh_sun(&s).share);
+}
+
 static const struct {
     const char *name;
     void (*answer)(const json *in);
@@ -3305,6 +3314,7 @@ static const struct {
     {"file.camera", do_camera_text},
     {"file.scene", do_scene},
     {"picture.denoised", do_denoised},
+    {"sky.share", do_sky_share},
 };
 
 static void answer_hello(void) {

@@ -86,6 +86,7 @@ ELEMENTARY = (
     "transport.lamp",
     "transport.light_pdf",
     "transport.",
+    "sky.share",
     "sky.",
     "encoding.srgb",
     "encoding.exposed",

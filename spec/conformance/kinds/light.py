@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ....refimpl import vectors
-from ....refimpl.light import camera, sampling
-from ....refimpl.light.scene import Camera, Light, Quad, Sphere
+from ....refimpl.light import camera, environment, sampling
+from ....refimpl.light.scene import Camera, Light, Quad, Sky, Sphere
 from ....refimpl.light.shapes.quad import light_radiance, quad_row
 from ....refimpl.light.shapes.shape import BLACK, MISS
 from ..case import Case, Kind, Output
@@ -87,7 +87,30 @@ LAMP = layout_kind(
 )
 """Lamps."""
 
-KINDS = (AXES, LAMP)
+
+def _share(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the sun's share in the light of a sky."""
+    parts = {name: tuple(map(float, value)) for name, value in given.items()}
+    return {"share": environment.build(Sky(**parts), np.float64).sun_share}  # type: ignore[arg-type]
+
+
+SHARE = layout_kind(
+    "sky.share",
+    "The share of the sun in the light of a sky",
+    "ENV-2",
+    dict.fromkeys(("zenith", "horizon", "ground", "sun_irradiance"), "float[3], linear RGB"),
+    {"share": "float, q"},
+    _share,
+    (
+        ((0.5, 0.25, 1.0), (0.125, 0.5, 0.25), (0.25, 0.75, 0.0625), (3.0, 2.0, 1.0)),
+        ((0.125, 0.0, 0.0), (0.0, 0.0625, 0.0), (0.0, 0.0, 0.03125), (0.0, 0.125, 0.25)),
+        ((1.0, 1.0, 1.0), (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)),
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+    ),
+)
+"""Skies; without light there is no share."""
+
+KINDS = (AXES, LAMP, SHARE)
 """Kinds of this module that are not functions which executors run."""
 
 CAMERA = Camera((0.5, 1.0, 4.0), (0.0, -0.2, 0.0), (0.0, 1.0, 0.0), 41.0)

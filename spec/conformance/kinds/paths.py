@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -224,7 +224,6 @@ WITH_ROULETTE = {"alive": "LTR-9", "beta": "LTR-9"}
 def _clauses(kind: str, inputs: Mapping[str, Any]) -> Mapping[str, str]:
     """Return the clauses of a case's outputs where they are not the case's own."""
     name = str(inputs["scene"]["file"]).removeprefix("scenes/").removesuffix(".json")
-    # Of single directions only: no light is sampled, and all weights are 1.
     found = {**CLAUSES[kind], **({"radiance": "SHD-4"} if name == MIRRORS.name else {})}
     if kind != "path.scatter":
         return found
@@ -297,7 +296,9 @@ def _steps() -> Found:
             state = {name: rounded(state[name]) for name in PATH}
             wanted = arrive(_with_scene({**kept, **state}, view))
             sent = ranges.evaluate(programs.arrive, _flat(state, PATH))
-            _add(found.arrive, "path.arrive", "LTR-2", {**kept, **state}, wanted, sent)
+            inputs = {**kept, **state}
+            of_light = _of_emission(view, state["direction"], wanted)
+            _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, sent, of_light)
             surface = {name: rounded(wanted[name]) for name in SURFACE}
             inputs = {
                 **kept,
@@ -327,13 +328,25 @@ def _steps() -> Found:
         view = View(scene, settings, 0, 0, 0)
         wanted = arrive(_with_scene(inputs, view))
         reach = ranges.evaluate(programs_of(scene, settings).arrive, _flat(inputs, PATH))
-        _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, reach)
+        of_light = _of_emission(view, inputs["direction"], wanted)
+        _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, reach, of_light)
     given = foundry_settings()
     for clause, name, value in WRONG_SETTINGS:
         inputs = {**given, "settings": {**given["settings"], name: value}}
         case = Case(f"path.start/{len(found.start)}", clause, inputs, None, (), f"{name} = {value}")
         found.start.append(case)
     return found
+
+
+def _of_emission(view: View, direction: Any, wanted: State) -> str:
+    """Return the clause of the light of an arrival, "" for that of the case.
+
+    A lamp is black behind; where no light is sampled, all weights are 1."""
+    world = world_of(scene_text(view.scene), asdict(view.settings)).world
+    lamp = int(world.geometry.light[int(wanted["surface"])])
+    if lamp >= 0 and world.lights is not None and float(world.lights.normal[lamp] @ direction) > 0.0:
+        return "ISC-14"
+    return "" if world.samples_lights else "SHD-4" if world.materials.single else "LTR-10"
 
 
 def _add(

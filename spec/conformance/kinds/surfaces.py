@@ -168,6 +168,7 @@ NEAREST = Function(
         ("between sphere and box", _ray((3, 0.5, 0), (-1, -0.125, 0))),
         ("the quad from below", _ray((0.75, 0.5, 0.75), (0, 1, 0))),
         ("nothing", _ray((0, 3, 0), (0, 1, 0))),
+        ("out of the sphere, from beyond its middle", _ray((0, 0.5, 0.25), (0, 0, 1)), "ISC-6"),
         ("into the far corner of the quad, which belongs to it", _ray((1, 3, 1), (0, -1, 0)), "ISC-7"),
     ],
     _aimed,

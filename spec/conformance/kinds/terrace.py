@@ -181,7 +181,7 @@ BALL = Sphere((0.0, 0.75, 0.0), 0.5, (0.875, 0.9375, 1.0), material=Dielectric(1
 
 LENS = Scene(
     "lens",
-    Camera((0.0, 0.875, 4.0), (0.0, 0.5, 0.0), (0.0, 1.0, 0.0), 40.0),
+    Camera((0.0, 4.0, 2.0), (0.0, 0.5, 0.0), (0.0, 1.0, 0.0), 40.0),
     spheres=(BALL,),
     quads=(Quad((-4.0, 0.0, -4.0), (0.0, 0.0, 8.0), (8.0, 0.0, 0.0), (0.75, 0.5, 0.25)),),
     lights=(Light((-0.5, 2.5, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.875, 0.75), 10.0),),
@@ -196,7 +196,7 @@ PANE = replace(
     quads=(),
     background=(0.0, 0.0, 0.0),
     environment=Sky(
-        (0.015625, 0.03125, 0.0625), (0.03125,) * 3, (0.015625,) * 3, sun_irradiance=(0.25, 0.125, 0.0)
+        (0.0078125, 0.015625, 0.03125), (0.015625,) * 3, (0.0078125,) * 3, sun_irradiance=(0.25, 0.125, 0.0)
     ),
 )
 """The same ball over a matte block, which comes first, under a sky whose light sums up to less than 1."""

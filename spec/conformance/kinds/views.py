@@ -174,7 +174,7 @@ def others() -> Iterator[View]:
     yield from map(_other, OTHERS)
 
 
-GLASS = tuple((scene.name, x, y) for scene in (LENS, PANE, BUBBLE) for x, y in ((8, 7), (7, 6), (8, 13)))
+GLASS = tuple((scene.name, x, y) for scene in (LENS, PANE, BUBBLE) for x, y in ((8, 7), (7, 6), (8, 14)))
 """Scenes with a ball of glass, and pixels that show the ball and what is below it."""
 
 PICKED = {TERRACE.name: (6, 13), NIGHT.name: (8, 13), FOUNDRY.name: (11, 8)}

@@ -1729,10 +1729,20 @@ static double exposed(double linear, double stops) { return linear * exp2(stops)
 /* ENC-5 */
 static double to_display(double linear, double stops) { return srgb_encode(clamp(exposed(linear, stops), 0, 1)); }
 
-static const char *const FEATURES[] = {"color",    "albedo",    "normal",    "depth",
-                                       "position", "direction", "unshadowed"};
+static const char *const FEATURES[] = {"color",    "albedo",    "normal",     "depth",
+                                       "position", "direction", "unshadowed", "highlights"};
 
-typedef enum { COLOR, ALBEDO, NORMAL, DEPTH, POSITION, DIRECTION, UNSHADOWED, FEATURE_COUNT } feature;
+typedef enum {
+    COLOR,
+    ALBEDO,
+    NORMAL,
+    DEPTH,
+    POSITION,
+    DIRECTION,
+    UNSHADOWED,
+    HIGHLIGHTS,
+    FEATURE_COUNT
+} feature;
 
 typedef struct {
     feature items[FEATURE_COUNT];
@@ -1778,10 +1788,14 @@ static scales read_scales(const json *in) {
     return made;
 }
 
+/* DAT-1: the layer that a feature is made of */
+static const char *layer_of(feature f) { return FEATURES[f == HIGHLIGHTS ? COLOR : f]; }
+
 /* DAT-1, DAT-10 */
 static double encoded(feature f, double x, size_t channel, const scales *s) {
     if (isnan(x)) x = 0;
     if (f == COLOR || f == UNSHADOWED) return to_display(x, s->stops);
+    if (f == HIGHLIGHTS) return to_display(x, s->stops - 4);
     if (f == ALBEDO) return clamp(x, 0, 1);
     if (f == DEPTH) return clamp(x / s->depth_scale, 0, 1);
     if (f == POSITION) x = (x - s->position_center.c[channel]) / s->position_scale;
@@ -1794,7 +1808,7 @@ static array feature_image(const json *in, const features *wanted, const scales 
     size_t offset = 0;
     for (size_t i = 0; i < wanted->count; i++) {
         feature f = wanted->items[i];
-        array layer = array_in(in, FEATURES[f], 3);
+        array layer = array_in(in, layer_of(f), 3);
         size_t channels = channels_of(f);
         if (!i) {
             size_t shape[3] = {layer.shape[0], layer.shape[1], wanted->channels};
@@ -1802,7 +1816,7 @@ static array feature_image(const json *in, const features *wanted, const scales 
         }
         if (layer.shape[2] != channels || layer.shape[0] != image.shape[0] || layer.shape[1] != image.shape[1]
             || !layer.count)
-            refuse("the layer %s has another shape", FEATURES[f]);
+            refuse("the layer %s has another shape", layer_of(f));
         for (size_t k = 0; k < layer.count; k++)
             image.values[k / channels * wanted->channels + offset + k % channels]
                 = (float)encoded(f, layer.values[k], k % channels, s);

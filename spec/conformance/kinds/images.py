@@ -125,6 +125,11 @@ def _feature_cases() -> list[Case]:
     inputs = {**shown, "features": names, **OTHER_SCALES}
     expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}
     cases.append(Case(f"image.features/{len(cases)}", "DAT-1", inputs, expected, (), "other scales"))
+    names = "highlights,depth,color"
+    shown = {name: layers[name][1:] for name in ("color", "depth")}
+    expected = {"image": Output(_features({**shown, "features": names, **SCALES})["image"], ULP, ENCODED)}
+    inputs = {**shown, "features": names, **SCALES}
+    cases.append(Case(f"image.features/{len(cases)}", "DAT-1", inputs, expected, (), "two of one layer"))
     for names, note in (
         ("color,depth", "a layer is missing"),
         ("color,color", "a feature twice"),

@@ -341,9 +341,11 @@ def _steps() -> Found:
 def _of_emission(view: View, direction: Any, wanted: State) -> str:
     """Return the clause of the light of an arrival, "" for that of the case.
 
-    A lamp is black behind; where no light is sampled, all weights are 1."""
+    A lamp is black behind; where no light is sampled, all weights are 1, as those of other surfaces."""
     world = world_of(scene_text(view.scene), asdict(view.settings)).world
     lamp = int(world.geometry.light[int(wanted["surface"])])
+    if lamp < 0 and int(wanted["surface"]) < world.geometry.nothing:
+        return ""
     if lamp >= 0 and world.lights is not None and float(world.lights.normal[lamp] @ direction) > 0.0:
         return "ISC-14"
     return "" if world.samples_lights else "SHD-4" if world.materials.single else "LTR-10"

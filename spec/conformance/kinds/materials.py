@@ -272,7 +272,8 @@ REFRACTED = Function(
 
 def _refracted(given: Numbers) -> dict[str, Any]:
     """Return the direction behind a surface, and its cosine."""
-    site = Site(given["wo"], given["normal"], *(None,) * 5)
+    nothing = np.zeros_like(given["wo"])
+    site = Site(given["wo"], given["normal"], None, nothing, nothing, nothing, None)
     cosine = np.minimum(np.maximum(dot(site.wo, site.normal), 0.0), 1.0)
     direction, behind = refract(site, cosine, given["ratio"])
     return {"direction": direction, "cosine": behind}

@@ -23,8 +23,9 @@ COUNTERS = ("seed", "pixel", "sample", "block")
 
 def _block(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the words and floats of a block."""
-    counters = [rng.counter(int(inputs[name])) for name in COUNTERS]
-    words, floats = rng.random_block(*counters), rng.uniforms(*counters, np.float64)
+    seed, pixel, sample, block = (rng.counter(int(inputs[name])) for name in COUNTERS)
+    words = rng.random_block(seed, pixel, sample, block)
+    floats = rng.uniforms(seed, pixel, sample, block, np.float64)
     return {"words": [int(w[0]) for w in words], "floats": np.array([f[0] for f in floats])}
 
 
@@ -187,7 +188,7 @@ TRANSFER = Function(
 def _exposed(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return exposed radiance."""
     stops = float(inputs["exposure_stops"])
-    return {"exposed": np.float64(encoding.expose(np.float64(inputs["linear"]), stops))}
+    return {"exposed": np.float64(encoding.expose(np.asarray(inputs["linear"], np.float64), stops))}
 
 
 def _exposures() -> list[Case]:

@@ -323,6 +323,17 @@ def _steps() -> Found:
             if not wanted["alive"]:
                 break
             state = wanted
+    _sent_midway(found)
+    given = foundry_settings()
+    for clause, name, value in WRONG_SETTINGS:
+        inputs = {**given, "settings": {**given["settings"], name: value}}
+        case = Case(f"path.start/{len(found.start)}", clause, inputs, None, (), f"{name} = {value}")
+        found.start.append(case)
+    return found
+
+
+def _sent_midway(found: Found) -> None:
+    """Add arrivals of rays that are sent from inside of a scene."""
     for scene, settings, direction in SENT:
         inputs = midway(scene, settings, direction)
         view = View(scene, settings, 0, 0, 0)
@@ -330,12 +341,6 @@ def _steps() -> Found:
         reach = ranges.evaluate(programs_of(scene, settings).arrive, _flat(inputs, PATH))
         of_light = _of_emission(view, inputs["direction"], wanted)
         _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, reach, of_light)
-    given = foundry_settings()
-    for clause, name, value in WRONG_SETTINGS:
-        inputs = {**given, "settings": {**given["settings"], name: value}}
-        case = Case(f"path.start/{len(found.start)}", clause, inputs, None, (), f"{name} = {value}")
-        found.start.append(case)
-    return found
 
 
 def _of_emission(view: View, direction: Any, wanted: State) -> str:

@@ -117,7 +117,7 @@ def ahead(
     return made
 
 
-HARD_OUTSIDE = ("input", "oidn-clean16", "oidn-past-prefiltered16", "hard-16")
+HARD_OUTSIDE = ("input", "oidn-clean16", "oidn-past-prefiltered16", "hard-16", "slow-16")
 """Rows that are shown of frames outside of the ranges of hard scenes."""
 
 README_ROWS = ("input", "oidn-color", "oidn-prefiltered1", "oidn-clean16", "best-16", "page-16", "page48-16")
@@ -133,8 +133,8 @@ AHEAD = (
         "camera moves all around the front, lamps of any hue: the network that ships",
     ),
     ("cornell", "best-16", "`cornell`, camera moves"),
-    ("glossy", "hard-16", "`glossy`, camera moves, features past mirrors and glass for both"),
-    ("daylight", "hard-16", "`daylight`, the same"),
+    ("glossy", "slow-16", "`glossy`, camera moves, features past mirrors and glass for both"),
+    ("daylight", "narrow-16", "`daylight`, the same"),
 )
 """Sets and rows that docs/results.md compares with Open Image Denoise, given the same features."""
 
@@ -153,11 +153,11 @@ GAPS = (("test", "psnr", 2), ("outside", "psnr", 2), ("test", "ssim", 3), ("test
 """The differences that are shown: split, score, digits."""
 
 
-def frame_ms(row: str) -> Callable[[Records], str]:
+def frame_ms(row: str, record: str = "quality-times") -> Callable[[Records], str]:
     """Return the median milliseconds of a frame by a row of `quality`."""
 
     def made(records: Records) -> str:
-        times = records["quality-times"].of("times", "seconds")[0]
+        times = records[record].of("times", "seconds")[0]
         return f"{1000.0 * statistics.median(times[row]):.0f}"
 
     return made
@@ -524,6 +524,9 @@ FIGURES: Mapping[str, Callable[[Records], str]] = {
     "departures-clip": departure("unclipped", -1.0),
     "departures-loss": departure("summed"),
     "departures-replacement": departure("without replacement"),
+    "hard-ms": frame_ms("slow-16", "hard-light-times"),
+    "hard-oidn-ms": frame_ms("oidn-past-prefiltered16", "hard-light-times"),
+    "hard-oidn-clean-ms": frame_ms("oidn-past-clean16", "hard-light-times"),
     "moving-mitsuba": moving("mitsuba", "whole picture, denoised fast", "times opencl, moving", 1),
     "moving-ms": moving("opencl", "one pipeline, moving", "ms, median", 0),
     "oidn-fast-ms": frame_ms("oidn-fast16"),
@@ -554,6 +557,7 @@ TABLES: Mapping[str, TableOf] = {
     "flicker": study("flicker"),
     "generalisation": generalisation,
     "heads": study("heads", "camera moves"),
+    "history": study("history", "`minicubes`, 24 pictures a second"),
     "lamps": study("lamps", "`minicubes`, camera at rest"),
     "learning-curve": learning_curve,
     "lights": study("lights"),
@@ -564,10 +568,7 @@ TABLES: Mapping[str, TableOf] = {
     "quality-lamps": quality("minicubes-page"),
     **{f"quality-{name}": quality(name) for name in ("cornell", "minicubes")},
     **{f"hard-{name}": quality(name, record="hard-light") for name in ("glossy", "daylight")},
-    **{
-        f"hard-{name}-outside": quality(name, "outside", HARD_OUTSIDE, "hard-light")
-        for name in ("glossy", "daylight")
-    },
+    "hard-glossy-outside": quality("glossy", "outside", HARD_OUTSIDE, "hard-light"),
     "quality-outside": quality("minicubes", "outside"),
     "quality-readme": quality("minicubes", only=README_ROWS),
     "quality-times": quality_times,

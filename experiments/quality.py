@@ -48,7 +48,7 @@ from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Floats, Frame
 from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.train import BEST, SHORT, Recipe
+from wamnet.refimpl.network.train import BEST, MIRRORS, SHORT, Recipe
 
 SHIPPED_SET = "minicubes-page"
 """The set that the network of the web page learns from: everything that the page can move."""
@@ -98,8 +98,8 @@ RECIPES: Mapping[str, Recipe] = {
     "bright": replace(BEST, features=BRIGHT),
     "narrow": NARROW,
     "long": replace(NARROW, steps=120_000),
-    "hard": replace(NARROW, steps=60_000, learning_rate=5e-4),
-    "slow": replace(NARROW, steps=120_000, learning_rate=5e-4),
+    "hard": MIRRORS,
+    "slow": replace(MIRRORS, steps=120_000),
     "page48": replace(BEST, features=LAMPS, steps=60_000, widths=(48,) * 4),
 }
 """Recipes of the rows by name."""

@@ -109,14 +109,14 @@ def train(
     preset: Annotated[
         Preset | None,
         typer.Option(
-            help="Protocol: the project's best, the paper's own, or one of half the best's time.",
+            help="Protocol: the project's best, one for mirrors and glass, the paper's, or a short one.",
             show_default="best",
         ),
     ] = None,
     features: Annotated[
         str | None,
         typer.Option(
-            help="What the network sees, with commas: color, normal, albedo, depth, position, direction.",
+            help="What the network sees, with commas: color, highlights, normal, albedo, seen_albedo, ...",
             show_default="the preset's",
         ),
     ] = None,

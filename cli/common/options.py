@@ -124,6 +124,7 @@ class Preset(str, Enum):
     """Training protocols by name; equal to the registry in refimpl."""
 
     best = "best"
+    mirrors = "mirrors"
     paper = "paper"
     short = "short"
 

@@ -131,7 +131,18 @@ SHORT = Recipe(
 BEST = replace(SHORT, steps=30_000)
 """The same for longer, which pays with many frames; chosen by `experiments/quality.py`."""
 
-PRESETS: Mapping[str, Recipe] = {"best": BEST, "paper": PAPER, "short": SHORT}
+MIRRORS = replace(
+    BEST,
+    features=("color", "highlights", "seen_normal", "seen_albedo", "seen_position"),
+    window=Window(8, "clamp"),
+    widths=(64, 64, 64, 64),
+    steps=60_000,
+    learning_rate=5e-4,
+)
+"""For scenes with mirrors, metal and glass, whose frames have layers of what is seen past these; chosen by
+`experiments/quality.py --sets glossy`."""
+
+PRESETS: Mapping[str, Recipe] = {"best": BEST, "mirrors": MIRRORS, "paper": PAPER, "short": SHORT}
 """Recipes by name; change single choices with `dataclasses.replace`."""
 
 

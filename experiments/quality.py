@@ -169,8 +169,14 @@ TIMED = ("oidn-fast16", "oidn-clean16", "page-16")
 HARD_TIMED = ("oidn-past-clean16", "oidn-past-prefiltered16", "slow-16")
 """The same of scenes with mirrors, metal and glass."""
 
-SHOWN = ("input", "oidn-clean16", "oidn-past-prefiltered16", "page-16", "slow-16")
-"""Rows that are shown beside the reference."""
+SHOWN = {
+    "input": "1 sample a pixel",
+    "oidn-clean16": "Open Image Denoise",
+    "oidn-past-prefiltered16": "Open Image Denoise, past mirrors",
+    "page-16": "wamnet",
+    "slow-16": "wamnet, past mirrors",
+}
+"""Rows that are shown beside the reference, and what their pictures are called."""
 
 COLUMNS = (
     tables.Column("psnr", "PSNR, dB", interval=True),
@@ -401,7 +407,7 @@ def drawn(bench: Bench, path: Path, rows: Sequence[str]) -> None:
     for name in [row for row in SHOWN if row in rows]:
         frame, clean = bench.tests(0, ROWS[name].rays)[0]
         picture = denoised(bench, ROWS[name], [frame], 0)[0][0][0]
-        pictures.append((ROWS[name].text, picture))
+        pictures.append((SHOWN[name], picture))
         target = to_display(clean["color"])
     if pictures:
         figures.sheet(path, [(bench.name, [*pictures, ("reference", target)])], inches=3.2)

@@ -35,7 +35,7 @@ WRONG = {
         "RNG-3",
         "fail",
     ),
-    "floats of 23 bits": ("(word >> 8) / 2**24", "(word >> 9) / 2**23", "random.block", "RNG-3", "fail"),
+    "floats of 23 bits": ("(word >> 8) / 2**24", "(word >> 9) / 2**23", "random.block", "RNG-6", "fail"),
     "a gamma of 2.2": ("1 / 2.4", "1 / 2.2", "encoding.display", "ENC-5", "fail"),
     "no clip": (
         'min(max(float.fromhex(given["linear"]), 0.0), 1.0)',

@@ -373,7 +373,7 @@ def configuration(name: str, split: str, row: str) -> str:
 
 
 HARD_ROWS = ("past-16", "bright-16", "narrow-16", "long-16", "hard-16", "slow-16")
-"""Rows for scenes with mirrors, metal and glass, each with one idea more."""
+"""Rows for scenes with mirrors, metal and glass: one idea after the other, then longer trainings."""
 
 OURS = {
     "best-1": (1,),

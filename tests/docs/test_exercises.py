@@ -48,7 +48,7 @@ WRONG = {
     ],
     "ex4_light": [
         ("reflectance * np.ones_like(z)", "reflectance * z / np.pi", "in a furnace of 2"),
-        ("1 / (1 + ratio * ratio)", "pdf * pdf / (pdf * pdf + other * other)", "are alike"),
+        ("1 / (1 + ratio * ratio)", "(p := np.maximum(pdf, 1e-15)) * p / (p * p + other**2)", "are alike"),
         ("4 * half * half", "half * half", "p-value"),
     ],
     "ex5_window": [

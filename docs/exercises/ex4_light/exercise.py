@@ -18,7 +18,8 @@ def bounce(reflectance: Any, u0: Any, u1: Any) -> tuple[Any, Any, Any]:
 def power_weight(pdf: Any, other: Any) -> Any:
     """Return the power heuristic's weight (...) of samples of density pdf (...), the other way's being other.
 
-    Densities may be as large as 1e30 in single precision, and may be 0.
+    Densities may be as large as 1e30 in single precision, and may be 0: a pdf below 1e-15 counts as 1e-15
+    (LTR-5).
     """
     raise NotImplementedError("power_weight")
 

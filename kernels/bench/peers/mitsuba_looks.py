@@ -93,7 +93,9 @@ def _metal_class(mi: Any) -> Any:
             """Return what its value is multiplied by; 0 where neither direction sees the other."""
             half = dr.normalize(wi + wo)
             one, other = self.facets.smith_g1(wi, half), self.facets.smith_g1(wo, half)
-            return dr.select(one * other > 0.0, correlated(one, other), 0.0)
+            seen = one * other > 0.0
+            # In the scalar variant both sides are worked out, and a division by 0 ends the program.
+            return dr.select(seen, correlated(dr.select(seen, one, 1.0), dr.select(seen, other, 1.0)), 0.0)
 
         def sample(self, context: Any, at: Any, u: Any, uv: Any, active: Any = True) -> Any:
             found, weight = self.separable.sample(context, at, u, uv, active)

@@ -94,7 +94,7 @@ def _say_what_is_no_number(path: Path, noisy: Frame, model: Model) -> None:
     from ...refimpl.frame import not_finite
     from ...refimpl.network.dataset import FEATURES
 
-    read = {FEATURES[name].layer for name in model.features}
+    read = {layer for name in model.features for layer in FEATURES[name].layers}
     for layer, count in not_finite(noisy).items():
         if layer in read:
             rule = "NaN is read as 0, an infinity as the end of the range"

@@ -258,7 +258,7 @@ def part_of(task: Task, box: Box) -> Frame:
 
     from ...refimpl.network.dataset import FEATURES
 
-    names = dict.fromkeys(FEATURES[name].layer for name in task.model.features)
+    names = dict.fromkeys(layer for name in task.model.features for layer in FEATURES[name].layers)
     largest = float(np.finfo(np.float32).max)
     layers = {
         name: np.nan_to_num(array, nan=0.0, posinf=largest, neginf=-largest)

@@ -126,7 +126,7 @@ def need_layers(path: Path, frame: Frame, features: Sequence[str], because: str,
     from ...refimpl.network.dataset import FEATURES
 
     # Unknown features are refused where they come from.
-    for layer in (FEATURES[name].layer for name in features if name in FEATURES):
+    for layer in (layer for name in features if name in FEATURES for layer in FEATURES[name].layers):
         if layer not in frame.layers:
             rule = f"{layer} must be among them, because {because}"
             raise InputError(f"{path}: list of layers", ", ".join(frame.layers), rule, way_out)

@@ -37,6 +37,9 @@ def layers_of(features: Sequence[str]) -> tuple[str, ...]:
     """Return the layers that features are made of: the groups of planes that a path kernel has to add up."""
     check_features(features)
     layers = tuple(dict.fromkeys(FEATURES[name].layer for name in features))
+    if smoothed := [name for name in features if FEATURES[name].guides]:
+        rule = "a path kernel knows nothing of a pixel's neighbours"
+        raise InputError("features", ", ".join(smoothed), rule, "denoise frames: wamnet render, then denoise")
     if before := [layer for layer in layers if layer in HISTORY]:
         rule = "a path kernel makes layers of one picture, not of those before it"
         raise InputError("features", ", ".join(before), rule, "make them with refimpl/light/history.py")

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ from ..frame import SEEN, Frame, check_finite
 from ..reading import parse_json, to_dataclass
 from ..rng import counter, random_block
 from ..vectors import vector
+from .smoothing import DEPTH, GUIDES, LEVELS, dimmed, smooth
 from .whole import steps_of
 
 Array = NDArray[Any]
@@ -40,7 +41,6 @@ PIXEL_TAG = 0x50495845
 LARGEST_WINDOW_PX = 64
 """Largest window: 64 x 64 pixels of 16 channels are 65,536 numbers a pixel, far beyond any use. A typing
 error is refused before it takes all memory."""
-
 
 LARGEST_SCALE = 1e18
 """Largest scale and position, in scene units. The smallest scale is its inverse: with a position of 1e12 no
@@ -62,6 +62,11 @@ HIGHLIGHT_STOPS = -4.0
 are far brighter than white, which `color` clips."""
 
 
+FENCES = 1.5
+"""Distance of the fences from the quartiles in interquartile ranges; Tukey's. A plain that reaches to the
+horizon is beyond them, and would leave a thirtieth of the range to all that is on it."""
+
+
 @dataclass(frozen=True)
 class Normalization:
     """Scales that bring a scene's numbers near [-1, 1]; part of the model, the same for all its frames.
@@ -80,6 +85,7 @@ class Feature:
     """A network input: `encode` turns `layer` (..., channels) into numbers in [low, high].
 
     `formula` says the same in words for whoever feeds a kernel, with a [`Normalization`]'s fields in braces.
+    With `guides`, names of layers by what they are to the filter, the layer is smoothed first [smoothing.py].
     """
 
     name: str
@@ -89,6 +95,12 @@ class Feature:
     high: float
     encode: Callable[[Array, Normalization], Array]
     formula: str
+    guides: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """Return all layers that the feature is made of."""
+        return (self.layer, *self.guides.values())
 
     def encoding(self, normalization: Normalization) -> str:
         """Return the formula with the model's scales in it."""
@@ -240,6 +252,19 @@ PICTURES_BEFORE: Mapping[str, Feature] = {
 }
 """Features of a picture that follows others (light/history.py)."""
 
+SMOOTHED: Mapping[str, Feature] = {
+    f"{past}smoothed": Feature(
+        f"{past}smoothed",
+        "color",
+        *(3, 0.0, 1.0, encode_color),
+        f"color smoothed, guided by {', '.join(guides.values())} (spec/smoothing.md); {DISPLAY_FORMULA}",
+        guides,
+    )
+    for past in ("", "seen_")
+    for guides in [{guide: past + guide for guide in (*GUIDES, DEPTH)}]
+}
+"""Smoothed colour, guided by the first hit or by what is seen past mirrors and glass."""
+
 FEATURES: Mapping[str, Feature] = {
     **FIRST_HITS,
     **{
@@ -247,6 +272,7 @@ FEATURES: Mapping[str, Feature] = {
         for seen, first in SEEN.items()
     },
     **PICTURES_BEFORE,
+    **SMOOTHED,
 }
 """Every feature that a model may use. Those of what is seen past mirrors and glass are encoded as those of
 the first hit are, by the same scales."""
@@ -327,17 +353,30 @@ def n_inputs(features: Sequence[str], window: Window) -> int:
 
 
 def normalization_of(frames: Sequence[Frame], exposure_stops: float = 0.0) -> Normalization:
-    """Measure the scales: the farthest depth, and the cube around all positions that are not exactly 0.
+    """Measure the scales: the farthest depth, and the cube around positions that are not exactly 0.
 
-    Those of what is seen past mirrors and glass count where a frame has them.
+    Those of what is seen past mirrors and glass count where a frame has them. Along an axis the cube ends at
+    Tukey's fences, where positions go beyond them (Exploratory Data Analysis, 1977).
     """
-    far = max(map(_farthest, _layers(frames, "depth", "seen_depth")), default=0.0)
-    hits = [_hits(position) for position in _layers(frames, "position", "seen_position")]
-    points = np.concatenate(hits) if hits else np.zeros((0, 3))
-    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.zeros(3))
-    x, y, z = (float(value) for value in (low + high) / 2)
-    extent = float((high - low).max()) / 2
+    depths = _layers(frames, "depth", "seen_depth")
+    far = max((float(np.max(d, initial=0.0, where=d < FARTHEST_DEPTH)) for d in depths), default=0.0)
+    hits = list(map(_hits, _layers(frames, "position", "seen_position")))
+    axes = np.array([_reach([points[:, axis] for points in hits]) for axis in range(3)])
+    x, y, z = (float(value) for value in axes.mean(axis=1))
+    extent = float((axes[:, 1] - axes[:, 0]).max()) / 2
     return Normalization(exposure_stops, far if far > 0 else 1.0, (x, y, z), extent if extent > 0 else 1.0)
+
+
+def _reach(parts: Sequence[Array]) -> tuple[float, float]:
+    """Return the least and the largest of all numbers, or Tukey's fences where numbers are beyond them."""
+    numbers = np.concatenate(parts) if parts else np.zeros(0)
+    if not len(numbers):
+        return 0.0, 0.0
+    # Quartiles are numbers that occur, not means of two: nothing is rounded.
+    at = (len(numbers) - 1) // 4
+    ends = [0, at, len(numbers) - 1 - at, len(numbers) - 1]
+    low, first, third, high = (float(number) for number in np.partition(numbers, ends)[ends])
+    return max(low, first - FENCES * (third - first)), min(high, third + FENCES * (third - first))
 
 
 def _layers(frames: Sequence[Frame], *names: str) -> list[Array]:
@@ -345,16 +384,10 @@ def _layers(frames: Sequence[Frame], *names: str) -> list[Array]:
     return [frame[name] for frame in frames for name in names if name in frame.layers]
 
 
-def _farthest(depth: Array) -> float:
-    """Return the largest depth of (H, W, 1) that is not a miss, or 0."""
-    return float(np.max(depth, initial=0.0, where=depth < FARTHEST_DEPTH))
-
-
 def _hits(position: Array) -> Array:
     """Return as float64 (N, 3) the positions (H, W, 3) of pixels that hit something: not 0."""
-    points = position.reshape(-1, 3).astype(np.float64)
-    hits: Array = points[np.any(points != 0.0, axis=-1)]
-    return hits
+    points: Array = position.reshape(-1, 3).astype(np.float64)
+    return points[np.any(points != 0.0, axis=-1)]
 
 
 def feature_image(frame: Frame, features: Sequence[str], normalization: Normalization) -> NDArray[np.float32]:
@@ -374,14 +407,14 @@ def encode_sums(
 ) -> dict[str, Any]:
     """Return encoded features (..., channels) by name, from layers (..., channels) summed over the samples.
 
-    With `rays` the layers but the colour are sums over so many camera rays.
-
-    That is what a renderer's kernel holds before it is read back; may be traced. The last clip changes
-    nothing but what rounding has put outside the range that a feature promises. `whole`: for a network of
-    integers [whole.py].
+    With `rays` the layers but the colour are sums over so many camera rays. That is what a renderer's kernel
+    holds before it is read back; may be traced. The last clip changes nothing but what rounding has put
+    outside the range that a feature promises. `whole`: for a network of integers [whole.py].
     """
     encoded = {}
     for feature in (FEATURES[name] for name in features):
+        if feature.guides:
+            raise InputError("feature", feature.name, "made of a pixel's own sums", "use feature_image")
         count = rays if rays and feature.layer != "color" else samples
         values = feature.encode(sums[feature.layer] / count, normalization)
         clipped = np.clip(values, feature.low, feature.high)
@@ -391,11 +424,15 @@ def encode_sums(
 
 def _encoded(frame: Frame, feature: Feature, normalization: Normalization) -> Array:
     """Return one encoded feature (H, W, channels) in float64, or say which layer is missing."""
-    if feature.layer not in frame.layers:
-        what = f"feature {feature.name!r}: layers of the frame"
-        rule = f"layer {feature.layer!r} must be present"
-        raise InputError(what, ", ".join(frame.layers), rule, "render it, or choose other features")
-    return feature.encode(known(frame[feature.layer].astype(np.float64)), normalization)
+    for layer in feature.layers:
+        if layer not in frame.layers:
+            what, rule = f"feature {feature.name!r}: layers of the frame", f"layer {layer!r} must be present"
+            raise InputError(what, ", ".join(frame.layers), rule, "render it, or choose other features")
+    values, *others = (known(frame[layer].astype(np.float64)) for layer in feature.layers)
+    if feature.guides:
+        guides = dict(zip(feature.guides, others, strict=True))
+        values = smooth(dimmed(values, normalization.exposure_stops), guides, LEVELS)
+    return feature.encode(values, normalization)
 
 
 def known(values: Array) -> Array:

@@ -129,7 +129,7 @@ def test_feature_ranges_channels_and_order() -> None:
     scales = Normalization(depth_scale=1.5, position_scale=1.5)
     image = dataset.feature_image(frame, tuple(FEATURES), scales)
     assert image.dtype == np.float32
-    assert image.shape == (5, 4, dataset.channels_of(tuple(FEATURES))) == (5, 4, 36)
+    assert image.shape == (5, 4, dataset.channels_of(tuple(FEATURES))) == (5, 4, 42)
     first = 0
     for feature in FEATURES.values():
         assert feature.channels == LAYERS[feature.layer].channels
@@ -138,8 +138,8 @@ def test_feature_ranges_channels_and_order() -> None:
         assert part.min() >= feature.low
         assert part.max() <= feature.high
         # Layers reach beyond the range, so the clip is seen; the interior is seen too. White is far below
-        # what `highlights` clips.
-        assert (part == feature.high).any() or feature.name == "highlights"
+        # what `highlights` clips, and a mean of 25 pixels is inside.
+        assert (part == feature.high).any() or feature.name == "highlights" or feature.guides
         assert ((part > feature.low) & (part < feature.high)).any()
         first += feature.channels
 
@@ -174,13 +174,17 @@ def test_features_by_hand() -> None:
         assert dataset.feature_image(frame, (name,), scales)[0, 0].tolist() == values
 
 
+OF_A_PIXEL = tuple(name for name, feature in FEATURES.items() if not feature.guides)
+"""Features that sums of a pixel are enough for."""
+
+
 def test_sums_are_encoded_as_their_means_are() -> None:
     """Sums over 4 samples, which divide exactly; in float64, so that only feature_image rounds."""
     frame = frame_of(5, 4)
     scales = Normalization(0.5, 1.5, (0.1, -0.2, 0.3), 1.5)
     sums = {name: 4.0 * values.astype(np.float64) for name, values in frame.layers.items()}
-    encoded = dataset.encode_sums(sums, 4.0, tuple(FEATURES), scales)
-    assert list(encoded) == list(FEATURES)
+    encoded = dataset.encode_sums(sums, 4.0, OF_A_PIXEL, scales)
+    assert list(encoded) == list(OF_A_PIXEL)
     for name, values in encoded.items():
         assert np.array_equal(values.astype(np.float32), dataset.feature_image(frame, (name,), scales))
 
@@ -188,7 +192,7 @@ def test_sums_are_encoded_as_their_means_are() -> None:
 def test_sums_stay_in_the_range_that_a_feature_promises() -> None:
     """In float32 1.055 x 1 - 0.055 and its like may pass 1: the last clip is what keeps them."""
     sums = {name: np.full((1, layer.channels), 3e38, np.float32) for name, layer in LAYERS.items()}
-    for name, values in dataset.encode_sums(sums, np.float32(1), tuple(FEATURES), Normalization()).items():
+    for name, values in dataset.encode_sums(sums, np.float32(1), OF_A_PIXEL, Normalization()).items():
         assert values.dtype == np.float32
         assert values.max() <= FEATURES[name].high
 
@@ -227,6 +231,18 @@ def test_normalization_by_hand() -> None:
     assert dataset.normalization_of([frame]) == Normalization(0.0, 7.0, (3.0, 2.0, 0.0), 3.0)
     both = dataset.normalization_of([frame, Frame({"depth": np.full((1, 1, 1), 9.0)})], exposure_stops=1.0)
     assert both == Normalization(1.0, 9.0, (3.0, 2.0, 0.0), 3.0)
+
+
+def test_a_plain_to_the_horizon_does_not_press_the_rest_together() -> None:
+    """Along x nine positions 1 to 9 and one at 1000. Their quartiles are 3 and 8, indices floor(9/4) = 2 and
+    ceil(27/4) = 7 of 10; the fence is at 8 + 1.5 * 5 = 15.5. So the box goes from 1 to 15.5."""
+    position = np.zeros((1, 10, 3))
+    position[0, :, 0] = [1000.0, *range(1, 10)]
+    found = dataset.normalization_of([Frame({"position": position})])
+    assert found == Normalization(0.0, 1.0, (8.25, 0.0, 0.0), 7.25)
+    encoded = dataset.encode_position(position, found)
+    assert encoded[0, 0, 0] == 1.0  # what is beyond is clipped
+    assert encoded[0, 1, 0] == -1.0
 
 
 def test_normalization_without_layers_or_hits_divides_by_one() -> None:

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 BUDGET = {
     "refimpl": 1150,
     "refimpl/light": 4300,
-    "refimpl/network": 2125,
+    "refimpl/network": 2250,
     "compiler": 1700,
     "compiler/core": 3450,
     "compiler/languages": 2300,

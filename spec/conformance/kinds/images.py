@@ -113,7 +113,7 @@ def _feature_cases() -> list[Case]:
     cases: list[Case] = []
     layers = bad_layers(2, 3, 50)
     for names, clause, note, bad in FEATURE_ROWS:
-        wanted = {dataset.FEATURES[name].layer for name in names.split(",")}
+        wanted = {layer for name in names.split(",") for layer in dataset.FEATURES[name].layers}
         shown = {n: v if bad else v[1:] for n, v in layers.items() if n in wanted}  # bad ones are in row 0
         inputs = {**shown, "features": names, **SCALES}
         expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}

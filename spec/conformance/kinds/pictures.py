@@ -93,7 +93,7 @@ DENOISED = (
 def _denoised() -> Iterator[tuple[Model, dict[str, Any], str]]:
     """Yield models, the layers that they are given, and notes."""
     for index, (features, window, widths, size, around, note) in enumerate(DENOISED):
-        wanted = {dataset.FEATURES[name].layer for name in features}
+        wanted = {layer for name in features for layer in dataset.FEATURES[name].layers}
         layers = {name: v for name, v in bad_layers(*size, 90 + 10 * index).items() if name in wanted}
         yield _model(features, window, widths, index, around), layers, note
     deep = _model(("depth",), Window(2, "clamp"), [4], len(DENOISED), MIDDLE)

@@ -90,6 +90,9 @@ BRIGHT = ("color", "highlights", *PAST[1:])
 NARROW = replace(BEST, features=BRIGHT, window=Window(8), widths=(64,) * 4)
 """Fewer taps for wider layers: what mirrors and glass show is remembered, not averaged."""
 
+SLOWER = replace(NARROW, steps=60_000, learning_rate=5e-4)
+"""Twice as many steps at half the rate."""
+
 RECIPES: Mapping[str, Recipe] = {
     "short": SHORT,
     "best": BEST,
@@ -98,8 +101,11 @@ RECIPES: Mapping[str, Recipe] = {
     "bright": replace(BEST, features=BRIGHT),
     "narrow": NARROW,
     "long": replace(NARROW, steps=120_000),
-    "hard": MIRRORS,
-    "slow": replace(MIRRORS, steps=120_000),
+    "hard": SLOWER,
+    "slow": replace(SLOWER, steps=120_000),
+    "smooth": MIRRORS,
+    "smooth-slow": replace(MIRRORS, steps=120_000),
+    "smooth-page": replace(MIRRORS, features=("color", "highlights", "smoothed", *LAMPS[1:])),
     "page48": replace(BEST, features=LAMPS, steps=60_000, widths=(48,) * 4),
 }
 """Recipes of the rows by name."""
@@ -153,12 +159,17 @@ ROWS: Mapping[str, Row] = {
     "best-16": Row(f"wamnet, best, {RAYS} rays", RAYS, "best"),
     "page-16": Row(f"wamnet, the page's inputs and steps, {RAYS} rays", RAYS, "page"),
     "page48-16": Row(f"wamnet, the same with 48 neurons a layer, {RAYS} rays", RAYS, "page48"),
+    "smooth-page-16": Row(
+        "the page's inputs, colour smoothed, 8 x 8 pixels, 64 neurons", RAYS, "smooth-page"
+    ),
     "past-16": Row(f"wamnet, best, {RAYS} rays past mirrors and glass", RAYS, "past", past=True),
     "bright-16": Row("the same, and how bright is what colour clips", RAYS, "bright", past=True),
     "narrow-16": Row("the same, 8 x 8 pixels, 64 neurons a layer", RAYS, "narrow", past=True),
     "long-16": Row("the same, four times as many steps", RAYS, "long", past=True),
     "hard-16": Row("twice as many steps at half the rate instead", RAYS, "hard", past=True),
     "slow-16": Row("four times as many steps at half the rate", RAYS, "slow", past=True),
+    "smooth-16": Row("twice as many steps, and colour smoothed (mirrors)", RAYS, "smooth", past=True),
+    "smooth-slow-16": Row("four times as many steps, and colour smoothed", RAYS, "smooth-slow", past=True),
     "shipped": Row(f"wamnet, the network of the page, {RAYS} rays", RAYS, "page", of=SHIPPED_SET),
 }
 """The rows by name."""
@@ -166,7 +177,7 @@ ROWS: Mapping[str, Row] = {
 TIMED = ("oidn-fast16", "oidn-clean16", "page-16")
 """Rows whose time is taken, ours last."""
 
-HARD_TIMED = ("oidn-past-clean16", "oidn-past-prefiltered16", "slow-16")
+HARD_TIMED = ("oidn-past-clean16", "oidn-past-prefiltered16", "smooth-slow-16")
 """The same of scenes with mirrors, metal and glass."""
 
 SHOWN = {
@@ -174,7 +185,7 @@ SHOWN = {
     "oidn-clean16": "Open Image Denoise",
     "oidn-past-prefiltered16": "Open Image Denoise, past mirrors",
     "page-16": "wamnet",
-    "slow-16": "wamnet, past mirrors",
+    "smooth-slow-16": "wamnet, past mirrors",
 }
 """Rows that are shown beside the reference, and what their pictures are called."""
 
@@ -372,12 +383,15 @@ def configuration(name: str, split: str, row: str) -> str:
     return f"{name}, {split}: {row}"
 
 
-HARD_ROWS = ("past-16", "bright-16", "narrow-16", "long-16", "hard-16", "slow-16")
+HARD_ROWS = (
+    *("past-16", "bright-16", "narrow-16", "long-16", "hard-16", "slow-16"),
+    *("smooth-16", "smooth-slow-16"),
+)
 """Rows for scenes with mirrors, metal and glass: one idea after the other, then longer trainings."""
 
 OURS = {
     "best-1": (1,),
-    **dict.fromkeys(("best-16", "page-16", "page48-16", "shipped", *HARD_ROWS), (1, RAYS)),
+    **dict.fromkeys(("best-16", "page-16", "page48-16", "smooth-page-16", "shipped", *HARD_ROWS), (1, RAYS)),
 }
 """Rows of ours that are compared with Open Image Denoise, and the rays of what it may be given then."""
 

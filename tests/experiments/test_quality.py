@@ -120,7 +120,8 @@ def test_both_denoisers_see_past_mirrors(monkeypatch, tmp_path):
     assert all(rows[row].past for row in quality.HARD_ROWS)
     for name in quality.HARD_ROWS:
         features = quality.RECIPES[rows[name].recipe].features
-        assert {f for f in features if f not in ("color", "highlights")} == set(quality.PAST[1:])
+        of_colour = ("color", "highlights", "seen_smoothed")
+        assert {f for f in features if f not in of_colour} == set(quality.PAST[1:])
     one = np.ones((2, 2, 3), np.float32)
     layers = {name: one * k for k, name in enumerate(("color", "albedo", "normal", "position"))}
     layers |= {f"seen_{name}": 10.0 + layers[name] for name in ("albedo", "normal", "position")}

@@ -90,6 +90,12 @@ def power(x: Ends, y: Ends) -> Ends:
         return hull(x[0] ** y[0], x[0] ** y[1], x[1] ** y[0], x[1] ** y[1])
 
 
+def exponential(a: Ends) -> Ends:
+    """Monotone; infinite where float64 ends."""
+    with np.errstate(over="ignore"):
+        return np.exp(a[0]), np.exp(a[1])
+
+
 def sine_range(low: Any, high: Any) -> Ends:
     """Return the least and largest sine on [low, high] (...): at the ends, or 1 and -1 at crests between."""
     sure = np.maximum(np.abs(low), np.abs(high)) <= SURE_TURNS

@@ -18,7 +18,7 @@ from . import intervals
 from .intervals import Ends, Image, monotone
 from .ir import DTYPES, Attribute, Node, Parameters, Type
 
-Rounding = Literal["exact", "nearest", "divide", "sqrt", "power", "sine", "cosine", "dot"]
+Rounding = Literal["exact", "nearest", "divide", "sqrt", "power", "exp", "sine", "cosine", "dot"]
 """How a target computes it: exactly, correctly rounded, or with its class's error (profiles.py)."""
 
 TypeRule = Callable[[Sequence[Type], Mapping[str, Attribute], Parameters], Type]
@@ -281,6 +281,7 @@ OPS: Mapping[str, Op] = {
         _row("floor", np.floor, 1),
         _row("sqrt", np.sqrt, 1, "sqrt", image=intervals.sqrt),
         _row("power", np.power, 2, "power", image=intervals.power),
+        _row("exp", np.exp, 1, "exp", image=intervals.exponential),
         _row("sin", np.sin, 1, "sine", image=intervals.sine),
         _row("cos", np.cos, 1, "cosine", image=intervals.cosine),
         _compare("less", np.less, intervals.less),

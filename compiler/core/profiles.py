@@ -49,6 +49,9 @@ LOG2_ABSOLUTE = 2.0**-21
 EXP2_ULPS = (3.0, 2.0)
 """Error of exp2(x): 3 + 2 |x| ulp in GLSL, whose pow(x, y) is as good as exp2(y log2(x)); OpenCL's 3 ulp."""
 
+EXP_ULPS = (3.0, 2.0)
+"""Error of exp(x): 3 + 2 |x| ulp in GLSL, 3 ulp in OpenCL."""
+
 LARGEST_DIVISOR = 2.0**126
 """Largest |b| for which GLSL bounds the error of a / b."""
 

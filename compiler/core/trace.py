@@ -43,6 +43,7 @@ _UFUNCS: Mapping[Any, str] = {
 TRACEABLE = (
     *(f"np.{name}" for name in dict.fromkeys(_UFUNCS.values())),
     *("np.matmul", "np.clip", "np.where", "np.stack", "np.moveaxis(np.stack(...), 0, -1)", "np.take"),
+    *("np.sum(..., axis=-1, keepdims=True)", "np.concatenate(..., axis=-1)"),
     *("np.full_like", "np.zeros_like", "np.ones_like", "x ** 1", "x ** 2", "x.astype", "x[..., i]"),
     "vectors.fold_rows",
     "x ** y with a positive constant y (x >= 0)",
@@ -443,8 +444,42 @@ def _known(array: NDArray[Any]) -> NDArray[Any]:
     return np.ascontiguousarray(array) if str(array.dtype) in DTYPES else _exact_float32(array)
 
 
+def _numbers(builder: Builder, value: Any) -> list[Traced]:
+    """Return the numbers of a traced vector or number."""
+    if not isinstance(value, Traced):
+        _refuse(f"a {type(value).__name__} among the parts of a vector")
+    count = value.shape[0] if value.shape else 0
+    return [value[..., i] for i in range(count)] or [value]
+
+
+def _sum(builder: Builder, x: Any, axis: Any = None, keepdims: bool = False) -> Traced:
+    """np.sum over the last axis: in NumPy's order, eight sums beside each other where there are so many."""
+    if axis != -1 or not keepdims:
+        _refuse("np.sum without axis=-1 and keepdims=True")
+    numbers = _numbers(builder, x)
+    whole = len(numbers) - len(numbers) % 8
+    sums = numbers[:8]
+    for i in range(8, whole):
+        sums[i % 8] = sums[i % 8] + numbers[i]
+    if whole:
+        a, b, c, d = (sums[i] + sums[i + 1] for i in (0, 2, 4, 6))
+        sums, numbers = [(a + b) + (c + d)], numbers[whole:]
+    else:
+        sums, numbers = numbers[:1], numbers[1:]
+    return sum(numbers, sums[0])
+
+
+def _concatenate(builder: Builder, parts: Any, axis: int = 0) -> Traced:
+    """np.concatenate of vectors and numbers on the last axis."""
+    if axis != -1:
+        _refuse(f"np.concatenate with axis={axis} (components are the last axis: axis=-1)")
+    return emit(builder, "stack", *(number for part in parts for number in _numbers(builder, part)))
+
+
 _FUNCTIONS: Mapping[Any, Callable[..., Any]] = {
     np.clip: _clip,
+    np.sum: _sum,
+    np.concatenate: _concatenate,
     np.stack: _stack,
     np.moveaxis: _moveaxis,
     np.where: _where,

@@ -129,6 +129,7 @@ class C(Arguments):
         "floor": "floorf({0})",
         "sqrt": "sqrtf({0})",
         "power": "powf({0}, {1})",
+        "exp": "expf({0})",
         "sin": "sinf({0})",
         "cos": "cosf({0})",
         "minimum": "{1} < {0} ? {1} : {0}",

@@ -113,6 +113,7 @@ class Dialect:
         "floor": "floor({0})",
         "sqrt": "sqrt({0})",
         "power": "pow({0}, {1})",
+        "exp": "exp({0})",
         "sin": "sin({0})",
         "cos": "cos({0})",
         "reciprocal": "1.0f / {0}",

@@ -58,6 +58,7 @@ class Metal(Buffers):
         "floor": "floor({0})",
         "sqrt": "sqrt({0})",
         "power": "pow({0}, {1})",
+        "exp": "exp({0})",
         "sin": "sin({0})",
         "cos": "cos({0})",
         "minimum": "min({0}, {1})",

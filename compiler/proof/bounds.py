@@ -37,6 +37,7 @@ from ..core.ir import LEAST, Gather, Node, Program
 from ..core.ops import LOOPS, OPS, image
 from ..core.profiles import (
     EXP2_ULPS,
+    EXP_ULPS,
     FLUSH,
     LARGEST_DIVISOR,
     LOG2_ABSOLUTE,
@@ -220,6 +221,23 @@ def power_error(exponent: Array, logarithm: Array) -> Array:
     return error
 
 
+def _exp(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """|exp(x') - exp(x)| <= exp(x) (exp(e) - 1), and neither is above exp(x + e)."""
+    (x,) = operands
+    low, high = _image(context, operands)
+    # Of an argument far below 0 the first is 0 times an infinity.
+    with np.errstate(all="ignore"):
+        passed_on = np.fmin(high * np.expm1(x.read), np.exp(x.high + x.read))
+    relative = exp_error(x.seen)
+    magnitude = high + passed_on
+    return held(low, high, passed_on + relative * magnitude + FLUSH, (1 + relative) * magnitude + FLUSH)
+
+
+def exp_error(argument: Array) -> Array:
+    """Return the largest relative error of exp(x) over all targets; |x| (...) at most the argument."""
+    return 2 * UNIT_ROUNDOFF * (EXP_ULPS[0] + EXP_ULPS[1] * argument)
+
+
 def _sin(context: Context, operands: list[Enclosure]) -> Enclosure:
     """The mean value theorem, |cos| between the two arguments, and the contract's error on its domain."""
     (a,) = operands
@@ -317,6 +335,7 @@ RULES: Mapping[str, Rule] = {
     "floor": _floor,
     "sqrt": _sqrt,
     "power": _power,
+    "exp": _exp,
     "sin": _sin,
     "stack": _stack,
     "component": _component,

@@ -45,7 +45,7 @@ from ..core.profiles import (
     RELATIVE_ERROR,
     SineContract,
 )
-from .bounds import OUTWARD, power_error
+from .bounds import OUTWARD, exp_error, power_error
 
 SLACK = 2.0**-51
 """Relative widening of an end: float64's rounding of an operation, and of the widening, twice."""
@@ -350,6 +350,15 @@ def _power(context: Context, operands: list[Range]) -> Range:
     return _made(context, low, high, _all_sure(operands) & (x.low > 0))
 
 
+def _exp(context: Context, operands: list[Range]) -> Range:
+    """Monotone, and the promise."""
+    (x,) = operands
+    relative = exp_error(np.maximum(np.abs(x.low), np.abs(x.high))) * (1 + OUTWARD)
+    with np.errstate(over="ignore", invalid="ignore"):
+        low, high = _wider(*_image(context, operands), relative)
+    return _made(context, low, high, _all_sure(operands))
+
+
 def _sin(context: Context, operands: list[Range]) -> Range:
     """The sine's range between both arguments, and the contract's error on its domain."""
     return _wave(context, operands, context.arithmetic.sine)
@@ -477,6 +486,7 @@ RULES: Mapping[str, Rule] = {
     "floor": _floor,
     "sqrt": _sqrt,
     "power": _power,
+    "exp": _exp,
     "sin": _sin,
     "cos": _cos,
     **dict.fromkeys(("less", "less_equal", "greater", "greater_equal", "equal", "not_equal"), _compare),

@@ -100,6 +100,22 @@ def test_power_bounds_what_every_standard_allows(x, y, shift, sign):
     assert abs(2**product * (1 + sign * (3 + 2 * abs(product)) * 2.0**-23) - wanted) <= found.error
 
 
+@given(x=st.floats(-100, 20, width=32), shift=shifts, ulps=st.floats(-1, 1))
+def test_exp_bounds_what_every_standard_allows(x, shift, ulps):
+    """An argument off by up to 2^-12, and 3 + 2 |x| ulp of the result, to one side and to the other."""
+    error = 2.0**-12
+    found = enclosed("exp", [around(x + shift * error, error)])
+    wanted = np.exp(x + shift * error)
+    assert abs(np.exp(x) * (1 + ulps * (3 + 2 * abs(x)) * 2.0**-23) - wanted) <= found.error
+    assert found.error <= wanted * (1.1 * error + 2 * (5 + 2 * abs(x)) * 2.0**-24) + 2 * bounds.FLUSH
+
+
+def test_exp_far_below_zero_is_known_to_be_nothing():
+    """An argument of -1e30 may be off by more than float64's exponential holds."""
+    assert enclosed("exp", [around(-1e30, 1e24)]).error <= 2 * bounds.FLUSH
+    assert enclosed("exp", [around(1e3, 0.0)]).error == np.inf
+
+
 @given(x=st.floats(0.25, 4), y=st.floats(0.125, 3), at=st.floats(0, 1))
 def test_power_of_a_range(x, y, at):
     """From x to 2 x and y to y + 1; 2^-40 of float64's rounding is added to every range (PRO-9)."""

@@ -85,7 +85,7 @@ def test_two_floats(op, data, arithmetic):
 
 
 @given(
-    op=st.sampled_from(["negative", "absolute", "sqrt", "reciprocal", "floor", "sin", "cos"]),
+    op=st.sampled_from(["negative", "absolute", "sqrt", "reciprocal", "floor", "exp", "sin", "cos"]),
     data=st.data(),
 )
 def test_one_float(op, data):

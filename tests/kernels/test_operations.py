@@ -61,6 +61,7 @@ CASES = {
     "floor": lambda x: np.floor(x * 1.5),
     "sqrt": lambda x: np.sqrt(np.absolute(x)),
     "power": lambda x: (np.absolute(x) + 0.003) ** (1 / 2.4) + (x + 2.5) ** 2.4,
+    "exp": lambda x: np.exp(3.0 * x) + np.exp(-40.0 * np.absolute(x)),
     "sin": lambda x: np.sin(1000.0 * x),
     "stack": lambda x: np.stack([x[..., 3], 0.5 * x[..., 0], x[..., -2]], axis=-1),
     "component": lambda x: x[..., 2] * x[..., 1] + 1.0,

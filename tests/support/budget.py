@@ -15,7 +15,7 @@ BUDGET = {
     "refimpl/light": 4300,
     "refimpl/network": 2250,
     "compiler": 1700,
-    "compiler/core": 3450,
+    "compiler/core": 3475,
     "compiler/languages": 2300,
     "compiler/proof": 3100,
     "compiler/reading": 4050,

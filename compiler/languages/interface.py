@@ -14,6 +14,9 @@ from ..core.ir import Image
 DENOISE, PATH, ENCODE = "denoise", "path", "encode"
 """What a kernel does."""
 
+GUIDE, SMOOTH = "guide", "smooth"
+"""What the two kernels of the filter do: clip a frame's layers, and take the means of a level."""
+
 READ, WRITE = "read", "write"
 """What a kernel does with an array."""
 
@@ -22,6 +25,9 @@ BUFFER, BLOCK, TABLE = "buffer", "uniform", "inline"
 
 WEIGHTS, RESULT, SUMS, IMAGE = "weights", "result", "sums", "image_"
 """Names of arrays; an image's name follows the last one."""
+
+GUIDES, LIGHT = "guides", "light"
+"""Names of the filter's arrays: planes that it compares, and planes of light that it takes means of."""
 
 SCENE_NUMBERS = "scene_numbers"
 """Name of the array of the numbers of a scene that are inputs of its path kernel."""
@@ -33,6 +39,8 @@ INTEGERS: Mapping[str, tuple[str, ...]] = {
     DENOISE: ("width", "height"),
     PATH: ("width", "height", "first_row", "rows", "first_sample", "samples", "seed_number"),
     ENCODE: ("width", "height", "sample_count"),
+    GUIDE: ("width", "height", "row_stride"),
+    SMOOTH: ("width", "height", "row_stride", "gap"),
 }
 """The integers that a kernel is given, in order, by role; a dialect may know some of them by itself."""
 
@@ -134,3 +142,20 @@ def encoding(planes: int, images: Sequence[Image], integers: Sequence[str]) -> I
     """Return what an encoding is given: planes of sums, and images to write."""
     found = [Array(SUMS, READ, (planes, "height", "width")), *(_image(image, WRITE) for image in images)]
     return Interface(ENCODE, tuple(found), tuple(integers))
+
+
+def guiding(layers: Sequence[Image], guides: int, light: int, integers: Sequence[str]) -> Interface:
+    """Return what prepares a filter: layers of a frame, and so many planes of guides and light to write."""
+    planes = (_planes(GUIDES, WRITE, guides), _planes(LIGHT, WRITE, light))
+    return Interface(GUIDE, (*(_image(layer, READ) for layer in layers), *planes), tuple(integers))
+
+
+def smoothing(guides: int, light: int, integers: Sequence[str]) -> Interface:
+    """Return what a level of a filter is given: planes of guides and of light, and a result like light."""
+    planes = (_planes(GUIDES, READ, guides), _planes(LIGHT, READ, light), _planes(RESULT, WRITE, light))
+    return Interface(SMOOTH, planes, tuple(integers))
+
+
+def _planes(name: str, access: str, count: int) -> Array:
+    """Return so many planes, whose rows may be longer than the picture's."""
+    return Array(name, access, (count, "height", "row_stride"))

@@ -4,7 +4,7 @@
 2. Guides are layers of the same frame: normal, albedo, position, and depth, which says how far apart
    positions may be [`guides_of`].
 3. A level takes, for each pixel, the mean of 5 x 5 pixels with gaps between them, weighted by a B3 spline and
-   by how alike the guides are [`smooth_once`], [`weight`].
+   by how alike the guides are [`smooth_once`], [`weight`], [`added`].
 4. Gaps double from level to level: three levels reach 14 pixels away with 75 taps [`smooth`].
 
 The filter is that of Dammertz, Sewtz, Hanika, Lensch, "Edge-Avoiding À-Trous Wavelet Transform for fast
@@ -70,6 +70,22 @@ def weight(here: Array, there: Array, factors: Array) -> Array:
     return squares
 
 
+def added(
+    total: Array, weights: Array, color: Array, spline: Any, here: Array, there: Array, factors: Array
+) -> tuple[Array, Array]:
+    """Return sums (..., 3) and (..., 1) with one more tap: its colour times its weight, and the weight.
+
+    `here` and `there` are the guides (..., 9) of pixel and tap; may be traced.
+    """
+    alike = spline * weight(here, there, factors)
+    return total + alike * color, weights + alike
+
+
+def mean(total: Array, weights: Array) -> Array:
+    """Return the mean (..., 3) of a sum (..., 3) and its weights (..., 1); may be traced."""
+    return total / weights
+
+
 def taps(height: int, width: int, gap: int) -> Iterator[tuple[float, Array, Array]]:
     """Yield the spline's weight and the rows (H) and columns (W) of each tap; pixels at the border repeat."""
     for dy, vertical in enumerate(SPLINE, -2):
@@ -84,10 +100,8 @@ def smooth_once(color: Array, guides: Array, factors: Array, gap: int) -> Array:
     total, weights = np.zeros_like(color), np.zeros_like(color[..., :1])
     for spline, rows, columns in taps(*color.shape[:2], gap):
         there = np.ix_(rows, columns)
-        alike = spline * weight(guides, guides[there], factors)
-        total, weights = total + alike * color[there], weights + alike
-    found: Array = total / weights
-    return found
+        total, weights = added(total, weights, color[there], spline, guides, guides[there], factors)
+    return mean(total, weights)
 
 
 def smooth(color: Array, layers: Mapping[str, Array], levels: int) -> Array:

@@ -200,7 +200,7 @@ def _body(program: Program, dialect: Dialect, planes: Sequence[str], images: Seq
         number = planes.index(name)
         buffer, component = divmod(number, dialect.planes_per_buffer)
         lines.append(dialect.load.format(plane=number, name=name, buffer=buffer, component=component))
-    texts = _statements(program, dialect, lines)
+    texts = statements(program, dialect, lines)
     outputs = dict(program.outputs)
     for image in images:
         for channel in range(image.channels):
@@ -224,7 +224,7 @@ def encode_source(
     return "\n".join(f"    {line}" for line in body)
 
 
-def _statements(program: Program, dialect: Dialect, lines: list[str]) -> list[str]:
+def statements(program: Program, dialect: Dialect, lines: list[str]) -> list[str]:
     """Write one statement for each operation; return the text of each value."""
     texts: list[str] = []
     for index, node in enumerate(program.nodes):

@@ -1,0 +1,125 @@
+"""The filter's programs are the reference, its bound is small, and its text is what a device gets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.scenes.lower_smooth import (
+    GUIDED,
+    HERE,
+    LAYERS_READ,
+    LIGHT,
+    SPLINE,
+    SUMS,
+    THERE,
+    WEIGHTS,
+    lower_smooth,
+)
+from wamnet.compiler.scenes.smooth_kernel import compile_smoothing, error_at
+from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.network import smoothing
+from wamnet.refimpl.network.dataset import Normalization
+
+SCALES = Normalization(exposure_stops=-1.5)
+
+A_PRIORI = 13 * smoothing.WHITES * 283 * 2.0**-24 + 2.0**-18
+"""SMO-5: the largest error of a number of the feature image, and 2^-18 for the encoding."""
+
+
+def layers_of(height, width, seed=1):
+    """Return rough layers (H, W, C) in float32, some clipped; a third of the pixels are misses."""
+    random = np.random.default_rng(seed)
+    spreads = {"normal": 0.4, "albedo": 0.15, "position": 0.4}
+    layers = {name: random.normal(0, spread, (height, width, 3)) for name, spread in spreads.items()}
+    layers["depth"] = random.uniform(2.0, 5.0, (height, width, 1))
+    layers["color"] = random.exponential(2.0, (height, width, 3)) * random.choice(
+        [1e-3, 1.0, 30.0], (height, width, 1)
+    )
+    missed = random.uniform(size=(height, width)) < 1 / 3
+    for name in ("normal", "albedo", "position", "depth"):
+        layers[name][missed] = 0.0
+    return {name: values.astype(np.float32) for name, values in layers.items()}
+
+
+def guided(programs, layers, dtype):
+    """Return the planes that `guide` writes, by name."""
+    given = {
+        f"{i.name}_{c}": layers[i.name][..., c].astype(dtype) for i in LAYERS_READ for c in range(i.channels)
+    }
+    return interpret(programs.guide, given, dtype)
+
+
+def one_level(programs, planes, light, gap, dtype):
+    """Return the light after a level, by the programs."""
+    height, width = light[LIGHT[0]].shape
+    sums = dict.fromkeys((*SUMS, WEIGHTS), np.zeros((height, width), dtype))
+    here = {f"{HERE}{name}": planes[name] for name in programs.guides}
+    for spline, rows, columns in smoothing.taps(height, width, gap):
+        at = np.ix_(rows, columns)
+        there = {f"{THERE}{name}": planes[name][at] for name in GUIDED}
+        taken = {name: plane[at] for name, plane in light.items()}
+        given = {**here, **there, **taken, **sums, SPLINE: dtype(spline)}
+        sums = interpret(programs.tap, given, dtype)
+    return interpret(programs.mean, sums, dtype)
+
+
+@pytest.mark.parametrize("gap", [1, 4])
+def test_the_programs_are_the_reference(gap):
+    """To the bit in float64: the sum of nine squares has NumPy's order."""
+    programs, layers = lower_smooth(SCALES), layers_of(9, 11)
+    wide = {name: values.astype(np.float64) for name, values in layers.items()}
+    planes = guided(programs, layers, np.float64)
+    light = {name: planes[name] for name in LIGHT}
+    dim = smoothing.dimmed(wide["color"], SCALES.exposure_stops)
+    assert np.array_equal(np.stack(list(light.values()), axis=-1), dim)
+    wanted = smoothing.smooth_once(dim, *smoothing.guides_of(wide), gap)
+    found = one_level(programs, planes, light, gap, np.float64)
+    assert np.array_equal(np.stack([found[name] for name in LIGHT], axis=-1), wanted)
+
+
+def test_equal_factors_are_one_plane_and_constants_none():
+    programs = lower_smooth(SCALES)
+    assert programs.guides == (*GUIDED, "factor_position_x")
+    constants = {node["value"] for node in programs.tap.nodes if node.op == "constant"}
+    assert {1 / 0.5, 1 / 0.2} <= constants
+
+
+def test_the_bound_is_small_and_below_that_of_all_layers():
+    """At ordinary layers a hundredth of the clause's number, and never above it."""
+    kernels = compile_smoothing(SCALES, "numpy")
+    for seed in range(3):
+        found = error_at(kernels, layers_of(8, 9, seed))
+        assert found.max() <= A_PRIORI
+        assert np.median(found) <= A_PRIORI / 100
+
+
+def test_golden_source(golden):
+    """SMO-6: arguments, loops over taps, rows that are read beyond their ends."""
+    kernels = compile_smoothing(SCALES, "opencl", lanes=16)
+    for made in (kernels.guide, kernels.smooth):
+        golden(f"ieee.{made.source_name}", made.source)
+
+
+def test_manifests_name_what_was_made():
+    kernels = compile_smoothing(SCALES, "opencl", lanes=8)
+    for made, entry in ((kernels.guide, "wamnet_guide"), (kernels.smooth, "wamnet_smooth")):
+        assert made.manifest["entry_point"] == made.entry_point == entry
+        assert f"void {entry}(" in made.source
+        assert list(made.contents()) == list(made.manifest["files"]) == [made.source_name]
+    assert (kernels.guide.lanes, kernels.smooth.lanes) == (1, 8)
+    assert kernels.encode.planes == LIGHT
+
+
+@pytest.mark.parametrize(
+    ("target", "profile", "lanes", "match"),
+    [
+        ("opengl", "ieee", 1, r"target opengl, 1 pixels .* for none; smooth by"),
+        ("opencl", "ieee", 3, r"target opencl, 3 pixels .* for 1, 4, 8, 16;"),
+        ("opencl", "exact", 1, r"smoothed features divide .* use profile ieee"),
+    ],
+)
+def test_what_has_no_kernel_is_refused(target, profile, lanes, match):
+    with pytest.raises(CompileError, match=match):
+        compile_smoothing(SCALES, target, profile, lanes)

@@ -4,6 +4,7 @@
     trace    path kernel -> sums
     encode   sums -> encoding kernel -> images
     passes   all three, without leaving the device [passes.py]
+    smooth   layers -> edge-avoiding filter -> image [smoothing.py]
 
 These are written once, here. A device makes a kernel ready [`Executor._prepare`] and starts it [`_start`].
 One with memory of its own also makes memory, with a content or without one [`_store`, `_memory`], copies from
@@ -31,16 +32,18 @@ from ...compiler.core.ir import Image
 from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS, UNSIGNED, Interface
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
+from ...compiler.scenes.smooth_kernel import SmoothArtifact, SmoothKernels
 from ...compiler.schedules.emit import output_channels
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.training.step_kernel import StepKernel
 from ...refimpl.errors import InputError
+from ...refimpl.network.dataset import known
 from .images import Images, black, checked, gather_of
 
 if TYPE_CHECKING:
     from .passes import Passes
 
-Kernel = Artifact | PathArtifact | EncodeArtifact
+Kernel = Artifact | PathArtifact | EncodeArtifact | SmoothArtifact
 """A kernel of any role."""
 
 Size = tuple[int, int]
@@ -110,7 +113,8 @@ class Executor(ABC):
     `byte_schedule`: that of networks of integers, where the device multiplies bytes. `driver` is the driver's
     version, where `device` does not name it. `trains` says whether it has a compiled trainer. `homes` are the
     homes of weights, apart from the target's usual one, whose kernels it runs
-    [compiler/languages/interface.py]. `paints`: it runs path kernels that write encoded images.
+    [compiler/languages/interface.py]. `paints`: it runs path kernels that write encoded images;
+    `smooths`: it filters a frame in far less time than the reference.
     """
 
     name: str
@@ -124,6 +128,7 @@ class Executor(ABC):
     trains: bool = False
     homes: tuple[str, ...] = ()
     paints: bool = False
+    smooths: bool = False
 
     def __init__(self) -> None:
         self._built: dict[str, Built] = {}
@@ -238,6 +243,10 @@ class Executor(ABC):
             (self._paint if kernel.images else self._trace)(
                 kernel, Part(size[1], size[0], 0, size[0], 0, 1, 0)
             )
+        elif isinstance(kernel, SmoothArtifact):
+            from .smoothing import run_once
+
+            run_once(self, kernel, size)
         elif isinstance(kernel, EncodeArtifact):
             self._encode(kernel, np.zeros((len(kernel.planes), *size), np.float32), 1)
         else:
@@ -388,6 +397,17 @@ class Executor(ABC):
         integers = {"width": width, "height": height, "row_stride": stride, "plane_stride": rows * stride}
         built = self._built[kernel.digest]
         self._start(kernel, built.prepared, arrays, {**integers, "sample_count": samples})
+
+    def smooth(self, kernels: SmoothKernels, layers: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+        """Return the feature image (H, W, 3) of the filter, at layers (H, W, C) by what they are to it.
+
+        They are color, normal, albedo, position and depth; NaN counts as 0.
+        """
+        from .smoothing import smoothed
+
+        with np.errstate(over="ignore"):
+            given = {name: known(values.astype(np.float32)) for name, values in layers.items()}
+        return smoothed(self, kernels, given)
 
     def passes(self, encode: EncodeArtifact, denoise: Artifact, size: Size) -> Passes:
         """Return passes over a picture of `size` (height, width), whose images stay on the device."""

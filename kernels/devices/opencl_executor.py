@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.languages.interface import BLOCK, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
 from ...compiler.scenes.path_kernel import PathArtifact
+from ...compiler.scenes.smooth_kernel import SmoothArtifact
 from ...compiler.training.step_kernel import StepKernel
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
@@ -92,7 +93,7 @@ class OpenCLExecutor(Executor):
     """One OpenCL device with its queue."""
 
     name = "opencl"
-    paints = True
+    paints = smooths = True
     homes = (BLOCK,)  # constant memory is a buffer to whoever calls
 
     def __init__(self, device: str | None = None) -> None:
@@ -140,7 +141,7 @@ class OpenCLExecutor(Executor):
         if isinstance(kernel, Artifact):
             schedule = kernel.manifest["schedule"]
             local, extent = self._local_size(kernel), (schedule["pixels"], schedule.get("rows", 1))
-        elif isinstance(kernel, PathArtifact):
+        elif isinstance(kernel, PathArtifact | SmoothArtifact):
             local, extent = PATH_LOCAL_SIZE[min(kernel.lanes, 2)], (kernel.lanes, 1)
         else:
             local, extent = LOCAL_SIZE, (1, 1)

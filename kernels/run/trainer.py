@@ -11,7 +11,9 @@ The definition is refimpl/network/train.py; how far a step may be from it: compi
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -138,7 +140,9 @@ def train_on(
     normalization = (
         dataset.normalization_of([noisy for noisy, _ in pairs]) if state is None else state.normalization
     )
-    data = dataset.build(pairs, recipe.features, recipe.window, normalization)
+    # NumPy works without the interpreter's lock: frames are encoded beside each other.
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        data = dataset.build(pairs, recipe.features, recipe.window, normalization, pool.map)
     if state is None:
         state = train.start(recipe, normalization, data.digest, network=network)
     state = train.resumed(state, recipe, data.digest)

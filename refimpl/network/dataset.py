@@ -16,7 +16,7 @@ rule and the encodings are decisions, explained in the chapter of this module.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -55,7 +55,6 @@ NORMALIZATION_LIMITS: Mapping[str, tuple[float, float]] = {
     "position_scale": (1.0 / LARGEST_SCALE, LARGEST_SCALE),
 }
 """Least and largest value of a normalization's numbers; beyond 2^64 there is no picture."""
-
 
 HIGHLIGHT_STOPS = -4.0
 """Exposure of `highlights` less that of `color`: of one path a pixel, most of the light is in few pixels that
@@ -520,10 +519,11 @@ def build(
     features: Sequence[str],
     window: Window,
     normalization: Normalization,
+    mapped: Callable[..., Iterable[Any]] = map,
 ) -> Dataset:
-    """Lay out the examples of (noisy, reference) pairs; the sizes of different pairs may differ."""
+    """Lay out the examples of (noisy, reference) pairs; sizes may differ. `mapped` does what `map` does."""
     _check_pairs(pairs)
-    images = [pad(feature_image(noisy, features, normalization), window) for noisy, _ in pairs]
+    images = list(mapped(lambda pair: pad(feature_image(pair[0], features, normalization), window), pairs))
     targets = [target_image(reference, normalization).reshape(-1, 3) for _, reference in pairs]
     return Dataset(
         values=np.concatenate([image.reshape(-1) for image in images]),

@@ -41,7 +41,7 @@ from wamnet.kernels import open_executor
 from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
 from wamnet.kernels.measure import in_turns
 from wamnet.kernels.run import tune
-from wamnet.kernels.run.denoise_on import images_of
+from wamnet.kernels.run.denoise_on import images_of, images_on
 from wamnet.kernels.run.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
@@ -334,7 +334,7 @@ def timed(bench: Bench, kept: Results, rounds: int) -> None:
         ways: dict[str, Callable[[], Any]] = {
             row: partial(lambda row: to_display(oidn(ROWS[row], frame)), row) for row in peers
         }
-        ways[ours] = lambda: device.run(kernel, images_of(model, frame))
+        ways[ours] = lambda: device.run(kernel, images_on(device, model, frame))
         ways[f"{ours}, encoded features given"] = lambda: device.run(kernel, images)
         found = in_turns({name: _done(way) for name, way in ways.items()}, rounds)
     values = {name: list(times.seconds) for name, times in found.items()}

@@ -62,13 +62,16 @@ def run_one(name: str, kernel: Artifact, model: Model, frame: Frame, truth: Any)
     from ...compiler.core.enclosure import round_up
     from ...compiler.variants import plan_model
     from ...kernels import denoise_on, open_executor
+    from ...kernels.run.denoise_on import images_of
     from ...refimpl.metrics import largest_error
 
     with open_executor(name) as executor:
         schedule = executor.schedule_for((frame.height, frame.width))
         plan = plan_model(model, name, kernel.profile, schedule)
-        first = denoise_on(executor, model, frame)
-        second = denoise_on(executor, model, frame)
+        # The bound is that of the network's kernel: its images are the reference's.
+        images = images_of(model, frame)
+        first = denoise_on(executor, model, frame, images=images)
+        second = denoise_on(executor, model, frame, images=images)
     everywhere = plan.bound.output
     run = Run(
         name,

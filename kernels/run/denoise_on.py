@@ -1,9 +1,14 @@
-"""Denoise a frame on an executor: lower, compile, encode, run, with both times."""
+"""Denoise a frame on an executor: lower, compile, encode, run, with both times.
+
+Features are encoded by the reference; the edge-avoiding filter, which takes it longer than a kernel takes for
+the network, runs on the device [`images_on`].
+"""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +16,13 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_plan
 from ...compiler.core.ir import sha256
+from ...compiler.core.profiles import profile_named
+from ...compiler.scenes.smooth_kernel import SmoothKernels, compile_smoothing
 from ...compiler.schedules import schedules
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.variants import FULL, plan_model
 from ...refimpl.frame import Frame
+from ...refimpl.network.dataset import FEATURES, Normalization
 from ...refimpl.network.denoise import Model, input_image
 from ..devices.executor import Executor
 from ..devices.images import Images
@@ -52,6 +60,43 @@ def images_of(model: Model, frame: Frame) -> Images:
     return {name: input_image(model, frame, (name,)) for name in model.features}
 
 
+def filter_of(executor: Executor, model: Model, frame: Frame, profile: str) -> SmoothKernels | None:
+    """Return the kernels, built, that smooth a frame's features on a device; None: the reference does.
+
+    The reference smooths where a device would take longer, where a picture has the same bits on all devices
+    (integers, profile `exact`), and layers with more digits than a kernel reads.
+    """
+    layers = [layer for name in model.features if FEATURES[name].guides for layer in FEATURES[name].layers]
+    same_bits = model.is_whole or bool(profile_named(profile).common)
+    if not layers or not executor.smooths or same_bits:
+        return None
+    if not all(layer in frame and frame[layer].dtype == np.float32 for layer in layers):
+        return None
+    kernels = _compiled(model.normalization, executor.name, profile, executor.lanes)
+    for kernel in (kernels.guide, kernels.smooth, kernels.encode):
+        executor.build(kernel)
+    return kernels
+
+
+@lru_cache(maxsize=16)
+def _compiled(normalization: Normalization, target: str, profile: str, lanes: int) -> SmoothKernels:
+    """Return the kernels of the filter, which all models with these scales share."""
+    return compile_smoothing(normalization, target, profile, lanes)
+
+
+def images_on(executor: Executor, model: Model, frame: Frame, profile: str = "ieee") -> Images:
+    """Return the images of [`images_of`], smoothed ones by the device where it does that: up to SMO-5."""
+    kernels = filter_of(executor, model, frame, profile)
+    if kernels is None:
+        return images_of(model, frame)
+    others = [name for name in model.features if not FEATURES[name].guides]
+    found = images_of(replace(model, features=tuple(others)), frame)
+    for feature in (FEATURES[name] for name in model.features if name not in found):
+        given = {"color": feature.layer, **feature.guides}
+        found[feature.name] = executor.smooth(kernels, {what: frame[layer] for what, layer in given.items()})
+    return {name: found[name] for name in model.features}
+
+
 def denoise_on(
     executor: Executor,
     model: Model,
@@ -60,18 +105,23 @@ def denoise_on(
     schedule: str | None = None,
     variant: str = FULL,
     pictures: int = 1,
+    images: Images | None = None,
 ) -> RunResult:
     """Return the denoised frame and the times.
 
     Without a `schedule`, it is the one that suits device, size and so many `pictures` to come [tune.py].
-    `variant`: with fewer operations [variants.py].
+    `variant`: with fewer operations [variants.py]. `images`: those of [`images_of`], for whoever compares
+    with the reference's picture; by default the device may make them [`images_on`].
     """
     start = time.perf_counter()
     size = (frame.height, frame.width)
     plan, reason = plan_model(model, executor.name, profile, schedule or PLAIN, variant), "as asked"
+    if images is None:
+        filter_of(executor, plan.model, frame, profile)
     planned = time.perf_counter() - start
-    # A frame that lacks a layer is refused before anything is compiled; encoding is not part of compilation.
-    images = images_of(plan.model, frame)
+    # A frame that lacks a layer is refused before its denoiser is compiled; encoding is not part of that.
+    if images is None:
+        images = images_on(executor, plan.model, frame, profile)
     start = time.perf_counter() - planned
     if not schedule:
         found = choose(executor, plan, size, pictures)

@@ -1,0 +1,198 @@
+"""The filter on executors: within its bound of the reference, on hard frames too, and only where it may."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from wamnet.compiler.scenes.smooth_kernel import compile_smoothing, error_at
+from wamnet.kernels.run.denoise_on import denoise_on, filter_of, images_of, images_on
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.frame import SEEN, Frame
+from wamnet.refimpl.network import dataset, smoothing
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
+
+SCALES = Normalization(exposure_stops=-1.5)
+
+SIZES = [(1, 1), (1, 37), (33, 1), (5, 16), (19, 35)]
+"""Heights and widths: one pixel wide or high, whole vectors and parts of them, taps beyond both ends."""
+
+
+def frame_of(height, width, seed=1):
+    """Return a rough frame in float32; a third of its pixels are misses, some light is above the clip."""
+    random = np.random.default_rng(seed)
+    spreads = {"normal": 0.4, "albedo": 0.15, "position": 0.4}
+    layers = {name: random.normal(0, spread, (height, width, 3)) for name, spread in spreads.items()}
+    layers["depth"] = random.uniform(2.0, 5.0, (height, width, 1))
+    layers["color"] = random.exponential(1.0, (height, width, 3)) * random.choice(
+        [0.1, 1.0, 300.0], (height, width, 1)
+    )
+    missed = random.uniform(size=(height, width)) < 1 / 3
+    for name in ("normal", "albedo", "position", "depth"):
+        layers[name][missed] = 0.0
+    return {name: values.astype(np.float32) for name, values in layers.items()}
+
+
+BOUNDS: dict[bytes, np.ndarray] = {}
+"""Bounds by the bytes of the layers: they are those of all executors, and take half a second."""
+
+
+def bound_of(kernels, layers):
+    """Return the bound (H, W, 3) at layers, in which NaN is 0."""
+    key = b"".join(values.tobytes() for values in layers.values())
+    if key not in BOUNDS:
+        BOUNDS[key] = error_at(kernels, layers)
+    return BOUNDS[key]
+
+
+def excess(kernels, found, layers, scales=SCALES):
+    """Return the largest error of a feature image (H, W, 3), in units of its bound."""
+    clean = {name: dataset.known(values) for name, values in layers.items()}
+    wide = {name: values.astype(np.float64) for name, values in clean.items()}
+    light = smoothing.dimmed(wide.pop("color"), scales.exposure_stops)
+    wanted = dataset.encode_color(smoothing.smooth(light, wide, smoothing.LEVELS), scales)
+    return float((np.abs(found - wanted) / bound_of(kernels, clean)).max())
+
+
+@pytest.fixture(params=["numpy", "opencl"])
+def device(request, executor_named):
+    return executor_named(request.param)
+
+
+def lanes_of(device):
+    return (1, device.lanes) if device.lanes > 1 else (1,)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_frames_are_within_the_bound(device, size):
+    for lanes in lanes_of(device):
+        kernels = compile_smoothing(SCALES, device.name, lanes=lanes)
+        layers = frame_of(*size)
+        assert excess(kernels, device.smooth(kernels, layers), layers) <= 1
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, 3e38, -3e38, 1e-42])
+@pytest.mark.parametrize("name", ["color", "normal", "albedo", "position", "depth"])
+def test_hard_numbers_are_within_the_bound(device, name, value):
+    """Ends of what float32 holds and beyond, NaN, denormals; in one pixel, in a row, in half of a frame."""
+    kernels = compile_smoothing(SCALES, device.name, lanes=lanes_of(device)[-1])
+    layers = frame_of(6, 18)
+    for place in (np.s_[4, 4], np.s_[1], np.s_[:, 10:]):
+        layers[name][place] = value
+    found = device.smooth(kernels, layers)
+    assert np.isfinite(found).all()
+    assert excess(kernels, found, layers) <= 1
+
+
+def test_a_frame_of_misses_is_within_the_bound(device):
+    """All guides are 0: the filter is the spline, also across the border of the picture."""
+    layers = {name: np.zeros_like(values) for name, values in frame_of(6, 21).items()}
+    layers["color"] = frame_of(6, 21)["color"]
+    kernels = compile_smoothing(SCALES, device.name, lanes=lanes_of(device)[-1])
+    assert excess(kernels, device.smooth(kernels, layers), layers) <= 1
+
+
+def changed(part, monkeypatch):
+    """Take one part out of the reference; return the scales of what is left."""
+    if part == "clip":
+        monkeypatch.setattr(smoothing, "WHITES", 1e6)
+    elif part == "level":
+        monkeypatch.setattr(smoothing, "LEVELS", 2)
+    elif part in smoothing.GUIDES:
+        others = {name: 1e6 if name == part else sigma for name, sigma in smoothing.GUIDES.items()}
+        monkeypatch.setattr(smoothing, "GUIDES", others)
+    elif part == "depth":
+        monkeypatch.setattr(smoothing, "LEAST_DEPTH", 4.0)
+    elif part == "spline":
+        monkeypatch.setattr(smoothing, "SPLINE", (0.2,) * 5)
+    elif part == "border":
+        monkeypatch.setattr(smoothing, "taps", wrapped)
+    elif part == "gap":
+        taps = smoothing.taps
+        monkeypatch.setattr(smoothing, "taps", lambda height, width, gap: taps(height, width, min(gap, 2)))
+    return Normalization(0.0) if part == "exposure" else SCALES
+
+
+def wrapped(height, width, gap):
+    """Yield the taps of a picture whose borders meet."""
+    for dy, vertical in enumerate(smoothing.SPLINE, -2):
+        for dx, horizontal in enumerate(smoothing.SPLINE, -2):
+            rows, columns = (np.arange(height) + gap * dy) % height, (np.arange(width) + gap * dx) % width
+            yield vertical * horizontal, rows, columns
+
+
+PARTS = ["clip", "level", *smoothing.GUIDES, "depth", "spline", "border", "gap", "exposure"]
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_each_part_is_seen(device, part, monkeypatch):
+    """What a device computes is far from a filter that lacks one part."""
+    kernels = compile_smoothing(SCALES, device.name, lanes=lanes_of(device)[-1])
+    layers = frame_of(19, 35)
+    found, _ = device.smooth(kernels, layers), bound_of(kernels, layers)
+    scales = changed(part, monkeypatch)
+    assert excess(kernels, found, layers, scales) > 10
+
+
+# ---- where it is used ---------------------------------------------------------------------------------
+
+
+def model_of(kit, features, scales=SCALES):
+    """Return an untrained model of some features."""
+    inputs = dataset.n_inputs(features, Window(3, "clamp"))
+    return Model(kit.network([inputs, 6, 3], (3.0, 3.0)), features, Window(3, "clamp"), scales)
+
+
+def whole_frame(layers, dtype=np.float32):
+    """Return a frame in which other surfaces are seen past mirrors and glass."""
+    seen = {name: -layers[first][::-1] for name, first in SEEN.items()}
+    return Frame({name: values.astype(dtype) for name, values in {**layers, **seen}.items()})
+
+
+def test_a_device_smooths_the_features_that_are_smoothed(executor_named, kit):
+    """In the model's order; others are the reference's to the bit."""
+    device, frame = executor_named("opencl"), whole_frame(frame_of(9, 20))
+    model = model_of(kit, ("normal", "seen_smoothed", "color", "smoothed"))
+    found, wanted = images_on(device, model, frame), images_of(model, frame)
+    assert list(found) == list(model.features)
+    kernels = compile_smoothing(SCALES, "opencl")
+    for name in ("normal", "color"):
+        assert np.array_equal(found[name], wanted[name])
+    for name, past in (("smoothed", ""), ("seen_smoothed", "seen_")):
+        layers = {"color": frame["color"]}
+        layers |= {guide: frame[past + guide] for guide in ("normal", "albedo", "position", "depth")}
+        assert excess(kernels, found[name], layers) <= 1
+        assert not np.array_equal(found[name], wanted[name])  # another order of sums
+    picture = denoise_on(device, model, frame).image
+    assert np.array_equal(picture, denoise_on(device, model, frame, images=found).image)
+    assert not np.array_equal(picture, denoise_on(device, model, frame, images=wanted).image)
+
+
+def test_the_reference_smooths_where_bits_count(executor_named, kit, monkeypatch):
+    """SMO-7: other executors, `exact`, integers, layers of float64, and models without such features."""
+    device, frame = executor_named("opencl"), whole_frame(frame_of(4, 5))
+    model = model_of(kit, ("color", "smoothed"))
+    assert filter_of(device, model, frame, "ieee") is not None
+    assert filter_of(executor_named("numpy"), model, frame, "ieee") is None
+    assert filter_of(device, model, frame, "exact") is None
+    assert filter_of(device, model, whole_frame(frame_of(4, 5), np.float64), "ieee") is None
+    assert filter_of(device, model_of(kit, ("color",)), frame, "ieee") is None
+    monkeypatch.setattr(Model, "is_whole", True)
+    assert filter_of(device, model, frame, "ieee") is None
+
+
+def test_a_frame_that_lacks_a_guide_is_refused_as_ever(executor_named, kit):
+    layers = whole_frame(frame_of(3, 4)).layers
+    frame = Frame({name: values for name, values in layers.items() if name != "depth"})
+    with pytest.raises(InputError, match=r"feature 'smoothed': .*layer 'depth' must be present"):
+        denoise_on(executor_named("opencl"), model_of(kit, ("smoothed",)), frame)
+
+
+def test_frames_are_encoded_beside_each_other_with_the_same_bits():
+    pairs = [(frame, frame) for frame in (Frame(frame_of(9, 12, seed)) for seed in range(5))]
+    given = (pairs, ("smoothed", "normal"), Window(3, "clamp"), SCALES)
+    with ThreadPoolExecutor(3) as pool:
+        assert dataset.build(*given, pool.map).digest == dataset.build(*given).digest

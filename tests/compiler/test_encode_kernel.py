@@ -17,7 +17,7 @@ from wamnet.refimpl.network.dataset import FEATURES, FIRST_HITS, PICTURES_BEFORE
 
 SCALES = Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 ALL = tuple(FIRST_HITS)
-OF_ONE_PICTURE = tuple(name for name in FEATURES if name not in PICTURES_BEFORE)
+OF_ONE_PICTURE = tuple(f.name for f in FEATURES.values() if f.name not in PICTURES_BEFORE and not f.guides)
 
 
 def sums_of(samples, seed=1):

@@ -19,7 +19,11 @@ from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model
 
 SETTINGS = Settings(max_depth=1)
-OF_ONE_PICTURE = tuple(name for name in dataset.FEATURES if name not in dataset.PICTURES_BEFORE)
+OF_ONE_PICTURE = tuple(
+    name
+    for name, feature in dataset.FEATURES.items()
+    if name not in dataset.PICTURES_BEFORE and not feature.guides
+)
 SCALES = dataset.Normalization(0.0, 12.0, (0.0, 0.0, 0.0), 6.0)
 
 

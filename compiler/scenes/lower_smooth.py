@@ -11,7 +11,7 @@ of SMO-3, the guides and the light of the pixel there.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -126,6 +126,6 @@ def _mean(*numbers: Any) -> dict[str, Any]:
     return _apart(LIGHT, smoothing.mean(np.stack(total, axis=-1), weights))
 
 
-def _apart(names: Sequence[str], vector: Any) -> Mapping[str, Any]:
+def _apart(names: Sequence[str], vector: Any) -> dict[str, Any]:
     """Return a vector's numbers by name."""
     return {name: vector[..., i] for i, name in enumerate(names)}

@@ -104,8 +104,8 @@ def compile_smoothing(
 
 def _of_profile(programs: SmoothPrograms, passes: Sequence[str]) -> SmoothPrograms:
     """Return the programs after the passes of a profile."""
-    parts = (pipeline.run(each, passes) for each in (programs.guide, programs.tap, programs.mean))
-    return SmoothPrograms(*parts, programs.guides)
+    guide, tap, mean = (pipeline.run(each, passes) for each in (programs.guide, programs.tap, programs.mean))
+    return SmoothPrograms(guide, tap, mean, programs.guides)
 
 
 def _compiled(programs: SmoothPrograms, role: str, target: str, profile: str, lanes: int) -> SmoothArtifact:

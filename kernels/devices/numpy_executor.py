@@ -135,7 +135,9 @@ def _smoothed(kernel: SmoothArtifact, held: Mapping[str, Any], integers: Mapping
         at = np.ix_(rows, columns)
         there = {f"{THERE}{name}": guides[name][at] for name in GUIDED}
         light = {name: plane[at] for name, plane in zip(LIGHT_PLANES, held[LIGHT], strict=True)}
-        sums = interpret(programs.tap, {**here, **there, **light, **sums, SPLINE: np.float32(spline)})
+        sums = interpret(
+            programs.tap, {**here, **there, **light, **sums, SPLINE: np.asarray(spline, np.float32)}
+        )
     found = interpret(programs.mean, sums)
     held[RESULT][:] = [found[name] for name in LIGHT_PLANES]
 

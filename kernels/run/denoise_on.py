@@ -90,7 +90,7 @@ def images_on(executor: Executor, model: Model, frame: Frame, profile: str = "ie
     if kernels is None:
         return images_of(model, frame)
     others = [name for name in model.features if not FEATURES[name].guides]
-    found = images_of(replace(model, features=tuple(others)), frame)
+    found = dict(images_of(replace(model, features=tuple(others)), frame))
     for feature in (FEATURES[name] for name in model.features if name not in found):
         given = {"color": feature.layer, **feature.guides}
         found[feature.name] = executor.smooth(kernels, {what: frame[layer] for what, layer in given.items()})

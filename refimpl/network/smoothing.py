@@ -98,7 +98,8 @@ def taps(height: int, width: int, gap: int) -> Iterator[tuple[float, Array, Arra
 def smooth_once(color: Array, guides: Array, factors: Array, gap: int) -> Array:
     """Return the weighted means (H, W, 3) of 25 pixels `gap` apart; weights of a pixel's own tap are 1."""
     total, weights = np.zeros_like(color), np.zeros_like(color[..., :1])
-    for spline, rows, columns in taps(*color.shape[:2], gap):
+    height, width = color.shape[:2]
+    for spline, rows, columns in taps(height, width, gap):
         there = np.ix_(rows, columns)
         total, weights = added(total, weights, color[there], spline, guides, guides[there], factors)
     return mean(total, weights)

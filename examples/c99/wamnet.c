@@ -1729,8 +1729,10 @@ static double exposed(double linear, double stops) { return linear * exp2(stops)
 /* ENC-5 */
 static double to_display(double linear, double stops) { return srgb_encode(clamp(exposed(linear, stops), 0, 1)); }
 
-static const char *const FEATURES[] = {"color",    "albedo",    "normal",     "depth",
-                                       "position", "direction", "unshadowed", "highlights"};
+static const char *const FEATURES[] = {"color",       "albedo",        "normal",     "depth",
+                                       "position",    "direction",     "unshadowed", "highlights",
+                                       "seen_albedo", "seen_normal",   "seen_depth", "seen_position",
+                                       "history",     "history_weight", "smoothed",  "seen_smoothed"};
 
 typedef enum {
     COLOR,
@@ -1741,6 +1743,14 @@ typedef enum {
     DIRECTION,
     UNSHADOWED,
     HIGHLIGHTS,
+    SEEN_ALBEDO,
+    SEEN_NORMAL,
+    SEEN_DEPTH,
+    SEEN_POSITION,
+    HISTORY,
+    HISTORY_WEIGHT,
+    SMOOTHED,
+    SEEN_SMOOTHED,
     FEATURE_COUNT
 } feature;
 
@@ -1749,7 +1759,7 @@ typedef struct {
     size_t count, channels;
 } features;
 
-static size_t channels_of(feature f) { return f == DEPTH ? 1 : 3; }
+static size_t channels_of(feature f) { return f == DEPTH || f == SEEN_DEPTH || f == HISTORY_WEIGHT ? 1 : 3; }
 
 /* DAT-9 */
 static void add_feature(features *to, const char *name, size_t length) {
@@ -1788,18 +1798,95 @@ static scales read_scales(const json *in) {
     return made;
 }
 
-/* DAT-1: the layer that a feature is made of */
-static const char *layer_of(feature f) { return FEATURES[f == HIGHLIGHTS ? COLOR : f]; }
+/* DAT-1, SMO-1: the layer that a feature is made of */
+static const char *layer_of(feature f) {
+    return FEATURES[f == HIGHLIGHTS || f == SMOOTHED || f == SEEN_SMOOTHED ? COLOR : f];
+}
 
 /* DAT-1, DAT-10 */
 static double encoded(feature f, double x, size_t channel, const scales *s) {
     if (isnan(x)) x = 0;
-    if (f == COLOR || f == UNSHADOWED) return to_display(x, s->stops);
+    if (f == COLOR || f == UNSHADOWED || f == HISTORY || f == SMOOTHED || f == SEEN_SMOOTHED)
+        return to_display(x, s->stops);
     if (f == HIGHLIGHTS) return to_display(x, s->stops - 4);
-    if (f == ALBEDO) return clamp(x, 0, 1);
-    if (f == DEPTH) return clamp(x / s->depth_scale, 0, 1);
-    if (f == POSITION) x = (x - s->position_center.c[channel]) / s->position_scale;
+    if (f == ALBEDO || f == SEEN_ALBEDO || f == HISTORY_WEIGHT) return clamp(x, 0, 1);
+    if (f == DEPTH || f == SEEN_DEPTH) return clamp(x / s->depth_scale, 0, 1);
+    if (f == POSITION || f == SEEN_POSITION) x = (x - s->position_center.c[channel]) / s->position_scale;
     return clamp(x, -1, 1);
+}
+
+/* SMO-3: what pixels are compared by, and the depth that their positions are a share of */
+enum { NORMAL_GUIDE, ALBEDO_GUIDE, POSITION_GUIDE, DEPTH_GUIDE, GUIDE_COUNT };
+
+static const char *const GUIDES[2][GUIDE_COUNT]
+    = {{"normal", "albedo", "position", "depth"}, {"seen_normal", "seen_albedo", "seen_position", "seen_depth"}};
+
+static void check_layer(const array *layer, const array *like, size_t channels, const char *name) {
+    if (layer->shape[2] != channels || layer->shape[0] != like->shape[0] || layer->shape[1] != like->shape[1]
+        || !layer->count)
+        refuse("the layer %s has another shape", name);
+}
+
+/* DAT-10 */
+static void forget_nan(array *layer) {
+    for (size_t k = 0; k < layer->count; k++)
+        if (isnan(layer->values[k])) layer->values[k] = 0;
+}
+
+static void read_guides(const json *in, const char *const *names, const array *color, array *guides) {
+    for (int g = 0; g < GUIDE_COUNT; g++) {
+        guides[g] = array_in(in, names[g], 3);
+        check_layer(&guides[g], color, g == DEPTH_GUIDE ? 1 : 3, names[g]);
+        forget_nan(&guides[g]);
+        for (size_t k = 0; k < guides[g].count; k++)
+            guides[g].values[k] = clamp(guides[g].values[k], g == DEPTH_GUIDE ? 1e-6 : -1e9, 1e9);
+    }
+}
+
+/* SMO-3: the weight of pixel q for pixel p, without the spline's */
+static double alike(const array *guides, size_t p, size_t q) {
+    double sigmas[] = {0.5, 0.2, 0.08 * guides[DEPTH_GUIDE].values[p]}, sum = 0;
+    for (int g = 0; g < DEPTH_GUIDE; g++)
+        for (size_t c = 0; c < 3; c++) {
+            double apart = (guides[g].values[3 * q + c] - guides[g].values[3 * p + c]) / sigmas[g];
+            sum += apart * apart;
+        }
+    return exp(-0.5 * sum);
+}
+
+static size_t within(long at, size_t count) { return at < 0 ? 0 : at < (long)count ? (size_t)at : count - 1; }
+
+/* SMO-3 */
+static array smoothed(array color, const array *guides, unsigned levels) {
+    static const double SPLINE[] = {1 / 16.0, 1 / 4.0, 3 / 8.0, 1 / 4.0, 1 / 16.0};
+    size_t height = color.shape[0], width = color.shape[1];
+    for (unsigned level = 0; level < levels; level++) {
+        array made = new_array(3, color.shape);
+        for (size_t p = 0; p < height * width; p++) {
+            double weights = 0;
+            for (long dy = -2; dy <= 2; dy++)
+                for (long dx = -2; dx <= 2; dx++) {
+                    size_t row = within((long)(p / width) + dy * (1L << level), height);
+                    size_t q = row * width + within((long)(p % width) + dx * (1L << level), width);
+                    double w = SPLINE[dy + 2] * SPLINE[dx + 2] * alike(guides, p, q);
+                    weights += w;
+                    for (size_t c = 0; c < 3; c++) made.values[3 * p + c] += w * color.values[3 * q + c];
+                }
+            for (size_t c = 0; c < 3; c++) made.values[3 * p + c] /= weights;
+        }
+        color = made;
+    }
+    return color;
+}
+
+/* SMO-1, SMO-2 */
+static array smoothed_layer(const json *in, feature f, const scales *s) {
+    array color = array_in(in, layer_of(f), 3), guides[GUIDE_COUNT];
+    check_layer(&color, &color, 3, layer_of(f));
+    forget_nan(&color);
+    for (size_t k = 0; k < color.count; k++) color.values[k] = clamp(color.values[k], 0, 16 / exp2(s->stops));
+    read_guides(in, GUIDES[f == SEEN_SMOOTHED], &color, guides);
+    return smoothed(color, guides, 3);
 }
 
 /* DAT-3 */
@@ -1808,15 +1895,14 @@ static array feature_image(const json *in, const features *wanted, const scales 
     size_t offset = 0;
     for (size_t i = 0; i < wanted->count; i++) {
         feature f = wanted->items[i];
-        array layer = array_in(in, layer_of(f), 3);
+        bool filtered = f == SMOOTHED || f == SEEN_SMOOTHED;
+        array layer = filtered ? smoothed_layer(in, f, s) : array_in(in, layer_of(f), 3);
         size_t channels = channels_of(f);
         if (!i) {
             size_t shape[3] = {layer.shape[0], layer.shape[1], wanted->channels};
             image = new_array(3, shape);
         }
-        if (layer.shape[2] != channels || layer.shape[0] != image.shape[0] || layer.shape[1] != image.shape[1]
-            || !layer.count)
-            refuse("the layer %s has another shape", layer_of(f));
+        check_layer(&layer, &image, channels, layer_of(f));
         for (size_t k = 0; k < layer.count; k++)
             image.values[k / channels * wanted->channels + offset + k % channels]
                 = (float)encoded(f, layer.values[k], k % channels, s);
@@ -2509,6 +2595,8 @@ static model read_model(const char *base64) {
     container in = read_container(content, length);
     if (strcmp(text(in.texts, "format"), "wamnet-model")) refuse("it is no model");
     if (strcmp(text(in.texts, "version"), "1")) refuse("it has another version");
+    const json *activation = find(in.texts, "activation");
+    if (activation && strcmp(text_of(activation, "activation"), "sine")) refuse("its activation is not the sine");
     model made = {.net = read_layers(&in)};
     made.net.omega_first = decimal(in.texts, "omega_0_first");
     made.net.omega_hidden = decimal(in.texts, "omega_0_hidden");
@@ -2663,6 +2751,10 @@ static const part MIXED_BOX = {.center = {{0, -0.5, 0}}, .half = {{1, 0.5, 1}},
 static const part MIXED_SPHERE = {.center = {{0, 0.5, 0}}, .radius = 0.5};
 static const part MIXED_QUAD = {.corner = {{-1, 1, -1}}, .edge_u = {{2, 0, 0}}, .edge_v = {{0, 0, 2}}};
 
+static const room HALL = {.given = true, .low = {{-3, -1, -3}}, .high = {{3, 3, 3}}};
+static const part HALL_LIGHT = {.corner = {{-0.5, 2, -0.5}}, .edge_u = {{1, 0, 0}}, .edge_v = {{0, 0, 1}},
+                                .color = {{0.5, 0.5, 0.5}}, .power = 1};
+
 static parts one(const part *from) {
     parts made = {get(1, sizeof(part)), 1};
     *made.items = *from;
@@ -2713,6 +2805,13 @@ static void do_room(const json *in) {
 static void do_nearest(const json *in) {
     scene s = {.boxes = one(&MIXED_BOX), .spheres = one(&MIXED_SPHERE), .quads = one(&MIXED_QUAD)};
     meet(in, &s, true, true);
+}
+
+static void do_occluded(const json *in) {
+    scene s = {.walls = HALL, .boxes = one(&MIXED_BOX), .spheres = one(&MIXED_SPHERE), .quads = one(&MIXED_QUAD),
+               .lights = one(&HALL_LIGHT)};
+    world w = build(s, (settings){0});
+    answer_number("occluded", occluded(&w, vec_in(in, "origin"), vec_in(in, "direction"), number(in, "distance")));
 }
 
 static site site_in(const json *in, material m) {
@@ -3103,12 +3202,23 @@ static void do_exposed(const json *in) {
 
 static void do_display(const json *in) { answer_number("encoded", to_display(number(in, "linear"), 0)); }
 
+static void do_shown(const json *in) {
+    answer_number("encoded", to_display(number(in, "linear"), number(in, "exposure_stops")));
+}
+
 static void do_sine(const json *in) { answer_number("sin", emitted_sine(number(in, "x"))); }
 
 static void do_features(const json *in) {
     features wanted = features_named(text(in, "features"));
     scales s = read_scales(in);
     answer_array("image", feature_image(in, &wanted, &s));
+}
+
+static void do_smoothed(const json *in) {
+    array color = array_in(in, "color", 3), guides[GUIDE_COUNT];
+    check_layer(&color, &color, 3, "color");
+    read_guides(in, GUIDES[0], &color, guides);
+    answer_array("color", smoothed(color, guides, (unsigned)whole_of(field(in, "levels"), 0, 20, "levels")));
 }
 
 static void do_window(const json *in) {
@@ -3279,6 +3389,7 @@ static const struct {
     {"intersection.turned_box", do_turned_box},
     {"intersection.room", do_room},
     {"intersection.nearest", do_nearest},
+    {"intersection.occluded", do_occluded},
     {"material.ggx", do_ggx},
     {"material.schlick", do_schlick},
     {"material.visible_normal", do_visible_normal},
@@ -3315,8 +3426,10 @@ static const struct {
     {"encoding.srgb", do_srgb},
     {"encoding.exposed", do_exposed},
     {"encoding.display", do_display},
+    {"encoding.shown", do_shown},
     {"sine", do_sine},
     {"image.features", do_features},
+    {"image.smoothed", do_smoothed},
     {"image.window", do_window},
     {"image.draws", do_draws},
     {"metric.mse", do_mse},

@@ -6,7 +6,20 @@ from collections.abc import Mapping
 
 from ..case import Kind
 from ..functions import Function
-from . import files, images, light, materials, network, numbers, paths, pictures, records, surfaces, whole
+from . import (
+    files,
+    images,
+    light,
+    materials,
+    network,
+    numbers,
+    paths,
+    pictures,
+    records,
+    smoothing,
+    surfaces,
+    whole,
+)
 
 FUNCTIONS: Mapping[str, Function] = {
     f.name: f for f in (*numbers.FUNCTIONS, *light.FUNCTIONS, *surfaces.FUNCTIONS, *materials.FUNCTIONS)
@@ -21,6 +34,7 @@ KINDS: Mapping[str, Kind] = {
         *paths.KINDS,
         *network.KINDS,
         *images.KINDS,
+        *smoothing.KINDS,
         *records.KINDS,
         *files.KINDS,
         *pictures.KINDS,

@@ -1,11 +1,14 @@
-// What the network sees: features, windows and draws (DAT-1 to DAT-10, FRM-5).
+// What the network sees: features, windows and draws (DAT-1 to DAT-10, SMO-1, SMO-2, FRM-5).
 
 import { toDisplay } from "./encoding.mjs";
 import { clip } from "./numbers.mjs";
 import { randomBlock } from "./random.mjs";
 import { require, requireInteger } from "./refusal.mjs";
+import { smooth } from "./smoothing.mjs";
 
 const HIGHLIGHT_STOPS = 4;
+const SMOOTHING_LEVELS = 3;
+const WHITES = 16;
 const PIXEL_TAG = 0x50495845;
 const LARGEST_SCALE = 1e18;
 const LEAST_SCALE = 1e-18;
@@ -24,6 +27,13 @@ const asPosition = (x, scales, channel) =>
 
 const feature = (layer, channels, encode) => ({ layer, channels, encode });
 
+// SMO-1: colour smoothed, guided by these layers; `past` begins the names of those past mirrors and glass.
+const smoothed = (past) => ({
+  ...feature("color", 3, asColor),
+  guides: { normal: `${past}normal`, albedo: `${past}albedo`, position: `${past}position`, depth: `${past}depth` },
+});
+const layersOf = ({ layer, guides = {} }) => [layer, ...Object.values(guides)];
+
 // DAT-1: each feature's layer, channels and encoding.
 export const FEATURES = {
   color: feature("color", 3, asColor),
@@ -40,10 +50,13 @@ export const FEATURES = {
   seen_position: feature("seen_position", 3, asPosition),
   history: feature("history", 3, asColor),
   history_weight: feature("history_weight", 1, asShare),
+  smoothed: smoothed(""),
+  seen_smoothed: smoothed("seen_"),
 };
 
-// FRM-2: the layers that features are made of.
+// FRM-2: the layers that features are made of, and the channels of each.
 export const LAYER_NAMES = [...new Set(Object.values(FEATURES).map(({ layer }) => layer))];
+const channelsOfLayer = (layer) => FEATURES[layer].channels;
 
 // DAT-9
 export function checkFeatures(names) {
@@ -75,12 +88,12 @@ export function checkScales(scales) {
 }
 
 // FRM-5: the common size of the layers that the features need.
-function frameSize(layers, names) {
+function frameSize(layers, needed) {
   let size = null;
-  for (const name of names) {
-    const { layer, channels } = FEATURES[name];
-    require(layers[layer] !== undefined, `feature ${name}: the frame has no layer ${layer}`);
+  for (const layer of needed) {
+    require(layers[layer] !== undefined, `the frame has no layer ${layer}`);
     const { shape } = layers[layer];
+    const channels = channelsOfLayer(layer);
     require(shape.length === 3 && shape[2] === channels, `layer ${layer}: must have ${channels} channels`);
     require(shape[0] > 0 && shape[1] > 0, `layer ${layer}: must have a pixel`);
     size ??= shape;
@@ -89,17 +102,37 @@ function frameSize(layers, names) {
   return { height: size[0], width: size[1] };
 }
 
+// DAT-10
+const known = (data) => data.map((x) => (Number.isNaN(x) ? 0 : x));
+
+// SMO-3: the colour of a frame after some levels, guided by its layers.
+export function smoothedColor(layers, levels, { layer, guides } = FEATURES.smoothed) {
+  const { height, width } = frameSize(layers, layersOf({ layer, guides }));
+  const compared = Object.fromEntries(Object.entries(guides).map(([name, from]) => [name, known(layers[from].data)]));
+  return { shape: [height, width, 3], data: smooth(layers[layer].data, compared, height, width, levels) };
+}
+
+// SMO-1, SMO-2: the numbers of which a feature is the encoding.
+function numbersOf(layers, source, scales) {
+  const { data } = layers[source.layer];
+  if (!source.guides) return data;
+  const brightest = WHITES * 2 ** -scales.exposure_stops;
+  const color = { ...layers.color, data: known(data).map((x) => clip(x, 0, brightest)) };
+  return smoothedColor({ ...layers, color }, SMOOTHING_LEVELS, source).data;
+}
+
 // DAT-3, DAT-10: an image as its shape and its numbers in C order.
 export function featureImage(layers, names, scales) {
   checkFeatures(names);
   checkScales(scales);
-  const { height, width } = frameSize(layers, names);
+  const sources = names.map((name) => FEATURES[name]);
+  const { height, width } = frameSize(layers, sources.flatMap(layersOf));
+  const numbers = sources.map((source) => numbersOf(layers, source, scales));
   const data = [];
   for (let pixel = 0; pixel < height * width; pixel++) {
-    for (const name of names) {
-      const { layer, channels, encode } = FEATURES[name];
+    for (const [index, { channels, encode }] of sources.entries()) {
       for (let channel = 0; channel < channels; channel++) {
-        const x = layers[layer].data[pixel * channels + channel];
+        const x = numbers[index][pixel * channels + channel];
         data.push(Math.fround(encode(Number.isNaN(x) ? 0 : x, scales, channel)));
       }
     }

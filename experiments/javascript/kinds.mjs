@@ -2,10 +2,10 @@
 
 import { cameraBasis, cameraRay } from "./camera.mjs";
 import { sceneDigest } from "./canonical.mjs";
-import { checkWindow, drawPixels, featureImage, LAYER_NAMES, windowAt } from "./dataset.mjs";
+import { checkWindow, drawPixels, featureImage, LAYER_NAMES, smoothedColor, windowAt } from "./dataset.mjs";
 import { expose, srgbEncode, toDisplay } from "./encoding.mjs";
 import { buildSky, sampleSky, skyPdf, skyRadiance, sunShare } from "./environment.mjs";
-import { buildGeometry, closestHit, lightRadiance, surfaceAt } from "./geometry.mjs";
+import { buildGeometry, closestHit, isOccluded, lightRadiance, surfaceAt } from "./geometry.mjs";
 import { fresnel, ggx, MATERIALS, refract, schlick, visibleNormal } from "./materials.mjs";
 import * as metrics from "./metrics.mjs";
 import { parametersDigest, readModel, widthsOf } from "./model_file.mjs";
@@ -77,6 +77,11 @@ const NEAREST = {
   spheres: [{ center: [0, 0.5, 0], radius: 0.5, ...WHITE }],
   quads: [{ corner: [-1, 1, -1], edge_u: [2, 0, 0], edge_v: [0, 0, 2], ...WHITE }],
 };
+const HALL = {
+  ...NEAREST,
+  room: { ...ROOM, low: [-3, -1, -3], high: [3, 3, 3] },
+  lights: [{ corner: [-0.5, 2, -0.5], edge_u: [1, 0, 0], edge_v: [0, 0, 1], color: ONE, power: 1 }],
+};
 const SKY = buildSky({
   zenith: [0.16, 0.3, 0.62],
   horizon: [0.62, 0.7, 0.8],
@@ -114,6 +119,7 @@ const light = {
   "encoding.exposed": ({ linear, exposure_stops: stops }) => ({ exposed: expose(linear, stops) }),
   "encoding.srgb": ({ linear }) => ({ encoded: srgbEncode(linear) }),
   "encoding.display": ({ linear }) => ({ encoded: toDisplay(linear, 0) }),
+  "encoding.shown": ({ linear, exposure_stops: stops }) => ({ encoded: toDisplay(linear, stops) }),
   "vector": ({ a, b, c }) => ({
     inner: dot(a, b),
     outer: cross(a, b),
@@ -174,6 +180,9 @@ const intersection = {
   "intersection.turned_box": (ray) => nearestHit({ boxes: [{ ...BOX, rotation: TURNED }] }, ray),
   "intersection.room": (ray) => nearestHit({ room: ROOM }, ray),
   "intersection.nearest": (ray) => nearestHit(NEAREST, ray),
+  "intersection.occluded": ({ origin, direction, distance }) => ({
+    occluded: Number(isOccluded(buildGeometry(HALL), origin, direction, distance)),
+  }),
 };
 
 // A surface of this material sends a path on.
@@ -317,6 +326,11 @@ const network = {
   "image.features": (input) => {
     const { shape, data } = featureImage(frameOf(input), text(input.features).split(","), scalesOf(input));
     return { image: nested(data, shape) };
+  },
+  "image.smoothed": (input) => {
+    requireInteger(input.levels, "levels", 0, 20);
+    const { shape, data } = smoothedColor(frameOf(input), input.levels);
+    return { color: nested(data, shape) };
   },
   "image.window": (input) => {
     const image = array(input.image);

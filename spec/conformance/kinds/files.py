@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....compiler import model_file
 from ....refimpl.light import scene as scene_module
@@ -295,6 +296,109 @@ BEYOND: Mapping[str, Callable[[], bytes]] = {
 """Files that are just not."""
 
 
+Tensors = Mapping[str, NDArray[Any]]
+
+
+def _tensors(model: Model = MODEL) -> dict[str, NDArray[Any]]:
+    """Return the tensors of a model by name."""
+    pairs = enumerate(zip(model.siren.weights, model.siren.biases, strict=True))
+    return {
+        f"layer{layer}.{name}": array
+        for layer, arrays in pairs
+        for name, array in zip(("weight", "bias"), arrays, strict=True)
+    }
+
+
+def _made_of(tensors: Tensors) -> bytes:
+    """Return the file with these tensors in place of its own, one after another."""
+    header, data = {"__metadata__": _parts(file_of(MODEL))[0]["__metadata__"]}, b""
+    for name, array in tensors.items():
+        span = [len(data), len(data) + array.nbytes]
+        dtype = {"float32": "F32", "float64": "F64"}[array.dtype.name]
+        header[name] = {"dtype": dtype, "shape": list(array.shape), "data_offsets": span}
+        data += array.tobytes()
+    return _joined(header, data)
+
+
+def _doubled(*parts: str) -> bytes:
+    """Return the file with the tensors in float64 whose names have one of these parts; they come first."""
+    of_double = {n: a.astype("<f8") for n, a in _tensors().items() if any(part in n for part in parts)}
+    return _made_of({**of_double, **{n: a for n, a in _tensors().items() if n not in of_double}})
+
+
+def _with(name: str, array: Any = MODEL.siren.weights[1]) -> bytes:
+    """Return the file with one tensor more."""
+    return _made_of({**_tensors(), name: array})
+
+
+LATER_GOOD: Mapping[str, Callable[[], bytes]] = {
+    "twelve layers: layer10 comes after layer9": lambda: file_of(
+        replace(MODEL, siren=siren.init([27, *range(2, 13), 3], 3.0, 1.0, seed=9, dtype=np.float32))
+    ),
+    "tensors in the order of their layers": lambda: _made_of(_tensors()),
+    "tensors in the other order": lambda: _made_of(dict(reversed(_tensors().items()))),
+    "a tensor that is not known": lambda: _with("layer0.scale"),
+    "biases of a layer that is not there": lambda: _with("layer2.bias", MODEL.siren.biases[1]),
+    "a name that goes on after .weight": lambda: _with("layer2.weights"),
+    "the activation, which is the sine": lambda: _text("activation", "sine"),
+    "omega_0 with a point and an exponent": lambda: _text("omega_0_first", "0.25e+1"),
+}
+"""Files that are read, which came later."""
+
+LATER_BAD: Mapping[str, Callable[[], bytes]] = {
+    "weights in float32, biases in float64": lambda: _doubled("bias"),
+    "weights in float64, biases in float32": lambda: _doubled("weight"),
+    "the first layer in float64, the last in float32": lambda: _doubled("layer0"),
+    "the last layer in float64, the first in float32": lambda: _doubled("layer1"),
+    "one tensor in float64": lambda: _doubled("layer1.bias"),
+    "weights of another name": lambda: _with("extra.weight"),
+    "weights of no name": lambda: _with(".weight"),
+    "weights of a layer with a zero before its number": lambda: _with("layer01.weight"),
+    "weights of a layer more, without its biases": lambda: _with("layer2.weight"),
+    "weights of a layer that is not the next": lambda: _made_of(
+        {**_tensors(), "layer3.weight": MODEL.siren.weights[1], "layer3.bias": MODEL.siren.biases[1]}
+    ),
+    "layers that begin with 1": lambda: _made_of(
+        {f"layer{int(name[5]) + 1}{name[6:]}": array for name, array in _tensors().items()}
+    ),
+    "no tensor": lambda: _made_of({}),
+    "names in capitals": lambda: _made_of({name.upper(): array for name, array in _tensors().items()}),
+    "an activation that is not the sine": lambda: _text("activation", "relu"),
+    "a letter after the end of a text": lambda: _text("features", '["color"]\0'),
+    **{
+        f"omega_0 = {text!a}": lambda text=text: _text("omega_0_first", text)  # type: ignore[misc]
+        for text in (
+            "",
+            "+3.0",
+            "3.",
+            ".5",
+            "03.0",
+            "3.0\n",
+            "3.0\0",
+            "3,0",
+            "3.0f",
+            "1e",
+            "inf",
+            "-0",
+            "1e400",
+        )
+    },
+    **{
+        f"a window of {text} pixels": lambda text=text: _text(  # type: ignore[misc]
+            "window", f'{{"border": "clamp", "size": {text}}}'
+        )
+        for text in ("3e0", "null", '"3"', "[3]", "-3")
+    },
+}
+"""Files that are refused, which came later."""
+
+LATER_RULES = {
+    "float64": "MOD-2", "activation": "MOD-6", "window of": "DAT-9", "omega_0 = '-0'": "MOD-6",
+    "omega_0": "MOD-2", "letter": "RDG-2",
+}  # fmt: skip
+"""Clauses of those, by what a note says of them."""
+
+
 GOVERNING = {
     "scale": "MOD-6", "position_center": "MOD-6", "exposure_stops": "MOD-6", "pixel": "DAT-9",
     "parameter": "MOD-6", "omega_0 ": "MOD-6", "biases": "DEN-1", "weights": "DEN-1", "outputs": "DEN-1",
@@ -333,6 +437,13 @@ def _model_cases() -> list[Case]:
             next((known for part, known in GOVERNING.items() if part in note), clause) if later else clause
         )
         refusal = "" if note not in good else "DAT-1" if "features" in note else "MOD-6"
+        cases.append(Case(f"file.model/{len(cases)}", clause, inputs, expected, (), note, refusal))
+    for note, content in [*LATER_GOOD.items(), *LATER_BAD.items()]:
+        inputs, read = {"content": base64.b64encode(content()).decode()}, note in LATER_GOOD
+        expected = {name: Output(value) for name, value in _model(inputs).items()} if read else None
+        otherwise = "MOD-2" if read else "MOD-6"
+        clause = next((known for part, known in LATER_RULES.items() if part in note), otherwise)
+        refusal = "MOD-6" if read else ""
         cases.append(Case(f"file.model/{len(cases)}", clause, inputs, expected, (), note, refusal))
     return cases
 
@@ -454,6 +565,10 @@ FIRST_OF_VALUES = "an angle of 180 degrees"
 """The first one that is refused for a value."""
 
 
+OF_SHAPES = {"rotation": "BOX-1", "area": "SHP-3"}
+"""Clauses of what is refused by a shape's own rule, by what a note says of it."""
+
+
 def _scene_cases() -> list[Case]:
     """Return good and bad scenes."""
     cases, names = list[Case](), list(SCENE_BAD)
@@ -464,7 +579,8 @@ def _scene_cases() -> list[Case]:
         expected = None if bad else {name: Output(v, clause=own) for name, v in _scene(inputs).items()}
         form = bad and names.index(note) < names.index(FIRST_OF_VALUES)
         read = "SCN-10" if note in SCENE_LATER else "SCN-8"
-        clause = read if not bad else "SCN-6" if form else "SCN-7"
+        rule = next((known for part, known in OF_SHAPES.items() if part in note), "SCN-7")
+        clause = read if not bad else "SCN-6" if form else rule
         refusal = "" if bad else "RDG-2" if "letters" in note else "SCN-7"
         cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note, refusal))
     for found, bad in (
@@ -474,6 +590,8 @@ def _scene_cases() -> list[Case]:
         (rules.last_bad(), True),
     ):
         _add_scenes(cases, found, bad)
+    for note, content in rules.no_texts():
+        cases.append(Case(f"file.scene/{len(cases)}", "RDG-2", {"text": content}, None, (), note))
     return cases
 
 

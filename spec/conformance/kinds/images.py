@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....refimpl import metrics, rng
-from ....refimpl.frame import LAYERS, USUAL, Frame
+from ....refimpl.frame import LAYERS, USUAL, Frame, validate
 from ....refimpl.network import dataset
 from ....refimpl.network.dataset import Normalization, Window
 from ..case import Case, Kind, Output
+from . import smoothing
 
 Array = NDArray[Any]
 
@@ -65,6 +66,7 @@ def normalization_of(inputs: Mapping[str, Any]) -> Normalization:
 def _features(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the feature image."""
     frame = frame_of({name: inputs[name] for name in LAYERS if name in inputs})
+    validate(frame, finite=False)
     names = tuple(str(inputs["features"]).split(","))
     return {"image": dataset.feature_image(frame, names, normalization_of(inputs))}
 
@@ -108,6 +110,91 @@ FEATURE_ROWS = (
 """Features of the cases, clause, note, and whether pixels are bad."""
 
 
+ENDS = (np.nan, -np.inf, np.inf, 0.0, -1e30, 1e30)
+"""Numbers of which a layer may hold any, and what each is clipped to tells nothing of the others."""
+
+FAR_SCALES = {
+    "exposure_stops": -3.0,
+    "depth_scale": 4.0,
+    "position_center": np.array([1.0, 2.0, 3.0]),
+    "position_scale": 8.0,
+}
+"""Scales with a centre that is not 0: what counts as a position of 0 is encoded as another number."""
+
+
+def ends_of(layer: str, turn: int = 0) -> Array:
+    """Return a layer (2, 3, channels) that has every one of `ENDS` in each channel, in turn."""
+    channels = LAYERS[layer].channels
+    return np.stack([np.roll(ENDS, turn + channel).reshape(2, 3) for channel in range(channels)], axis=-1)
+
+
+def _end_cases(first: int) -> list[Case]:
+    """Return each feature of one pixel's layers where these are NaN, infinite or huge, with either sign."""
+    cases = []
+    for feature in dataset.FEATURES.values():
+        if not feature.guides:
+            inputs = {feature.layer: ends_of(feature.layer), "features": feature.name, **FAR_SCALES}
+            expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}
+            note = "NaN is 0 before it is encoded, infinities are the ends of the range"
+            name = f"image.features/{first + len(cases)}"
+            cases.append(Case(name, "DAT-10", inputs, expected, (), note, "DAT-9"))
+    return cases
+
+
+def _layers_of(names: str, shape: tuple[int, int]) -> dict[str, Array]:
+    """Return the layers of features, with numbers from -0.5 to 2.5."""
+    layers = [layer for name in names.split(",") for layer in dataset.FEATURES[name].layers]
+    return {
+        layer: single(noise(80 + i, (*shape, LAYERS[layer].channels)) * 3.0 - 0.5)
+        for i, layer in enumerate(dict.fromkeys(layers))
+    }
+
+
+LATER_ROWS = (
+    ("seen_albedo,seen_normal,seen_depth,seen_position", "what is seen past mirrors and glass"),
+    ("seen_depth,depth,seen_position,position", "by the same scales as the first hit"),
+    ("history_weight,history,color", "the pictures before"),
+)
+"""Features that came later, with notes."""
+
+WRONG_LAYERS: tuple[tuple[str, tuple[int, ...], str], ...] = (
+    ("albedo", (3, 2, 3), "a layer of as many pixels and another size"),
+    ("albedo", (1, 3, 3), "a layer of fewer rows"),
+    ("albedo", (1, 1, 3), "a layer of one pixel beside larger ones"),
+    ("albedo", (2, 3, 1), "a layer of one channel for three"),
+    ("albedo", (2, 3, 4), "a layer of four channels for three"),
+    ("albedo", (2, 9), "a layer of two axes"),
+)
+"""Layers beside a colour of 2 x 3 pixels that do not go with it."""
+
+
+def _later_feature_cases(first: int) -> list[Case]:
+    """Return other features, each with its limits, and more that is refused."""
+    cases = _end_cases(first)
+
+    def add(clause: str, inputs: Mapping[str, Any], valid: bool, note: str) -> None:
+        expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)} if valid else None
+        name = f"image.features/{first + len(cases)}"
+        cases.append(Case(name, clause, inputs, expected, (), note, "DAT-9" if valid else ""))
+
+    for names, note in LATER_ROWS:
+        inputs = {**_layers_of(names, (2, 2)), "features": names, **OTHER_SCALES}
+        add("DAT-1", inputs, True, note)
+    color = {"color": single(noise(90, (2, 3, 3)))}
+    for names, note in (("", "no feature"), ("color,", "a feature without a name"), (" color", "a space")):
+        add("DAT-9", {**color, "features": names, **SCALES}, False, note)
+    for names in ("seen_depth", "history", "highlights,normal"):
+        add("DAT-9", {**color, "features": names, **SCALES}, False, f"a layer of {names} is missing")
+    for layer, shape, note in WRONG_LAYERS:
+        inputs = {**color, layer: np.full(shape, 0.5), "features": f"color,{layer}", **SCALES}
+        add("FRM-5", inputs, False, note)
+    for clause, note, names, layers, stops in smoothing.feature_rows():
+        add(clause, {**layers, "features": names, **SCALES, "exposure_stops": stops}, True, note)
+    for note, names, layers in smoothing.missing_rows():
+        add("DAT-9", {**layers, "features": names, **SCALES}, False, note)
+    return cases
+
+
 def _feature_cases() -> list[Case]:
     """Return feature images of a frame with bad pixels; one without a needed layer is refused."""
     cases: list[Case] = []
@@ -137,7 +224,7 @@ def _feature_cases() -> list[Case]:
     ):
         inputs = {"color": layers["color"], "features": names, **SCALES}
         cases.append(Case(f"image.features/{len(cases)}", "DAT-9", inputs, None, (), note))
-    return cases
+    return [*cases, *_later_feature_cases(len(cases))]
 
 
 # ---- windows ----------------------------------------------------------------------------------------------
@@ -203,12 +290,17 @@ def _draws(inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _draw_cases() -> list[Case]:
-    """Return draws from one and from three frames."""
+    """Return draws from one frame and from several: large ones, and ones of a pixel, which have many ends."""
     cases: list[Case] = []
     rows = (
         (0, 0, 10, [(8, 8)]),
         (3, 19_999, 10, [(64, 64), (1, 7), (480, 640)]),
         (2**31 + 5, 2**31 + 70_000, 300, [(3, 5), (700, 300), (1, 1), (1, 60_000)]),
+        (7, 4, 8, [(1, 1), (1, 1), (1, 2)]),
+        (7, 5, 16, [(2, 1), (1, 2), (1, 1), (2, 2)]),
+        (8, 0, 5, [(1, 1)] * 5),
+        (9, 1, 1, [(1, 1)]),
+        (10, 2, 12, [(32_768, 32_767), (32_767, 32_768)]),
     )
     for seed, stream, count, shapes in rows:
         inputs = {"seed": seed, "stream": stream, "count": count, "shapes": np.array(shapes)}
@@ -304,6 +396,19 @@ def _small() -> list[tuple[str, Array, Array]]:
     ]
 
 
+OTHER_SHAPES = (
+    ((2, 1, 3), (1, 2, 3), "as many numbers, rows for columns"),
+    ((1, 2, 3), (3, 2, 1), "as many numbers, axes exchanged"),
+    ((1, 1, 6), (1, 2, 3), "as many numbers, more channels"),
+    ((6,), (1, 2, 3), "as many numbers on one axis"),
+    ((1, 1, 3), (1, 3), "the first axis is missing"),
+    ((1, 1, 1), (1, 1, 3), "one channel against three"),
+    ((2, 2, 3), (1, 1, 3), "pictures against a pixel"),
+    ((2, 3, 3), (1, 3, 3), "rows against a row"),
+)
+"""Shapes of pictures that are not compared, and notes: as many numbers, or some that would repeat."""
+
+
 def _metric_cases(name: str) -> list[Case]:
     """Return the cases of a metric."""
     clause, function, bound = METRICS[name]
@@ -335,6 +440,15 @@ def _metric_cases(name: str) -> list[Case]:
     add(one[:0, 0, 0], one[:0, 0, 0], None, "no number", "MET-1")
     for value in (np.nan, np.inf):
         add(np.where(one > 0, [value, 0.5, 0.5], one), one, None, f"{value} in a picture", "MET-1")
+    more = 1 if name != "ssim" else metrics.WINDOW_SIZE_PX
+    for left, right, note in OTHER_SHAPES:
+        add(np.full(left, 0.5), np.full(right, 0.5), None, note, "MET-1")
+    square = np.full((more, more, 1), 0.5)
+    for value in (np.nan, -np.inf):
+        bad = square.copy()
+        bad[-1, -1] = value
+        add(square, bad, None, f"{value} in a reference", "MET-1")
+    add(bad, bad, None, "-inf in both, at the same place", "MET-1")
     return cases
 
 
@@ -351,7 +465,7 @@ def _metric(name: str) -> Kind:
     )
 
 
-LAYER_FIELDS = {name: f"float[H][W][{layer.channels}]" for name, layer in LAYERS.items() if name in USUAL}
+LAYER_FIELDS = {name: f"float[H][W][{layer.channels}]" for name, layer in LAYERS.items()}
 """What the layers of a frame are, for the page."""
 
 KINDS = (

@@ -6,7 +6,7 @@ What fails here makes every scene and model fail: JSON (RDG-2) and records (RDG-
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -82,6 +82,59 @@ NO_JSON = {
 }
 """Texts that are not JSON as it is read here."""
 
+NO_SPACES = {
+    "a vertical tab": "\v",
+    "a form feed": "\f",
+    "U+0000": "\0",
+    "U+001F": "\x1f",
+    "U+0085": "\x85",
+    "a space that does not break": "\xa0",
+    "a separator of lines": "\u2028",
+    "a byte order mark": "\ufeff",
+}
+"""Characters that other readers skip as they do spaces, and RFC 8259 does not."""
+
+NO_NUMBERS = (
+    "-", "- 45", "--45", "-.5", "-045", "00", "45.e1", "1e", "1e+", "1.5.5", "4_5", "0x2D", "45f", "4 5",
+    "-Infinity", "-NaN", "inf", "nan", "\uff14\uff15",
+)  # fmt: skip
+"""What other readers take for a number; the last are digits of another width."""
+
+NO_FORM = {
+    "a list that ends as an object": _raw("-4.0]", "-4.0}"),
+    "an object that ends as a list": _text()[:-1] + "]",
+    "no comma between two keys": _raw('], "up"', '] "up"'),
+    "two commas between two keys": _raw('], "up"', '],, "up"'),
+    "a comma before the first key": _raw("{", "{,"),
+    "two commas in a list": _raw("1.5, -4.0", "1.5,, -4.0"),
+    "no comma in a list": _raw("1.5, -4.0", "1.5 -4.0"),
+    "a semicolon in a list": _raw("1.5, -4.0", "1.5; -4.0"),
+    "no colon": _raw('"up":', '"up"'),
+    "two colons": _raw('"up":', '"up"::'),
+    "an equals sign for a colon": _raw('"up":', '"up" ='),
+    "a number as key": _raw('"up"', "3"),
+    "a key that does not end": _raw('"up"', '"up'),
+    "a key twice, the second time in escapes": _text()[:-1] + ', "\\u0075p": [0, 1, 0]}',
+    "a comment in a list": _raw("1.5,", "1.5, /* y */"),
+    "two objects": _text() * 2,
+    "null in capitals": _raw("45", "NULL"),
+    "a part of null": _raw("45", "nul"),
+    "true with a capital, as Python writes it": _raw("45", "True"),
+    "undefined": _raw("45", "undefined"),
+}
+"""Texts that break the grammar in one place."""
+
+
+def no_json() -> Iterator[tuple[str, str]]:
+    """Yield notes and texts that came later: no spaces, no numbers, and what breaks the grammar."""
+    for name, character in NO_SPACES.items():
+        yield f"{name} before the object", character + _text()
+        yield f"{name} after the object", _text() + character
+        yield f"{name} between two tokens", _raw('"up": ', f'"up":{character}')
+    yield from ((f"{text!a} for a number", _raw("45", text)) for text in NO_NUMBERS)
+    yield from NO_FORM.items()
+
+
 NO_RECORD = {
     "a list": "[]",
     "a text": '"camera"',
@@ -118,6 +171,8 @@ def _cases() -> list[Case]:
                 values = _camera(inputs).items()
                 expected = {name: Output(value, clause=own.get(name, refusal)) for name, value in values}
             cases.append(Case(f"file.camera/{len(cases)}", clause, inputs, expected, (), note, refusal))
+    for note, text in no_json():
+        cases.append(Case(f"file.camera/{len(cases)}", "RDG-2", {"text": text}, None, (), note))
     return cases
 
 

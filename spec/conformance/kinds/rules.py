@@ -277,6 +277,9 @@ def last_good() -> Iterator[tuple[str, str]]:
         changed(("boxes.0.rotation.2", LONG_AXES[0])),
     )
     yield "quads.0.material.roughness = 1", changed(("quads.0.material.roughness", 1))
+    for name in ("\x7f\x80\x9f", "\u2028\ufeff\uffff", "\U0001f3e0"):
+        yield f"name = {json.dumps(name)} as it is: letters that need no escape", _named(name)
+    yield "name: every escape", _named(r"\"\\\/\b\f\n\r\t\u00e9\u00E9\uD83C\udfe0")
 
 
 def last_bad() -> Iterator[tuple[str, str]]:
@@ -290,6 +293,28 @@ def last_bad() -> Iterator[tuple[str, str]]:
         "camera: up along a view from a place off all axes",
         changed(("camera.position", [2, 3, 5]), ("camera.look_at", [3, 4, 6]), ("camera.up", [1, 1, 1])),
     )
+
+
+def no_texts() -> Iterator[tuple[str, str]]:
+    """Yield notes and texts of scenes whose name has a character or an escape that no text of JSON has."""
+    yield from ((f"U+{ord(c):04X} as it is in the name", _named(f"ea{c}ch")) for c in CONTROLS)
+    yield from ((f"the escape {escape} in the name", _named(f"ea{escape}ch")) for escape in NO_ESCAPES)
+    yield "a name that ends in an escape", _named("each" + chr(92))
+
+
+def _named(letters: str) -> str:
+    """Return the text of that scene with letters in place of its name, as they are."""
+    return changed(("name", "each")).replace('"each"', f'"{letters}"')
+
+
+CONTROLS = "\0\x01\b\t\n\v\f\r\x1b\x1f"
+"""Characters that a text of JSON has in escapes only."""
+
+NO_ESCAPES = (
+    r"\a", r"\v", r"\0", r"\'", r"\ ", r"\x41", r"\U00000041", r"\N{BULLET}", r"\u", r"\u12", r"\u00g0",
+    r"\u+041", r"\u 041", r"\ud83c", r"\udfe0\ud83c", r"\ud83c\ud83c", "\\\n",
+)  # fmt: skip
+"""Escapes of other languages, and halves of characters."""
 
 
 LONG_AXES = ([0, 0, 1.0000004999], [0, 0, 1.0000005002])

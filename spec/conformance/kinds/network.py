@@ -193,8 +193,8 @@ def _gradient_cases() -> list[Case]:
         step = step_of(partial(siren.forward, network), widths[0], widths[-1], EXAMPLES)
         errors = sum_errors(step, x, target)
         expected = {}
-        # The loss comes last: what is wrong with its derivatives is not of its own clause.
-        for name, value in sorted(_gradient(inputs).items(), key=lambda item: item[0] == "loss"):
+        # The loss comes first: what is wrong with it is wrong with all derivatives.
+        for name, value in _gradient(inputs).items():
             if name == "loss":
                 # The mean of all squares is their sums' sum over their number: 8 more roundings at most.
                 error = float(errors[SQUARES].sum()) / target.size + gamma(8) * value

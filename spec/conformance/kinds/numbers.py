@@ -234,6 +234,48 @@ SRGB = Function(
 """The transfer function with its clip."""
 
 
+def _shown(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return exposed and display-encoded radiance."""
+    linear = np.asarray(inputs["linear"], np.float64)
+    return {"encoded": np.float64(encoding.to_display(linear, float(inputs["exposure_stops"])))}
+
+
+def _displays() -> list[Case]:
+    """Return radiance that exposure brings into the range, or out of it at either end."""
+    rows = (
+        ("clipped after it is exposed: 1 is not white", 4.0, -3.0),
+        ("exposed beyond white", 0.25, 3.0),
+        ("exposed to white", 0.25, 2.0),
+        ("below black", -0.5, 3.0),
+        ("below black, darker", -8.0, -3.0),
+        ("onto the line at black", 0.5, -8.0),
+        ("from the line to the curve", 0.001953125, 6.0),
+        ("a fraction of a stop", 0.375, 0.5),
+        ("a firefly of which exposure leaves little", 1024.0, -11.5),
+    )
+    found = []
+    for index, (note, linear, stops) in enumerate(rows):
+        inputs = {"linear": linear, "exposure_stops": stops}
+        light = np.float64(np.float32(_exposed(inputs)["exposed"]))
+        value = _shown(inputs)["encoded"]
+        # Near a number the encoding grows by at most its own share: slope times x over value is at most 1.
+        bound = SRGB.bounded({"linear": light})[0]["encoded"].bound + 2.0**-22 * value
+        expected = {"encoded": Output(value, bound, "those of encoding.exposed and of encoding.display")}
+        found.append(Case(f"encoding.shown/{index}", "ENC-5", inputs, expected, (), note))
+    return found
+
+
+SHOWN = Kind(
+    "encoding.shown",
+    "Linear radiance, exposed and display-encoded",
+    {"linear": "float", "exposure_stops": "float"},
+    {"encoded": "float in [0, 1]"},
+    _displays,
+    _shown,
+)
+"""Exposure, clip and transfer function, one after another."""
+
+
 def _adam(given: Mapping[str, Any], dtype: Any) -> dict[str, Any]:
     """Return parameter and moments after a step."""
     grown = (given["growth_1"], given["growth_2"])
@@ -302,13 +344,17 @@ SINE = Function(
             {"x": np.float32(710 * np.pi)},
         ),
         ("last float32 in the domain", {"x": LARGEST}),
-        ("first one", {"x": -LARGEST}),
+        ("first one", {"x": -LARGEST}, "SIN-1"),
+        *(
+            (f"{x:g}: its multiple of pi is rounded down", {"x": x}, "SIN-1")
+            for x in (-1.5, -1.75, -3.0, -4.5, -5.0, 1.5, 1.75, 4.5, 5.0)
+        ),
     ],
     lambda u: {"x": _scalar(u, -100.0, 100.0)},
 )
 """The sine of the network; its contract is the emitted sine's."""
 
-KINDS = (HASH, FLOAT, BLOCK, SCRAMBLED, POINT, SOBOL, EXPOSED)
+KINDS = (HASH, FLOAT, BLOCK, SCRAMBLED, POINT, SOBOL, EXPOSED, SHOWN)
 """Kinds of this module that are not functions of floats."""
 
 FUNCTIONS = (TRANSFER, SRGB, SINE, ADAM)

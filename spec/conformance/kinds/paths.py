@@ -36,6 +36,7 @@ from .views import (
     SENT,
     WRONG_SETTINGS,
     View,
+    aimed,
     files,
     foundry,
     foundry_settings,
@@ -221,16 +222,21 @@ WITH_ROULETTE = {"alive": "LTR-9", "beta": "LTR-9"}
 """Clauses of outputs of a scattering with Russian roulette."""
 
 
-def _clauses(kind: str, inputs: Mapping[str, Any]) -> Mapping[str, str]:
+def _clauses(kind: str, inputs: Mapping[str, Any], wanted: State) -> Mapping[str, str]:
     """Return the clauses of a case's outputs where they are not the case's own."""
     name = str(inputs["scene"]["file"]).removeprefix("scenes/").removesuffix(".json")
     found = {**CLAUSES[kind], **({"radiance": "SHD-4"} if name == MIRRORS.name else {})}
     if kind != "path.scatter":
         return found
-    materials = materials_by_id(scene_module.from_json(scene_text(name)))
+    scene = scene_module.from_json(scene_text(name))
+    if scene.lights and scene.environment is not None and name != MIRRORS.name:
+        found |= {"radiance": "ENV-4"}
+    materials = materials_by_id(scene)
     number = int(inputs["surface"])
     if number < len(materials) and isinstance(materials[number][0], Dielectric):
         found |= OF_GLASS
+        if float(np.dot(wanted.get("direction", inputs["normal"]), inputs["normal"])) < 0.0:
+            found |= {"origin": "DIE-4"}
     return {**found, **(WITH_ROULETTE if inputs["settings"]["roulette_depth"] is not None else {})}
 
 
@@ -341,19 +347,29 @@ def _sent_midway(found: Found) -> None:
         reach = ranges.evaluate(programs_of(scene, settings).arrive, _flat(inputs, PATH))
         of_light = _of_emission(view, inputs["direction"], wanted)
         _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, reach, of_light)
+    for view, inputs, note in aimed():
+        wanted = arrive(_with_scene(inputs, view))
+        reach = ranges.evaluate(programs_of(view.scene, view.settings).arrive, _flat(inputs, PATH))
+        of_light = _of_emission(view, inputs["direction"], wanted)
+        _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, reach, of_light, note)
 
 
 def _of_emission(view: View, direction: Any, wanted: State) -> str:
     """Return the clause of the light of an arrival, "" for that of the case.
 
-    A lamp is black behind; where no light is sampled, all weights are 1, as those of other surfaces."""
+    A lamp is black behind, and a quad that is none is not; where no light is sampled, all weights are 1, as
+    those of other surfaces."""
     world = world_of(scene_text(view.scene), asdict(view.settings)).world
     lamp = int(world.geometry.light[int(wanted["surface"])])
     if lamp < 0 and int(wanted["surface"]) < world.geometry.nothing:
-        return ""
+        scene = scene_module.from_json(scene_text(view.scene))
+        quad = int(wanted["surface"]) - (world.geometry.nothing - len(scene.lights) - len(scene.quads))
+        return "QUA-1" if quad >= 0 and any(scene.quads[quad].emission) else ""
     if lamp >= 0 and world.lights is not None and float(world.lights.normal[lamp] @ direction) > 0.0:
         return "ISC-14"
-    return "" if world.samples_lights else "SHD-4" if world.materials.single else "LTR-10"
+    if world.samples_lights:
+        return "ENV-4" if world.lights is not None and world.environment is not None else ""
+    return "SHD-4" if world.materials.single else "LTR-10"
 
 
 def _add(
@@ -364,13 +380,14 @@ def _add(
     wanted: State,
     found: Mapping[str, Range],
     of_light: str = "",
+    note: str = "",
 ) -> None:
     """Append a case, unless a decision of it is not sure. Its light may have a clause of its own."""
     own = ("radiance",) if wanted.get("alive", True) else ("alive", "radiance")
-    clauses = {**_clauses(kind, inputs), **(dict.fromkeys(own, of_light) if of_light else {})}
+    clauses = {**_clauses(kind, inputs, wanted), **(dict.fromkeys(own, of_light) if of_light else {})}
     expected = _expected(wanted, found, clauses)
     if expected is not None:
-        note = f"{inputs['settings']['strategy']}, {inputs['settings']['sampler']}"
+        note = note or f"{inputs['settings']['strategy']}, {inputs['settings']['sampler']}"
         cases.append(Case(f"{kind}/{len(cases)}", clause, dict(inputs), expected, (), note, "LTR-8"))
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ....refimpl.light import intersection
-from ....refimpl.light.scene import Box, Camera, Quad, Room, Scene, Sphere
+from ....refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
 from ....refimpl.light.shapes.box import slabs
 from ....refimpl.light.shapes.shape import inverse
 from ..functions import Field, Function, Numbers
@@ -72,6 +74,16 @@ def _slabs(given: Numbers, dtype: Any) -> dict[str, Any]:
     return {"enter": enter, "leave": leave}
 
 
+def _nearly_parallel() -> Iterator[tuple[str, Numbers, str]]:
+    """Yield rays with one component that is near 0, of either sign, or zero, on each axis."""
+    for axis in range(3):
+        for component in (-1e-16, 1e-16, -9e-16, 9e-16, -2e-15, 2e-15, -1e-9, 0.0, -0.0):
+            direction = np.roll((0.0, 0.6, -0.8), axis)
+            direction[axis] = component
+            note = f"a component {'xyz'[axis]} of {component:g}"
+            yield note, {"origin": (0.5, 0.0, 4.0), "direction": direction}, "ISC-5"
+
+
 SLABS = Function(
     "intersection.slabs",
     f"The slabs of the box around {BOX.center} with the half extents {BOX.half_extent}",
@@ -87,6 +99,7 @@ SLABS = Function(
         ("from inside", _ray((0.5, -0.25, 0.5), (2, -1, 2))),
         ("parallel to two slabs, outside one", _ray((2.0, -0.5, 4.0), (0, 0, -1)), "ISC-5"),
         ("a component that is the other zero", _ray((0.5, -0.25, 4.0), (-0.0, 0.0, -1)), "ISC-5"),
+        *_nearly_parallel(),
     ],
     _aimed,
     draws=4,
@@ -122,11 +135,16 @@ BOXES = Function(
 TURNED_BOXES = Function(
     "intersection.turned_box",
     f"The same box turned: its axes are {HALVES}",
-    "ISC-3",
+    "VEC-4",
     RAY_FIELDS,
-    {**FOUND, "normal": FOUND["normal"]._replace(clause="")},
+    FOUND,
     _met(Scene("turned box", EYE, boxes=(TURNED,))),
-    [("from outside", _ray((0.25, -0.5, 4.0), (0, 0, -1))), ("from inside", _ray(BOX.center, (0, 1, 0)))],
+    [
+        ("into a part that is beside it if it is turned the other way", _ray((0.19, 0.33, 4.0), (0, 0, -1))),
+        ("past it, where it would be if it were", _ray((0.31, 0.33, 4.0), (0, 0, -1))),
+        ("from outside", _ray((0.25, -0.5, 4.0), (0, 0, -1))),
+        ("from inside", _ray(BOX.center, (0, 1, 0))),
+    ],
     _aimed,
 )
 """Rays and a turned box."""
@@ -175,5 +193,61 @@ NEAREST = Function(
 )
 """Rays and a scene."""
 
-FUNCTIONS = (SLABS, BOXES, TURNED_BOXES, ROOMS, NEAREST)
+HALL = replace(
+    MIXED,
+    name="hall",
+    room=Room((-3.0, -1.0, -3.0), (3.0, 3.0, 3.0), (GRAY,) * 6),
+    lights=(Light((-0.5, 2.0, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), GRAY, 1.0),),
+)
+"""The same shapes and a light in a room."""
+
+
+def _occluded(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return 1 where something is nearer than a distance."""
+    geometry = intersection.build(HALL, dtype)
+    found = intersection.occluded(geometry, given["origin"], given["direction"], given["distance"])
+    one = np.ones_like(given["distance"])
+    return {"occluded": np.where(found, one, 0.0 * one)}
+
+
+def _shadow(origin: Any, direction: Any, distance: float) -> dict[str, Any]:
+    """Return the inputs of a ray and a distance on it."""
+    return {**_ray(origin, direction), "distance": distance}
+
+
+OCCLUDED = Function(
+    "intersection.occluded",
+    "Whether anything is between two points: the scene of intersection.nearest in a room from "
+    f"{HALL.room.low} to {HALL.room.high}, with a light: "  # type: ignore[union-attr]
+    f"corner {HALL.lights[0].corner}, edges {HALL.lights[0].edge_u}, {HALL.lights[0].edge_v}",
+    "ISC-10",
+    {**RAY_FIELDS, "distance": Field("distance of the other point", 0, 0.0, 100.0)},
+    {"occluded": Field("1 if something is nearer than it, else 0")},
+    _occluded,
+    [
+        ("a light in front, seen from below", _shadow((0, 1.5, 0), (0, 1, 0), 0.75)),
+        ("a light in front, seen from above", _shadow((0, 2.5, 0), (0, -1, 0), 0.75)),
+        ("the same light, farther than the point", _shadow((0, 1.5, 0), (0, 1, 0), 0.25)),
+        ("past the light", _shadow((0.75, 1.5, 0), (0, 1, 0), 1.25)),
+        ("past the light, to a point beyond the ceiling", _shadow((0.75, 1.5, 0), (0, 1, 0), 1.75)),
+        ("a wall in front", _shadow((0, 1.5, 2), (1, 0, 0), 3.25)),
+        ("a wall, farther than the point", _shadow((0, 1.5, 2), (1, 0, 0), 2.75)),
+        ("from outside: the near wall is not there", _shadow((0, 1.5, 5), (0, 0, -1), 4.0)),
+        ("a box in front", _shadow((2, -0.5, 0.25), (-1, 0, 0), 1.5)),
+        ("a box, farther than the point", _shadow((2, -0.5, 0.25), (-1, 0, 0), 0.75)),
+        ("a box around the point", _shadow((0.25, -0.5, 0.25), (1, 0, 0), 1.5)),
+        ("a box behind the ray", _shadow((2, -0.5, 0.25), (1, 0, 0), 0.75)),
+        ("a sphere in front", _shadow((2, 0.5, 0.25), (-1, 0, 0), 2.0)),
+        ("a sphere, farther than the point", _shadow((2, 0.5, 0.25), (-1, 0, 0), 1.25)),
+        ("a sphere around the point", _shadow((0, 0.5, 0.25), (0, 0, 1), 0.5)),
+        ("a quad in front, from below", _shadow((0.75, 0.5, 0.75), (0, 1, 0), 1.0)),
+        ("a quad in front, from above", _shadow((0.75, 1.75, 0.75), (0, -1, 0), 1.0)),
+        ("a quad, farther than the point", _shadow((0.75, 0.5, 0.75), (0, 1, 0), 0.25)),
+        ("on the quad, leaving", _shadow((0.75, 1.0, 0.75), (0, 1, 0), 0.5)),
+    ],
+    lambda u: {**_aimed(u), "distance": 8.0 * u[7]},
+)
+"""Rays and what is between two points."""
+
+FUNCTIONS = (SLABS, BOXES, TURNED_BOXES, ROOMS, NEAREST, OCCLUDED)
 """The functions of this module."""

@@ -13,6 +13,8 @@
 7. [`DARK`]: lamps without power or colour.
 8. [`PLATE`]: a matte floor under a distant lamp, whose samples hardly differ.
 9. [`LENS`], [`PANE`] and [`BUBBLE`]: glass as the first of two kinds of material, the second, and by itself.
+10. [`GLOW`]: no lamp and no sky, and a surface of each kind and material that emits; [`DUSK`] is the same
+    with a lamp in it.
 """
 
 from __future__ import annotations
@@ -203,3 +205,35 @@ PANE = replace(
 
 BUBBLE = replace(LENS, name="bubble", quads=(), lights=())
 """The ball by itself."""
+
+SHINE = {"reflectance": (0.5, 0.75, 0.25), "emission": (0.25, 0.5, 1.0)}
+"""A surface that emits and reflects."""
+
+GLOW = Scene(
+    "glow",
+    Camera((0.0, 0.5, 2.5), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 60.0),
+    Room((-3.0, -2.0, -3.0), (3.0, 2.0, 3.0), ((0.5, 0.5, 0.5),) * 6, (0.0625, 0.125, 0.03125)),
+    boxes=(
+        Box((2.0, 0.0, 0.0), (0.25, 0.25, 0.25), **SHINE),
+        Box((0.0, 0.0, -2.0), (0.25, 0.25, 0.25), rotation=TURN, material=Conductor(0.5), **SHINE),
+        Box((-1.5, 0.0, -1.5), (0.25, 0.25, 0.25), rotation=TURN, material=Dielectric(1.5), **SHINE),
+    ),
+    spheres=(
+        Sphere((-2.0, 0.0, 0.0), 0.25, **SHINE),
+        Sphere((1.5, 0.0, -1.5), 0.25, material=Mirror(), **SHINE),
+        Sphere((0.0, 0.0, 2.0), 0.25, material=Dielectric(1.5), **SHINE),
+    ),
+    quads=(
+        Quad((-0.25, 1.0, -0.25), (0.5, 0.0, 0.0), (0.0, 0.0, 0.5), **SHINE),
+        Quad((-0.25, -1.0, -0.25), (0.5, 0.0, 0.0), (0.0, 0.0, 0.5), material=Mirror(), **SHINE),
+        Quad((1.25, -0.25, 1.5), (0.5, 0.0, -0.5), (0.0, 0.5, 0.0), material=Conductor(0.5), **SHINE),
+    ),
+)
+"""A room that shines by its surfaces alone."""
+
+DUSK = replace(
+    GLOW,
+    name="dusk",
+    lights=(Light((-1.0, 1.75, 0.0), (0.5, 0.0, 0.0), (0.0, 0.0, 0.5), (1.0, 0.5, 0.25), 2.0),),
+)
+"""The same room with a lamp, which has weights; its surfaces have none."""

@@ -19,14 +19,17 @@ from ....refimpl import rng
 from ....refimpl.light import render, scenes, transport
 from ....refimpl.light import scene as scene_module
 from ....refimpl.light.transport import Settings
-from .terrace import BARE, BUBBLE, DARK, FOUNDRY, LENS, MIRRORS, NIGHT, PANE, PLATE, TERRACE, YARD
+from .terrace import BARE, BUBBLE, DARK, DUSK, FOUNDRY, GLOW, LENS, MIRRORS, NIGHT, PANE, PLATE, TERRACE, YARD
 
 SCENES = ("cornell", "glossy", "daylight", "minicubes")
 """Canonical scenes whose paths are cases; each at a time of its own, [`TIME_S`]."""
 
 OWN = {
     scene.name: scene
-    for scene in (TERRACE, FOUNDRY, YARD, MIRRORS, PLATE, BARE, NIGHT, DARK, LENS, PANE, BUBBLE)
+    for scene in (
+        *(TERRACE, FOUNDRY, YARD, MIRRORS, PLATE, BARE, NIGHT, DARK, LENS, PANE, BUBBLE),
+        *(GLOW, DUSK),
+    )
 }
 """Scenes of the vectors' own."""
 
@@ -263,10 +266,69 @@ ORIGINS = {
 """Where these directions begin."""
 
 
-def midway(scene: str, settings: Settings, direction: tuple[float, ...]) -> dict[str, Any]:
+Place = tuple[float, float, float]
+"""A place in a scene."""
+
+SHINING: tuple[tuple[str, Place, Place], ...] = (
+    ("a wall", (0.0, 0.0, 0.0), (3.0, 1.0, 1.5)),
+    ("the ceiling", (0.0, 0.0, 0.0), (1.0, 2.0, 0.5)),
+    ("a block", (0.0, 0.0, 0.0), (1.75, 0.0625, 0.125)),
+    ("a block of metal", (0.0, 0.0, 0.0), (0.0625, 0.0625, -2.0)),
+    ("a block of glass", (0.0, 0.0, 0.0), (-1.5, 0.0625, -1.5)),
+    ("a block of glass, from inside", (-1.5, 0.0, -1.5), (-1.25, 0.0625, -0.5)),
+    ("a ball", (0.0, 0.0, 0.0), (-2.0, 0.0625, 0.125)),
+    ("a ball, from inside", (-2.0, 0.0, 0.125), (-1.0, 0.5, 0.0)),
+    ("a ball that is a mirror", (0.0, 0.0, 0.0), (1.5, 0.0625, -1.4375)),
+    ("a ball of glass", (0.0, 0.0, 0.0), (0.0625, 0.0625, 2.0)),
+    ("a ball of glass, from inside", (0.0, 0.0, 2.0), (1.0, 0.25, 2.5)),
+    ("a quad, along edge_u x edge_v", (0.125, 1.5, 0.0), (0.0, 1.0, 0.0625)),
+    ("a quad, against edge_u x edge_v", (0.125, 0.25, 0.0), (0.03125, 1.0, 0.0625)),
+    ("a quad that is a mirror, along edge_u x edge_v", (0.125, -0.5, 0.0), (0.03125, -1.0, 0.0625)),
+    ("a quad that is a mirror, against edge_u x edge_v", (0.125, -1.5, 0.0), (0.03125, -1.0, 0.0625)),
+    ("a quad of metal", (0.0, 0.0, 0.0), (1.5, 0.0625, 1.25)),
+    ("a quad of metal, from the other side", (2.5, 0.0, 2.5), (1.5, 0.0625, 1.25)),
+)
+"""What shines in a room and is no lamp, with places from which and towards which rays are sent."""
+
+LAMPLIT: tuple[tuple[str, Place, Place], ...] = (
+    (MIRRORS.name, (0.0, 0.75, 0.0), (0.125, 2.0, 0.0625)),
+    (MIRRORS.name, (0.0, 3.0, 0.0), (0.125, 2.0, 0.0625)),
+    (MIRRORS.name, (0.0, 0.75, 0.0), (2.0, 2.0, 3.0)),
+    (BUBBLE.name, (2.0, 0.75, 0.0), (3.0, 2.0, 0.0)),
+    (DARK.name, (0.0, 0.5, 0.0), (0.125, 1.5, 0.0625)),
+    (DARK.name, (0.0, 0.5, 0.0), (3.0, 1.5, 3.0)),
+    (DUSK.name, (0.0, 0.0, 0.0), (-0.75, 1.75, 0.25)),
+    (DUSK.name, (-0.875, 1.875, 0.0), (-0.75, 1.75, 0.25)),
+)
+"""Rays of scenes to lamps, from both sides, and to what is behind everything: in some no lamp is sampled."""
+
+PDFS = (0.5, float(np.float32(transport.CAMERA_PDF)))
+"""Densities of those rays: of a direction that a light sample may have, and of a single one."""
+
+
+def aimed() -> Iterator[tuple[View, dict[str, Any], str]]:
+    """Yield views, inputs and notes of arrivals from given places towards others."""
+    some = [
+        *((GLOW.name, start, end, f"{note}, no lamp") for note, start, end in SHINING),
+        *((DUSK.name, start, end, f"{note}, beside a lamp") for note, start, end in SHINING[::3]),
+        *((scene, start, end, "what a light sample may have found") for scene, start, end in LAMPLIT),
+    ]
+    for index, (scene, start, end, note) in enumerate(some):
+        direction = np.subtract(end, start) / np.linalg.norm(np.subtract(end, start))
+        lamp = (scene, start, end) in LAMPLIT and scene in (MIRRORS.name, DUSK.name)
+        for settings in VARIANTS if lamp else (VARIANTS[index % 2], VARIANTS[3]):
+            for pdf in PDFS if lamp else PDFS[:1]:
+                inputs = midway(scene, settings, tuple(direction), start) | {"pdf": pdf}
+                told = f"{note}, {settings.strategy}, {settings.heuristic}"
+                yield View(scene, settings, 0, 0, 0), inputs, told
+
+
+def midway(
+    scene: str, settings: Settings, direction: tuple[float, ...], origin: Place | None = None
+) -> dict[str, Any]:
     """Return the inputs of an arrival in the middle of a path that a surface has sent in a direction."""
     state = {
-        "origin": ORIGINS[scene],
+        "origin": ORIGINS[scene] if origin is None else origin,
         "direction": direction,
         "beta": (0.5, 0.25, 0.75),
         "radiance": (0.125, 0.0625, 0.5),

@@ -64,6 +64,9 @@ def _input_cases() -> list[Case]:
         ),
         "": (2.0 * drawn("whole.input", 0, 12) - 1.0).astype(np.float32),
     }
+    halves = (np.arange(-INPUT_LEVELS, INPUT_LEVELS) + 0.5) / INPUT_LEVELS
+    moved = halves[whole.round_image(halves) != whole.round_image(halves.astype(np.float32))]
+    rows["ties of float64, which float32 moves to the integer below or above"] = moved
     found = []
     for index, (note, x) in enumerate(rows.items()):
         inputs = {"x": x.astype(np.float64)}
@@ -400,7 +403,7 @@ KINDS = (
     Kind(
         "whole.input",
         "Inputs in integers",
-        {"x": "float[n], float32 in [-1, 1]"},
+        {"x": "float[n] in [-1, 1], to be rounded to float32 first"},
         {"n": "integer[n]"},
         _input_cases,
         _input,

@@ -13,7 +13,7 @@ from wamnet.refimpl import encoding, metrics, rng
 from wamnet.refimpl.light import camera, environment, intersection, sampling, transport
 from wamnet.refimpl.light.materials import conductor, dielectric
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network import adam, dataset, siren
+from wamnet.refimpl.network import adam, dataset, siren, smoothing
 from wamnet.spec.conformance import blocks, case, program, report, run, vectors
 from wamnet.spec.conformance.functions import Field, Function
 from wamnet.spec.conformance.kinds import FUNCTIONS, KINDS, paths
@@ -116,6 +116,32 @@ MUTANTS = {
         "image.window",
         "DAT-5",
     ),
+    "a flat spline": (smoothing, "SPLINE", (0.2,) * 5, "image.smoothed", "SMO-3"),
+    "positions by another share of depth": (
+        smoothing,
+        "GUIDES",
+        {"normal": 0.5, "albedo": 0.2, "position": 0.0801},
+        "image.smoothed",
+        "SMO-3",
+    ),
+    "depths down to 1e-7": (smoothing, "LEAST_DEPTH", 1e-7, "image.smoothed", "SMO-3"),
+    "guides up to 1.001e9": (smoothing, "FARTHEST", 1.001e9, "image.smoothed", "SMO-3"),
+    "gaps of 1 at all levels": (
+        smoothing,
+        "smooth_once",
+        lambda c, g, f, gap, true=smoothing.smooth_once: true(c, g, f, 1),
+        "image.smoothed",
+        "SMO-3",
+    ),
+    "positions by the other pixel's depth": (
+        smoothing,
+        "weight",
+        lambda here, there, factors, true=smoothing.weight: true(here, there, factors[:, ::-1]),
+        "image.smoothed",
+        "SMO-3",
+    ),
+    "two levels": (dataset, "LEVELS", 2, "image.features", "SMO-1"),
+    "light clipped to 15 times white": (smoothing, "WHITES", 15.0, "image.features", "SMO-2"),
     "the centre one pixel off": (
         dataset.Window,
         "before",
@@ -127,8 +153,8 @@ MUTANTS = {
         siren,
         "_omega_0",
         lambda s, layer: 1.0,
-        "network.gradient",
-        "SIR-7",
+        "network.forward",
+        "SIR-2",
     ),
     "biases without their own tag": (siren, "BIAS_TAG", siren.WEIGHT_TAG, "network.init", "SIR-5"),
     "PSNR by the natural logarithm": (
@@ -188,6 +214,10 @@ MADE_OF = (
     ("material.fresnel", "material.dielectric"),
     ("transport.light_pdf", "path.arrive"),
     ("encoding.srgb", "encoding.display"),
+    ("encoding.shown", "image.features"),
+    ("image.smoothed", "image.features"),
+    ("intersection.occluded", "path.scatter"),
+    ("intersection.nearest", "intersection.occluded"),
 )
 """Kinds of functions that clauses share, and kinds that are made of them."""
 

@@ -184,6 +184,7 @@ def test_each_kind_of_files_has_cases_to_be_refused():
         "file.model",
         "file.scene",
         "image.features",
+        "image.smoothed",
         "image.window",
         "metric.ssim",
         "picture.denoised",

@@ -29,7 +29,7 @@ BUDGET = {
     "kernels/bench": 4850,
     "kernels/export": 3200,
     "kernels/verify": 2900,
-    "spec/conformance": 6800,
+    "spec/conformance": 7650,
     "cli": 300,
     "cli/commands": 5460,
     "cli/common": 1050,

@@ -211,6 +211,18 @@ def past(layers: Layers) -> Layers:
 
 def feature_rows() -> Iterator[tuple[str, str, str, Layers, float]]:
     """Yield clause, note, features, layers and exposure of feature images."""
+    some = {"color": colors(45, 3, 4), **uneven(45, 3, 4, *ALL), **past(uneven(46, 3, 4, *ALL))}
+    yield "SMO-1", "guided by the first hit, and past mirrors and glass", "smoothed,seen_smoothed", some, -0.5
+    others = {name: some[name] for name in ("color", *SEEN)}
+    yield "SMO-1", "guided past mirrors and glass", "seen_smoothed", others, 0.5
+    first = {name: some[name] for name in ("color", *GUIDE_LAYERS)}
+    yield (
+        "SMO-1",
+        "after its own guides, which stay as they are",
+        "depth,normal,smoothed,color,position",
+        first,
+        0.0,
+    )
     # The filter reaches 14 pixels: somewhere on the way what is left of a clipped number is neither 0 nor 1.
     bright = np.full((1, 15, 3), 0.015625)
     bright[0, 0] = (1e6, 15.0, -8.0)
@@ -230,18 +242,6 @@ def feature_rows() -> Iterator[tuple[str, str, str, Layers, float]]:
         layers = uneven(40, 2, 3, *ALL)
         layers[name][0, 1] = np.nan
         yield "DAT-10", f"NaN in {name} is 0", "smoothed", {"color": colors(40 + index, 2, 3), **layers}, -1.0
-    some = {"color": colors(45, 3, 4), **uneven(45, 3, 4, *ALL), **past(uneven(46, 3, 4, *ALL))}
-    yield "SMO-1", "guided by the first hit, and past mirrors and glass", "smoothed,seen_smoothed", some, -0.5
-    others = {name: some[name] for name in ("color", *SEEN)}
-    yield "SMO-1", "guided past mirrors and glass", "seen_smoothed", others, 0.5
-    first = {name: some[name] for name in ("color", *GUIDE_LAYERS)}
-    yield (
-        "SMO-1",
-        "after its own guides, which stay as they are",
-        "depth,normal,smoothed,color,position",
-        first,
-        0.0,
-    )
 
 
 def missing_rows() -> Iterator[tuple[str, str, Layers]]:

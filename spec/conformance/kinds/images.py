@@ -130,7 +130,7 @@ def ends_of(layer: str, turn: int = 0) -> Array:
 
 def _end_cases(first: int) -> list[Case]:
     """Return each feature of one pixel's layers where these are NaN, infinite or huge, with either sign."""
-    cases = []
+    cases: list[Case] = []
     for feature in dataset.FEATURES.values():
         if not feature.guides:
             inputs = {feature.layer: ends_of(feature.layer), "features": feature.name, **FAR_SCALES}
@@ -441,8 +441,8 @@ def _metric_cases(name: str) -> list[Case]:
     for value in (np.nan, np.inf):
         add(np.where(one > 0, [value, 0.5, 0.5], one), one, None, f"{value} in a picture", "MET-1")
     more = 1 if name != "ssim" else metrics.WINDOW_SIZE_PX
-    for left, right, note in OTHER_SHAPES:
-        add(np.full(left, 0.5), np.full(right, 0.5), None, note, "MET-1")
+    for shape, other, note in OTHER_SHAPES:
+        add(np.full(shape, 0.5), np.full(other, 0.5), None, note, "MET-1")
     square = np.full((more, more, 1), 0.5)
     for value in (np.nan, -np.inf):
         bad = square.copy()

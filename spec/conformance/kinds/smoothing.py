@@ -37,11 +37,12 @@ GUIDE_LAYERS = (*GUIDES, DEPTH)
 def bound_of(color: Array, layers: Mapping[str, Array], levels: int) -> Array:
     """Return how far off colours (H, W, 3) may be after some levels."""
     guides, factors = smoothing.guides_of(layers)
+    height, width = color.shape[:2]
     error = np.zeros_like(color)
     for level in range(levels):
         mean = smoothing.smooth_once(color, guides, factors, 2**level)
         moved, total, largest = np.zeros_like(color), np.zeros_like(color[..., :1]), np.zeros_like(color)
-        for spline, rows, columns in smoothing.taps(*color.shape[:2], 2**level):
+        for spline, rows, columns in smoothing.taps(height, width, 2**level):
             there = np.ix_(rows, columns)
             apart = (guides[there] - guides) * factors
             exponent = 0.5 * np.sum(apart * apart, axis=-1, keepdims=True)

@@ -20,6 +20,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from ....refimpl.light.materials import Conductor, Dielectric, Mirror
 from ....refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sky, Sphere
@@ -206,7 +207,7 @@ PANE = replace(
 BUBBLE = replace(LENS, name="bubble", quads=(), lights=())
 """The ball by itself."""
 
-SHINE = {"reflectance": (0.5, 0.75, 0.25), "emission": (0.25, 0.5, 1.0)}
+SHINE: dict[str, Any] = {"reflectance": (0.5, 0.75, 0.25), "emission": (0.25, 0.5, 1.0)}
 """A surface that emits and reflects."""
 
 GLOW = Scene(

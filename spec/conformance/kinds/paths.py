@@ -357,7 +357,7 @@ def _sent_midway(found: Found) -> None:
 def _of_emission(view: View, direction: Any, wanted: State) -> str:
     """Return the clause of the light of an arrival, "" for that of the case.
 
-    A lamp is black behind, and a quad that is none is not; where no light is sampled, all weights are 1, as
+    A lamp is black behind, other quads are not; where no light is sampled, all weights are 1, as
     those of other surfaces."""
     world = world_of(scene_text(view.scene), asdict(view.settings)).world
     lamp = int(world.geometry.light[int(wanted["surface"])])

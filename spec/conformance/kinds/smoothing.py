@@ -250,8 +250,8 @@ def missing_rows() -> Iterator[tuple[str, str, Layers]]:
     layers = {"color": colors(50, 2, 2), **alike(2, 2)}
     for name in ("color", *GUIDE_LAYERS):
         yield f"{name} is missing", "smoothed", {key: some for key, some in layers.items() if key != name}
-    yield "guides of the first hit alone", "seen_smoothed", layers
-    yield "guides past mirrors and glass alone", "smoothed", {"color": layers["color"], **past(alike(2, 2))}
+    yield "only guides of the first hit", "seen_smoothed", layers
+    yield "only guides past mirrors and glass", "smoothed", {"color": layers["color"], **past(alike(2, 2))}
 
 
 KINDS = (

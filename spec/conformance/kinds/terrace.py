@@ -230,7 +230,7 @@ GLOW = Scene(
         Quad((1.25, -0.25, 1.5), (0.5, 0.0, -0.5), (0.0, 0.5, 0.0), material=Conductor(0.5), **SHINE),
     ),
 )
-"""A room that shines by its surfaces alone."""
+"""A room in which only surfaces shine."""
 
 DUSK = replace(
     GLOW,

@@ -288,7 +288,7 @@ SHINING: tuple[tuple[str, Place, Place], ...] = (
     ("a quad of metal", (0.0, 0.0, 0.0), (1.5, 0.0625, 1.25)),
     ("a quad of metal, from the other side", (2.5, 0.0, 2.5), (1.5, 0.0625, 1.25)),
 )
-"""What shines in a room and is no lamp, with places from which and towards which rays are sent."""
+"""What shines in a room beside lamps, with places from which and towards which rays are sent."""
 
 LAMPLIT: tuple[tuple[str, Place, Place], ...] = (
     (MIRRORS.name, (0.0, 0.75, 0.0), (0.125, 2.0, 0.0625)),

@@ -418,7 +418,7 @@ def ahead(kept: Results, name: str, split: str, rows: Sequence[str]) -> str:
 def drawn(bench: Bench, path: Path, rows: Sequence[str]) -> None:
     """Write the first test frame as each row has it, and the reference."""
     pictures = []
-    for name in [row for row in SHOWN if row in rows]:
+    for name in [row for row in SHOWN if row in rows and (SETS[bench.name].seen or not ROWS[row].past)]:
         frame, clean = bench.tests(0, ROWS[name].rays)[0]
         picture = denoised(bench, ROWS[name], [frame], 0)[0][0][0]
         pictures.append((SHOWN[name], picture))

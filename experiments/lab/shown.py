@@ -136,8 +136,8 @@ AHEAD = (
         "shipped",
         "camera moves all around the front, lamps of any hue: the network that ships",
     ),
-    ("cornell", "best-16", "`cornell`, camera moves"),
     ("minicubes-page", "smooth-page-16", "the same cameras and lamps, colour smoothed"),
+    ("cornell", "best-16", "`cornell`, camera moves"),
     ("glossy", "smooth-16", "`glossy`, camera moves, features past mirrors and glass for both"),
     ("daylight", "smooth-16", "`daylight`, the same"),
 )

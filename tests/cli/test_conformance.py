@@ -44,7 +44,7 @@ def test_an_executor_and_the_reference_pass(wamnet):
     for name in ("numpy", "reference"):
         done = wamnet("conformance", "--executor", name, "-k", "PRO-4")
         assert (done.status, done.err) == (0, "")
-        assert "15 of 15 cases passed" in done.out
+        assert "14 of 14 cases passed" in done.out
 
 
 def test_a_failure_tells_everything_and_how_to_repeat_it(wamnet, program):

@@ -161,8 +161,8 @@ CASES = [
     *LOOPS,
     (
         "known_operations",
-        plus(Node("exp", (1,), V3)),
-        "%2 is 'exp', which is not an operation; there are: input,",
+        plus(Node("tanh", (1,), V3)),
+        "%2 is 'tanh', which is not an operation; there are: input,",
     ),
     ("operands_before_use", plus(Node("add", (1,), V3)), "%2 add has 1 operands; it takes 2"),
     ("operands_before_use", plus(Node("stack", (), V3)), "%2 stack has 0 operands; it takes one or more"),

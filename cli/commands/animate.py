@@ -163,17 +163,22 @@ def _draw(
         open_executor(executor.value) as runner,
         progress("drawing", len(left)) as advance,
     ):
-        draw = draw_frames if _one_device(executor, renderer, shots[0].noisy) else draw_apart
+        together = _one_device(executor, renderer, shots[0].noisy, network.features)
+        draw = draw_frames if together else draw_apart
         for _ in draw(left, network, runner, renderer.value, with_rank(FULL, rank)):
             advance(1)
     return len(left)
 
 
-def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job) -> bool:
-    """Tell whether a pipeline can draw: one device does both, and what is seen is seen by the paths."""
+def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job, features: Sequence[str]) -> bool:
+    """Tell whether a pipeline can draw: one device does both, from what the paths of a pixel have seen."""
     from ...refimpl.light.render import feature_job
+    from ...refimpl.network.dataset import FEATURES
 
-    return renderer.value == executor.value != "numpy" and not (noisy.seen and feature_job(noisy))
+    smooths = any(FEATURES[name].guides for name in features)
+    return renderer.value == executor.value != "numpy" and not (
+        smooths or (noisy.seen and feature_job(noisy))
+    )
 
 
 def _said_of(shots: Sequence[Shot], renderer: Renderer) -> list[str]:

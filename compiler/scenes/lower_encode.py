@@ -48,7 +48,8 @@ def layers_of(features: Sequence[str]) -> tuple[str, ...]:
 
 def sees(features: Sequence[str]) -> bool:
     """Tell whether some of the features are of what is seen past mirrors and glass."""
-    return any(layer in SEEN for layer in layers_of(features))
+    check_features(features)
+    return any(layer in SEEN for name in features for layer in FEATURES[name].layers)
 
 
 def planes_of(features: Sequence[str]) -> tuple[str, ...]:

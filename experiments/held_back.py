@@ -9,8 +9,8 @@
    fails: the clause of that case is the one that `wamnet conformance` says to look at first.
 3. Words choose faults by their file or clause. Outcomes are kept in the folder, and a fault that has one is
    not asked again.
-4. Tables: faults by file, then those that no case catches, then those that blame another chapter. Status 1
-   where a smaller share is caught than `--least-caught`.
+4. It prints tables of faults by file, of those that no case catches, and of those that blame another chapter.
+   It ends with status 1 if a smaller share is caught than `--least-caught`.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ LIMIT_S = 20.0
 class Fault(NamedTuple):
     """A mistake: in a file a text, which is there once, becomes another, and breaks a clause.
 
-    `says` is the mistake in words. Of those that no case caught when they were first asked, `equal` is why no
-    input that the spec allows can tell them, and `shown_by` is one that does, with what is right there."""
+    `says` is the mistake in words. The first run missed some: `equal` is the reason why no input that the
+    spec allows shows the fault, `shown_by` an input that does, with the right answer."""
 
     file: str
     old: str

@@ -8,7 +8,8 @@
 2. Each row denoises the test frames of each seed, which is that of the noise and of the training [`judged`].
    Features are those of the colour's one camera ray, or means over 16 rays: then for both denoisers.
 3. Each score comes with the number of samples per pixel whose render has the same error [`climbed`].
-4. Times of a frame are interleaved, and go from frame to picture in display encoding [`timed`].
+4. Networks are certified: how far a kernel may be off, over all pictures [`certified`]. Times of a frame
+   are interleaved, and go from frame to picture in display encoding [`timed`].
 5. Records hold every frame's scores. Tables have means and 95 % intervals over frames and seeds, and so have
    the differences between two rows, frame by frame [`report`]. The folder gets `quality.json`, `times.json`
    and `quality.md`, and a sheet of pictures for each set.
@@ -303,6 +304,20 @@ def oidn(row: Row, frame: Frame) -> Floats:
     return filtered(frame, frame if row.aux else None, row.aux == "clean", row.quality)
 
 
+def certified(bench: Bench, kept: Results, rows: Sequence[str], seed: int) -> None:
+    """Keep what the certificates of networks say: how far a colour may be off, over all pictures."""
+    for row in rows:
+        key = certificate(bench.name, row)
+        if ROWS[row].recipe and kept.get(key, seed) is None:
+            model, _ = bench.model(ROWS[row], seed)
+            kept.put(key, seed, {"bound": max(plan_model(model, bench.executor).bound.output)})
+
+
+def certificate(name: str, row: str) -> str:
+    """Return the name of the record of a network's bound."""
+    return f"{name}, certificate: {row}"
+
+
 def climbed(bench: Bench, kept: Results) -> scores.Ladder:
     """Return the errors of renders of the test frames, by samples per pixel; they are kept too."""
     name = f"{bench.name}: ladder"
@@ -461,6 +476,9 @@ def work(options: argparse.Namespace) -> None:
             and (SETS[name].seen or not ROWS[row].past)
         }
         results.fill(kept, ways, options.seeds, name)
+        own = [row for row in options.only if configuration(name, TEST, row) in ways]
+        for seed in options.seeds:
+            certified(bench, kept, own, seed)
         drawn(bench, options.output / f"{name}.png", options.only)
     if options.rounds:
         timed(Bench(options.sets[0], plan, options.cache, options.executor), clock, options.rounds)

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -32,7 +34,8 @@ from .frames import DIGITS, Pair
 def path_of(folder: Path, recipe: Recipe, pairs: Sequence[Pair], executor: str) -> Path:
     """Return the file of a network."""
     scales = dataset.normalization_of([noisy for noisy, _ in pairs])
-    data = dataset.build(pairs, recipe.features, recipe.window, scales).digest
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        data = dataset.build(pairs, recipe.features, recipe.window, scales, pool.map).digest
     text = json.dumps([recipe_to_json(recipe), data, executor])
     return folder / f"{hashlib.sha256(text.encode()).hexdigest()[:DIGITS]}.safetensors"
 

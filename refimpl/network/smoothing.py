@@ -96,7 +96,7 @@ def taps(height: int, width: int, gap: int) -> Iterator[tuple[float, Array, Arra
 
 
 def smooth_once(color: Array, guides: Array, factors: Array, gap: int) -> Array:
-    """Return the weighted means (H, W, 3) of 25 pixels `gap` apart; weights of a pixel's own tap are 1."""
+    """Return the weighted means (H, W, 3) of 25 pixels `gap` apart."""
     total, weights = np.zeros_like(color), np.zeros_like(color[..., :1])
     height, width = color.shape[:2]
     for spline, rows, columns in taps(height, width, gap):

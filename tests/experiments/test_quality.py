@@ -102,8 +102,15 @@ def test_the_whole_way(tmp_path, capsys):
         for row in ("input", "best-16")
         for seed in (0, 1)
     }
-    assert found == {*rows, ("cornell: ladder", 0), ("cornell: nearest training frame", 0)}
-    each = [r["values"]["per_frame"]["psnr"] for r in data["records"] if "best-16" in r["configuration"]]
+    bounds = {("cornell, certificate: best-16", seed) for seed in (0, 1)}
+    assert found == {*rows, *bounds, ("cornell: ladder", 0), ("cornell: nearest training frame", 0)}
+    for record in data["records"]:
+        assert "certificate" not in record["configuration"] or 0.0 < record["values"]["bound"] < 0.01
+    each = [
+        r["values"]["per_frame"]["psnr"]
+        for r in data["records"]
+        if (r["configuration"], r["seed"]) in rows and "best-16" in r["configuration"]
+    ]
     assert [len(values) for values in each] == [2, 2, 2, 2]
     assert (tmp_path / "cornell.png").stat().st_size > 0
     before = (tmp_path / "quality.json").read_bytes()

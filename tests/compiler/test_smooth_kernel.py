@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rough import rough_layers
 
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.scenes.lower_smooth import (
@@ -26,21 +27,6 @@ SCALES = Normalization(exposure_stops=-1.5)
 
 A_PRIORI = 13 * smoothing.WHITES * 283 * 2.0**-24 + 2.0**-18
 """SMO-5: the largest error of a number of the feature image, and 2^-18 for the encoding."""
-
-
-def layers_of(height, width, seed=1):
-    """Return rough layers (H, W, C) in float32, some clipped; a third of the pixels are misses."""
-    random = np.random.default_rng(seed)
-    spreads = {"normal": 0.4, "albedo": 0.15, "position": 0.4}
-    layers = {name: random.normal(0, spread, (height, width, 3)) for name, spread in spreads.items()}
-    layers["depth"] = random.uniform(2.0, 5.0, (height, width, 1))
-    layers["color"] = random.exponential(2.0, (height, width, 3)) * random.choice(
-        [1e-3, 1.0, 30.0], (height, width, 1)
-    )
-    missed = random.uniform(size=(height, width)) < 1 / 3
-    for name in ("normal", "albedo", "position", "depth"):
-        layers[name][missed] = 0.0
-    return {name: values.astype(np.float32) for name, values in layers.items()}
 
 
 def guided(programs, layers, dtype):
@@ -68,7 +54,7 @@ def one_level(programs, planes, light, gap, dtype):
 @pytest.mark.parametrize("gap", [1, 4])
 def test_the_programs_are_the_reference(gap):
     """To the bit in float64: the sum of nine squares has NumPy's order."""
-    programs, layers = lower_smooth(SCALES), layers_of(9, 11)
+    programs, layers = lower_smooth(SCALES), rough_layers(9, 11)
     wide = {name: values.astype(np.float64) for name, values in layers.items()}
     planes = guided(programs, layers, np.float64)
     light = {name: planes[name] for name in LIGHT}
@@ -90,7 +76,7 @@ def test_the_bound_is_small_and_below_that_of_all_layers():
     """At ordinary layers a hundredth of the clause's number, and never above it."""
     kernels = compile_smoothing(SCALES, "numpy")
     for seed in range(3):
-        found = error_at(kernels, layers_of(8, 9, seed))
+        found = error_at(kernels, rough_layers(8, 9, seed))
         assert found.max() <= A_PRIORI
         assert np.median(found) <= A_PRIORI / 100
 

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from rough import rough_layers
 
 from wamnet.compiler.scenes.smooth_kernel import compile_smoothing, error_at
 from wamnet.kernels.run.denoise_on import denoise_on, filter_of, images_of, images_on
@@ -19,21 +20,6 @@ SCALES = Normalization(exposure_stops=-1.5)
 
 SIZES = [(1, 1), (1, 37), (33, 1), (5, 16), (19, 35)]
 """Heights and widths: one pixel wide or high, whole vectors and parts of them, taps beyond both ends."""
-
-
-def frame_of(height, width, seed=1):
-    """Return a rough frame in float32; a third of its pixels are misses, some light is above the clip."""
-    random = np.random.default_rng(seed)
-    spreads = {"normal": 0.4, "albedo": 0.15, "position": 0.4}
-    layers = {name: random.normal(0, spread, (height, width, 3)) for name, spread in spreads.items()}
-    layers["depth"] = random.uniform(2.0, 5.0, (height, width, 1))
-    layers["color"] = random.exponential(1.0, (height, width, 3)) * random.choice(
-        [0.1, 1.0, 300.0], (height, width, 1)
-    )
-    missed = random.uniform(size=(height, width)) < 1 / 3
-    for name in ("normal", "albedo", "position", "depth"):
-        layers[name][missed] = 0.0
-    return {name: values.astype(np.float32) for name, values in layers.items()}
 
 
 BOUNDS: dict[bytes, np.ndarray] = {}
@@ -70,7 +56,7 @@ def lanes_of(device):
 def test_frames_are_within_the_bound(device, size):
     for lanes in lanes_of(device):
         kernels = compile_smoothing(SCALES, device.name, lanes=lanes)
-        layers = frame_of(*size)
+        layers = rough_layers(*size)
         assert excess(kernels, device.smooth(kernels, layers), layers) <= 1
 
 
@@ -79,7 +65,7 @@ def test_frames_are_within_the_bound(device, size):
 def test_hard_numbers_are_within_the_bound(device, name, value):
     """Ends of what float32 holds and beyond, NaN, denormals; in one pixel, in a row, in half of a frame."""
     kernels = compile_smoothing(SCALES, device.name, lanes=lanes_of(device)[-1])
-    layers = frame_of(6, 18)
+    layers = rough_layers(6, 18)
     for place in (np.s_[4, 4], np.s_[1], np.s_[:, 10:]):
         layers[name][place] = value
     found = device.smooth(kernels, layers)
@@ -89,8 +75,8 @@ def test_hard_numbers_are_within_the_bound(device, name, value):
 
 def test_a_frame_of_misses_is_within_the_bound(device):
     """All guides are 0: the filter is the spline, also across the border of the picture."""
-    layers = {name: np.zeros_like(values) for name, values in frame_of(6, 21).items()}
-    layers["color"] = frame_of(6, 21)["color"]
+    layers = {name: np.zeros_like(values) for name, values in rough_layers(6, 21).items()}
+    layers["color"] = rough_layers(6, 21)["color"]
     kernels = compile_smoothing(SCALES, device.name, lanes=lanes_of(device)[-1])
     assert excess(kernels, device.smooth(kernels, layers), layers) <= 1
 
@@ -131,7 +117,7 @@ PARTS = ["clip", "level", *smoothing.GUIDES, "depth", "spline", "border", "gap",
 def test_each_part_is_seen(device, part, monkeypatch):
     """What a device computes is far from a filter that lacks one part."""
     kernels = compile_smoothing(SCALES, device.name, lanes=lanes_of(device)[-1])
-    layers = frame_of(19, 35)
+    layers = rough_layers(19, 35)
     found, _ = device.smooth(kernels, layers), bound_of(kernels, layers)
     scales = changed(part, monkeypatch)
     assert excess(kernels, found, layers, scales) > 10
@@ -154,7 +140,7 @@ def whole_frame(layers, dtype=np.float32):
 
 def test_a_device_smooths_the_features_that_are_smoothed(executor_named, kit):
     """In the model's order; others are the reference's to the bit."""
-    device, frame = executor_named("opencl"), whole_frame(frame_of(9, 20))
+    device, frame = executor_named("opencl"), whole_frame(rough_layers(9, 20))
     model = model_of(kit, ("normal", "seen_smoothed", "color", "smoothed"))
     found, wanted = images_on(device, model, frame), images_of(model, frame)
     assert list(found) == list(model.features)
@@ -173,26 +159,26 @@ def test_a_device_smooths_the_features_that_are_smoothed(executor_named, kit):
 
 def test_the_reference_smooths_where_bits_count(executor_named, kit, monkeypatch):
     """SMO-7: other executors, `exact`, integers, layers of float64, and models without such features."""
-    device, frame = executor_named("opencl"), whole_frame(frame_of(4, 5))
+    device, frame = executor_named("opencl"), whole_frame(rough_layers(4, 5))
     model = model_of(kit, ("color", "smoothed"))
     assert filter_of(device, model, frame, "ieee") is not None
     assert filter_of(executor_named("numpy"), model, frame, "ieee") is None
     assert filter_of(device, model, frame, "exact") is None
-    assert filter_of(device, model, whole_frame(frame_of(4, 5), np.float64), "ieee") is None
+    assert filter_of(device, model, whole_frame(rough_layers(4, 5), np.float64), "ieee") is None
     assert filter_of(device, model_of(kit, ("color",)), frame, "ieee") is None
     monkeypatch.setattr(Model, "is_whole", True)
     assert filter_of(device, model, frame, "ieee") is None
 
 
 def test_a_frame_that_lacks_a_guide_is_refused_as_ever(executor_named, kit):
-    layers = whole_frame(frame_of(3, 4)).layers
+    layers = whole_frame(rough_layers(3, 4)).layers
     frame = Frame({name: values for name, values in layers.items() if name != "depth"})
     with pytest.raises(InputError, match=r"feature 'smoothed': .*layer 'depth' must be present"):
         denoise_on(executor_named("opencl"), model_of(kit, ("smoothed",)), frame)
 
 
 def test_frames_are_encoded_beside_each_other_with_the_same_bits():
-    pairs = [(frame, frame) for frame in (Frame(frame_of(9, 12, seed)) for seed in range(5))]
+    pairs = [(frame, frame) for frame in (Frame(rough_layers(9, 12, seed)) for seed in range(5))]
     given = (pairs, ("smoothed", "normal"), Window(3, "clamp"), SCALES)
     with ThreadPoolExecutor(3) as pool:
         assert dataset.build(*given, pool.map).digest == dataset.build(*given).digest

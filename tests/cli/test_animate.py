@@ -79,7 +79,7 @@ def test_one_device_draws_by_one_pipeline(
 def test_a_network_that_sees_smoothed_colour_is_drawn_apart(
     wamnet, tmp_path, monkeypatch, executor_named, name, feature
 ) -> None:
-    """No pipeline makes that feature; one device that does both parts is no reason to refuse the model."""
+    """No pipeline makes that feature. A device that does both parts draws such a model in two steps."""
     executor_named(name)
     window, scales = Window(2), Normalization()
     network = siren.init((n_inputs((feature,), window), 4, 3), 1.0, 1.0, 0)

@@ -62,20 +62,27 @@ LAYERS: Mapping[str, Layer] = {
         Layer("seen_normal", 3, "unit normal of what is seen in world space, on the path's side"),
         Layer("seen_depth", 1, "length of the way to what is seen, in scene units; 0 where nothing is hit"),
         Layer("seen_position", 3, "what is seen in world space, in scene units; 0 where nothing is hit"),
+        Layer(
+            "seen_emission",
+            3,
+            "radiance that what is seen emits itself, times the throughput of the way there",
+        ),
         Layer("history", 3, "linear radiance: mean of this colour and those of the pictures before"),
         Layer("history_weight", 1, "share of the pictures before in the history, in [0, 1); 0: it is new"),
     )
 }
 """Every layer that a frame may have; a new one is one line here."""
 
-SEEN: Mapping[str, str] = {
+FIRST_HIT: Mapping[str, str] = {
     "seen_albedo": "albedo",
     "seen_normal": "normal",
     "seen_depth": "depth",
     "seen_position": "position",
 }
-"""The layers of what is seen past mirrors and glass (light/following.py), which a frame has on request, and
-those of the first hit that they are where nothing is followed."""
+"""Layers of what is seen, and those of the first hit that they are where nothing is followed."""
+
+SEEN = (*FIRST_HIT, "seen_emission")
+"""The layers of what is seen past mirrors and glass (light/following.py), which a frame has on request."""
 
 HISTORY = ("history", "history_weight")
 """The layers that a frame has which follows others (light/history.py)."""

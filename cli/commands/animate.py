@@ -321,8 +321,9 @@ def draw_frames(
     if not shots:
         return
     first, scenes = shots[0], [shot.scene for shot in shots]
-    # A reference is traced by the pipeline's kernel, unless that has rays of features too.
-    frames = None if feature_job(first.noisy) is None else Frames(scenes)
+    # A reference is traced by the pipeline's kernel, unless that has rays of features too, or sees more.
+    apart = feature_job(first.noisy) is not None or first.noisy.seen
+    frames = Frames(scenes) if apart else None
     with Pipeline(
         executor,
         first.scene,

@@ -42,6 +42,7 @@ CHANNELS: Mapping[str, tuple[str, ...]] = {
     "seen_normal": ("seen_normal.X", "seen_normal.Y", "seen_normal.Z"),
     "seen_depth": ("seen_depth.Z",),
     "seen_position": ("seen_position.X", "seen_position.Y", "seen_position.Z"),
+    "seen_emission": ("seen_emission.R", "seen_emission.G", "seen_emission.B"),
     "history": ("history.R", "history.G", "history.B"),
     "history_weight": ("history_weight.V",),
 }

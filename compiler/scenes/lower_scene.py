@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from ...refimpl import frame, vectors
-from ...refimpl.light import following, render, transport
+from ...refimpl.light import following, intersection, render, transport
 from ...refimpl.light.intersection import Hit, Surface, reflecting
 from ...refimpl.light.scene import Scene, scene_digest
 from ...refimpl.light.transport import Counters, Path, Settings, World
@@ -79,7 +79,10 @@ LAYERS: Values = {
 }
 """The feature layers of the first hit, as refimpl/light/render.py: first_hit_layers."""
 
-SEEN: Values = {seen: LAYERS[first] for seen, first in frame.SEEN.items()}
+SEEN: Values = {
+    **{seen: LAYERS[first] for seen, first in frame.FIRST_HIT.items()},
+    "seen_emission": (RGB, FLOAT),
+}
 """The feature layers past mirrors and glass, as refimpl/light/following.py: see."""
 
 WAY: Values = {"way_going": (NUMBER, TRUTH), "way_length": (NUMBER, FLOAT)}
@@ -245,19 +248,21 @@ def _see(
 
     def first(given: Mapping[str, Any]) -> dict[str, Any]:
         layers = render.first_hit_layers(world_of(given), *_surface(given), _vector(given, "point", XYZ))
-        return _components(SEEN, {name: layers[of] for name, of in frame.SEEN.items()})
+        found = {name: layers[of] for name, of in frame.FIRST_HIT.items()}
+        return _components(SEEN, {**found, "seen_emission": _emitting(world_of(given), given)[0].emission})
 
     def see(given: Mapping[str, Any]) -> dict[str, Any]:
         way = following.Way(given["way_going"] & given["alive"], given["way_length"])
         path = Path(*[None] * 5)._replace(beta=_vector(given, "beta", RGB))  # type: ignore[arg-type]
-        depth = given["depth"]
-        way, layers = following.see(world_of(given), way, path, *_surface(given), depth, most)
+        world, depth = world_of(given), given["depth"]
+        way, layers = following.see(world, way, path, *_emitting(world, given), depth, most)
         return {**_components(SEEN, layers), "way_going": way.going, "way_length": way.length}
 
     if not most:
-        return first, {**SURFACE, **scene_numbers}
-    state = {"beta": PATH["beta"], "depth": (NUMBER, COUNTER), "alive": (NUMBER, TRUTH)}
-    return see, {**SURFACE, **state, **WAY, **scene_numbers}
+        return first, {**SURFACE, "direction": PATH["direction"], **scene_numbers}
+    arrived = {name: PATH[name] for name in ("beta", "direction")}
+    state = {"depth": (NUMBER, COUNTER), "alive": (NUMBER, TRUTH)}
+    return see, {**SURFACE, **arrived, **state, **WAY, **scene_numbers}
 
 
 def _started(
@@ -320,6 +325,14 @@ def _surface(given: Mapping[str, Any]) -> tuple[Surface, Hit]:
         _vector(given, name, SURFACE[name][0]) for name in ("point", "normal", "reflectance")
     )
     return reflecting(point, normal, reflectance), Hit(given["t"], given["surface"])
+
+
+def _emitting(world: World, given: Mapping[str, Any]) -> tuple[Surface, Hit]:
+    """Return surface and hit, with the emission: it is looked up again, as `arrive` hands on only its sum."""
+    surface, hit = _surface(given)
+    direction = _vector(given, "direction", XYZ)
+    emission = intersection.emission_at(world.geometry, hit, direction)
+    return surface._replace(emission=transport.with_sky(world, hit, direction, emission)), hit
 
 
 def _taken(values: Values, *tuples: Any) -> dict[str, Traced]:

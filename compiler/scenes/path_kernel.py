@@ -92,9 +92,19 @@ class PathArtifact(OneSource):
         return np.array(self.programs.values, np.float32)
 
 
+NO_LIMIT = 2**16
+"""Planes of a kernel without a limit of its own: far more than there are."""
+
+
 def forms_of(target: str) -> Forms:
     """Return the forms of a scene's primitives from which a target gains."""
     return target_named(target).forms
+
+
+def most_planes(target: str, lanes: int) -> int:
+    """Return how many planes a path kernel of a target adds up at most; NumPy's has no limit."""
+    dialect = target_named(target).paths.get(lanes)
+    return dialect.max_planes if dialect else NO_LIMIT
 
 
 def can_move(target: str, scene: Scene, tables: Tables, inputs: SceneInputs) -> bool:

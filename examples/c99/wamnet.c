@@ -1732,7 +1732,7 @@ static double to_display(double linear, double stops) { return srgb_encode(clamp
 static const char *const FEATURES[] = {"color",       "albedo",        "normal",     "depth",
                                        "position",    "direction",     "unshadowed", "highlights",
                                        "seen_albedo", "seen_normal",   "seen_depth", "seen_position",
-                                       "history",     "history_weight", "smoothed",  "seen_smoothed"};
+                                       "seen_emission", "history", "history_weight", "smoothed", "seen_smoothed"};
 
 typedef enum {
     COLOR,
@@ -1747,6 +1747,7 @@ typedef enum {
     SEEN_NORMAL,
     SEEN_DEPTH,
     SEEN_POSITION,
+    SEEN_EMISSION,
     HISTORY,
     HISTORY_WEIGHT,
     SMOOTHED,
@@ -1806,7 +1807,7 @@ static const char *layer_of(feature f) {
 /* DAT-1, DAT-10 */
 static double encoded(feature f, double x, size_t channel, const scales *s) {
     if (isnan(x)) x = 0;
-    if (f == COLOR || f == UNSHADOWED || f == HISTORY || f == SMOOTHED || f == SEEN_SMOOTHED)
+    if (f == COLOR || f == UNSHADOWED || f == SEEN_EMISSION || f == HISTORY || f == SMOOTHED || f == SEEN_SMOOTHED)
         return to_display(x, s->stops);
     if (f == HIGHLIGHTS) return to_display(x, s->stops - 4);
     if (f == ALBEDO || f == SEEN_ALBEDO || f == HISTORY_WEIGHT) return clamp(x, 0, 1);

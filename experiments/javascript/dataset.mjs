@@ -48,6 +48,7 @@ export const FEATURES = {
   seen_normal: feature("seen_normal", 3, asSigned),
   seen_depth: feature("seen_depth", 1, asDepth),
   seen_position: feature("seen_position", 3, asPosition),
+  seen_emission: feature("seen_emission", 3, asColor),
   history: feature("history", 3, asColor),
   history_weight: feature("history_weight", 1, asShare),
   smoothed: smoothed(""),

@@ -27,7 +27,7 @@ from wamnet.kernels.run.frame_plan import version
 from wamnet.kernels.run.render_frame import render_frame
 from wamnet.kernels.run.render_on import Frames
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.frame import SEEN, Frame
+from wamnet.refimpl.frame import FIRST_HIT, Frame
 from wamnet.refimpl.light.render import Job, feature_job, render_info
 from wamnet.refimpl.light.scene import Scene, scene_digest
 from wamnet.refimpl.light.scenes import canonical
@@ -152,7 +152,7 @@ def frames(folder: Path, shots: Iterable[Shot], executor: str = "opencl") -> lis
 
 def past_mirrors(frame: Frame) -> Frame:
     """Return a frame whose layers of the first hit are those past mirrors and glass."""
-    return Frame({**frame.layers, **{first: frame[seen] for seen, first in SEEN.items()}}, frame.info)
+    return Frame({**frame.layers, **{first: frame[seen] for seen, first in FIRST_HIT.items()}}, frame.info)
 
 
 def reference(shot: Shot, spp: int) -> Shot:

@@ -32,7 +32,6 @@ from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...compiler.variants import FULL, plan_model
 from ...refimpl.errors import InputError
-from ...refimpl.frame import SEEN
 from ...refimpl.light.render import Job, feature_job, feature_sampler
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import SPREAD, Settings
@@ -118,6 +117,9 @@ class Pipeline:
         rays = {"feature_spp": feature_spp, "feature_sampler": feature_sampler}
         job = Job(self._width, self._height, settings=self._settings, **rays)  # type: ignore[arg-type]
         self._rays = _rays_of(job, whole, sees(self._features))
+        if whole and sees(self._features):
+            rule = "a frame's kernel writes the first hits, and what is seen past them is of another one"
+            raise InputError("whole", whole, rule, "render references by a kernel of their own")
         self._in_integers = model.is_whole
         # A kernel of whole frames leaves sums, which are read in another way too.
         painted = executor.paints and not whole and not sums
@@ -155,7 +157,7 @@ class Pipeline:
         programs = lower_scene(scene, self._settings, forms, inputs, seen=seen, rays=self._rays)
         groups = layers_of(self._features)
         if self._whole:
-            groups = (*FRAME_GROUPS, *(SEEN if seen else ()))
+            groups = FRAME_GROUPS
         kernel = compile_path(programs, executor.name, profile, executor.lanes, groups, self._encoding)
         executor.build(kernel)
         return kernel

@@ -14,20 +14,28 @@ rounding, and to paths whose decision fell differently by it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.scenes.emit_path import FRAME_GROUPS, GROUPS
+from ...compiler.scenes.emit_path import FRAME_GROUPS, GROUPS, planes
 from ...compiler.scenes.lower_scene import lower_scene
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
+from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of, most_planes
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...refimpl.errors import InputError
 from ...refimpl.frame import SEEN, Frame
-from ...refimpl.light.render import Job, Render, checked_rows, feature_job, render_info, with_own_features
+from ...refimpl.light.render import (
+    Job,
+    Render,
+    checked_rows,
+    feature_job,
+    joined,
+    render_info,
+    with_own_features,
+)
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 from ..devices.executor import Executor, Part
@@ -55,7 +63,7 @@ def _compiled(
     scene: Scene, settings: Settings, target: str, profile: str, lanes: int, groups: tuple[str, ...]
 ) -> PathArtifact:
     """Return the kernel; it depends on nothing else."""
-    programs = lower_scene(scene, settings, forms_of(target), seen=bool(SEEN.keys() & set(groups)))
+    programs = lower_scene(scene, settings, forms_of(target), seen=not set(groups).isdisjoint(SEEN))
     return compile_path(programs, target, profile, lanes, groups)
 
 
@@ -108,6 +116,11 @@ def render_on(
     if feature_job(job) is not None:
         options: dict[str, Any] = {"rows": rows, "on_progress": on_progress, "profile": profile}
         return with_own_features(scene, job, partial(render_on, executor, scene, **options, frames=frames))
+    if job.seen and job.color and len(planes(groups_of(job))) > most_planes(executor.name, executor.lanes):
+        # The same paths twice, for layers that no kernel of this device writes at once.
+        parts = replace(job, seen=False), replace(job, color=False)
+        part = partial(render_on, executor, scene, rows=rows, profile=profile, frames=frames)
+        return joined(scene, job, part(parts[0], on_progress=on_progress), part(parts[1]))
     first, last = checked_rows(job, rows)
     if moment is None and frames is not None:
         moment = frames.of(executor, scene, job, profile)

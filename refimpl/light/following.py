@@ -68,5 +68,6 @@ def see(
         "seen_normal": intersection.choose_or_zero(ends, surface.normal),
         "seen_depth": np.where(ends & found, length, 0.0),
         "seen_position": intersection.choose_or_zero(ends & found, surface.point),
+        "seen_emission": intersection.choose_or_zero(ends, path.beta * surface.emission),
     }
     return Way(way.going & further, length), layers

@@ -249,17 +249,22 @@ def surface_at(geometry: Geometry, hit: Hit, origin: Points, direction: Directio
     found = hit.surface < geometry.nothing
     t = np.where(found, hit.t, 0.0)
     point = choose_or_zero(found, origin + vectors.scale(direction, t))
-    fronts = _fronts(geometry)
-    met = Met(hit.surface, point, origin, direction, fronts)
+    met = Met(hit.surface, point, origin, direction, _fronts(geometry))
     normal = choose_or_zero(found, _normal(geometry, met))
-    emission = vectors.look_up_rows(geometry.emission, hit.surface)
-    # Lights are black behind.
+    emission = emission_at(geometry, hit, direction)
     light = vectors.look_up(geometry.light, hit.surface)
+    return Surface(point, normal, vectors.look_up_rows(geometry.reflectance, hit.surface), emission, light)
+
+
+def emission_at(geometry: Geometry, hit: Hit, direction: Directions) -> Radiance:
+    """Return the radiance (..., 3) that hits send back along rays; for misses the background's."""
+    emission: Radiance = vectors.look_up_rows(geometry.emission, hit.surface)
+    # Lights are black behind.
     if any(group.fronts is not None for group in geometry.groups):
-        front = vectors.look_up_rows(fronts, hit.surface)
+        front = vectors.look_up_rows(_fronts(geometry), hit.surface)
         behind = vectors.look_up(geometry.one_sided, hit.surface) & (vectors.dot(front, direction) > 0.0)
         emission = vectors.choose(behind, 0.0, emission)
-    return Surface(point, normal, vectors.look_up_rows(geometry.reflectance, hit.surface), emission, light)
+    return emission
 
 
 def choose_or_zero(condition: Truths, a: Points) -> Points:

@@ -206,7 +206,11 @@ def with_own_features(scene: Scene, job: Job, render_part: Callable[[Job], Rende
     """Render colour and features apart, each by `render_part`, and return them as one render."""
     of_features = feature_job(job)
     assert of_features is not None
-    color, features = render_part(replace(job, feature_spp=0)), render_part(of_features)
+    return joined(scene, job, render_part(replace(job, feature_spp=0)), render_part(of_features))
+
+
+def joined(scene: Scene, job: Job, color: Render, features: Render) -> Render:
+    """Return one render of a job: the colour of the one, all other layers of the other."""
     found = {**features.frame.layers, "color": color.frame["color"]}
     layers = {name: found[name] for name in job.layers}
     return Render(Frame(layers, render_info(scene, job)), color.color_variance)

@@ -232,13 +232,18 @@ def arrive(world: World, path: Path) -> tuple[Path, Surface, Hit]:
     """Find the next surface of paths and add what it emits; return state, surface and hit."""
     hit = intersection.closest_hit(world.geometry, path.origin, path.direction)
     surface = intersection.surface_at(world.geometry, hit, path.origin, path.direction)
-    if world.environment is not None:
-        missed = hit.surface == world.geometry.nothing
-        sky = environment.radiance(world.environment, path.direction)
-        surface = surface._replace(emission=vectors.choose(missed, sky, surface.emission))
+    surface = surface._replace(emission=with_sky(world, hit, path.direction, surface.emission))
     weight = emission_weight(world, path, hit, surface)
     radiance = path.radiance + path.beta * vectors.scale(surface.emission, weight)
     return path._replace(radiance=radiance), surface, hit
+
+
+def with_sky(world: World, hit: Hit, direction: Directions, emission: Radiance) -> Radiance:
+    """Return the emission (..., 3) of hits, and where rays of a direction (..., 3) miss all, the sky's."""
+    if world.environment is None:
+        return emission
+    missed = hit.surface == world.geometry.nothing
+    return vectors.choose(missed, environment.radiance(world.environment, direction), emission)
 
 
 def scatter(

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..encoding import to_display
 from ..errors import InputError
-from ..frame import SEEN, Frame, check_finite
+from ..frame import FIRST_HIT, Frame, check_finite
 from ..reading import parse_json, to_dataclass
 from ..rng import counter, random_block
 from ..vectors import vector
@@ -121,11 +121,6 @@ def encode_albedo(values: Array, normalization: Normalization) -> Array:
     return np.clip(values, 0.0, 1.0)
 
 
-def encode_light(values: Array, normalization: Normalization) -> Array:
-    """Encode the lamps' unshadowed light (..., 3) as colour is, to [0, 1]."""
-    return to_display(values, normalization.exposure_stops)
-
-
 def encode_share(values: Array, normalization: Normalization) -> Array:
     """Clip shares (..., 1) to [0, 1]."""
     return np.clip(values, 0.0, 1.0)
@@ -207,7 +202,7 @@ FIRST_HITS: Mapping[str, Feature] = {
             3,
             0.0,
             1.0,
-            encode_light,
+            encode_color,
             "the lamps' radiance off the first hit, were it matt and nothing in between: " + DISPLAY_FORMULA,
         ),
         Feature(
@@ -268,8 +263,11 @@ FEATURES: Mapping[str, Feature] = {
     **FIRST_HITS,
     **{
         seen: replace(FIRST_HITS[first], name=seen, layer=seen, formula=PAST + FIRST_HITS[first].formula)
-        for seen, first in SEEN.items()
+        for seen, first in FIRST_HIT.items()
     },
+    "seen_emission": Feature(
+        *("seen_emission", "seen_emission", 3, 0.0, 1.0, encode_color, PAST + "emission, " + DISPLAY_FORMULA)
+    ),
     **PICTURES_BEFORE,
     **SMOOTHED,
 }

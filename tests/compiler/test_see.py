@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.core.interpret import interpret
-from wamnet.compiler.scenes.emit_path import FRAME_GROUPS
 from wamnet.compiler.scenes.lower_encode import sees
 from wamnet.compiler.scenes.lower_scene import SEEN, lower_scene, names
 from wamnet.compiler.scenes.path_kernel import compile_path
@@ -43,6 +42,7 @@ def test_the_program_has_the_reference_s_bits(name):
             given = {f"point_{c}": surface.point[:, i] for i, c in enumerate("xyz")}
             given |= {f"normal_{c}": surface.normal[:, i] for i, c in enumerate("xyz")}
             given |= {f"reflectance_{c}": surface.reflectance[:, i] for i, c in enumerate("rgb")}
+            given |= {f"direction_{c}": path.direction[:, i] for i, c in enumerate("xyz")}
             given |= {f"beta_{c}": path.beta[:, i] for i, c in enumerate("rgb")}
             given |= {"t": hit.t, "surface": hit.surface, "alive": alive, "depth": rng.counter(depth)}
             given |= {"way_going": way.going, "way_length": way.length}
@@ -81,7 +81,7 @@ def test_a_kernel_that_is_not_asked_has_no_word_of_it(target, lanes):
 def test_a_scene_of_matte_surfaces_has_no_way(target, lanes):
     """FOL-4: no state, the first surface again; and of features only the first surface is traced."""
     programs = lower_scene(scenes.canonical("cornell"), SETTINGS, seen=True)
-    made = compile_path(programs, target, lanes=lanes, groups=(*FRAME_GROUPS, *SEEN))
+    made = compile_path(programs, target, lanes=lanes, groups=("color", "albedo", *SEEN))
     assert programs.most_followed == 0
     assert "way_" not in made.source
     features = compile_path(programs, target, lanes=lanes, groups=("albedo", *SEEN))

@@ -249,6 +249,10 @@ def test_rays_of_features_that_mean_nothing_are_refused(executor_named, model_of
         Pipeline(*given, feature_spp=4, whole=True)
     with pytest.raises(InputError, match="feature_spp is 4: in a pipeline what is seen past mirrors"):
         Pipeline(*given, feature_spp=4, show=("seen_albedo",))
+    with pytest.raises(
+        InputError, match="whole is True: a frame's kernel writes the first hits, and what is"
+    ):
+        Pipeline(*given, whole=True, show=("seen_albedo",))
     with Pipeline(*given, feature_spp=4) as pipeline:
         with pytest.raises(InputError, match="kernel is features of their own rays: a render's kernel adds"):
             render_on(executor, scene("empty"), Job(2, 2), moment=pipeline.moment)

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from wamnet.refimpl import rng
-from wamnet.refimpl.frame import SEEN, USUAL
+from wamnet.refimpl.frame import FIRST_HIT, SEEN, USUAL
 from wamnet.refimpl.light import following, scenes, shading, transport
 from wamnet.refimpl.light import render as R
 from wamnet.refimpl.light.materials import Conductor, Dielectric, Mirror
 from wamnet.refimpl.light.materials.conductor import LARGEST_FOLLOWED
 from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Scene
+from wamnet.refimpl.light.shapes.quad import light_radiance
 from wamnet.refimpl.light.transport import Counters, Settings
 
 CAMERA = Camera((0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
@@ -116,15 +117,34 @@ def test_a_mirror_that_faces_a_mirror_ends_at_the_limit(max_depth, most):
 
 
 def test_a_way_into_the_sky_is_a_miss_and_a_lamp_is_seen():
-    """FOL-1: as first hits are: of the sky all layers are 0, and a lamp reflects nothing."""
+    """FOL-1: as first hits are: of the sky all layers but its light are 0, and a lamp reflects nothing."""
     mirror = wall(-2.0, TINT, Mirror())
-    missed = looked(Scene("sky", CAMERA, quads=(mirror,), background=(1.0,) * 3))
+    missed = looked(Scene("sky", CAMERA, quads=(mirror,), background=RED))
+    assert np.array_equal(missed.pop("seen_emission")[0], product(RED, TINT))
     assert all(not values.any() for values in missed.values())
-    lamp = Light((-1.0, 1.0, 3.0), (2.0, 0.0, 0.0), (0.0, -2.0, 0.0), (1.0,) * 3, 1.0)
+    lamp = Light((-1.0, 1.0, 3.0), (2.0, 0.0, 0.0), (0.0, -2.0, 0.0), RED, 4.0)
     lit = looked(Scene("lamp", CAMERA, quads=(mirror,), lights=(lamp,)))
+    assert np.array_equal(lit["seen_emission"][0], product(light_radiance(lamp), TINT))
     assert not lit["seen_albedo"].any()
     assert np.array_equal(lit["seen_normal"][0], [0.0, 0.0, -1.0])
     assert abs(lit["seen_depth"][0] - 7.0) <= LIFT
+
+
+def test_a_lamp_is_black_behind_and_a_wall_shows_no_light_of_lamps():
+    """FOL-1: what is emitted towards the path, not what is reflected."""
+    mirror = wall(-2.0, TINT, Mirror())
+    behind = Light((-1.0, -1.0, 3.0), (2.0, 0.0, 0.0), (0.0, 2.0, 0.0), RED, 4.0)
+    assert not looked(Scene("behind", CAMERA, quads=(mirror,), lights=(behind,)))["seen_emission"].any()
+    aside = Light((5.0, 1.0, 2.0), (2.0, 0.0, 0.0), (0.0, -2.0, 0.0), RED, 4.0)
+    lit = looked(Scene("aside", CAMERA, quads=(mirror, wall(3.0)), lights=(aside,)))
+    assert not lit["seen_emission"].any()
+
+
+@pytest.mark.parametrize("name", ["furnace", "daylight", "glossy", "minicubes"])
+def test_of_what_only_emits_it_is_the_colour(name):
+    """FOL-1: with paths that end where they arrive first (no scattering), colour is that light."""
+    found = R.render(scenes.canonical(name), R.Job(12, 9, 2, settings=Settings(max_depth=0), seen=True)).frame
+    assert np.array_equal(found["seen_emission"], found["color"])
 
 
 @pytest.mark.parametrize("name", ["minicubes", "cornell", "furnace", "lone_light", "empty"])
@@ -134,7 +154,7 @@ def test_without_mirrors_they_are_the_first_hits_to_the_bit(name):
     with_seen, usual = R.render(scene, replace(job, seen=True)).frame, R.render(scene, job).frame
     assert set(usual.layers) == set(USUAL)
     assert set(with_seen.layers) == {*USUAL, *SEEN}
-    for seen, first in SEEN.items():
+    for seen, first in FIRST_HIT.items():
         assert np.array_equal(with_seen[seen], usual[first]), seen
     assert all(np.array_equal(with_seen[name], usual[name]) for name in USUAL)
 

@@ -154,6 +154,7 @@ LATER_ROWS = (
     ("seen_albedo,seen_normal,seen_depth,seen_position", "what is seen past mirrors and glass"),
     ("seen_depth,depth,seen_position,position", "by the same scales as the first hit"),
     ("history_weight,history,color", "the pictures before"),
+    ("albedo,seen_emission,unshadowed", "what is seen emits light of its own"),
 )
 """Features that came later, with notes."""
 

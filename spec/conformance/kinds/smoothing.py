@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....refimpl.frame import LAYERS, SEEN, Frame, validate
+from ....refimpl.frame import FIRST_HIT, LAYERS, SEEN, Frame, validate
 from ....refimpl.network import smoothing
 from ....refimpl.network.smoothing import DEPTH, FARTHEST, GUIDES
 from ..case import Case, Kind, Output
@@ -207,7 +207,7 @@ def _smoothed_cases() -> list[Case]:
 
 def past(layers: Layers) -> Layers:
     """Return guides under the names of what is seen past mirrors and glass."""
-    return {seen: layers[first] for seen, first in SEEN.items()}
+    return {seen: layers[first] for seen, first in FIRST_HIT.items()}
 
 
 def feature_rows() -> Iterator[tuple[str, str, str, Layers, float]]:

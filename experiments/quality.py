@@ -94,6 +94,9 @@ NARROW = replace(BEST, features=BRIGHT, window=Window(8), widths=(64,) * 4)
 SLOWER = replace(NARROW, steps=60_000, learning_rate=5e-4)
 """Twice as many steps at half the rate."""
 
+SMOOTH = replace(MIRRORS, features=MIRRORS.features[:-1])
+"""The preset for mirrors without what is seen emits."""
+
 RECIPES: Mapping[str, Recipe] = {
     "short": SHORT,
     "best": BEST,
@@ -104,9 +107,11 @@ RECIPES: Mapping[str, Recipe] = {
     "long": replace(NARROW, steps=120_000),
     "hard": SLOWER,
     "slow": replace(SLOWER, steps=120_000),
-    "smooth": MIRRORS,
-    "smooth-slow": replace(MIRRORS, steps=120_000),
-    "smooth-page": replace(MIRRORS, features=("color", "highlights", "smoothed", *LAMPS[1:])),
+    "smooth": SMOOTH,
+    "smooth-slow": replace(SMOOTH, steps=120_000),
+    "lit": MIRRORS,
+    "lit-slow": replace(MIRRORS, steps=120_000),
+    "smooth-page": replace(SMOOTH, features=("color", "highlights", "smoothed", *LAMPS[1:])),
     "page48": replace(BEST, features=LAMPS, steps=60_000, widths=(48,) * 4),
 }
 """Recipes of the rows by name."""
@@ -119,6 +124,7 @@ class Row:
     `aux`: how its auxiliaries are: "" none are given, `noisy`, `prefiltered`, or `clean`. `of`: the set whose
     frames a network has learned from, if not that of the test. `past`: features are also of what is seen past
     mirrors and glass, which frames of some sets have; Open Image Denoise gets these in place of the others.
+    `apart`: what is seen emits is taken off the colour before, and added without its noise after.
     """
 
     text: str
@@ -128,6 +134,7 @@ class Row:
     aux: str = ""
     of: str = ""
     past: bool = False
+    apart: bool = False
 
 
 ROWS: Mapping[str, Row] = {
@@ -155,6 +162,14 @@ ROWS: Mapping[str, Row] = {
         aux="prefiltered",
         past=True,
     ),
+    "oidn-past-apart16": Row(
+        "the same, what is seen emits taken off the colour before and added after",
+        RAYS,
+        quality="high",
+        aux="prefiltered",
+        past=True,
+        apart=True,
+    ),
     "short-1": Row("wamnet, short, features of 1 ray", 1, "short"),
     "best-1": Row("wamnet, best, features of 1 ray", 1, "best"),
     "best-16": Row(f"wamnet, best, {RAYS} rays", RAYS, "best"),
@@ -169,8 +184,10 @@ ROWS: Mapping[str, Row] = {
     "long-16": Row("the same, four times as many steps", RAYS, "long", past=True),
     "hard-16": Row("twice as many steps at half the rate instead", RAYS, "hard", past=True),
     "slow-16": Row("four times as many steps at half the rate", RAYS, "slow", past=True),
-    "smooth-16": Row("twice as many steps, and colour smoothed (mirrors)", RAYS, "smooth", past=True),
+    "smooth-16": Row("twice as many steps, and colour smoothed", RAYS, "smooth", past=True),
     "smooth-slow-16": Row("four times as many steps, and colour smoothed", RAYS, "smooth-slow", past=True),
+    "lit-16": Row("colour smoothed, and what is seen emits (mirrors)", RAYS, "lit", past=True),
+    "lit-slow-16": Row("the same, four times as many steps", RAYS, "lit-slow", past=True),
     "shipped": Row(f"wamnet, the network of the page, {RAYS} rays", RAYS, "page", of=SHIPPED_SET),
 }
 """The rows by name."""
@@ -178,7 +195,7 @@ ROWS: Mapping[str, Row] = {
 TIMED = ("oidn-fast16", "oidn-clean16", "page-16")
 """Rows whose time is taken, ours last."""
 
-HARD_TIMED = ("oidn-past-clean16", "oidn-past-prefiltered16", "smooth-16")
+HARD_TIMED = ("oidn-past-clean16", "oidn-past-prefiltered16", "lit-16")
 """The same of scenes with mirrors, metal and glass."""
 
 SHOWN = {
@@ -186,7 +203,7 @@ SHOWN = {
     "oidn-clean16": "Open Image Denoise",
     "oidn-past-prefiltered16": "Open Image Denoise, past mirrors",
     "page-16": "wamnet",
-    "smooth-16": "wamnet, past mirrors",
+    "lit-16": "wamnet, past mirrors",
 }
 """Rows that are shown beside the reference, and what their pictures are called."""
 
@@ -272,7 +289,10 @@ def training_pairs(bench: Bench, rays: int) -> list[Pair]:
 def judged(bench: Bench, row: Row, split: str, ladder: scores.Ladder | None, seed: int) -> Values:
     """Return the scores of a row over the test frames of a seed, of each frame and their means, and more."""
     pairs = bench.tests(seed, row.rays, split)
-    pictures, facts = denoised(bench, row, [frame for frame, _ in pairs], seed)
+    given = [frame for frame, _ in pairs]
+    if row.apart:
+        given = [reflected(f, own) for f, (own, _) in zip(given, bench.tests(seed, 1, split), strict=True)]
+    pictures, facts = denoised(bench, row, given, seed)
     found = [
         scores.score(picture, clean["color"], linear)
         for (picture, linear), (_, clean) in zip(pictures, pairs, strict=True)
@@ -296,12 +316,21 @@ def denoised(
     return [(to_display(image), image) for image in linear], {}
 
 
+def reflected(frame: Frame, own: Frame) -> Frame:
+    """Return a frame whose colour is without what its own paths, which the other frame is of, saw emit."""
+    # A nearly perfect mirror's light may have been found by two ways, each with less than all of it.
+    color = np.maximum(frame["color"] - own["seen_emission"], 0.0)
+    return Frame({**frame.layers, "color": color}, frame.info)
+
+
 def oidn(row: Row, frame: Frame) -> Floats:
     """Return the radiance that Open Image Denoise makes of a frame."""
     frame = past_mirrors(frame) if row.past else frame
     if row.aux == "prefiltered":
-        return filtered(frame, prefiltered(frame, row.quality), True, row.quality)
-    return filtered(frame, frame if row.aux else None, row.aux == "clean", row.quality)
+        found = filtered(frame, prefiltered(frame, row.quality), True, row.quality)
+    else:
+        found = filtered(frame, frame if row.aux else None, row.aux == "clean", row.quality)
+    return found + frame["seen_emission"] if row.apart else found
 
 
 def certified(bench: Bench, kept: Results, rows: Sequence[str], seed: int) -> None:
@@ -400,7 +429,7 @@ def configuration(name: str, split: str, row: str) -> str:
 
 HARD_ROWS = (
     *("past-16", "bright-16", "narrow-16", "long-16", "hard-16", "slow-16"),
-    *("smooth-16", "smooth-slow-16"),
+    *("smooth-16", "smooth-slow-16", "lit-16", "lit-slow-16"),
 )
 """Rows for scenes with mirrors, metal and glass: one idea after the other, then longer trainings."""
 

@@ -133,7 +133,10 @@ BEST = replace(SHORT, steps=30_000)
 
 MIRRORS = replace(
     BEST,
-    features=("color", "highlights", "seen_smoothed", "seen_normal", "seen_albedo", "seen_position"),
+    features=(
+        *("color", "highlights", "seen_smoothed", "seen_normal", "seen_albedo", "seen_position"),
+        "seen_emission",
+    ),
     window=Window(8, "clamp"),
     widths=(64, 64, 64, 64),
     steps=60_000,

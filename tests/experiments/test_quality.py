@@ -129,7 +129,7 @@ def test_both_denoisers_see_past_mirrors(monkeypatch, tmp_path):
     for name in quality.HARD_ROWS:
         features = quality.RECIPES[rows[name].recipe].features
         of_colour = ("color", "highlights", "seen_smoothed")
-        assert {f for f in features if f not in of_colour} == set(quality.PAST[1:])
+        assert {f for f in features if f not in of_colour} - {"seen_emission"} == set(quality.PAST[1:])
     one = np.ones((2, 2, 3), np.float32)
     layers = {name: one * k for k, name in enumerate(("color", "albedo", "normal", "position"))}
     layers |= {f"seen_{name}": 10.0 + layers[name] for name in ("albedo", "normal", "position")}
@@ -142,6 +142,20 @@ def test_both_denoisers_see_past_mirrors(monkeypatch, tmp_path):
     assert np.array_equal(colour["color"], layers["color"])
     assert np.array_equal(aux["albedo"], layers["seen_albedo"])
     assert np.array_equal(aux["normal"], layers["seen_normal"])
+
+
+def test_a_peer_need_not_denoise_what_is_seen_emits(monkeypatch):
+    """By hand: what its own paths saw emit is taken off, not below 0, and the clean one added."""
+    one = np.ones((2, 2, 3), np.float32)
+    frame = Frame({"color": one * 3.0, "seen_emission": one * 0.25})
+    own = np.stack([0.5 * one[0], 4.0 * one[1]])
+    given = quality.reflected(frame, Frame({"seen_emission": own}))
+    assert np.array_equal(given["color"], np.stack([2.5 * one[0], 0.0 * one[1]]))
+    monkeypatch.setattr(quality, "past_mirrors", lambda frame: frame)
+    monkeypatch.setattr(quality, "prefiltered", lambda *parts: None)
+    monkeypatch.setattr(quality, "filtered", lambda frame, *parts: frame["color"])
+    found = quality.oidn(quality.ROWS["oidn-past-apart16"], given)
+    assert np.array_equal(found, given["color"] + 0.25)
 
 
 def test_gaps_are_to_the_best_peer_with_the_same_features(tmp_path):

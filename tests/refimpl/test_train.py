@@ -263,9 +263,9 @@ def test_best_is_short_for_longer() -> None:
 
 
 def test_mirrors_is_best_with_other_inputs_and_sizes() -> None:
-    """TRN-9b: 18 channels of 8 x 8 pixels, four layers of 64, and the same minibatches."""
+    """TRN-9b: 21 channels of 8 x 8 pixels, four layers of 64, and the same minibatches."""
     mirrors, best = PRESETS["mirrors"], PRESETS["best"]
-    assert mirrors.layer_widths == (1152, 64, 64, 64, 64, 3)
+    assert mirrors.layer_widths == (1344, 64, 64, 64, 64, 3)
     assert [name for name in mirrors.features if not name.startswith("seen_")] == ["color", "highlights"]
     kept = {"features", "window", "widths", "steps", "learning_rate"}
     changed = {name for name in vars(best) if getattr(best, name) != getattr(mirrors, name)}

@@ -9,7 +9,8 @@
    refused with one line [`load_model`], [`load_checkpoint`].
 
 The format of the container is safetensors' own: 8 bytes of header length, little-endian; a JSON header,
-padded with spaces to a multiple of 8; the tensors' bytes.
+padded with spaces to a multiple of 8; the tensors' bytes. Versions of the library differ in what they take:
+entries and types are checked here too [`_check_entry`].
 """
 
 from __future__ import annotations
@@ -24,8 +25,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from safetensors import SafetensorError
-from safetensors.numpy import load as decode_tensors
+from safetensors import SafetensorError, deserialize
 
 from ..refimpl.errors import InputError
 from ..refimpl.network import train
@@ -70,6 +70,16 @@ _DECIMAL = re.compile(_WHOLE.pattern + r"(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 
 _DTYPES = {"float32": "F32", "float64": "F64", "int64": "I64", "int32": "I32", "int8": "I8"}
 """Element types that are written, by NumPy's name, as safetensors names them."""
+
+_TYPES = {
+    "BOOL": "?", "U8": "u1", "I8": "i1", "F8_E5M2": "V1", "F8_E4M3": "V1",
+    "U16": "<u2", "I16": "<i2", "F16": "<f2", "BF16": "V2",
+    "U32": "<u4", "I32": "<i4", "F32": "<f4", "U64": "<u8", "I64": "<i8", "F64": "<f8",
+}  # fmt: skip
+"""Element types that a file may have, as NumPy reads them; of those that NumPy lacks, only the size."""
+
+_ENTRY = {"dtype", "shape", "data_offsets"}
+"""Keys of a tensor in the header."""
 
 
 def save_model(path: str | os.PathLike[str], model: Model) -> None:
@@ -195,20 +205,39 @@ def _read(
     content = read_file(path, f"{kind} file")
     way_out = "write it with `wamnet train`"
     try:
-        tensors = decode_tensors(content)
+        found = deserialize(content)
     except (SafetensorError, *BROKEN) as error:
         raise InputError(f"{kind} file", str(path), f"not a safetensors file ({error})", way_out) from None
     texts = _header_texts(path, content)
+    tensors = {
+        name: np.frombuffer(entry["data"], _TYPES[entry["dtype"]]).reshape(entry["shape"])
+        for name, entry in found
+    }
     _check_kind(path, texts, kind, versions)
     return tensors, texts
 
 
 def _header_texts(path: Path, content: bytes) -> dict[str, str]:
     """Return the header's texts; the library has found the header sound, but keeps them to itself."""
-    length = int.from_bytes(content[:8], "little")
-    header = parse_json(content[8 : 8 + length], f"{path}: header", "write it with `wamnet train`")
-    texts: dict[str, str] = header.get("__metadata__") or {}
+    length, way_out = int.from_bytes(content[:8], "little"), "write it with `wamnet train`"
+    text = content[8 : 8 + length]
+    if not text.startswith(b"{"):
+        raise InputError(f"{path}: header", text[:20], "its first byte must be {", way_out)
+    header = parse_json(text, f"{path}: header", way_out)
+    texts: dict[str, str] = header.pop("__metadata__", None) or {}
+    for name, entry in header.items():
+        _check_entry(f"{path}: header: {name}", entry, way_out)
     return texts
+
+
+def _check_entry(what: str, entry: Any, way_out: str) -> None:
+    """Refuse a tensor's entry with other keys than these three, or a type that is not known."""
+    if not isinstance(entry, dict) or set(entry) != _ENTRY:
+        rule = f"it must be an object with the keys {', '.join(sorted(_ENTRY))} and no others"
+        raise InputError(what, entry, rule, way_out)
+    if entry["dtype"] not in _TYPES:
+        rule = f"no such type of numbers; known are {', '.join(_TYPES)}"
+        raise InputError(f"{what}.dtype", entry["dtype"], rule, way_out)
 
 
 def _check_kind(path: Path, texts: Texts, kind: str, versions: Sequence[str]) -> None:

@@ -238,14 +238,61 @@ def test_a_file_of_another_kind_is_refused(content: bytes, tmp_path: Path) -> No
         model_file.load_model(path)
 
 
-def test_element_types_that_numpy_lacks_are_refused(tmp_path: Path) -> None:
-    """Numbers of 16 bits with 8 of exponent (bfloat16) are valid in the container and unknown to NumPy."""
-    header = b'{"layer0.weight":{"dtype":"BF16","shape":[1],"data_offsets":[0,2]}}'
+def of_container(path: Path, entry: Any, before: bytes = b"", name: str = "more") -> None:
+    """Write a model's file with one tensor more, of 8 bytes at its end, and bytes before its header."""
+    model_file.save_model(path, model_of())
+    content = path.read_bytes()
+    length = int.from_bytes(content[:8], "little")
+    header, data = json.loads(content[8 : 8 + length]), content[8 + length :]
+    span = [len(data), len(data) + 8]
+    # MORE stands for the place, which the caller does not know.
+    text = json.dumps({**header, name: entry}).replace('"MORE"', json.dumps(span))
+    raw = before + text.encode()
+    path.write_bytes(len(raw).to_bytes(8, "little") + raw + data + bytes(8))
+
+
+ENTRY = {"dtype": "F32", "shape": [2], "data_offsets": "MORE"}
+"""A tensor's entry."""
+
+
+@pytest.mark.parametrize(
+    ("dtype", "count"), [("BF16", 4), ("F8_E5M2", 8), ("F8_E4M3", 8), ("BOOL", 8), ("U64", 1), ("F16", 4)]
+)
+def test_a_tensor_of_another_type_is_ignored(dtype: str, count: int, tmp_path: Path) -> None:
+    """Some types NumPy lacks: bfloat16, and numbers of 8 bits."""
     path = tmp_path / "model.safetensors"
-    path.write_bytes(len(header).to_bytes(8, "little") + header + b"\0\0")
-    with pytest.raises(
-        InputError, match=r"wamnet-model file is .*: not a safetensors file|format is missing"
-    ):
+    of_container(path, {**ENTRY, "dtype": dtype, "shape": [count]})
+    assert same(model_file.load_model(path), model_of())
+
+
+def test_a_tensor_of_a_type_that_numpy_lacks_counts_as_a_layer(tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    of_container(path, {**ENTRY, "dtype": "BF16", "shape": [1, 4]}, name="layer2.weight")
+    with pytest.raises(InputError, match=r"list of tensors is .*: 'layer2.bias' must be among them"):
+        model_file.load_model(path)
+
+
+@pytest.mark.parametrize(
+    ("entry", "rule"),
+    [
+        (["F32", [2], "MORE"], "more is .*: it must be an object with the keys data_offsets, dtype, shape"),
+        ({**ENTRY, "strides": [1]}, "more is .*: it must be an object with the keys .* and no others"),
+        ({**ENTRY, "dtype": "C64", "shape": [1]}, "more.dtype is C64: no such type of numbers; known are"),
+    ],
+)
+def test_an_entry_of_another_form_is_refused(entry: Any, rule: str, tmp_path: Path) -> None:
+    """The library takes the first two, and from some version on the third."""
+    path = tmp_path / "model.safetensors"
+    of_container(path, entry)
+    with pytest.raises(InputError, match=f"{rule}|not a safetensors file .*unknown variant"):
+        model_file.load_model(path)
+
+
+def test_a_header_that_begins_with_a_space_is_refused(tmp_path: Path) -> None:
+    """The library has taken it since a version; the format's own page says that it must not."""
+    path = tmp_path / "model.safetensors"
+    of_container(path, ENTRY, b" ")
+    with pytest.raises(InputError, match=r"header is .*: its first byte must be \{|not a safetensors file"):
         model_file.load_model(path)
 
 

@@ -14,7 +14,7 @@ BUDGET = {
     "refimpl": 1150,
     "refimpl/light": 4325,
     "refimpl/network": 2275,
-    "compiler": 1700,
+    "compiler": 1725,
     "compiler/core": 3475,
     "compiler/languages": 2425,
     "compiler/proof": 3100,

@@ -134,9 +134,10 @@ def load(path: Path) -> tuple[str, list[Case]]:
     data = parse_json(read_file(path, "file of vectors"), f"file of vectors {path}", "fetch it again")
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise InputError("file of vectors", str(path), f"its format must be {FORMAT!r}", "give another file")
-    if str(data.get("version")).split(".")[0] != VERSION.split(".")[0]:
-        rule = f"this runner reads version {VERSION.split('.')[0]}"
-        raise InputError(f"{path}: version", data.get("version"), rule, "update wamnet or the vectors")
+    version, major = data.get("version"), VERSION.split(".")[0]
+    if not isinstance(version, str) or version.split(".")[0] != major:
+        rule = f"this runner reads version {major}, a text such as {VERSION}"
+        raise InputError(f"{path}: version", version, rule, "update wamnet or the vectors")
     rule = "its cases must be as spec/vectors/schema.json says"
     with refusing("file of vectors", str(path), rule, "fetch it again"):
         return str(data["kind"]), [_case(item, path.parent) for item in data["cases"]]

@@ -214,8 +214,9 @@ def test_a_file_comes_back_as_it_was_made():
         ({"format": "other"}, "its format must be 'wamnet-vectors'"),
         (
             {"version": "2.0.0"},
-            r"version is 2\.0\.0: this runner reads version 1; update wamnet or the vectors",
+            r"version is 2\.0\.0: this runner reads version 1, a text such as 1.*; update wamnet or",
         ),
+        ({"version": 1.0}, r"version is 1\.0: this runner reads version 1, a text such as 1"),
         ({"cases": [{"id": "a"}]}, "its cases must be as spec/vectors/schema.json says"),
         ({"cases": 3}, "its cases must be as spec/vectors/schema.json says"),
     ],

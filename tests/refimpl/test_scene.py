@@ -80,6 +80,13 @@ def test_digest_depends_on_content_and_not_on_spelling():
     assert S.scene_digest(replace(EVERYTHING, info={"note": "x"})) == S.scene_digest(EVERYTHING)
 
 
+@pytest.mark.parametrize("version", ["1", "1.0", "1e0", "10e-1"])
+def test_the_version_is_a_number_however_it_is_written(version):
+    text = S.to_json(EVERYTHING).replace('"version": 1,', f'"version": {version},')
+    assert f'"version": {version},' in text
+    assert S.from_json(text) == EVERYTHING
+
+
 def changed(path: str, value: object) -> str:
     """Return the JSON of EVERYTHING with the value at a dotted path replaced; a value of ... removes the
     key."""
@@ -99,6 +106,8 @@ REFUSALS = [
     ("format", "other", r"scene.format is 'other': it must be 'wamnet-scene'"),
     ("version", 2, r"scene.version is 2: it must be 1"),
     ("version", "1", r"scene.version is '1': it must be 1"),
+    ("version", True, r"scene.version is True: it must be 1"),
+    ("version", 1.5, r"scene.version is 1.5: it must be 1"),
     ("name", "\ud800", r"scene.name is .*: half a character .* cannot be written"),
     (
         "spheres.0.radius",

@@ -41,6 +41,34 @@ def test_the_reference_answers_its_own_vectors(kind):
     assert not wrong
 
 
+def answered(kind: str, **changes) -> dict:
+    """Return the reference's answer to the first vector of a kind with some inputs changed."""
+    _, cases = case.load(vectors.FOLDER / f"{kind}.json")
+    request = {"id": "0", "kind": kind, "profile": "ieee", "input": {**cases[0].inputs, **changes}}
+    answers = io.StringIO()
+    program.serve([json.dumps(request)], answers, "here", [kind], program.of_reference)
+    return json.loads(answers.getvalue())
+
+
+@pytest.mark.parametrize("value", [True, False, 1.0, 1.5, "1", "0x1p+0", None, [1]])
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("random.block", "seed"),
+        ("image.window", "x"),
+        ("image.window", "size"),
+        ("path.start", "width"),
+        ("path.scatter", "depth"),
+        ("picture.exact", "spp"),
+        ("whole.sine", "amplitude"),
+    ],
+)
+def test_integers_of_a_request_are_integers_of_json(kind, name, value):
+    """A seed that was true counted as 1."""
+    refused = answered(kind, **{name: value})["refused"]
+    assert refused.startswith(f"{name} is {json.dumps(value)}: it must be an integer of JSON; write it")
+
+
 def test_the_radiance_of_a_whole_path_has_no_light_sample_of_its_last_vertex():
     """Where roulette ends a path, as where the depth does: after the vertex's emission, as the page says."""
     ended = 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections import Counter
 
 import numpy as np
@@ -48,6 +49,19 @@ def answered(kind: str, **changes) -> dict:
     answers = io.StringIO()
     program.serve([json.dumps(request)], answers, "here", [kind], program.of_reference)
     return json.loads(answers.getvalue())
+
+
+@pytest.mark.parametrize(("x", "y"), [(-1, 0), (4, 0), (0, -1), (0, 4), (2**40, 0)])
+def test_the_window_of_a_pixel_outside_is_refused(x, y):
+    """NumPy took an index of -1 for the last pixel, and raised an error of its own beyond the end."""
+    assert "output" in answered("image.window", x=3, y=3)
+    refused = answered("image.window", x=x, y=y)["refused"]
+    assert re.match(r"[xy] is -?\d+: the image has the pixels 0 to 3 on this axis; ask for", refused)
+
+
+@pytest.mark.parametrize("image", [[], [[]], [[0, 1]], [[[0.5]]], [[[True]]], 1, "a", [[[0]], [[0], [1]]]])
+def test_the_window_of_no_image_is_refused(image):
+    assert "it must be integers [H][W][C]" in answered("image.window", image=image, x=0, y=0)["refused"]
 
 
 @pytest.mark.parametrize("value", [True, False, 1.0, 1.5, "1", "0x1p+0", None, [1]])

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....refimpl import metrics, rng
+from ....refimpl.errors import InputError
 from ....refimpl.frame import LAYERS, USUAL, Frame, validate
 from ....refimpl.network import dataset
 from ....refimpl.network.dataset import Normalization, Window
@@ -232,11 +233,18 @@ def _feature_cases() -> list[Case]:
 
 
 def _window(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the window vector of a pixel."""
-    window = Window(int(inputs["size"]), str(inputs["border"]))
+    """Return the window vector of a pixel; the reference's own function leaves its place to the caller."""
+    window, image = Window(int(inputs["size"]), str(inputs["border"])), inputs["image"]
     dataset.check_window(window)
+    if not isinstance(image, np.ndarray) or image.ndim != 3 or image.dtype.kind != "i" or not image.size:
+        rule = "it must be integers [H][W][C], none of the three 0"
+        raise InputError("image", getattr(image, "shape", image), rule, "see the format page of this kind")
+    for name, sides in (("x", image.shape[1]), ("y", image.shape[0])):
+        if not 0 <= inputs[name] < sides:
+            rule = f"the image has the pixels 0 to {sides - 1} on this axis"
+            raise InputError(name, int(inputs[name]), rule, "ask for a pixel of the image")
     x, y = (np.array([int(inputs[name])]) for name in ("x", "y"))
-    return {"window": dataset.windows_at(np.asarray(inputs["image"]), y, x, window)[0]}
+    return {"window": dataset.windows_at(image, y, x, window)[0]}
 
 
 WINDOW_ROWS = (

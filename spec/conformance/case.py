@@ -167,6 +167,9 @@ def _placed(value: Any, folder: Path) -> Any:
     if not isinstance(value, dict) or "file" not in value:
         return value
     named = value["file"]
+    if isinstance(named, str) and Path(named).is_absolute():
+        rule = "paths in a file of vectors are relative to its folder; those in requests are absolute"
+        raise InputError("file of a vector", named, rule, "put the file into that folder, and name it there")
     names = named.split("/") if isinstance(named, str) else [named]
     path = folder.joinpath(*(plain_name(name, "file of a vector", WAY_OUT) for name in names)).resolve()
     if not path.is_relative_to(folder.resolve()):
@@ -182,6 +185,9 @@ WAY_OUT = "fetch the vectors again"
 def given(value: Any) -> Any:
     """Return an input as the reference takes it: numbers as arrays, files as what they hold."""
     if isinstance(value, dict) and "file" in value:
+        if not isinstance(value["file"], str) or not Path(value["file"]).is_absolute():
+            rule = "paths in a request are absolute; those in a file of vectors are relative to its folder"
+            raise InputError("file of a request", value["file"], rule, "write the whole path")
         return from_file(value, "input") if "shape" in value else read_file(value["file"]).decode()
     if isinstance(value, (dict, bool)):
         return value

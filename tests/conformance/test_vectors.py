@@ -241,8 +241,17 @@ def test_vectors_name_files_of_their_own_folder(tmp_path, name):
     data = json.loads(text)
     data["cases"][0]["input"]["image"] = {"file": name, "shape": [1]}
     (tmp_path / "a.json").write_text(json.dumps(data))
-    with pytest.raises(InputError, match="plain name of a file in its own folder"):
+    with pytest.raises(InputError, match=r"plain name of a file in its own|are relative to its folder"):
         case.load(tmp_path / "a.json")
+
+
+def test_an_absolute_path_is_for_requests_only(tmp_path):
+    (tmp_path / "a").write_text("text")
+    with pytest.raises(InputError, match=r"vector is /.*/a: paths in a file of vectors are relative to its"):
+        case._placed({"file": str(tmp_path / "a")}, tmp_path)
+    for wrong in ("a", 3, None):
+        with pytest.raises(InputError, match=r"file of a request is .*: paths in a request are absolute"):
+            case.given({"file": wrong})
 
 
 def test_a_link_out_of_the_folder_of_vectors_is_refused(tmp_path):

@@ -21,7 +21,7 @@ import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import MISSING, fields, is_dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
@@ -159,21 +159,15 @@ def parse_json(text: str | bytes, what: str, way_out: str, most: int = LARGEST_J
         raise refused(f"it has more than {most} bytes")
     unusual: list[str] = []
 
-    def number(text: str) -> float:
-        value: float = _checked(float, text)
-        if not math.isfinite(value):
-            unusual.append(text)
-        return value
-
     try:
         read = text if isinstance(text, str) else text.decode("utf-8")
         if sum(map(read.count, ",[{")) > MOST_VALUES:
             raise refused(f"it has more than {MOST_VALUES} values")
         value = json.loads(
             read,
-            parse_int=lambda text: _checked(int, text),
-            parse_float=number,
-            parse_constant=number,
+            parse_int=partial(_read_number, unusual, int),
+            parse_float=partial(_read_number, unusual, float),
+            parse_constant=partial(_read_number, unusual, float),
             object_pairs_hook=_object,
         )
     except InputError:
@@ -190,6 +184,9 @@ def parse_json(text: str | bytes, what: str, way_out: str, most: int = LARGEST_J
     return value
 
 
+_LONG = 309
+"""Characters of the largest double: an integer of fewer is below it."""
+
 _BEGINNING = 200
 """Characters of a text that an error may show; it cuts them further."""
 
@@ -199,6 +196,16 @@ def _checked(kind: Callable[[str], Any], text: str) -> Any:
     if len(text) > LONGEST_NUMBER:
         raise ValueError(f"a number of {len(text)} digits")
     return kind(text)
+
+
+def _read_number(unusual: list[str], kind: Callable[[str], Any], text: str) -> Any:
+    """Return a number; the text of one that is not finite goes to `unusual`."""
+    value = _checked(kind, text)
+    # Python's integers have no largest one, and JSON knows one kind of numbers only.
+    if (kind is float or len(text) >= _LONG) and not math.isfinite(float(text)):
+        unusual.append(text)
+        return float(text)
+    return value
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -50,9 +50,13 @@ def test_json_comes_back(value):
         ("1" * 5000, "digits"),
         ("1." + "1" * 5000, "digits"),
         ("1e999", "thing is inf: it must be a finite number"),
+        ("9" * 309, "thing is inf: it must be a finite number"),
+        ("[-1" + "0" * 309 + "]", r"thing\[0\] is -inf: it must be a finite number"),
         ("NaN", "thing is nan"),
         ("[Infinity]", r"thing\[0\] is inf"),
         ('{"a": 1, "a": 1}', "twice"),
+        ('{"a": 1, "\\u0061": 1}', "twice"),
+        (b"\xef\xbb\xbf[]", "BOM"),
         ('["\\ud800"]', "surrogate"),
         ('{"\\udfff": 1}', "surrogate"),
         (b"\xff\xfe[]", "utf-8"),
@@ -87,6 +91,14 @@ def test_the_worst_json_of_its_length_takes_bounded_memory(piece):
 def test_json_of_too_many_values_is_refused_before_it_is_taken_apart():
     with pytest.raises(InputError, match="4000000 values"):
         parsed("[" + "[]," * reading.MOST_VALUES + "0]")
+    # It is counted before texts are known from what is between them.
+    with pytest.raises(InputError, match="4000000 values"):
+        parsed('"' + "," * (reading.MOST_VALUES + 1) + '"')
+
+
+def test_the_largest_integer_is_the_largest_double():
+    largest = int(float.fromhex("0x1.fffffffffffffp+1023"))
+    assert parsed(f"[{largest}, {-largest}]") == [largest, -largest]
 
 
 def test_json_that_is_too_long_is_refused():

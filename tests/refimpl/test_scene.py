@@ -112,7 +112,7 @@ REFUSALS = [
     (
         "spheres.0.radius",
         10**400,
-        r"radius is an integer of 1329 bits: it must be a finite number of at most 1e\+12",
+        r"spheres\[0\].radius is inf: it must be a finite number",
     ),
     (
         "spheres.0.center",

@@ -43,7 +43,10 @@ MOST_TOLD = 300
 NPZ, EXR, PNG = ".npz", ".exr", ".png"
 """Ends of the names of pictures."""
 
-LISTS = ("{outputs}", "{seeds}")
+OUTPUT, OUTPUTS, SEEDS = "{output}", "{outputs}", "{seeds}"
+"""Words that say where one picture goes, or all of a shot, and the seeds of these."""
+
+LISTS = (OUTPUTS, SEEDS)
 """Words of a command that runs for each shot; any other runs for each picture."""
 
 Read = Callable[[Path], Picture]
@@ -231,10 +234,13 @@ def command_words(text: str) -> tuple[str, ...]:
         raise InputError(
             "--command", text, f"it is not a command ({error})", "close quotation marks"
         ) from None
-    marks = [mark for mark in ("{scene}", "{output") if not any(mark in word for word in words)]
-    if not words or marks:
-        rule = "it must say where {scene} and {output} go"
+    has = {mark for mark in ("{scene}", OUTPUT, *LISTS) if any(mark in word for word in words)}
+    if "{scene}" not in has or not has & {OUTPUT, OUTPUTS}:
+        rule = "it must say where {scene} and {output} go, or {outputs} for all pictures of a shot"
         raise InputError("--command", text or "empty", rule, "for example: my_renderer {scene} {output}")
+    if has & set(LISTS) and OUTPUTS not in has:
+        rule = "one process for all {seeds} must know where all pictures go"
+        raise InputError("--command", text, rule, "write {outputs} for {output}, or {seed} for {seeds}")
     return words
 
 

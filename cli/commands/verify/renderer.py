@@ -48,7 +48,7 @@ Command = Annotated[
     typer.Option(
         "--command",
         metavar="CMD",
-        help="In its place any program: a command with {scene} and {output}; no shell reads it. "
+        help="In its place any program: a command with {scene}, {output} or {outputs}; no shell reads it. "
         "Further {seed}, {width}, {height}, {samples}, {depth}.",
         show_default=False,
     ),

@@ -179,11 +179,22 @@ def test_our_own_tracer_as_a_program():
         ("mine 'half", "it is not a command"),
         ("", "{scene} and {output}"),
         ("mine {scene}", "{scene} and {output}"),
+        ("mine {output}", "{scene} and {output}"),
+        ("mine {outputs} {seeds}", "{scene} and {output}"),
+        ("mine {scene} {output.exr}", "{scene} and {output}"),
+        ("mine {scene} {outputs", "{scene} and {output}"),
+        ("mine {scene} {seeds} {output}", "one process for all {seeds} must know where all"),
     ],
 )
 def test_commands_that_cannot_ask(command, rule):
     with pytest.raises(InputError, match=rule):
         R.command_words(command)
+
+
+def test_a_command_of_lists_needs_no_other_output():
+    """VRF-10: {outputs} stands for {output}; {seeds} may be left to the scene file."""
+    for text in ("mine {scene} {seeds} {outputs}", "mine {scene} --to={outputs}"):
+        assert R.command_words(text) == tuple(text.split())
 
 
 def test_unknown_renderers_are_refused():

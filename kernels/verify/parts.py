@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ...refimpl.light.materials import Conductor, Dielectric, Material, Mirror
 from ...refimpl.light.scene import Box, Camera, Room, Scene, Sphere
 from ...refimpl.light.shapes.quad import light_radiance
+from ...refimpl.light.shapes.shape import Vector
 from ..bench.peers.peer_mitsuba import room_walls
 
 Array = NDArray[np.float64]
@@ -34,7 +35,7 @@ the radius below the sphere, a tenth of the slack of an answer."""
 FAR = 4.0
 """Half of the edges of a sky that is a surface, in the largest coordinate of what it surrounds."""
 
-KINDS: dict[type[Material], str] = {Mirror: MIRROR, Conductor: METAL, Dielectric: GLASS}
+KINDS: dict[type[Any], str] = {Mirror: MIRROR, Conductor: METAL, Dielectric: GLASS}
 """Kinds by material; a surface without one is matte, and so is any other material."""
 
 
@@ -109,7 +110,8 @@ def parts_of(scene: Scene) -> Parts:
     ]
     if scene.room is not None:
         room = scene.room
-        looks = (Look(MATTE, r, room.emission, 0.0) for r in room.reflectances)
+        materials = room.materials or (None,) * len(room.reflectances)
+        looks = (_look(r, room.emission, m) for r, m in zip(room.reflectances, materials, strict=True))
         walls = zip(room_walls(room), looks, strict=True)
         sheets += [Sheet(np.array(corner), u, v, look, front=True) for (corner, u, v), look in walls]
     for light in scene.lights:
@@ -123,9 +125,13 @@ def parts_of(scene: Scene) -> Parts:
 
 def look_of(part: Any) -> Look:
     """Return the look of a box, a sphere or a quad."""
-    kind = KINDS.get(type(part.material), MATTE)
-    number = 0.0 if part.material is None or part.material.parameter is None else part.material.parameter
-    return Look(kind, part.reflectance, part.emission, float(number))
+    return _look(part.reflectance, part.emission, part.material)
+
+
+def _look(reflectance: Vector, emission: Vector, material: Material | None) -> Look:
+    """Return the look of a surface."""
+    number = 0.0 if material is None or material.parameter is None else material.parameter
+    return Look(KINDS.get(type(material), MATTE), reflectance, emission, float(number))
 
 
 def meshes_of(parts: Parts) -> list[Mesh]:

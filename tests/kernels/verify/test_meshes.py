@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from triangles import ReadSurface, shape_differences, volume, wanted
 
 from wamnet.kernels.verify.cases import questions
-from wamnet.kernels.verify.parts import NotExpressed, meshes_of, parts_of, sky_of
+from wamnet.kernels.verify.parts import MATTE, METAL, MIRROR, NotExpressed, meshes_of, parts_of, sky_of
 from wamnet.kernels.verify.run import shots_of
-from wamnet.refimpl.light.materials import Mirror
-from wamnet.refimpl.light.scene import Quad, Scene
+from wamnet.refimpl.light.materials import Conductor, Lambertian, Mirror
+from wamnet.refimpl.light.scene import Quad, Room, Scene, Sphere
 from wamnet.refimpl.light.scenes import empty
 
 SHOTS = {shot.name: shot for shot in shots_of(questions())}
@@ -50,6 +52,22 @@ def test_faults_are_found(name, fault):
     else:
         found.corners = found.corners[1:]
     assert [*shape_differences(found, want)]
+
+
+def test_walls_have_materials():
+    """Walls of mirrors and of metal were written as matte ones, in silence."""
+    materials = (Mirror(), None, Conductor(0.3), Lambertian(), None, Mirror())
+    colors = tuple((0.1 * wall, 0.5, 1.0) for wall in range(6))
+    room = Room((-1.0, 0.0, -2.0), (1.0, 2.0, 2.0), colors, materials=materials)
+    looks = [mesh.look for mesh in meshes_of(parts_of(replace(empty(), room=room)))]
+    assert [look.kind for look in looks] == [MIRROR, MATTE, METAL, MATTE, MATTE, MIRROR]
+    assert tuple(look.reflectance for look in looks) == colors
+    ball = Sphere((0.0, 1.0, 0.0), 0.5, (0.5, 0.5, 0.5), material=Conductor(0.3))
+    (like,) = meshes_of(parts_of(replace(empty(), spheres=(ball,))))
+    assert looks[2].number == like.look.number != 0.0
+    shining = replace(room, emission=(1.0, 1.0, 1.0))
+    with pytest.raises(NotExpressed, match="mirror that emits"):
+        meshes_of(parts_of(replace(empty(), room=shining)))
 
 
 def test_a_sky_surrounds_all():

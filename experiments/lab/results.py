@@ -40,7 +40,7 @@ OLDER = "wamnet-experiment-1"
 PER_FRAME = "per_frame"
 """The value that holds lists of numbers, one for each pose, by the names of their means."""
 
-PACKAGES = ("torch", "pyoidn", "flip-evaluator", "onnxruntime", "mitsuba", "scikit-image")
+PACKAGES = ("torch", "pyoidn", "flip-evaluator", "onnxruntime", "mitsuba", "scikit-image", "bpy", "pyluxcore")
 """Packages whose versions a file of results names too, where they are installed."""
 
 Values = Mapping[str, Any]

@@ -1432,7 +1432,7 @@ static world build(scene from, settings how) {
     *s = (surface){BLACK, from.background, BLACK, {0}, -1};
     weigh_lights(&w);
     if (from.above.given) w.sun = weigh_sun(&from.above);
-    bool single = true; /* SHD-4; lights and nothing have no material of their own */
+    bool single = w.first_quad + quads.count > 0; /* SHD-4; lights and nothing have no material of their own */
     for (size_t i = 0; i < w.first_quad + quads.count; i++) single = single && is_single(w.surfaces[i].made_of);
     w.samples_lights = (w.light_sums || from.above.given) && how.strategy != BY_BSDF && !single;
     return w;
@@ -1955,6 +1955,7 @@ typedef struct {
     size_t layers, widths[MOST_LAYERS + 1];
     double *weights[MOST_LAYERS], *biases[MOST_LAYERS];
     double omega_first, omega_hidden;
+    bool rectifies;
 } network;
 
 static double omega(const network *n, size_t layer) { return layer ? n->omega_hidden : n->omega_first; }
@@ -1969,10 +1970,16 @@ static void affine(const network *n, size_t layer, const double *x, double *z) {
     }
 }
 
+/* ACT-1 */
+static double activated(const network *n, double a) {
+    if (!n->rectifies) return sin(a);
+    return a < 0 ? 0 : a;
+}
+
 static double *forward_layer(const network *n, size_t layer, const double *x) {
     double *z = get(n->widths[layer + 1], sizeof *z);
     affine(n, layer, x, z);
-    for (size_t i = 0; i < n->widths[layer + 1] && layer + 1 < n->layers; i++) z[i] = sin(z[i]);
+    for (size_t i = 0; i < n->widths[layer + 1] && layer + 1 < n->layers; i++) z[i] = activated(n, z[i]);
     return z;
 }
 
@@ -2595,10 +2602,16 @@ static model read_model(const char *base64) {
     const unsigned char *content = from_base64(base64, &length);
     container in = read_container(content, length);
     if (strcmp(text(in.texts, "format"), "wamnet-model")) refuse("it is no model");
-    if (strcmp(text(in.texts, "version"), "1")) refuse("it has another version");
-    const json *activation = find(in.texts, "activation");
-    if (activation && strcmp(text_of(activation, "activation"), "sine")) refuse("its activation is not the sine");
+    const char *version = text(in.texts, "version");
+    bool second = !strcmp(version, "2");
+    if (!second && strcmp(version, "1")) refuse("it has another version");
+    const json *named = find(in.texts, "activation");
+    if (!named && second) refuse("a model of version 2 must name its activation");
+    const char *activation = named ? text_of(named, "activation") : "sine";
+    bool rectifies = !strcmp(activation, "relu");
+    if ((rectifies && !second) || (!rectifies && strcmp(activation, "sine"))) refuse("it has another activation");
     model made = {.net = read_layers(&in)};
+    made.net.rectifies = rectifies;
     made.net.omega_first = decimal(in.texts, "omega_0_first");
     made.net.omega_hidden = decimal(in.texts, "omega_0_hidden");
     check_omega(made.net.omega_first);

@@ -56,7 +56,7 @@ WRONG = {
         '"words": [10**999] * 4',
         "random.block",
         "RNG-3",
-        "fail",
+        "garbage",
     ),
     "lists of lists of lists": (
         "print(json.dumps(answer)",

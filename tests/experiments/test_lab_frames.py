@@ -14,7 +14,7 @@ from lab.frames import Shot
 from wamnet.kernels.run import render_on
 from wamnet.kernels.run.frame_plan import version
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.frame import SEEN, USUAL
+from wamnet.refimpl.frame import FIRST_HIT, SEEN, USUAL
 from wamnet.refimpl.light import render as driver
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scene import scene_digest
@@ -137,7 +137,7 @@ def test_what_a_denoiser_of_first_hits_is_given_past_mirrors():
     found = render(shot.build(), shot.job).frame
     named = frames.past_mirrors(found)
     assert np.array_equal(named["color"], found["color"])
-    assert all(np.array_equal(named[first], found[seen]) for seen, first in SEEN.items())
+    assert all(np.array_equal(named[first], found[seen]) for seen, first in FIRST_HIT.items())
     assert not np.array_equal(named["position"], found["position"])
 
 

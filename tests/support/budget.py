@@ -29,7 +29,7 @@ BUDGET = {
     "kernels/bench": 4850,
     "kernels/export": 3200,
     "kernels/verify": 2925,
-    "spec/conformance": 7675,
+    "spec/conformance": 7700,
     "cli": 300,
     "cli/commands": 5480,
     "cli/common": 1050,

@@ -180,6 +180,9 @@ BAD: Mapping[str, Callable[[], bytes]] = {
     "a header that is no JSON": lambda: _joined(b"{'layer0': 1}", b""),
     "a header that is no object": lambda: _joined(b"[]", b""),
     "a header that is not UTF-8": lambda: _joined(b'{"\xff": 1}', b""),
+    "a text of the header that is not UTF-8": lambda: _text("note", "rough").replace(
+        b"rough", b"\xff\xff\xff\xff\xff"
+    ),
     "a header of brackets": lambda: _joined(b"[" * 4000, b""),
     "another format": lambda: _text("format", "wamnet-checkpoint"),
     "no format": lambda: _text("format", None),

@@ -185,6 +185,13 @@ def _later_feature_cases(first: int) -> list[Case]:
     color = {"color": single(noise(90, (2, 3, 3)))}
     for names, note in (("", "no feature"), ("color,", "a feature without a name"), (" color", "a space")):
         add("DAT-9", {**color, "features": names, **SCALES}, False, note)
+    apart = {**color, "depth": single(noise(91, (2, 3, 1)))}
+    add(
+        "DAT-9",
+        {**apart, "features": "color,depth,color", **SCALES},
+        False,
+        "a feature twice, another between",
+    )
     for names in ("seen_depth", "history", "highlights,normal"):
         add("DAT-9", {**color, "features": names, **SCALES}, False, f"a layer of {names} is missing")
     for layer, shape, note in WRONG_LAYERS:

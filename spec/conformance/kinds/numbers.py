@@ -171,14 +171,15 @@ TRANSFER = Function(
     "encoding.srgb",
     "Linear values in [0, 1] by the transfer function of sRGB",
     "ENC-1",
-    {"linear": Field("linear value")},
-    {"encoded": Field("encoded value in [0, 1]")},
+    {"linear": Field("linear value", 0, -1.0, 1.0)},
+    {"encoded": Field("encoded value in [0, 1]; of a negative one on the straight part")},
     lambda given, dtype: {"encoded": encoding.srgb_encode(given["linear"])},
     [
         ("black", {"linear": 0.0}),
         ("white", {"linear": 1.0}),
         ("where the line meets the curve, below", {"linear": 0.0031308}),
         ("where the line meets the curve, above", {"linear": 0.0031309}),
+        ("below black", {"linear": -0.5}, "ENC-3"),
     ],
     lambda u: {"linear": u[0]},
 )

@@ -58,7 +58,12 @@ MIDDLE, BEYOND = (0.5, 0.5, 0.5), (-0.25, 0.5, 1.25)
 
 
 def _model(
-    features: tuple[str, ...], window: Window, widths: list[int], seed: int, around: tuple[float, ...]
+    features: tuple[str, ...],
+    window: Window,
+    widths: list[int],
+    seed: int,
+    around: tuple[float, ...],
+    activation: str = siren.SINE,
 ) -> Model:
     """Return a small model whose pictures are near a colour."""
     n_in = dataset.n_inputs(features, window)
@@ -66,7 +71,7 @@ def _model(
     biases = (*network.biases[:-1], np.array(around, np.float32))
     weights = (*network.weights[:-1], (network.weights[-1] * np.float32(0.2)).astype(np.float32))
     scales = Normalization(0.5, 0.75, (0.25, -0.5, 0.5), 0.5)
-    return Model(siren.Siren(weights, biases, 3.0, 1.0), features, window, scales)
+    return Model(siren.Siren(weights, biases, 3.0, 1.0, activation), features, window, scales)
 
 
 def _layers(inputs: Mapping[str, Any]) -> Frame:
@@ -98,6 +103,9 @@ def _denoised() -> Iterator[tuple[Model, dict[str, Any], str]]:
         yield _model(features, window, widths, index, around), layers, note
     deep = _model(("depth",), Window(2, "clamp"), [4], len(DENOISED), MIDDLE)
     yield deep, {"depth": np.full((1, 1, 1), 0.25)}, "a frame of one number"
+    other = _model(("color", "depth"), Window(2, "clamp"), [6, 5], len(DENOISED) + 1, MIDDLE, "relu")
+    layers = bad_layers(2, 3, 160)
+    yield other, {name: layers[name] for name in ("color", "depth")}, "the activation relu"
 
 
 def _denoise_cases() -> list[Case]:
@@ -109,7 +117,8 @@ def _denoise_cases() -> list[Case]:
         bound = _bound(model, frame_of(layers), picture)
         text = "bounds of profile ieee at these pixels, features being one ulp off (compiler/proof/bounds.py)"
         expected = {"picture": Output(picture, bound, text)}
-        cases.append(Case(f"picture.denoised/{index}", "DEN-2", inputs, expected, (), note, "FRM-5"))
+        clause = "DEN-2" if model.siren.activation == siren.SINE else "ACT-1"
+        cases.append(Case(f"picture.denoised/{index}", clause, inputs, expected, (), note, "FRM-5"))
     needy = _model(("color", "normal"), Window(2, "clamp"), [4], 0, MIDDLE)
     inputs = {
         "color": bad_layers(2, 2, 5)["color"],
@@ -215,6 +224,8 @@ EXACT = (
     Exact("foundry", Settings(max_depth=0), 3, 4, 2, (1 << 31) + 1),
     Exact("foundry", Settings(max_depth=1), 2, 2, 1, (1 << 31) + 1),
     Exact("foundry", Settings(max_depth=0), 1, 1, 65, (1 << 31) + 1),
+    Exact("terrace", Settings(max_depth=3, roulette_depth=0), 2, 2, 2, (1 << 31) + 24),
+    Exact("yard", Settings(max_depth=3, roulette_depth=0), 2, 2, 2, (1 << 31) + 46),
 )
 """The pictures; the seeds are the first ones of which no sample has a decision that rounding could change."""
 

@@ -51,10 +51,10 @@ def _least() -> str:
     return json.dumps({**data, "boxes": [box, metal, glass]})
 
 
-def _sky(name: str, value: Any) -> str:
-    """Return the text of a scene with a fact of its sky changed."""
+def _sky(name: str, value: Any, **more: Any) -> str:
+    """Return the text of a scene with facts of its sky changed."""
     data = json.loads(scene_text("daylight"))
-    data["environment"][name] = value
+    data["environment"] |= {name: value, **more}
     return json.dumps(data)
 
 
@@ -77,7 +77,10 @@ def _letters() -> str:
     return json.dumps(data).replace("7.0]", "-0]")
 
 
-SCENE_LATER: Mapping[str, Callable[[], str]] = {"letters that are escaped, zeros with a sign": _letters}
+SCENE_LATER: Mapping[str, Callable[[], str]] = {
+    "letters that are escaped, zeros with a sign": _letters,
+    "six walls that name no material": lambda: _changed("room.materials", [None] * 6),
+}
 """Scenes that are read, which come last: those before keep their numbers."""
 
 SCENE_BAD: Mapping[str, Callable[[], str]] = {
@@ -118,6 +121,9 @@ SCENE_BAD: Mapping[str, Callable[[], str]] = {
     "a sun that is too narrow": lambda: _sky("sun_concentration", 2e6),
     "a sky and a background": lambda: json.dumps(
         {**json.loads(scene_text("daylight")), "background": [0.1, 0.1, 0.1]}
+    ),
+    "a sun without a direction and without light": lambda: _sky(
+        "sun_direction", [0.0, 0.0, 0.0], sun_irradiance=[0.0, 0.0, 0.0]
     ),
 }
 """Scenes that are refused: first for their form."""

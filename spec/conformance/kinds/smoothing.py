@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....refimpl.frame import FIRST_HIT, LAYERS, SEEN, Frame, validate
+from ....refimpl.frame import FIRST_HIT, LAYERS, Frame, validate
 from ....refimpl.network import smoothing
 from ....refimpl.network.smoothing import DEPTH, FARTHEST, GUIDES
 from ..case import Case, Kind, Output
@@ -214,7 +214,7 @@ def feature_rows() -> Iterator[tuple[str, str, str, Layers, float]]:
     """Yield clause, note, features, layers and exposure of feature images."""
     some = {"color": colors(45, 3, 4), **uneven(45, 3, 4, *ALL), **past(uneven(46, 3, 4, *ALL))}
     yield "SMO-1", "guided by the first hit, and past mirrors and glass", "smoothed,seen_smoothed", some, -0.5
-    others = {name: some[name] for name in ("color", *SEEN)}
+    others = {name: some[name] for name in ("color", *FIRST_HIT)}
     yield "SMO-1", "guided past mirrors and glass", "seen_smoothed", others, 0.5
     first = {name: some[name] for name in ("color", *GUIDE_LAYERS)}
     yield (

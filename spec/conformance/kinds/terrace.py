@@ -207,6 +207,9 @@ PANE = replace(
 BUBBLE = replace(LENS, name="bubble", quads=(), lights=())
 """The ball by itself."""
 
+LAMP = replace(LENS, name="lamp", spheres=(), quads=())
+"""The lamp by itself: a scene without a material."""
+
 SHINE: dict[str, Any] = {"reflectance": (0.5, 0.75, 0.25), "emission": (0.25, 0.5, 1.0)}
 """A surface that emits and reflects."""
 

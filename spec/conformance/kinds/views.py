@@ -19,7 +19,22 @@ from ....refimpl import rng
 from ....refimpl.light import render, scenes, transport
 from ....refimpl.light import scene as scene_module
 from ....refimpl.light.transport import Settings
-from .terrace import BARE, BUBBLE, DARK, DUSK, FOUNDRY, GLOW, LENS, MIRRORS, NIGHT, PANE, PLATE, TERRACE, YARD
+from .terrace import (
+    BARE,
+    BUBBLE,
+    DARK,
+    DUSK,
+    FOUNDRY,
+    GLOW,
+    LAMP,
+    LENS,
+    MIRRORS,
+    NIGHT,
+    PANE,
+    PLATE,
+    TERRACE,
+    YARD,
+)
 
 SCENES = ("cornell", "glossy", "daylight", "minicubes")
 """Canonical scenes whose paths are cases; each at a time of its own, [`TIME_S`]."""
@@ -28,7 +43,7 @@ OWN = {
     scene.name: scene
     for scene in (
         *(TERRACE, FOUNDRY, YARD, MIRRORS, PLATE, BARE, NIGHT, DARK, LENS, PANE, BUBBLE),
-        *(GLOW, DUSK),
+        *(GLOW, DUSK, LAMP),
     )
 }
 """Scenes of the vectors' own."""
@@ -299,6 +314,8 @@ LAMPLIT: tuple[tuple[str, Place, Place], ...] = (
     (DARK.name, (0.0, 0.5, 0.0), (3.0, 1.5, 3.0)),
     (DUSK.name, (0.0, 0.0, 0.0), (-0.75, 1.75, 0.25)),
     (DUSK.name, (-0.875, 1.875, 0.0), (-0.75, 1.75, 0.25)),
+    (LAMP.name, (0.0, 0.5, 0.0), (0.125, 2.5, 0.0625)),
+    (LAMP.name, (0.0, 3.0, 0.0), (0.125, 2.5, 0.0625)),
 )
 """Rays of scenes to lamps, from both sides, and to what is behind everything: in some no lamp is sampled."""
 

@@ -205,7 +205,7 @@ def _read(
     content = read_file(path, f"{kind} file")
     way_out = "write it with `wamnet train`"
     try:
-        found = deserialize(content)
+        found = deserialize(content)  # type: ignore[no-untyped-call]
     except (SafetensorError, *BROKEN) as error:
         raise InputError(f"{kind} file", str(path), f"not a safetensors file ({error})", way_out) from None
     texts = _header_texts(path, content)

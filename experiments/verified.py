@@ -3,7 +3,8 @@
 1. Each renderer is asked all cases [kernels/verify/run.py]; a row of the first table says for each rule how
    many of its cases passed, and which profile explains the others.
 2. The second table has a row for each deviation, with what a smaller case with other seeds said of it.
-3. What was found of a renderer is kept in the folder of results: an interrupted run resumes there. One that
+3. Those of `renderers.KNOWN` have commands; the path tracer of three.js is a page [lab/in_page.py].
+4. What was found of a renderer is kept in the folder of results: an interrupted run resumes there. One that
    is not installed fails in all cases, and its column says so.
 
     python experiments/verified.py --only wamnet,mitsuba
@@ -15,10 +16,12 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
+from lab import in_page
 from lab.command import begin
 from lab.tables import markdown
 
@@ -29,7 +32,7 @@ from wamnet.kernels.verify.case import RULES
 from wamnet.kernels.verify.cases import questions
 from wamnet.kernels.verify.judgement import Verdict
 
-NAMES = ("wamnet", *renderers.KNOWN)
+NAMES = ("wamnet", *renderers.KNOWN, in_page.NAME)
 """Renderers, in the order of the table."""
 
 
@@ -53,8 +56,8 @@ def kept(name: str, options: argparse.Namespace) -> dict[str, Any]:
     """Return what was found of a renderer, from the folder or by asking it."""
     path = options.output / f"{name}.json"
     if not path.exists():
-        renderer = renderers.known(name, options.executor, read_layers)
-        verdicts = run.verify(renderer, questions(), pictures=options.pictures)
+        with opened(name, options.executor) as renderer:
+            verdicts = run.verify(renderer, questions(), pictures=options.pictures)
         print(f"{name}: {dict(run.counts(verdicts))}", file=sys.stderr)
         shown = [report.row(verdict) for verdict in verdicts if verdict.deviates]
         rows = [[*row[:2], *row[3:]] for row in shown]
@@ -62,6 +65,16 @@ def kept(name: str, options: argparse.Namespace) -> dict[str, Any]:
         write_text(path, json.dumps(data, indent=1) + "\n")
     found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return found
+
+
+@contextmanager
+def opened(name: str, executor: str) -> Iterator[renderers.Renderer]:
+    """Yield a renderer by name."""
+    if name != in_page.NAME:
+        yield renderers.known(name, executor, read_layers)
+        return
+    with closing(in_page.PathTracer()) as renderer:
+        yield renderer
 
 
 def cell(verdicts: Sequence[Verdict], rule: str) -> str:

@@ -121,7 +121,7 @@ def ahead(
     return made
 
 
-HARD_OUTSIDE = ("input", "oidn-clean16", "oidn-past-prefiltered16", "hard-16", "slow-16", "smooth-16")
+HARD_OUTSIDE = ("input", "oidn-past-prefiltered16", "oidn-past-apart16", "hard-16", "smooth-16", "lit-16")
 """Rows that are shown of frames outside of the ranges of hard scenes."""
 
 README_ROWS = ("input", "oidn-color", "oidn-prefiltered1", "oidn-clean16", "best-16", "page-16", "page48-16")
@@ -138,8 +138,8 @@ AHEAD = (
     ),
     ("minicubes-page", "smooth-page-16", "the same cameras and lamps, colour smoothed"),
     ("cornell", "best-16", "`cornell`, camera moves"),
-    ("glossy", "smooth-16", "`glossy`, camera moves, features past mirrors and glass for both"),
-    ("daylight", "smooth-16", "`daylight`, the same"),
+    ("glossy", "lit-16", "`glossy`, camera moves, features past mirrors and glass for both"),
+    ("daylight", "lit-16", "`daylight`, the same"),
 )
 """Sets and rows that docs/results.md compares with Open Image Denoise, given the same features."""
 
@@ -529,7 +529,7 @@ FIGURES: Mapping[str, Callable[[Records], str]] = {
     "departures-clip": departure("unclipped", -1.0),
     "departures-loss": departure("summed"),
     "departures-replacement": departure("without replacement"),
-    "hard-ms": frame_ms("smooth-16", "hard-light-times"),
+    "hard-ms": frame_ms("lit-16", "hard-light-times"),
     "hard-oidn-ms": frame_ms("oidn-past-prefiltered16", "hard-light-times"),
     "hard-oidn-clean-ms": frame_ms("oidn-past-clean16", "hard-light-times"),
     "moving-mitsuba": moving("mitsuba", "whole picture, denoised fast", "times opencl, moving", 1),

@@ -14,7 +14,7 @@ from lab.frames import Shot
 from wamnet.kernels.run import render_on
 from wamnet.kernels.run.frame_plan import version
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.frame import FIRST_HIT, SEEN, USUAL
+from wamnet.refimpl.frame import FIRST_HIT, USUAL
 from wamnet.refimpl.light import render as driver
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scene import scene_digest

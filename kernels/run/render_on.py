@@ -118,9 +118,9 @@ def render_on(
         return with_own_features(scene, job, partial(render_on, executor, scene, **options, frames=frames))
     if job.seen and job.color and len(planes(groups_of(job))) > most_planes(executor.name, executor.lanes):
         # The same paths twice, for layers that no kernel of this device writes at once.
-        parts = replace(job, seen=False), replace(job, color=False)
-        part = partial(render_on, executor, scene, rows=rows, profile=profile, frames=frames)
-        return joined(scene, job, part(parts[0], on_progress=on_progress), part(parts[1]))
+        again = partial(render_on, executor, scene, rows=rows, profile=profile, frames=frames)
+        color = again(replace(job, seen=False), on_progress=on_progress)
+        return joined(scene, job, color, again(replace(job, color=False)))
     first, last = checked_rows(job, rows)
     if moment is None and frames is not None:
         moment = frames.of(executor, scene, job, profile)

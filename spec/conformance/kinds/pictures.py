@@ -28,6 +28,7 @@ from ....refimpl.light import scene as scene_module
 from ....refimpl.light.render import Job, render
 from ....refimpl.light.transport import Settings
 from ....refimpl.network import dataset, denoise, siren
+from ....refimpl.network.activation import SINE
 from ....refimpl.network.dataset import Normalization, Window
 from ....refimpl.network.denoise import Model
 from .. import blocks
@@ -63,7 +64,7 @@ def _model(
     widths: list[int],
     seed: int,
     around: tuple[float, ...],
-    activation: str = siren.SINE,
+    activation: str = SINE,
 ) -> Model:
     """Return a small model whose pictures are near a colour."""
     n_in = dataset.n_inputs(features, window)
@@ -117,7 +118,7 @@ def _denoise_cases() -> list[Case]:
         bound = _bound(model, frame_of(layers), picture)
         text = "bounds of profile ieee at these pixels, features being one ulp off (compiler/proof/bounds.py)"
         expected = {"picture": Output(picture, bound, text)}
-        clause = "DEN-2" if model.siren.activation == siren.SINE else "ACT-1"
+        clause = "DEN-2" if model.siren.activation == SINE else "ACT-1"
         cases.append(Case(f"picture.denoised/{index}", clause, inputs, expected, (), note, "FRM-5"))
     needy = _model(("color", "normal"), Window(2, "clamp"), [4], 0, MIDDLE)
     inputs = {

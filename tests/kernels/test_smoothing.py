@@ -11,7 +11,7 @@ from rough import rough_layers
 from wamnet.compiler.scenes.smooth_kernel import compile_smoothing, error_at
 from wamnet.kernels.run.denoise_on import denoise_on, filter_of, images_of, images_on
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.frame import SEEN, Frame
+from wamnet.refimpl.frame import FIRST_HIT, Frame
 from wamnet.refimpl.network import dataset, smoothing
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
@@ -134,7 +134,7 @@ def model_of(kit, features, scales=SCALES):
 
 def whole_frame(layers, dtype=np.float32):
     """Return a frame in which other surfaces are seen past mirrors and glass."""
-    seen = {name: -layers[first][::-1] for name, first in SEEN.items()}
+    seen = {name: -layers[first][::-1] for name, first in FIRST_HIT.items()}
     return Frame({name: values.astype(dtype) for name, values in {**layers, **seen}.items()})
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.frame import SEEN, Frame
+from wamnet.refimpl.frame import FIRST_HIT, Frame
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.smoothing import dimmed, smooth
@@ -147,10 +147,10 @@ def test_the_features_clip_smooth_and_encode():
     color = np.random.default_rng(1).exponential(1.0, shape)
     color[2, 2] = (1e6, np.nan, -1.0)
     scales = Normalization(exposure_stops=-2.0)
-    frame = Frame({"color": color, **layers, **{s: -layers[f] for s, f in SEEN.items() if f in layers}})
+    frame = Frame({"color": color, **layers, **{s: -layers[f] for s, f in FIRST_HIT.items() if f in layers}})
     clipped = np.where(np.isnan(color), 0.0, color).clip(0.0, 64.0)
     assert np.array_equal(dimmed(clipped, -2.0), clipped)
-    past = {first: frame[seen].astype(np.float64) for seen, first in SEEN.items() if first in layers}
+    past = {first: frame[seen].astype(np.float64) for seen, first in FIRST_HIT.items() if first in layers}
     for name, guides in (("smoothed", layers), ("seen_smoothed", past)):
         wanted = dataset.encode_color(smooth(clipped, guides, 3), scales).astype(np.float32)
         assert np.array_equal(dataset.feature_image(frame, (name,), scales), wanted)

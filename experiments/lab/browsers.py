@@ -85,10 +85,9 @@ document.body.append(asked);
 """The same as a script of the page itself: those of Marionette have a scope of their own."""
 
 
-def denoise(
-    model: Model, images: Mapping[str, NDArray[np.float32]], flags: Sequence[str]
-) -> tuple[str, NDArray[np.float32]]:
-    """Return browser and graphics device, and the picture (H, W, 3) of square images (H, W, C)."""
+@contextmanager
+def chromium(flags: Sequence[str] = ()) -> Iterator[Any]:
+    """Yield a browser; raise ExecutorUnavailable where there is none, or it does not start."""
     program = next(filter(None, map(shutil.which, NAMES)), None)
     try:
         from playwright.sync_api import Error, sync_playwright
@@ -96,9 +95,25 @@ def denoise(
         raise ExecutorUnavailable("no package playwright; pip install 'wamnet[web]'") from None
     if program is None:
         raise ExecutorUnavailable("no Chromium; in Debian: apt-get install chromium")
-    with _page(model, images) as path, sync_playwright() as driver:
+    with sync_playwright() as driver:
         try:
             browser = driver.chromium.launch(executable_path=program, headless=True, args=[*FLAGS, *flags])
+        except Error as error:
+            raise ExecutorUnavailable(f"Chromium does not start: {str(error).splitlines()[0]}") from None
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+def denoise(
+    model: Model, images: Mapping[str, NDArray[np.float32]], flags: Sequence[str]
+) -> tuple[str, NDArray[np.float32]]:
+    """Return browser and graphics device, and the picture (H, W, 3) of square images (H, W, C)."""
+    with chromium(flags) as browser, _page(model, images) as path:
+        from playwright.sync_api import Error
+
+        try:
             tab = browser.new_context(reduced_motion="reduce").new_page()
             tab.set_default_timeout(WAIT_MS)
             tab.goto(path.resolve().as_uri())
@@ -107,7 +122,6 @@ def denoise(
         except Error as error:
             raise ExecutorUnavailable(f"Chromium: {str(error).splitlines()[0]}") from None
         told = f"Chromium {browser.version}, {device}"
-        browser.close()
     return told, _picture(words)
 
 

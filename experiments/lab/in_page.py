@@ -18,6 +18,7 @@ import os
 import shutil
 import subprocess
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ from wamnet.kernels.verify.judgement import FAILED, UNTESTED, Missing, Picture
 from wamnet.kernels.verify.parts import NotExpressed
 from wamnet.refimpl.errors import ExecutorUnavailable
 
-from .browsers import FLAGS, NAMES, WAIT_MS
+from .browsers import WAIT_MS, chromium
 
 NAME = "three-gpu-pathtracer"
 """Of the renderer, and of its package."""
@@ -113,7 +114,7 @@ class PathTracer:
     intents = renderers.FORMATS["gltf"].intents
 
     def __init__(self) -> None:
-        self._driver: Any = None
+        self._browser = ExitStack()
         self._page: Any = None
 
     def pictures(self, shot: Shot, seeds: Sequence[int]) -> Sequence[Picture] | Missing:
@@ -137,16 +138,8 @@ class PathTracer:
     def _opened(self) -> Any:
         """Return the page, with all of its modules."""
         if self._page is None:
-            folder, program = packages(), next(filter(None, map(shutil.which, NAMES)), None)
-            if program is None:
-                raise ExecutorUnavailable("no Chromium; in Debian: apt-get install chromium")
-            try:
-                from playwright.sync_api import sync_playwright
-            except ImportError:
-                raise ExecutorUnavailable("no package playwright; pip install 'wamnet[web]'") from None
-            self._driver = sync_playwright().start()
-            browser = self._driver.chromium.launch(executable_path=program, headless=True, args=[*FLAGS])
-            page = browser.new_page()
+            folder = packages()
+            page = self._browser.enter_context(chromium()).new_page()
             page.set_default_timeout(WAIT_MS)
             page.route("**/*", lambda route: _answer(route, folder))
             page.goto(ADDRESS)
@@ -156,10 +149,8 @@ class PathTracer:
 
     def close(self) -> None:
         """Close the browser."""
-        if self._driver is not None:
-            self._page.context.browser.close()
-            self._driver.stop()
-            self._driver = self._page = None
+        self._browser.close()
+        self._page = None
 
 
 def packages() -> Path:

@@ -6,7 +6,7 @@ import base64
 
 import numpy as np
 import pytest
-from lab import in_page
+from lab import browsers, in_page
 
 from wamnet.kernels.verify import run
 from wamnet.kernels.verify.case import Shot
@@ -86,6 +86,14 @@ def test_a_missing_package_is_named(monkeypatch, tmp_path):
     for path in in_page.MODULES.values():
         (tmp_path / path).mkdir(parents=True, exist_ok=True)
     assert in_page.packages() == tmp_path
+
+
+def test_a_browser_that_does_not_start_is_no_executor(monkeypatch):
+    """A crash of the browser is reported in a sentence, and leaves no driver behind."""
+    pytest.importorskip("playwright")
+    monkeypatch.setattr(browsers, "NAMES", ("false",))
+    with pytest.raises(ExecutorUnavailable, match="Chromium does not start: "), browsers.chromium():
+        pass
 
 
 @pytest.mark.slow

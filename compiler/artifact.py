@@ -60,7 +60,7 @@ class Artifact:
     @property
     def entry_point(self) -> str:
         """Return the name of the kernel's function."""
-        return self.plan.target.entry
+        return str(self.manifest["entry_point"])
 
     @property
     def interface(self) -> Interface:

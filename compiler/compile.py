@@ -88,7 +88,7 @@ def _of_two_passes(plan: Plan, cut: Cut) -> Artifact:
         f"pass      2 of 2: sums along the columns of the first pass's image, and the layers after it; the\n"
         f"          bound is that of both passes, against program {ir.digest(plan.analysed)[:32]}",
     )
-    before = _of_one_pass(horizontal, alone, notes[0].split("\n"))
+    before = _of_one_pass(horizontal, alone, notes[0].split("\n"), HORIZONTAL)
     found = _of_one_pass(vertical, bound, notes[1].split("\n"))
     return replace(_joined(before, found, _report(plan, cut)), plan=plan)
 
@@ -127,12 +127,22 @@ def _joined(before: Artifact, found: Artifact, report: Mapping[str, Any]) -> Art
     return replace(found, manifest=manifest, before=before)
 
 
-def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[str] = ()) -> Artifact:
-    """Return the kernel of a plan without a cut; `notes` are further lines of its header."""
+def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[str] = (), part: str = "") -> Artifact:
+    """Return the kernel of a plan without a cut; `notes` are further lines of its header.
+
+    `part`: what a language calls it whose hosts join it with the denoiser's other kernel.
+    """
     header = [*_header(plan, bound), *notes, *_weight_lines(plan.emitted, plan.schedule)]
     # Where nothing rounds, a language need not keep the order of operations.
     is_ordered = bound.output is not None and not bound.exact
-    return _assemble(plan, bound, plan.schedule.emit(plan.emitted, header, is_ordered))
+    source, entry, dialect = (
+        plan.schedule.emit(plan.emitted, header, is_ordered),
+        plan.target.entry,
+        plan.target.dialect,
+    )
+    if part and dialect is not None:
+        source, entry = dialect.apart(source, part), dialect.apart(entry, part)
+    return _assemble(plan, bound, source, entry)
 
 
 def _header(plan: Plan, bound: Bound) -> list[str]:
@@ -197,7 +207,7 @@ def _bound_text(bound: Bound, program: Program) -> str:
     return f"|output - float64 reference| <= {round_up(max(bound.output)):g} for all images in these ranges"
 
 
-def _assemble(plan: Plan, bound: Bound, source: str) -> Artifact:
+def _assemble(plan: Plan, bound: Bound, source: str, entry: str) -> Artifact:
     """Return the artifact with its manifest."""
     emitted, target, schedule = plan.emitted, plan.target, plan.schedule
     gather, profile = kernel_gather(emitted), plan.profile
@@ -210,7 +220,7 @@ def _assemble(plan: Plan, bound: Bound, source: str) -> Artifact:
         "program": ir.digest(plan.analysed),
         "target": target.name,
         "language": schedule.language or target.language,
-        "entry_point": target.entry,
+        "entry_point": entry,
         "profile": {"name": profile.name, "text": profile.text},
         "sine": asdict_finite(plan.sine),
         "passes": [*pipeline.COMMON, *profile.common, *profile.passes],

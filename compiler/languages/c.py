@@ -3,10 +3,14 @@
 Contraction (a product fused with a sum) is off in the text itself: by the standard's pragma, which GCC
 ignores, and by GCC's own. An option of the compiler that allows more than the standard does, such as
 -ffast-math, voids the bound: where a bound is stated, the text refuses to compile with it.
+
+A header is C++ as well, leaves no macro behind but its guard and those named WAMNET_, and shares no name with
+the header of a denoiser's other kernel [`C.finished`, `C.apart`].
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
@@ -39,6 +43,21 @@ POPPED = """\
 #endif"""
 """The last lines of a header."""
 
+RESTRICT = """\
+#if defined(__cplusplus)
+#define restrict __restrict /* what compilers of C++ call it */
+#endif"""
+"""The lines that make the header C++."""
+
+DEFINED = re.compile(r"^ *# *define (?!WAMNET_)(\w+)", re.MULTILINE)
+"""Macros of a text, but the guard and other names that nobody else has."""
+
+TABLES = re.compile(r"^static const \w+ (\w+)\[", re.MULTILINE)
+"""Tables outside of functions."""
+
+GUARD, GUARDED = "#ifndef WAMNET_", "\n#endif"
+"""What the first line below a header's comment begins with, and its last line."""
+
 IGNORED = """\
 /* What only planes need that are not asked for is computed all the same; compilers leave it out. */
 #if defined(__GNUC__)
@@ -61,10 +80,15 @@ ALL_PIXELS = "/* All pixels, one after another. */"
 """What the function is for that calls the one of a pixel."""
 
 
+def whole(entry: str) -> str:
+    """Return the name of the function of all pixels, by that of a pixel's."""
+    return entry.replace("_trace_pixel", "_trace").replace("_pixel", "_image")
+
+
 def includes(role: str, *names: str) -> list[str]:
     """Return the guard of a header, and what it includes."""
     guard = f"WAMNET_{'TRACE' if role == PATH else role.upper()}_H"
-    return [f"#ifndef {guard}", f"#define {guard}", *(f"#include <{name}.h>" for name in names)]
+    return [f"#ifndef {guard}", f"#define {guard}", *(f"#include <{name}.h>" for name in names), RESTRICT]
 
 
 class C(Arguments):
@@ -136,6 +160,20 @@ class C(Arguments):
         "maximum": "{1} > {0} ? {1} : {0}",
         "convert": "({type}){0}",
     }
+
+    def finished(self, text: str) -> str:
+        """Return a header that drops its macros at its end, before the end of its guard."""
+        dropped = [f"#undef {name}" for name in sorted(set(DEFINED.findall(text)))]
+        return "\n".join([text.removesuffix(GUARDED), *dropped]) + GUARDED
+
+    def apart(self, source: str, part: str) -> str:
+        """Return a header whose functions, types, tables and guard are named after a part of a denoiser."""
+        tables = "|".join(TABLES.findall(source)) or "(?!)"
+        place = source.find(GUARD)  # what is above is a comment, or the source is a name
+        above, text = source[: max(place, 0)], source[max(place, 0) :]
+        text = re.sub(r"\bWAMNET_DENOISE_H\b", f"WAMNET_{part.upper()}_H", text)
+        text = re.sub(rf"\b({tables})\b", r"wamnet_\1", text)
+        return re.sub(r"\bwamnet_(?=[a-z])", f"wamnet_{part}_", above + text)
 
     def integer(self, kernel: Interface, name: str) -> str:
         """Return the text of an integer that the kernel is given: a path's are in one structure."""

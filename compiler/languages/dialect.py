@@ -147,6 +147,14 @@ class Dialect:
         """Return the text of a number converted to another kind."""
         return f"{self.scalars[dtype]}({text})"
 
+    def finished(self, text: str) -> str:
+        """Return the whole text of a kernel, without what may not be left behind."""
+        return text
+
+    def apart(self, source: str, part: str) -> str:
+        """Return a kernel whose names are those of no other part of its denoiser, if a host joins them."""
+        return source
+
     def integer(self, kernel: Interface, name: str) -> str:
         """Return the text of an integer that the kernel is given."""
         return name

@@ -106,7 +106,8 @@ class GodotDenoise(GLSL):
         DENOISE: (
             "each image: a texture of 32-bit floats (Image.FORMAT_RGBF), row 0 the picture's top row;\n"
             "weight_texture: Image.FORMAT_RF, 1024 texels wide, as many rows as weights fill, row by row;\n"
-            "the item has the images' size in pixels, and a viewport with HDR 2D, or colours keep 8 bits.\n"
+            "the item has the images' size in pixels. Colours keep 8 bits. A viewport with HDR 2D keeps 16,\n"
+            "but encodes once more what it shows: read from it, and do not show it.\n"
             "The result is display-encoded already"
         )
     }

@@ -92,7 +92,7 @@ def framed(
     """Return a kernel's source: a comment, what the kernel is bound to, its statements, its end."""
     comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
     begin, end = dialect.begin(kernel, parts), dialect.ends[kernel.role]
-    return "\n".join([*dialect.first, *comment, begin, *lines, end]) + "\n"
+    return dialect.finished("\n".join([*dialect.first, *comment, begin, *lines, end])) + "\n"
 
 
 def private_bytes(program: Program) -> int:

@@ -8,6 +8,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
+#if defined(__cplusplus)
+#define restrict __restrict /* what compilers of C++ call it */
+#endif
 #define WINDOW_SIZE 2
 #define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
 /* A product may be fused with a sum: the bound holds either way. */
@@ -319,4 +322,10 @@ static inline void wamnet_pixel(
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC pop_options
 #endif
+#undef LANES
+#undef PATCH_WIDTH
+#undef PIXELS
+#undef WINDOW_CENTRE
+#undef WINDOW_SIZE
+#undef restrict
 #endif

@@ -23,6 +23,9 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
+#if defined(__cplusplus)
+#define restrict __restrict /* what compilers of C++ call it */
+#endif
 
 /* No product may be fused with a sum. Compilers differ in what they obey, so give them -ffp-contract=off too:
    clang takes the standard's pragma unless it is told -ffp-contract=fast, GCC ignores that and takes its own,
@@ -163,4 +166,7 @@ static inline void wamnet_pixel(
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC pop_options
 #endif
+#undef WINDOW_CENTRE
+#undef WINDOW_SIZE
+#undef restrict
 #endif

@@ -27,6 +27,9 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
+#if defined(__cplusplus)
+#define restrict __restrict /* what compilers of C++ call it */
+#endif
 #if defined(__FAST_MATH__) || !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif
@@ -424,4 +427,7 @@ static inline void wamnet_pixel(
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC pop_options
 #endif
+#undef WINDOW_CENTRE
+#undef WINDOW_SIZE
+#undef restrict
 #endif

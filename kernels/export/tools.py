@@ -16,6 +16,7 @@ from pathlib import Path
 
 from ...compiler.schedules.buffers_group import PORTABLE
 from ...refimpl.errors import CompileError, ExecutorUnavailable
+from .spirv_names import named
 
 PACKAGES: Mapping[str, str] = {
     "glslangValidator": "glslang-tools",
@@ -92,7 +93,7 @@ def hlsl(binary: bytes, style: str) -> str:
     """Return SPIR-V as HLSL for a compiler of [`HLSL_STYLES`]."""
     with tempfile.TemporaryDirectory(prefix="wamnet-hlsl-") as name:
         folder = Path(name)
-        (folder / "kernel.spv").write_bytes(binary)
+        (folder / "kernel.spv").write_bytes(named(binary))
         model = HLSL_STYLES[style]
         run(
             "spirv-cross",

@@ -26,6 +26,8 @@ wamnet export model.safetensors --target wgsl -o for-webgpu
 
 wamnet export model.safetensors --scene minicubes --target glsl-es -o for-webgl
 
+wamnet export model.safetensors --scene minicubes --host c -o program
+
 wamnet export model.safetensors --target c --weights inline --check -o header
 
 wamnet export model.safetensors --target cuda --schedule plain -o to-read
@@ -42,6 +44,9 @@ TARGETS = (
     "onnx, html"
 )
 """Targets by name, for help texts: those of the registry in kernels, and the page."""
+
+HOSTS = "c, cpp, opencl, vulkan, webgpu, three, babylon, playcanvas, onnxruntime-web, onnxruntime, openvino"
+"""Hosts by name, for help texts: those of the registry in kernels."""
 
 HTML, PAGE_NAME = "html", "index.html"
 """The target that is a web page, and its file."""
@@ -100,6 +105,26 @@ SceneToo = Annotated[
 ]
 
 
+TargetName = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help=f"Where it is going: {TARGETS}.", show_default="the host's"),
+]
+HostName = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help=f"A whole program around it: {HOSTS}.", show_default="none"),
+]
+Folder = Annotated[
+    Path | None,
+    typer.Option(
+        "-o", "--output", metavar="FOLDER", help="New folder for the files.", show_default="HOST or TARGET"
+    ),
+]
+Checked = Annotated[
+    bool,
+    typer.Option("--check", help="Compile and run it here, and compare with the reference's picture."),
+]
+
+
 @dataclass(frozen=True)
 class Span:
     """What moves, and the length and the density of the table of times, if they are given."""
@@ -128,15 +153,9 @@ class Span:
 
 def export(
     model: options.ModelFile,
-    target: Annotated[
-        str, typer.Option(metavar="NAME", help=f"Where it is going: {TARGETS}.", show_default=False)
-    ],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", metavar="FOLDER", help="New folder for the files.", show_default="TARGET"
-        ),
-    ] = None,
+    target: TargetName = None,
+    host: HostName = None,
+    output: Folder = None,
     scene: SceneToo = None,
     time: options.Time = None,
     parameters: options.Parameters = None,
@@ -149,18 +168,18 @@ def export(
     moving: Moving = None,
     seconds: Seconds = None,
     fps: Fps = None,
-    check: Annotated[
-        bool,
-        typer.Option("--check", help="Compile and run it here, and compare with the reference's picture."),
-    ] = False,
+    check: Checked = False,
 ) -> None:
     """Write a denoiser for another program: kernels, a manifest, a README, and a pair to check with.
+
+    With --host there is a program around it that runs as it is: see "Run it" in the README.
 
     Each target's files were compiled by its own tools, run, and checked against the bound in the manifest.
     With a scene the path tracer and the encoding of its features are written too; with --target html, a web
     page that does all of it.
     """
-    folder = output or Path(target)
+    target = _target(target, host)
+    folder = output or Path(host or target)
     if target == HTML:
         of_kernels = {"--weights": weights, "--variant": variant, "--check": check or None, "--time": time}
         of_kernels |= {"--schedule": schedule, "--moving": moving, "--seconds": seconds, "--fps": fps}
@@ -179,11 +198,23 @@ def export(
     moment, paths = (time, parameters or []), (max_depth, sampler)
     span = None if moving is None else Span(tuple(moving.split(",")), seconds, fps)
     asked = (variant, weights, schedule)
-    made = _export(model, target, scene, moment, paths, profile, asked, span)
+    made = _export(model, (target, host or ""), scene, moment, paths, profile, asked, span)
     _write(folder, made.contents())
     _tell(made)
     if check:
         _checked(made)
+
+
+def _target(target: str | None, host: str | None) -> str:
+    """Return the target that is named, or that of a host."""
+    if host is not None:
+        from ...kernels.export.hosts.table import host_named
+
+        return target or host_named(host).target
+    if target is None:
+        rule = "an export has a target or a host"
+        raise InputError("--target", "not given", rule, "add --target NAME or --host NAME; --help lists both")
+    return target
 
 
 def _refuse(given: dict[str, Any], rule: str, way_out: str) -> None:
@@ -195,7 +226,7 @@ def _refuse(given: dict[str, Any], rule: str, way_out: str) -> None:
 
 def _export(
     model: Path,
-    target: str,
+    place: tuple[str, str],
     scene: str | None,
     moment: tuple[float | None, list[str]],
     paths: tuple[int, Sampler],
@@ -203,7 +234,10 @@ def _export(
     asked: tuple[str | None, str | None, str | None],
     span: Span | None,
 ) -> Export:
-    """Return the export that the options ask for: `asked` are variant, place of the weights and schedule."""
+    """Return the export that the options ask for.
+
+    `place`: target and host; `asked`: variant, place of the weights and schedule.
+    """
     from ...compiler.variants import FULL
     from ...kernels.export.package import Request
     from ...kernels.export.package import export as exported
@@ -213,8 +247,8 @@ def _export(
     motion = span.motion(scene, *moment) if scene and span else None
     loaded = motion.scenes[0] if motion else load_scene(scene, *moment) if scene else None
     variant, weights, schedule = (text or "" for text in asked)
-    options_of = (weights, variant or FULL, settings, schedule, motion)
-    return exported(Request(load_model(model), target, loaded, profile, *options_of))
+    options_of = (weights, variant or FULL, settings, schedule, motion, place[1])
+    return exported(Request(load_model(model), place[0], loaded, profile, *options_of))
 
 
 def _tell(made: Export) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ...compiler.languages.c import whole
 from ...compiler.languages.interface import BLOCK, PATH, TABLE, UNSIGNED, Interface
 from ...refimpl.errors import ExecutorUnavailable
 from ..devices.executor import Kernel
@@ -208,11 +209,10 @@ class CRunner(HostRunner):
 
     def _glue(self, kernel: Kernel, group: tuple[int, int] | None, folder: Path) -> str:
         arrays, integers = _arrays(kernel.interface), _integers(kernel.interface)
-        function = {"wamnet_pixel": "wamnet_image", "wamnet_trace_pixel": "wamnet_trace"}
-        call = f"{function.get(kernel.entry_point, kernel.entry_point)}({', '.join([*arrays, *integers])});"
+        call = f"{whole(kernel.entry_point)}({', '.join([*arrays, *integers])});"
         if kernel.interface.role == PATH:
             part = f"const wamnet_part part = {{{', '.join(integers)}}};"
-            call = f"{part}\n    wamnet_trace(&part, {', '.join(arrays)});"
+            call = f"{part}\n    {whole(kernel.entry_point)}(&part, {', '.join(arrays)});"
         head = "void wamnet_call(const int *sizes, float *const *buffers, int columns, int rows)"
         return (
             f'#include "kernel.txt"\n{head};\n{head}\n{{\n    (void)columns;\n    (void)rows;\n'

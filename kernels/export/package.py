@@ -6,6 +6,7 @@
    are beside the source that they are made from.
 3. `check/` holds inputs, the reference's output and how far off each number may be [check_pair.py].
 4. `manifest.json` says what there is and how it is bound [`manifest_of`], `README.md` how to call it.
+5. With a host there is a whole program around it [hosts/], and the picture that it shows.
 
 Everything is a function of model, scene and request, and of the translators' versions.
 """
@@ -14,7 +15,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,8 @@ from ...refimpl.network.denoise import Model, learned_feature_spp
 from ...refimpl.network.whole import Whole
 from ...refimpl.reading import SIZES
 from . import bindings, check_pair, onnx_export, readme
+from .hosts.picture import beside
+from .hosts.table import host_named
 from .motion import ROWS_NAME, Motion
 from .targets import NAMES, ONNX, TARGETS, Limit, Place, Row
 
@@ -54,12 +57,15 @@ LICENCE = (
 MANIFEST_NAME, README_NAME = "manifest.json", "README.md"
 """Files of every export."""
 
+EXPECTED_NAME = "expected.png"
+"""What a host shows of the check pair, as the reference draws it."""
+
 
 @dataclass(frozen=True)
 class Request:
     """What is wanted. `weights`: a place, `schedule`: one that has them there; the usual ones where empty.
 
-    `motion`: what moves in the scene, which is that of its first moment.
+    `motion`: what moves in the scene, which is that of its first moment. `host`: a program around it.
     """
 
     model: Model
@@ -71,6 +77,7 @@ class Request:
     settings: Settings = field(default_factory=Settings)
     schedule: str = ""
     motion: Motion | None = None
+    host: str = ""
 
 
 @dataclass(frozen=True)
@@ -102,6 +109,7 @@ def export(request: Request) -> Export:
     if request.target not in NAMES:
         rule = f"must be one of {', '.join(NAMES)}, html"
         raise InputError("--target", request.target, rule, "choose one of these")
+    request = _hosted(request)
     if request.target == ONNX:
         return _graph(request)
     row = TARGETS[request.target]
@@ -135,6 +143,21 @@ def export(request: Request) -> Export:
     facts["scene"] = _scene(request, programs)
     facts["kernels"] = bindings.kernels(row, denoiser, path, encoder, passes)
     return _finished(request, facts, files, denoiser, path, encoder, passes, pair)
+
+
+def _hosted(request: Request) -> Request:
+    """Return a request with what its host wants of an export, or refuse what the host does not run."""
+    if not request.host:
+        return request
+    host = host_named(request.host)
+    if request.target != host.target:
+        rule = f"host {host.name} runs kernels of target {host.target}"
+        raise InputError("--target", request.target, rule, "leave it out, or leave --host out")
+    scene = None if request.scene is None else request.scene.name
+    two = vary(parse(request.variant), request.model).rank > 0
+    host.check(scene, request.motion is not None, two, request.variant)
+    weights, schedule = request.weights or host.weights, request.schedule or host.schedule
+    return replace(request, weights=weights, schedule=schedule)
 
 
 def _graph(request: Request) -> Export:
@@ -180,7 +203,13 @@ def _finished(
 ) -> Export:
     """Return the export with its README and manifest, which has hashes and lengths of all other files."""
     facts = {"schema": SCHEMA, "target": request.target, "licence": LICENCE, "check": pair.facts(), **facts}
-    files = {**files, README_NAME: readme.readme(facts, denoiser).encode()}
+    host = host_named(request.host) if request.host else None
+    if host:
+        facts["host"] = host.facts()
+        first = next(iter(pair.images.values()))
+        seen = first if first.shape[2] == 3 else pair.output
+        files = {**files, **host.contents(facts), EXPECTED_NAME: beside(seen, pair.output)}
+    files = {**files, README_NAME: readme.readme(facts, denoiser, host).encode()}
     hashes = {name: sha256(data) for name, data in sorted(files.items())}
     digest = sha256(*(value.encode() for value in hashes.values()))
     named = {"files": hashes, SIZES: {name: len(files[name]) for name in hashes}, "digest": digest}

@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...compiler.artifact import Artifact
-from ...compiler.languages.interface import SCENE_NUMBERS
+from ...compiler.languages.c import whole
+from ...compiler.languages.interface import SCENE_NUMBERS, WEIGHTS
 from ...compiler.reading.languages import is_read
 from ...compiler.schedules.schedules import text
-from .targets import ONNX, TARGETS
+from .hosts.host import Host
+from .targets import DISPATCHED, ONNX, TARGETS, Row
 
 ONNX_CODE = """\
 import numpy as np, onnxruntime
@@ -26,23 +28,48 @@ print("largest error", np.abs(result - expected).max(), "expected at most", boun
 """A program for a graph, which checks itself."""
 
 IMAGE_LINES: Mapping[str, str] = {
-    "numbered": "bind_storage(pipeline, {slot}, {name});",
-    "registers": "bind_storage(pipeline, {slot}, {name});",
     "names": 'bind_texture({number}, {name}, "{name}");',
     "channels": "   {slot}: {name}",
-    "arguments": "",
-    "header": "",
+    "godot": 'material.set_shader_parameter("{name}", ImageTexture.create_from_image({name}))',
 }
-"""How a line of the code binds an image, by the kind of slots."""
+"""How a line of the code binds an image of the denoiser, by the kind of slots, or by the target."""
+
+EARLIER: Mapping[str, str] = {
+    "arguments": "/* `arguments` of this kernel in manifest.json says how many items it takes. */\n"
+    "run({file}, {entry}, {arguments});",
+    "header": '#include "{file}"\n{whole}({arguments});',
+    "names": "glUseProgram(link(fullscreen_triangle, compile(GL_FRAGMENT_SHADER, {file})));\n"
+    "{images}{integers}"
+    "draw_into({written});   /* RGBA32F colour buffers, in this order; then as below */",
+    "channels": "",
+}
+"""Lines that call a kernel before the last one, by the kind of slots; of buffers [`BUFFER_LINES`]."""
+
+DOES: Mapping[str, str] = {
+    "path": "Paths: sums over samples.",
+    "encode": "The images of the features, from the sums.",
+    "horizontal": "Sums along the rows: this kernel's result is the next one's image_horizontal.",
+}
+"""What a kernel before the last one does, by its role."""
+
+BUFFER_LINES = """\
+pipeline = create_pipeline({file}, "{entry}");
+{bound}
+{dispatch};"""
+"""Lines that call a kernel on buffers with numbers."""
 
 
-def readme(facts: Mapping[str, Any], denoiser: Artifact | None) -> str:
-    """Return the text for what a manifest says; `denoiser`: the kernel, None where it is a graph."""
+def readme(facts: Mapping[str, Any], denoiser: Artifact | None, host: Host | None = None) -> str:
+    """Return the text for what a manifest says.
+
+    `denoiser`: the kernel, None where it is a graph; `host`: the program around it, if there is one.
+    """
     lines = [
         f"# Denoiser for {facts['target']}",
         "",
         f"{facts['language']}. Written by `wamnet export`; `manifest.json` says the same for programs.",
         "",
+        *_hosted(host),
         *_facts(facts),
         "",
         "## Kernels, in the order in which they run",
@@ -71,6 +98,31 @@ def readme(facts: Mapping[str, Any], denoiser: Artifact | None) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def _hosted(host: Host | None) -> list[str]:
+    """Return the section about the program around the kernels."""
+    if host is None:
+        return []
+    storage = host.storage
+    added = (
+        f"its bound and {storage.added:.3g} ({storage.name}: {storage.why})" if storage.added else "its bound"
+    )
+    return [
+        "## Run it",
+        "",
+        f"Here is {host.text}, complete. It needs {host.needs}. In this folder:",
+        "",
+        "```sh",
+        host.run,
+        "```",
+        "",
+        f"It compares the check pair with the reference, each number within {added}, and shows {host.sees}:",
+        "the noisy picture on the left, the denoised one on the right, as in `expected.png`.",
+        "",
+        "## Facts",
+        "",
+    ]
 
 
 def _facts(facts: Mapping[str, Any]) -> list[str]:
@@ -243,23 +295,78 @@ def _started(schedule: Mapping[str, Any]) -> dict[str, int]:
 
 
 def _code(facts: Mapping[str, Any]) -> str:
-    """Return the lines of a program that calls the denoiser."""
+    """Return the lines of a program that calls all kernels in their order."""
     check = facts["check"]
     if facts["target"] == ONNX:
         shape = {name: image["channels"] for name, image in check["images"].items()}
         return ONNX_CODE.format(shape=shape, height=check["height"], width=check["width"])
-    row, kernel = TARGETS[facts["target"]], facts["kernels"][-1]
+    row, (*earlier, last) = TARGETS[facts["target"]], facts["kernels"]
+    called = [_called(row, kernel) for kernel in earlier]
+    return "\n\n".join([*filter(None, called), _last(row, last)])
+
+
+def _called(row: Row, kernel: Mapping[str, Any]) -> str:
+    """Return the lines that call a kernel before the last one, below what it does."""
+    if row.single:
+        return ""
+    role, file = kernel["role"], kernel["files"][0]
+    given = {"file": file if row.slots == "header" else f'"{file}"', "entry": kernel["entry_point"]}
+    if row.slots in DISPATCHED:
+        lines = BUFFER_LINES.format(**given, bound=_buffers(kernel), dispatch=_dispatch(row, kernel))
+        return f"/* {DOES[role]} */\n{lines}"
     read = [
-        b for b in kernel["bindings"] if b["name"].startswith("image_") or b["name"].startswith("horizontal")
+        b["name"] for b in kernel["bindings"] if b["access"] == "read" and b["type"].startswith("float32")
     ]
-    template = IMAGE_LINES[row.slots]
-    if row.name == "godot":
-        template = 'material.set_shader_parameter("{name}", ImageTexture.create_from_image({name}))'
+    read = ["weight_texture" if name == WEIGHTS else name for name in read]
+    written = [b["name"] for b in kernel["bindings"] if b["access"] == "write"]
+    integers = [b["name"] for b in kernel["bindings"] if b["type"] == "int32"]
+    images = IMAGE_LINES["names"]
+    lines = EARLIER[row.slots].format(
+        **given,
+        whole=whole(kernel["entry_point"]),
+        arguments=_arguments(kernel),
+        images="".join(f"{images.format(number=i, name=name)}\n" for i, name in enumerate(read)),
+        integers=f"set_uniforms({', '.join(integers)});\n" if integers else "",
+        written=", ".join(written),
+    )
+    return f"/* {DOES[role]} */\n{lines}"
+
+
+def _arguments(kernel: Mapping[str, Any]) -> str:
+    """Return the names of what a function is given, in order; a structure by its address."""
+    return ", ".join("&part" if b["name"] == "part" else b["name"] for b in kernel["bindings"])
+
+
+def _buffers(kernel: Mapping[str, Any]) -> str:
+    """Return the lines that bind buffers, each with what is in it."""
+    lines = []
+    for b in kernel["bindings"]:
+        shape, inside = ", ".join(map(str, b["shape"])), {"weights": f"{kernel['role']}/weights.bin"}
+        kind = "uniform" if "uniform" in b["type"] else "storage"
+        says = "int32: " if b["name"] == "sizes" else f"{b['access']}: "
+        lines.append(
+            f"bind_{kind}(pipeline, {b['slot']}, {b['name']});   /* {says}{inside.get(b['name'], shape)} */"
+        )
+    return "\n".join(lines)
+
+
+def _dispatch(row: Row, kernel: Mapping[str, Any]) -> str:
+    """Return the call that starts a kernel, one item a pixel if no schedule says otherwise."""
+    started = _started(kernel.get("schedule", {"pixels": 1}))
+    return row.dispatch.format(**started, height="rows" if kernel["role"] == "path" else "height")
+
+
+def _last(row: Row, kernel: Mapping[str, Any]) -> str:
+    """Return the lines that call the denoiser."""
+    read = [b for b in kernel["bindings"] if b["name"].startswith("image_")]
+    template = IMAGE_LINES.get(row.name, IMAGE_LINES.get(row.slots, ""))
     each = [template.format(slot=b["slot"], name=b["name"], number=i) for i, b in enumerate(read)]
     return row.code.format(
         **_started(kernel["schedule"]),
         images="\n".join(each),
-        arguments=", ".join(b["name"] for b in kernel["bindings"]),
+        bound=_buffers(kernel),
+        dispatch=_dispatch(row, kernel) if row.dispatch else "",
+        arguments=_arguments(kernel),
         count=len(read),
         file=kernel["files"][0],
         entry=kernel["entry_point"],

@@ -69,6 +69,7 @@ class Row:
     """One target. `slots`: what kernels are bound to, `code`: ten lines of a program that calls the denoiser.
 
     `single`: a pass of the host writes one image, so that a noisy picture's features are passes of their own.
+    `dispatch`: how kernels on buffers with numbers are started.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Row:
     single: bool = False
     most_images: Limit | None = None
     source: Limit | None = None
+    dispatch: str = ""
 
 
 def _block(bytes_: int, name: str) -> Limit:
@@ -142,8 +144,11 @@ VULKAN_PLACES = _storage("glsl-vulkan", *UNIFORM_RANGE, GROUPED_BYTES)
 TRANSLATED_PLACES = _storage("glsl-vulkan", *UNIFORM_RANGE)
 """The same for what is made of its GLSL by way of SPIR-V 1.0, which has no products of bytes."""
 
-DISPATCH = "dispatch(ceil(width / {across}), ceil(height / {down}), 1)"
+DISPATCH = "dispatch(ceil(width / {across}), ceil({height} / {down}), 1)"
 """How kernels on buffers are started, in groups that compute so many pixels."""
+
+DISPATCHED = ("numbered", "registers")
+"""Kinds of slots of such kernels."""
 
 SPECTRA = ("fft32x8", "fft32", "fft32x4")
 """Schedules of spectra. Most processors have AVX2's registers, or get two instructions for each vector."""
@@ -159,7 +164,7 @@ IN_C = ("tile8", "tile16", "tile4", *SPECTRA, BYTES[0], PLAIN)
 """Schedules of C. Those of spectra are the fastest, but only GCC and clang take them."""
 
 GL_CODE = """\
-GLuint program = link(fullscreen_triangle, compile(GL_FRAGMENT_SHADER, "denoise.frag"));
+GLuint program = link(fullscreen_triangle, compile(GL_FRAGMENT_SHADER, "{file}"));
 glUseProgram(program);
 /* One RGBA32F texture for each image (texel row 0 is the top row), and the weights: R32F, 1024 wide. */
 {images}
@@ -172,18 +177,21 @@ glDrawArrays(GL_TRIANGLES, 0, 3);"""
 """Integration with OpenGL; helpers are the program's own."""
 
 
-def _buffers_code(api: str, dispatch: str = DISPATCH) -> str:
+ENGINES = """\
+/* three.js: a RawShaderMaterial with glslVersion: GLSL3 writes the first line itself: pass the text below
+   `#version 300 es`. PlayCanvas wants an output of its own name: see `--host playcanvas`. */"""
+"""What engines on WebGL do to a text."""
+
+
+def _buffers_code(api: str) -> str:
     """Return the integration with buffers that have numbers; helpers are the program's own."""
     return f"""\
 /* All buffers hold 32-bit floats; images (height, width, channels), rows from the top. */
 {api} pipeline = create_pipeline("{{file}}", "{{entry}}");
-bind_uniform(pipeline, 0, sizes);          /* int32: width, height */
-bind_storage(pipeline, 1, weights);        /* weights.bin */
-bind_storage(pipeline, 2, result);         /* width * height * 3 floats, display-encoded */
-{{images}}
-{dispatch};
+{{bound}}
+{{dispatch}};
 wait();
-show(result);                              /* do not encode for the display again */"""
+show(result);   /* width * height * 3 floats, encoded for the display: do not encode them again */"""
 
 
 def _arguments_code(call: str) -> str:
@@ -223,7 +231,8 @@ ROWS: tuple[Row, ...] = (
         _storage("glsl-compute", 16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE"),
         _as(".comp"),
         "numbered",
-        _buffers_code("GLuint", f"gl{DISPATCH}"),
+        _buffers_code("GLuint"),
+        dispatch=f"gl{DISPATCH}",
     ),
     Row(
         "glsl-es",
@@ -231,7 +240,7 @@ ROWS: tuple[Row, ...] = (
         _fragment("glsl-es", 2048),
         _as(".frag"),
         "names",
-        GL_CODE,
+        f"{GL_CODE}\n{ENGINES}",
     ),
     Row(
         "glsl-vulkan",
@@ -240,6 +249,7 @@ ROWS: tuple[Row, ...] = (
         _as(".comp"),
         "numbered",
         _buffers_code("VkPipeline"),
+        dispatch=DISPATCH,
     ),
     Row(
         "wgsl",
@@ -248,6 +258,7 @@ ROWS: tuple[Row, ...] = (
         _as(".wgsl"),
         "numbered",
         _buffers_code("const"),
+        dispatch=DISPATCH,
         most_images=Limit("maxStorageBuffersPerShaderStage, less 2", 6, "use fewer features"),
     ),
     Row(
@@ -257,6 +268,7 @@ ROWS: tuple[Row, ...] = (
         _hlsl,
         "registers",
         _buffers_code("auto"),
+        dispatch=DISPATCH,
     ),
     Row(
         "metal",
@@ -264,10 +276,9 @@ ROWS: tuple[Row, ...] = (
         _storage("metal", 64 * KILOBYTE, "constant memory of a kernel") | _tabled("metal"),
         _as(".metal"),
         "numbered",
-        _buffers_code(
-            "id<MTLComputePipelineState>",
-            "dispatchThreadgroups(ceil(width / {across}), ceil(height / {down})) of {group_x} x {group_y}",
-        ),
+        _buffers_code("id<MTLComputePipelineState>"),
+        dispatch="dispatchThreadgroups(ceil(width / {across}), ceil({height} / {down})) "
+        "of {group_x} x {group_y}",
     ),
     Row(
         "spirv",
@@ -276,6 +287,7 @@ ROWS: tuple[Row, ...] = (
         _spirv,
         "numbered",
         _buffers_code("VkPipeline"),
+        dispatch=DISPATCH,
     ),
     Row(
         "c",
@@ -283,7 +295,7 @@ ROWS: tuple[Row, ...] = (
         {BUFFER: Place("c", IN_C), **_tabled("c")},
         _as(".h"),
         "header",
-        '#include "denoise.h"\n'
+        '#include "{file}"\n'
         + _arguments_code("wamnet_image({arguments});")
         + "\n/* wamnet_pixel does {columns} pixels of a row, for your own loops. Use -O3 -march=native:\n"
         "   tile8 wants registers of 8 floats (AVX2); for those of 4 (SSE, NEON) export --schedule tile4.\n"
@@ -334,7 +346,8 @@ ROWS: tuple[Row, ...] = (
         "{images}\n"
         'material.set_shader_parameter("weight_texture", ImageTexture.create_from_image(weights))\n'
         "$Picture.material = material   # a TextureRect of the picture's size\n"
-        "get_viewport().use_hdr_2d = true   # else colours keep 8 bits",
+        "# Leave HDR 2D off: a viewport with it encodes for the display what it shows, and these colours\n"
+        "# are encoded. To read them in 16 bits, draw into a SubViewport with use_hdr_2d that is not shown.",
         single=True,
     ),
 )

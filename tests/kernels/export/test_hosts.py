@@ -1,0 +1,334 @@
+"""Hosts (EXP-14): each folder of `--host` runs as it is, in the programs that are here; others are said.
+
+`make hosts` runs all of them. A program that is missing is a skip with the way to get it, which the summary
+shows: never a green test.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from pages import browse
+
+from wamnet.kernels.export import tint_runner
+from wamnet.kernels.export.hosts.table import HOSTS
+from wamnet.kernels.export.package import Request, export
+from wamnet.kernels.export.shelf import random_model
+from wamnet.refimpl.errors import ExecutorUnavailable, InputError
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.transport import Settings
+
+ROOT = Path(__file__).resolve().parents[3]
+"""The repository's root folder."""
+
+SETTINGS = Settings(max_depth=1)
+
+SECONDS = 300
+"""How long a host may take: machines that run tests are slow, and no test asserts a time."""
+
+STRICT = "-O2 -Wall -Wextra -Wpedantic -Werror"
+"""What a careful project compiles programs with."""
+
+ZIG = f"{sys.executable} -m ziglang"
+"""The compiler of PyPI's package ziglang."""
+
+
+def made(host, **options):
+    """Return an export with a host."""
+    try:
+        return export(Request(random_model(), HOSTS[host].target, host=host, settings=SETTINGS, **options))
+    except ExecutorUnavailable as error:
+        pytest.skip(str(error))
+
+
+def written(export, folder):
+    """Write an export's files into a folder, and return it."""
+    for name, data in export.contents().items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(data)
+    return folder
+
+
+def needs(*programs):
+    """Skip, with the way out, where a program is missing."""
+    ways = {"tcc": "apt-get install tcc", "clang": "apt-get install clang", "node": "apt-get install nodejs"}
+    for program in programs:
+        if program == ZIG:
+            pytest.importorskip("ziglang", reason="zig is missing: pip install ziglang")
+        elif shutil.which(program) is None:
+            pytest.skip(f"{program} is missing: {ways.get(program, f'apt-get install {program}')}")
+
+
+def run(folder, *command, **options):
+    """Return what a host says; it must end well and find itself right."""
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, timeout=SECONDS, check=False, **options
+    )
+    told = done.stdout + done.stderr
+    assert done.returncode == 0, told
+    assert done.stdout.strip().splitlines()[-1] == "right", told
+    return told
+
+
+def error_of(told):
+    """Return the largest error that a host states, and what it allows."""
+    found = re.search(r"largest error (\S+), allowed (\S+);", told)
+    assert found, told
+    return float(found[1]), float(found[2])
+
+
+# ---- what all have in common ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("host", HOSTS)
+def test_a_manifest_says_which_host_it_has(host):
+    """The schema; a picture of what one should see; each file with its hash; the README's command."""
+    whole = made(host)
+    schema = json.loads((ROOT / "spec/export.schema.json").read_text())
+    jsonschema.Draft202012Validator(schema).validate(whole.manifest)
+    row = HOSTS[host]
+    assert whole.manifest["host"] == {
+        "name": host,
+        "run": row.run,
+        "storage": {"name": row.storage.name, "added": row.storage.added, "why": row.storage.why},
+    }
+    assert {*row.files, *row.shared, *row.made, "expected.png"} <= set(whole.manifest["files"])
+    assert whole.files["expected.png"].startswith(b"\x89PNG")
+    readme = whole.files["README.md"].decode()
+    assert f"```sh\n{row.run}\n```" in readme
+    assert whole.contents() == made(host).contents()
+
+
+def test_storages_hold_what_they_say():
+    """Every number of [0, 1], cut off or rounded to half floats or 8 bits, is no farther off than stated."""
+    values = np.linspace(0, 1, 100_001)
+    halves = np.arange(0x3C01, dtype=np.uint16).view(np.float16).astype(np.float64)
+    for grid, host in ((halves, "godot-hdr"), (np.arange(256) / 255, "godot")):
+        if host not in HOSTS:
+            continue
+        below = np.searchsorted(grid, values, side="right") - 1
+        above = np.minimum(below + 1, len(grid) - 1)
+        worst = np.maximum(values - grid[below], grid[above] - values).max()
+        assert worst <= HOSTS[host].storage.added
+
+
+def test_what_a_host_does_not_run_is_refused():
+    model = random_model()
+    with pytest.raises(InputError, match="--host is unity: must be one of c, cpp"):
+        export(Request(model, "c", host="unity"))
+    with pytest.raises(InputError, match="--target is wgsl: host c runs kernels of target c; leave it out"):
+        export(Request(model, "wgsl", host="c"))
+
+
+# ---- C and C++ -----------------------------------------------------------------------------------
+
+
+@pytest.mark.needs("devices")
+@pytest.mark.parametrize("compiler", ["gcc", "clang", "tcc", ZIG])
+def test_the_program_in_c_is_right(compiler, tmp_path):
+    """A rank, so two kernels, and a scene's two: all compiled into one program."""
+    needs("make", compiler)
+    folder = written(made("c", scene=canonical("lone_light"), variant="rank2"), tmp_path)
+    asked = f"CC={compiler} cc" if compiler == ZIG else f"CC={compiler}"
+    warned = [] if compiler == "tcc" else ["CFLAGS=-O2 -Wall -Wextra -Wpedantic -Werror -Wno-unused-function"]
+    error, allowed = error_of(run(folder, "make", "-s", "run", asked, *warned))
+    assert error <= allowed
+    assert (folder / "picture.ppm").read_bytes().startswith(b"P6 384 192 255\n")
+
+
+@pytest.mark.needs("devices")
+def test_the_program_in_c_finds_a_wrong_weight(tmp_path):
+    """A host that finds everything right would be worth nothing."""
+    needs("make", "cc")
+    folder = written(made("c"), tmp_path)
+    weights = np.fromfile(folder / "denoise/weights.bin", "<f4")
+    weights[3] += 0.1
+    weights.tofile(folder / "denoise/weights.bin")
+    done = subprocess.run(["make", "-s", "run"], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "WRONG" in done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.needs("devices")
+def test_the_program_in_c_is_right_as_webassembly(tmp_path):
+    needs("make", "node", ZIG)
+    folder = written(made("c", scene=canonical("lone_light")), tmp_path)
+    run(folder, "make", "-s", "wasm", f"ZIG={ZIG}")
+
+
+@pytest.mark.needs("devices")
+@pytest.mark.parametrize("compiler", ["g++", "clang++"])
+def test_the_program_in_cpp_is_right(compiler, tmp_path):
+    needs("make", compiler.replace("++", "") if compiler == "clang++" else compiler)
+    folder = written(made("cpp", scene=canonical("lone_light")), tmp_path)
+    run(
+        folder,
+        "make",
+        "-s",
+        "run",
+        f"CXX={compiler}",
+        "CXXFLAGS=-O2 -Wall -Wextra -Werror -Wno-unused-function",
+    )
+
+
+# ---- OpenCL and Vulkan --------------------------------------------------------------------------------
+
+
+HOSTS_FOLDER = Path(sys.prefix) / "hosts"
+"""Where `.ci/setup hosts` puts what hosts run in."""
+
+DRIVERS = {
+    "pocl": ("pocl/usr/lib/x86_64-linux-gnu/libpocl.so.2", "pocl/usr/lib/llvm-15/lib"),
+    "intel": ("intel/lib/libintelocl.so", "intel/lib"),
+}
+"""Drivers of OpenCL there, and a further folder of libraries: they are seen by these tests only."""
+
+
+def opencl_with(driver, folder):
+    """Return an environment in which OpenCL's loader finds a driver, or skip."""
+    library, besides = (HOSTS_FOLDER / name for name in DRIVERS[driver])
+    loader = next((HOSTS_FOLDER / "pocl").glob("usr/lib/*/libOpenCL.so.1"), None)
+    if loader is None or not library.exists():
+        pytest.skip(f"OpenCL's loader or driver {driver} is missing: make hosts installs them")
+    vendors = folder / "vendors"
+    vendors.mkdir()
+    (vendors / "driver.icd").write_text(f"{library}\n")
+    return {
+        **os.environ,
+        "HOST_OPENCL": str(loader),
+        "OCL_ICD_VENDORS": str(vendors),
+        "POCL_CACHE_DIR": str(folder / "cache"),
+        "LD_LIBRARY_PATH": f"{library.parent}:{besides}",
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.needs("devices")
+@pytest.mark.parametrize("driver", DRIVERS)
+def test_the_program_on_opencl_is_right(driver, tmp_path):
+    """It loads the library itself; a rank's two kernels share a buffer."""
+    needs("make", "cc")
+    (tmp_path / "export").mkdir()
+    folder = written(made("opencl", variant="rank2"), tmp_path / "export")
+    subprocess.run(["make", "-s", "host", f"CFLAGS={STRICT}"], cwd=folder, check=True)
+    error_of(run(folder, "./host", env=opencl_with(driver, tmp_path)))
+
+
+@pytest.mark.needs("devices")
+def test_the_program_on_opencl_says_what_is_missing(tmp_path):
+    """A sentence and a status, where there is no library."""
+    needs("make", "cc")
+    folder = written(made("opencl"), tmp_path)
+    environment = {**os.environ, "HOST_OPENCL": "libNobodyHasIt.so"}
+    options = {"env": environment, "capture_output": True, "text": True}
+    done = subprocess.run(["make", "-s", "run"], cwd=folder, check=False, **options)
+    assert done.returncode != 0
+    assert "libNobodyHasIt.so: cannot be loaded: install OpenCL's loader" in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.needs("devices")
+def test_the_program_on_vulkan_is_right(tmp_path):
+    """On whatever driver there is; a rank has a barrier between its kernels."""
+    needs("make", "cc")
+    if not Path("/usr/include/vulkan/vulkan.h").exists():
+        pytest.skip("Vulkan's headers are missing: apt-get install libvulkan-dev")
+    folder = written(made("vulkan", variant="rank2"), tmp_path)
+    error, allowed = error_of(run(folder, "make", "-s", "run", f"CFLAGS={STRICT}"))
+    assert error <= allowed
+
+
+# ---- pages, Node and ONNX ------------------------------------------------------------------------------
+
+
+NODE_MODULES = HOSTS_FOLDER / "node_modules"
+"""Packages of npm."""
+
+
+def installed(folder, *packages):
+    """Give a folder the packages that `npm install` would bring, or skip."""
+    needs("node")
+    missing = [name for name in packages if not (NODE_MODULES / name).is_dir()]
+    if missing:
+        pytest.skip(f"npm's packages {', '.join(missing)} are missing: make hosts installs them")
+    (folder / "node_modules").symlink_to(NODE_MODULES)
+    return folder
+
+
+PAGES = {
+    "three": "three",
+    "babylon": "@babylonjs/core",
+    "playcanvas": "playcanvas",
+    "onnxruntime-web": "onnxruntime-web",
+}
+"""The package of each page."""
+
+
+@pytest.mark.slow
+@pytest.mark.needs("devices")
+@pytest.mark.parametrize("browser", ["chromium", "firefox"])
+@pytest.mark.parametrize("host", PAGES)
+def test_the_page_is_right(host, browser, tmp_path):
+    """As it is, from its own server; of three.js with a rank, whose first kernel has two colour buffers."""
+    options = {"variant": "rank6"} if host == "three" else {}
+    folder = installed(written(made(host, **options), tmp_path), PAGES[host])
+    status, told = browse(folder, browser)
+    assert status == 0, told
+    error, allowed = error_of(told)
+    assert error <= allowed
+
+
+@pytest.mark.slow
+@pytest.mark.needs("devices")
+@pytest.mark.parametrize("where", ["node", "chromium"])
+def test_webgpu_is_right_in_node_and_on_a_page(where, tmp_path, monkeypatch):
+    """Dawn in both; paths and a rank's two kernels too."""
+    folder = written(made("webgpu", scene=canonical("lone_light"), variant="rank2"), tmp_path)
+    installed(folder, "webgpu")
+    if where == "node":
+        for name, value in tint_runner.TRIED["vulkan"].items():
+            monkeypatch.setenv(name, value)  # lavapipe of Mesa 22 lacks what Dawn needs
+        error_of(run(folder, "node", "node.mjs"))
+        return
+    status, told = browse(folder, where)
+    if "no device of WebGPU" in told:
+        pytest.skip("this Chromium has no device of WebGPU")
+    assert status == 0, told
+
+
+@pytest.mark.slow
+@pytest.mark.needs("devices")
+@pytest.mark.parametrize("host", ["onnxruntime", "openvino"])
+def test_the_program_in_python_is_right(host, tmp_path):
+    pytest.importorskip(host, reason=f"{host} is missing: pip install {host}")
+    run(written(made(host), tmp_path), sys.executable, "check.py")
+
+
+@pytest.mark.slow
+@pytest.mark.needs("devices")
+def test_openvino_in_bfloat16_is_found_wrong(tmp_path):
+    """A number of bfloat16 has 8 bits: its rounding is beyond the bound, where the processor has it."""
+    pytest.importorskip("openvino", reason="openvino is missing: pip install openvino")
+    folder = written(made("openvino"), tmp_path)
+    command = [sys.executable, "check.py", "--default"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if "bfloat16" not in done.stdout:
+        pytest.skip("OpenVINO's default is not bfloat16 on this processor")
+    assert done.returncode == 1, done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.needs("devices")
+def test_onnx_runtime_for_node_is_right(tmp_path):
+    folder = installed(written(made("onnxruntime"), tmp_path), "onnxruntime-node")
+    run(folder, "node", "node.mjs")

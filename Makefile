@@ -22,7 +22,7 @@ export VENV PYTHON WAMNET_REQUIRE
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup baselines demo docs quick test long fuzz faults lint clean distclean
+.PHONY: help setup baselines demo docs quick test long fuzz faults hosts lint clean distclean
 
 help: ## List the targets
 	@grep -hE '^[a-z]+: .*## ' Makefile | sed -E 's/^([a-z]+):.*## (.*)/  make \1	\2/' | expand -t 20
@@ -58,6 +58,10 @@ fuzz: setup ## Feed changed files and options to every reader and command; MINUT
 
 faults: setup ## Kill commands and workers, fill their disk, start two at once: COUNT=300 times (an hour); SEED=n repeats
 	@$(ONE_THREAD) $(VENV)/bin/python tests/support/faults.py --count $(COUNT) $(if $(SEED),--seed $(SEED))
+
+hosts: setup ## Run the programs of `wamnet export --host` in all hosts that can be had, and say which are missing
+	@.ci/setup hosts
+	@WAMNET_REQUIRE= $(ONE_THREAD) $(VENV)/bin/pytest --slow -rsfE -v tests/kernels/export/test_hosts.py
 
 lint: setup ## Check style, format, types on the installed wheel, and the house rules
 	@.ci/lint

@@ -27,7 +27,7 @@ PEERS = {
 ALLOWED = {
     "refimpl": {"numpy"},
     "compiler": {"numpy", "safetensors", "pcpp"},
-    "kernels": {"numpy", "pyopencl", "pocl", "moderngl", "wgpu", *PEERS},
+    "kernels": {"numpy", "pyopencl", "pocl", "moderngl", "wgpu", "PIL", *PEERS},
     "spec": {"numpy"},
     "cli": {
         "numpy",

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from ....refimpl.errors import InputError
 from . import calls, launches
-from .host import Host
+from .host import EIGHT_BITS, Host
 
 PAGE = ("wamnet.js", "serve.mjs")
 """What pages share."""
@@ -87,6 +87,17 @@ ROWS = (
     _on_webgl("three", "a page with three.js", ranks=True),
     _on_webgl("babylon", "a page with Babylon.js"),
     _on_webgl("playcanvas", "a page with PlayCanvas"),
+    Host(
+        "godot",
+        "a project of Godot 4",
+        "godot",
+        ("project.godot", "main.tscn", "main.gd"),
+        "godot --path . -- --once",
+        "Godot 4.2 or newer: Godot 3 says that the project is of a newer engine",
+        "the window, without `-- --once`",
+        storage=EIGHT_BITS,
+        ranks=False,
+    ),
     Host(
         "onnxruntime-web",
         "a page with ONNX Runtime, as WebAssembly",

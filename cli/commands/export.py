@@ -45,7 +45,10 @@ TARGETS = (
 )
 """Targets by name, for help texts: those of the registry in kernels, and the page."""
 
-HOSTS = "c, cpp, opencl, vulkan, webgpu, three, babylon, playcanvas, godot, onnxruntime-web, onnxruntime, openvino"
+HOSTS = (
+    "c, cpp, opencl, vulkan, webgpu, three, babylon, playcanvas, godot, "
+    "onnxruntime-web, onnxruntime, openvino"
+)
 """Hosts by name, for help texts: those of the registry in kernels."""
 
 HTML, PAGE_NAME = "html", "index.html"

@@ -25,7 +25,7 @@ from ...compiler.core.writing import remove_temporaries
 from ...refimpl.errors import InputError
 from ..common import options
 from ..common.effort import said_of_rendering
-from ..common.inputs import feature_rays, load_model, model_path, unlike_training
+from ..common.inputs import load_model, model_path, unlike_training
 from ..common.options import ExecutorName, Renderer
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import movie
@@ -117,6 +117,8 @@ def animate(
     network = load_model(model)
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
     facts += cut_facts(network, rank)
+    from ...compiler.scenes.lower_encode import feature_rays
+
     rays = feature_rays(network) if feature_spp is None else feature_spp
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     named = scene or scene_of(network), _parameters(parameters), view

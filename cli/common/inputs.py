@@ -100,15 +100,6 @@ def unlike_features(model: Model, info: Mapping[str, str]) -> str:
     )
 
 
-def feature_rays(model: Model) -> int:
-    """Return how many camera rays that are spread evenly are worth those that a model has learned from."""
-    from ...refimpl.light.render import FEATURE_SAMPLER, spread_rays
-    from ...refimpl.network.denoise import learned_feature_spp
-
-    rays = learned_feature_spp(model)
-    return rays if model.info.get(f"trained_on_{FEATURE_SAMPLER}") else spread_rays(rays)
-
-
 def outside_ranges(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what of a frame lies outside of the ranges that a model says it has learned."""
     from ...refimpl.light.scenes import CANONICAL, canonical

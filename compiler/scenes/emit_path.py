@@ -24,7 +24,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -252,12 +252,21 @@ class _Kernel(Lines):
         self._open(dialect.loop("n", rays.count - 1))
         number = f"{self.shared['sample']} + {dialect.number(1, 'uint32')}"
         self._line(dialect.let("uint32", "sample_number", number))
-        self._line(dialect.var("uint32", "pixel"))
+        # The rays of a feature draw no further numbers; a compiler may refuse what nothing reads.
+        unread = () if self._reads("pixel", "arrive", "look") else ("pixel",)
+        if not unread:
+            self._line(dialect.var("uint32", "pixel"))
         self._declare({**PATH, **SURFACE})
-        self.block("ray", "the ray at the camera", {"width": "image_width", "height": "image_height"})
+        size = {"width": "image_width", "height": "image_height"}
+        self.block("ray", "the ray at the camera", size, unread=unread)
         self.block("arrive", "the first surface")
         self.block("look", "its features", summed=True)
         self._close()
+
+    def _reads(self, name: str, *parts: str) -> bool:
+        """Tell whether one of the programs reads a variable."""
+        nodes = (node for part in parts for node in self.programs.parts()[part].nodes)
+        return any(node.op == "input" and node["name"] == name for node in nodes)
 
     def _declare(self, values: Values) -> None:
         """Declare the variables of some values."""
@@ -342,11 +351,12 @@ class _Kernel(Lines):
         renamed: Mapping[str, str] | None = None,
         masked: Sequence[str] = (),
         summed: bool = False,
+        unread: Sequence[str] = (),
     ) -> None:
         """Write the statements of a program, and assign its outputs or add them up.
 
         Inputs are variables of their names, or of those that `renamed` gives. Outputs in `masked` are
-        assigned where a path is alive.
+        assigned where a path is alive, those that are `unread` are not.
         """
         program = self.programs.parts()[part]
         renamed = {**self._scene_numbers(), **(renamed or {})}
@@ -356,7 +366,8 @@ class _Kernel(Lines):
         texts = self._statements(part, program, renamed)
         for line in self._added(program, texts) if summed else []:
             self._line(line)
-        for line in self._assignments(program, texts, masked, WAY if summed else None):
+        left = [name for name, _ in program.outputs if name not in unread]
+        for line in self._assignments(program, texts, masked, WAY if summed else left):
             self._line(line)
         self._close()
 
@@ -455,13 +466,13 @@ class _Kernel(Lines):
         return [f"sum_{name} += {texts[i]};" for name, i in program.outputs if name in self.planes]
 
     def _assignments(
-        self, program: Program, texts: Sequence[str], masked: Sequence[str], only: Values | None
+        self, program: Program, texts: Sequence[str], masked: Sequence[str], only: Collection[str]
     ) -> list[str]:
         """Return the assignments of a program's outputs, or of some, to the variables of their names."""
         inputs = {str(node["name"]) for node in program.nodes if node.op == "input"}
         before, after = [], []
         for name, index in program.outputs:
-            if only is not None and name not in only:
+            if name not in only:
                 continue
             value = texts[index]
             if value in inputs and value != name:

@@ -13,6 +13,8 @@ from typing import Any
 from ...refimpl import vectors
 from ...refimpl.errors import InputError
 from ...refimpl.frame import HISTORY, SEEN
+from ...refimpl.light.render import FEATURE_SAMPLER, spread, spread_rays
+from ...refimpl.light.transport import Settings
 from ...refimpl.network.dataset import (
     FEATURES,
     Normalization,
@@ -20,11 +22,13 @@ from ...refimpl.network.dataset import (
     check_normalization,
     encode_sums,
 )
+from ...refimpl.network.denoise import Model, learned_feature_spp
 from ..core.ir import Program, Type
 from ..core.passes import pipeline
 from ..core.trace import trace
 from ..core.verify import verify
 from .emit_path import GROUPS
+from .lower_scene import FeatureRays
 
 PASSES = ("scalarize", "fold", "eliminate_dead")
 """What the program goes through: numbers in place of vectors, constants in float64, rounded when emitted."""
@@ -50,6 +54,23 @@ def sees(features: Sequence[str]) -> bool:
     """Tell whether some of the features are of what is seen past mirrors and glass."""
     check_features(features)
     return any(layer in SEEN for name in features for layer in FEATURES[name].layers)
+
+
+def feature_rays(model: Model) -> int:
+    """Return how many camera rays that are spread evenly are worth those that a model has learned from."""
+    rays = learned_feature_spp(model)
+    return rays if model.info.get(f"trained_on_{FEATURE_SAMPLER}") else spread_rays(rays)
+
+
+def learned_rays(model: Model, settings: Settings) -> FeatureRays | None:
+    """Return the rays of features that a path kernel makes for a model, or None: those of its samples.
+
+    What is seen past mirrors and glass is seen by paths, which have no further rays.
+    """
+    count = feature_rays(model)
+    if count < 2 or sees(model.features):
+        return None
+    return FeatureRays(count, spread(settings.sampler, False))
 
 
 def planes_of(features: Sequence[str]) -> tuple[str, ...]:

@@ -137,7 +137,8 @@ def pair(
         images = _livelier(plan.analysed, size)
     else:
         planes, sums = _sums(programs, model.features, plan.profile.name, size)
-        images = _encoded(model, dict(zip(planes, sums, strict=True)))
+        rays = programs.rays.count if programs.rays else 0
+        images = _encoded(model, dict(zip(planes, sums, strict=True)), rays)
         summed = partial(_sums, programs, model.features, plan.profile.name, size)
         moments = tuple(Moment(row, summed(row)[1]) for row in rows)
     held = (plan if promised else plan_program(lower(model), "numpy")).expected(images)
@@ -186,15 +187,19 @@ def _sums(
         return kernel.planes, executor.trace(kernel, Part(size[1], size[0], 0, size[0], 0, 1, SEED), numbers)
 
 
-def _encoded(model: Model, sums: Mapping[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:
-    """Return the encoded images (H, W, C) of a model's features, from sums over one sample."""
+def _encoded(
+    model: Model, sums: Mapping[str, NDArray[np.float32]], rays: int
+) -> dict[str, NDArray[np.float32]]:
+    """Return the encoded images (H, W, C) of a model's features, from sums over one sample.
+
+    `rays`: the number of the features' own, or 0.
+    """
     found = {}
     for name in model.features:
         planes = [sums[plane].astype(np.float64) for plane in emit_path.GROUPS[FEATURES[name].layer]]
         layer = planes[0] if len(planes) == 1 else np.stack(planes, axis=-1)
-        encoded = encode_sums(
-            {FEATURES[name].layer: layer}, 1.0, (name,), model.normalization, model.is_whole
-        )[name]
+        given = ({FEATURES[name].layer: layer}, 1.0, (name,), model.normalization, model.is_whole, rays)
+        encoded = encode_sums(*given)[name]
         image = encoded[..., None] if encoded.ndim == 2 else encoded
         found[name] = image.astype(np.float32)
     return found

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,7 @@ from ...compiler.core.lower import lower
 from ...compiler.plan import plan_program
 from ...compiler.scenes.encode_kernel import EncodeArtifact, compile_encode
 from ...compiler.scenes.host_pass import feature_pass
-from ...compiler.scenes.lower_encode import layers_of, sees
+from ...compiler.scenes.lower_encode import layers_of, learned_rays, sees
 from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.variants import FULL, parse, plan_model, vary
@@ -249,7 +249,13 @@ def _scene(request: Request, programs: PathPrograms | None) -> dict[str, Any] | 
     if request.scene is None or programs is None:
         return None
     numbers = {"numbers": request.motion.facts(programs)} if request.motion else {}
-    return {"name": request.scene.name, "settings": request.settings.facts(), **numbers}
+    rays = asdict(programs.rays) if programs.rays else None
+    return {
+        "name": request.scene.name,
+        "settings": request.settings.facts(),
+        "feature_rays": rays,
+        **numbers,
+    }
 
 
 def _model(request: Request) -> dict[str, Any]:
@@ -341,7 +347,10 @@ def _programs(request: Request, row: Row) -> PathPrograms | None:
         raise InputError("--moving", ", ".join(request.motion.kinds), rule, "leave it out")
     moving = request.motion.inputs(request.settings) if request.motion else None
     seen = sees(request.model.features)
-    return lower_scene(request.scene, request.settings, forms_of(_usual(row)), moving, seen=seen)
+    # A pass of a host writes a feature of one sample.
+    rays = None if row.single else learned_rays(request.model, request.settings)
+    forms = forms_of(_usual(row))
+    return lower_scene(request.scene, request.settings, forms, moving, seen=seen, rays=rays)
 
 
 def _usual(row: Row) -> str:
@@ -369,9 +378,9 @@ def _of_scene(
     path = compile_path(
         programs, target, request.profile, groups=tuple(dict.fromkeys(layers_of(model.features)))
     )
-    encoder = compile_encode(
-        model.features, model.normalization, target, request.profile, path.planes, model.is_whole
-    )
+    rays = programs.rays.count if programs.rays else 0
+    scales, whole = model.normalization, model.is_whole
+    encoder = compile_encode(model.features, scales, target, request.profile, path.planes, whole, rays)
     return path, encoder, {}
 
 

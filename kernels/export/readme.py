@@ -206,9 +206,15 @@ def _moving(facts: Mapping[str, Any]) -> list[str]:
 
 def _rays(facts: Mapping[str, Any]) -> list[str]:
     """Return the line about features of more camera rays than the colour's."""
-    rays = facts["model"]["feature_spp"]
+    rays, own = facts["model"]["feature_spp"], facts["scene"] and facts["scene"]["feature_rays"]
     if rays < 2 or facts["scene"] is None:
         return []
+    if own:
+        return [
+            f"* The model has learned from features that are means over {rays} camera rays: the path kernel "
+            f"traces {own['count']}, spread evenly ({own['sampler']}), whatever the number of samples. Give "
+            "the encoding the sums of one launch, of fewer samples than that."
+        ]
     return [
         f"* The model has learned from features that are means over {rays} camera rays. Run the path kernel "
         f"again with samples = {rays}, divide all planes but the colour's by {rays}, and give the encoding "

@@ -32,8 +32,8 @@ from ...compiler.languages.glsl import MOST_UNIFORMS
 from ...compiler.languages.glsl_es import MOST_BUFFERS
 from ...compiler.plan import plan_program
 from ...compiler.scenes.encode_kernel import compile_encode
-from ...compiler.scenes.lower_encode import layers_of, planes_of, sees
-from ...compiler.scenes.lower_scene import lower_scene
+from ...compiler.scenes.lower_encode import feature_rays, layers_of, learned_rays, planes_of, sees
+from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs, varying
 from ...compiler.schedules.emit import kernel_gather, output_channels
@@ -49,11 +49,11 @@ from ...refimpl.light.transport import Settings
 from ...refimpl.light.variation import RANGES, ranges_from_json
 from ...refimpl.network import factored
 from ...refimpl.network.dataset import FEATURES
-from ...refimpl.network.denoise import Model, check_model, learned_feature_spp
+from ...refimpl.network.denoise import Model, check_model
 from ...refimpl.network.whole import INPUT_LEVELS
 from .denoise_on import images_of
 
-SCHEMA = "wamnet-page-2"
+SCHEMA = "wamnet-page-3"
 """Name and version of the form of a page's data."""
 
 TARGET = "glsl-es"
@@ -139,15 +139,16 @@ def page_data(
     together = drawn_together(shown)
     # Whole paths give colour; the other features are of their first hit, or of what is seen.
     lengths = [settings, *(feature_settings(settings, sees(part)) for part in together[1:])]
+    rays = learned_rays(first, settings)
     paths = [
-        path_kernel(scene, length, inputs, part, profile)
+        path_kernel(scene, length, inputs, part, profile, rays)
         for length, part in zip(lengths, together, strict=True)
     ]
-    images = check(animation, first, shown, settings)
+    images = check(animation, first, shown, settings, rays)
     variants = [variant(network, images, profile) for network in networks]
     for one, network in zip(variants, networks, strict=True):
         one["ranges"] = learned_ranges(network.model, scene.name)
-        one["rays"] = learned_feature_spp(network.model) or 1
+        one["rays"] = max(feature_rays(network.model), 1)
         # How far a variant's picture is from the first one's is a fact about the weights, not about a device.
         off = one["picture"] - variants[0]["picture"]
         one["rms_to_first"] = float(np.sqrt(np.mean(off**2)))
@@ -162,6 +163,7 @@ def page_data(
         "lights": _lights(scene),
         "share": transport.SKY_SHARE if scene.environment is not None else 1.0,
         "numbers": numbers,
+        "rays": rays.count if rays else 1,
         "paths": [
             {"source": one.source, "planes": list(one.planes), "settings": one.programs.settings.facts()}
             for one in paths
@@ -169,7 +171,7 @@ def page_data(
         "encoders": [
             {"path": number, **encoder}
             for number, (part, path) in enumerate(zip(together, paths, strict=True))
-            for encoder in encoders(part, first, path.planes, profile)
+            for encoder in encoders(part, first, path.planes, profile, rays)
         ],
         "check": {
             "size": CHECK_PX,
@@ -203,10 +205,15 @@ def drawn_together(features: Sequence[str]) -> list[tuple[str, ...]]:
 
 
 def path_kernel(
-    scene: Scene, settings: Settings, inputs: SceneInputs, features: Sequence[str], profile: str
+    scene: Scene,
+    settings: Settings,
+    inputs: SceneInputs,
+    features: Sequence[str],
+    profile: str,
+    rays: FeatureRays | None,
 ) -> PathArtifact:
     """Return the kernel that adds up the planes of some features."""
-    programs = lower_scene(scene, settings, STATEMENTS, inputs, seen=sees(features))
+    programs = lower_scene(scene, settings, STATEMENTS, inputs, seen=sees(features), rays=rays)
     return compile_path(programs, TARGET, profile, 1, layers_of(features))
 
 
@@ -253,13 +260,12 @@ def _lights(scene: Scene) -> list[dict[str, Any]]:
 
 
 def encoders(
-    features: Sequence[str], model: Model, planes: Sequence[str], profile: str
+    features: Sequence[str], model: Model, planes: Sequence[str], profile: str, rays: FeatureRays | None
 ) -> list[dict[str, Any]]:
     """Return the encoding as passes of at most as many features as there are colour buffers."""
     parts = [features[first : first + MOST_BUFFERS] for first in range(0, len(features), MOST_BUFFERS)]
-    found = [
-        compile_encode(part, model.normalization, TARGET, profile, planes, model.is_whole) for part in parts
-    ]
+    given = (model.normalization, TARGET, profile, planes, model.is_whole, rays.count if rays else 0)
+    found = [compile_encode(part, *given) for part in parts]
     return [{"source": one.source, "images": [image.facts for image in one.images]} for one in found]
 
 
@@ -317,10 +323,15 @@ def _pass(kernel: Artifact) -> dict[str, Any]:
 
 
 def check(
-    animation: Animation, model: Model, features: Sequence[str], settings: Settings
+    animation: Animation,
+    model: Model,
+    features: Sequence[str],
+    settings: Settings,
+    rays: FeatureRays | None,
 ) -> dict[str, NDArray[np.float32]]:
     """Return the encoded features (H, W, C) of a small noisy picture, by name."""
-    job = Job(CHECK_PX, CHECK_PX, 1, CHECK_SEED, settings, seen=sees(features))
+    own = {"feature_spp": rays.count, "feature_sampler": rays.sampler} if rays else {}
+    job = Job(CHECK_PX, CHECK_PX, 1, CHECK_SEED, settings, seen=sees(features), **own)
     frame = render(animation.scenes[0], job).frame
     return dict(images_of(replace(model, features=tuple(features)), frame))
 

@@ -13,6 +13,7 @@ import pytest
 from wamnet.cli.common import inputs
 from wamnet.cli.files import exr
 from wamnet.compiler.model_file import load_model, save_model
+from wamnet.compiler.scenes.lower_encode import feature_rays
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import scenes
@@ -188,7 +189,7 @@ def test_rays_that_stand_for_those_of_the_training(samples) -> None:
     model = load_model(samples / "model.safetensors")
 
     def rays(**facts: str) -> int:
-        return inputs.feature_rays(replace(model, info={f"trained_on_{k}": v for k, v in facts.items()}))
+        return feature_rays(replace(model, info={f"trained_on_{k}": v for k, v in facts.items()}))
 
     assert [rays(feature_spp=str(n)) for n in (1, 2, 4, 5, 16, 17)] == [1, 2, 2, 3, 4, 5]
     assert rays(feature_spp="6", feature_sampler="net") == 6

@@ -19,7 +19,7 @@ import pytest
 from wamnet.cli.reports import webpage
 from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
 from wamnet.compiler.scenes.lower_encode import layers_of
-from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels.devices.executor import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor
@@ -112,14 +112,14 @@ def test_the_paths_are_the_reference_s(still, options):
         assert share_alike(found[..., first : first + 3], expected[..., first : first + 3]) >= 0.99, layer
 
 
-def traced(told, features, seed):
+def traced(told, features, seed, rays=None):
     """Return the reference's sums (H, W, planes) of what a page has drawn, and its scene."""
     scene = scenes.canonical("minicubes", time=told["time"])
     camera = replace(scene.camera, position=tuple(told["camera"]["position"]))
     pairs = zip(scene.lights, told["colors"], strict=True)
     lights = tuple(replace(light, color=tuple(color)) for light, color in pairs)
     scene = replace(scene, camera=camera, lights=lights)
-    kernel = compile_path(lower_scene(scene, SETTINGS), "numpy", groups=layers_of(features))
+    kernel = compile_path(lower_scene(scene, SETTINGS, rays=rays), "numpy", groups=layers_of(features))
     sums = NumpyExecutor().trace(kernel, Part(SIZE, SIZE, 0, SIZE, 0, 1, seed))
     return np.moveaxis(sums, 0, -1), scene
 
@@ -131,17 +131,19 @@ def share_alike(found, held):
 
 
 def test_all_features_together_are_the_reference_s(chromium, kit, tmp_path):
-    """They take two kernels of paths; the lamps' light without shadows follows their colours."""
+    """They take two kernels of paths, which trace three rays for them; lamps' light follows their colours."""
     features, window = tuple(dataset.FIRST_HITS), dataset.Window(3, "clamp")
     network = kit.network([dataset.n_inputs(features, window), 6, 3], (3.0, 3.0))
     animation = P.Animation(TIMES, tuple(scenes.canonical("minicubes", time=time) for time in TIMES))
-    networks = P.networks_of(Model(network, features, window, SCALES), rank=2)[:1]
+    learned = {"trained_on_feature_spp": "3", "trained_on_feature_sampler": "net"}
+    networks = P.networks_of(Model(network, features, window, SCALES, learned), rank=2)[:1]
     data = P.page_data(animation, networks, SETTINGS)
+    assert data["rays"] == data["variants"][0]["rays"] == 3
     (tmp_path / "page.html").write_text(webpage.render_page(data), encoding="utf-8")
     with chromium.tab(tmp_path / "page.html", **NO_MOTION) as tab:
         tab.page.evaluate("wamnet.ready")
         told = draw(tab, frame=FRAME, seed=SEED, turn=TURN, colors=COLORS)
-        expected, _ = traced(told, features, SEED)
+        expected, _ = traced(told, features, SEED, FeatureRays(3, "net"))
         planes, first = {}, 0
         for path in data["paths"]:
             for number, plane in enumerate(path["planes"]):
@@ -359,7 +361,7 @@ def test_rays_are_those_of_the_model(model, data):
     assert [one["rays"] for one in data["variants"]] == [1, 1, 1]
     many = replace(model, info={**model.info, "trained_on_feature_spp": "16, 4"})
     animation = P.Animation(TIMES[:1], (scenes.canonical("minicubes", time=TIMES[0]),))
-    assert P.page_data(animation, P.networks_of(many, rank=4)[:1], SETTINGS)["variants"][0]["rays"] == 16
+    assert P.page_data(animation, P.networks_of(many, rank=4)[:1], SETTINGS)["variants"][0]["rays"] == 4
 
 
 def test_ready_is_what_has_drawn(chromium, path):

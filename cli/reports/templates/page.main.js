@@ -323,7 +323,7 @@ class Page {
     find("first-difference").textContent =
       facts.name === this.data.variants[0].name ? "it is the full one" : `${(100 * facts.rms_to_first).toFixed(1)} %`;
     find("unknown-ranges").hidden = facts.ranges !== null;
-    find("rays").textContent = raysSentence(facts.rays);
+    find("rays").textContent = raysSentence(facts.rays, this.data.rays);
     this.reserveOutside();
     this.tellOutside();
     if (check) {

@@ -152,9 +152,9 @@ function outsideSentence(found) {
 }
 
 /** What a network that has learned from features of more rays than the page traces makes of them. */
-function raysSentence(rays) {
-  return rays > 1
-    ? `This network has learned from features of ${rays} rays per pixel, and the page traces 1: edges are rougher here.`
+function raysSentence(rays, traced) {
+  return rays > traced
+    ? `This network has learned from features of ${rays} rays per pixel, and the page traces ${traced}: edges are rougher here.`
     : "";
 }
 

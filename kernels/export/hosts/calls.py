@@ -93,7 +93,7 @@ def header(facts: Mapping[str, Any]) -> str:
         height=check["height"],
         count=len(images),
         planes=len(sums["planes"]) if sums else 0,
-        rays=facts["model"]["feature_spp"],
+        rays=_rays(facts),
         seed=SEED,
         added=float(facts["host"]["storage"]["added"]),
         alike=ALIKE,
@@ -102,6 +102,12 @@ def header(facts: Mapping[str, Any]) -> str:
     )
     made = [top, *_paths(kernels, facts["images"]), _denoiser(kernels, facts["images"])]
     return "\n".join([*made, "#endif\n"])
+
+
+def _rays(facts: Mapping[str, Any]) -> int:
+    """Return how many launches' means the features are: those of one where its kernel traces further rays."""
+    own = facts["scene"] and facts["scene"]["feature_rays"]
+    return 1 if own else int(facts["model"]["feature_spp"])
 
 
 def _places(images: list[Mapping[str, Any]]) -> dict[str, str]:

@@ -15,10 +15,12 @@ import pytest
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.scene_inputs import tables_of
 from wamnet.compiler.variants import parse, vary
-from wamnet.kernels.export import check, runners, targets, tools
+from wamnet.kernels.export import check, check_pair, runners, targets, tools
 from wamnet.kernels.export.motion import FORMULAS, KINDS, Motion, drawn
 from wamnet.kernels.export.package import Request, export
+from wamnet.kernels.run.denoise_on import images_of
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
+from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import siren
@@ -71,6 +73,32 @@ def test_an_export_keeps_its_bound_where_it_is_run(exported):
     assert verdict.share <= 1
     assert verdict.error > 0, "clipped outputs would hide errors"
     assert exported.target == "onnx" or verdict.paths >= check.PATHS_ALIKE
+
+
+@pytest.mark.parametrize("target", [name for name, row in targets.TARGETS.items() if not row.single])
+def test_a_path_kernel_traces_the_rays_that_the_model_has_learned_from(target):
+    """EXP-15: 16 at random are 4 spread evenly; sums and images of the pair are those of such a frame."""
+    many = replace(model(), info={"trained_on_feature_spp": "16"})
+    scene, settings = canonical("cornell", time=0.5), Settings(max_depth=1)
+    try:
+        made = export(Request(many, target, scene, settings=settings))
+    except ExecutorUnavailable as error:
+        pytest.skip(str(error))
+    schema = json.loads((ROOT / "spec/export.schema.json").read_text())
+    jsonschema.Draft202012Validator(schema).validate(made.manifest)
+    assert made.manifest["scene"]["feature_rays"] == {"count": 4, "sampler": "net"}
+    assert "the path kernel traces 4, spread evenly (net)" in made.files["README.md"].decode()
+    height, width, _ = made.pair.output.shape
+    rays = {"feature_spp": 4, "feature_sampler": "net"}
+    frame = render(scene, Job(width, height, 1, check_pair.SEED, settings, **rays)).frame
+    for name, image in images_of(many, frame).items():
+        # The frame's means are rounded once to float32, the pair's sums three times.
+        assert np.abs(made.pair.images[name] - image).max() <= 8 * 2.0**-24, name
+    verdict = check.check(made)
+    assert verdict.holds, verdict.wrong
+    if "missing" in verdict.executed:
+        pytest.skip(verdict.executed)
+    assert verdict.paths >= check.PATHS_ALIKE
 
 
 MOVING = Motion(

@@ -113,8 +113,10 @@ static void draw(void)
         images[i] = host_floats(pixels * (size_t)host_images[i].channels);
     }
     host_trace(DRAWN, DRAWN, 0, 1, sums);
-    host_trace(DRAWN, DRAWN, 0, HOST_RAYS, means);
-    for (size_t i = 3 * pixels; i < pixels * HOST_PLANES; ++i) { /* planes 0 to 2 are the colour */
+    if (HOST_RAYS > 1) {
+        host_trace(DRAWN, DRAWN, 0, HOST_RAYS, means);
+    }
+    for (size_t i = 3 * pixels; HOST_RAYS > 1 && i < pixels * HOST_PLANES; ++i) { /* planes 0 to 2 are the colour */
         sums[i] = means[i] / HOST_RAYS;
     }
     host_encode(sums, images, DRAWN, DRAWN, 1);

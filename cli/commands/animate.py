@@ -108,6 +108,7 @@ def animate(
 
     After any interruption the same command resumes where it was.
     """
+    from ...compiler.scenes.lower_encode import feature_rays
     from ...kernels.run.frame_plan import animation_times
 
     is_film = output.suffix.lower() in movie.WRITERS
@@ -117,8 +118,6 @@ def animate(
     network = load_model(model)
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
     facts += cut_facts(network, rank)
-    from ...compiler.scenes.lower_encode import feature_rays
-
     rays = feature_rays(network) if feature_spp is None else feature_spp
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     named = scene or scene_of(network), _parameters(parameters), view

@@ -139,7 +139,7 @@ def page_data(
     together = drawn_together(shown)
     # Whole paths give colour; the other features are of their first hit, or of what is seen.
     lengths = [settings, *(feature_settings(settings, sees(part)) for part in together[1:])]
-    rays = learned_rays(first, settings)
+    rays = learned_rays(replace(first, features=shown), settings)
     paths = [
         path_kernel(scene, length, inputs, part, profile, rays)
         for length, part in zip(lengths, together, strict=True)
@@ -330,8 +330,9 @@ def check(
     rays: FeatureRays | None,
 ) -> dict[str, NDArray[np.float32]]:
     """Return the encoded features (H, W, C) of a small noisy picture, by name."""
-    own = {"feature_spp": rays.count, "feature_sampler": rays.sampler} if rays else {}
-    job = Job(CHECK_PX, CHECK_PX, 1, CHECK_SEED, settings, seen=sees(features), **own)
+    job = Job(CHECK_PX, CHECK_PX, 1, CHECK_SEED, settings, seen=sees(features))
+    if rays:
+        job = replace(job, feature_spp=rays.count, feature_sampler=rays.sampler)
     frame = render(animation.scenes[0], job).frame
     return dict(images_of(replace(model, features=tuple(features)), frame))
 

@@ -93,7 +93,7 @@ ROWS = (
         "godot",
         ("project.godot", "main.tscn", "main.gd"),
         "godot --path . -- --once",
-        "Godot 4.2 or newer: Godot 3 says that the project is of a newer engine",
+        "Godot 4.2 or newer, and Godot 3 refuses the project",
         "the window, without `-- --once`",
         storage=EIGHT_BITS,
         ranks=False,

@@ -1,4 +1,4 @@
-"""Names of buffers in SPIR-V: a block without a name of its own gets that of its first member.
+"""Names in SPIR-V: a block without a name of its own gets that of its first member.
 
 glslang gives a block that the text does not name an empty name, and a translator then makes one up: `_709`. A
 host that binds by name, as Unity does, needs `weights` and `image_color`, which the manifest says.
@@ -19,8 +19,8 @@ from ...compiler.languages.interface import WEIGHTS
 HEAD = 5
 """Words before the first instruction."""
 
-NAME, MEMBER_NAME, POINTER, FUNCTION, VARIABLE = 5, 6, 32, 54, 59
-"""Numbers of OpName, OpMemberName, OpTypePointer, OpFunction and OpVariable."""
+SOURCE, NAME, MEMBER_NAME, POINTER, FUNCTION, VARIABLE = 3, 5, 6, 32, 54, 59
+"""Numbers of OpSource, OpName, OpMemberName, OpTypePointer, OpFunction and OpVariable."""
 
 UNIFORM, BLOCK_NAME = 2, "sizes"
 """The storage class of buffers and blocks; what a block of integers is called, as manifests say it."""
@@ -72,4 +72,14 @@ def named(binary: bytes) -> bytes:
         number = int(given[0]) if operation == NAME else -1
         head = np.array([(len(given) + 1) << 16 | operation], np.uint32)
         written += [_named(number, names[number])] if number in names else [head, given]
+    return np.concatenate(written).astype("<u4").tobytes()
+
+
+def unsourced(binary: bytes) -> bytes:
+    """Return a module that does not say its source's language, a number that older readers may not know."""
+    words: Words = np.frombuffer(binary, "<u4").astype(np.uint32)
+    written = [words[:HEAD]]
+    for operation, given in _instructions(words):
+        if operation != SOURCE:
+            written += [np.array([(len(given) + 1) << 16 | operation], np.uint32), given]
     return np.concatenate(written).astype("<u4").tobytes()

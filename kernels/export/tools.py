@@ -2,6 +2,7 @@
 
 1. [`run`] runs one in a folder of its own; the error for a missing one says how to get it.
 2. [`spirv`] makes SPIR-V from GLSL or HLSL and validates it; [`hlsl`] makes HLSL from SPIR-V.
+3. [`slang`] is a second reader of that HLSL.
 """
 
 from __future__ import annotations
@@ -16,13 +17,14 @@ from pathlib import Path
 
 from ...compiler.schedules.buffers_group import PORTABLE
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from .spirv_names import named
+from .spirv_names import named, unsourced
 
 PACKAGES: Mapping[str, str] = {
     "glslangValidator": "glslang-tools",
     "spirv-val": "spirv-tools",
     "spirv-cross": "spirv-cross",
     "nvcc": "nvidia-cuda-toolkit, or NVIDIA's own installer",
+    "slangc": "none of Debian's: put slangtorch/bin of PyPI's package slangtorch on the PATH",
     "c++": "g++",
     "cc": "gcc and libc6-dev",
 }
@@ -84,9 +86,24 @@ def spirv(source: str, language: str = "glsl") -> bytes:
         return (folder / "kernel.spv").read_bytes()
 
 
-def validate(folder: Path, name: str) -> None:
+def slang(source: str) -> bytes:
+    """Return the validated SPIR-V that Slang makes of a compute shader in HLSL, registers as bindings."""
+    with tempfile.TemporaryDirectory(prefix="wamnet-slang-") as name:
+        folder = Path(name)
+        (folder / "kernel.hlsl").write_text(source, encoding="utf-8")
+        # -O0: what optimises is a library of its own, which some packages leave out.
+        options = ["-target", "spirv", "-O0", "-entry", "main", "-stage", "compute", "-profile", "spirv_1_3"]
+        for kind in ("b", "t", "u"):
+            options += [f"-fvk-{kind}-shift", "0", "0"]
+        run("slangc", "kernel.hlsl", *options, "-o", "kernel.spv", folder=folder)
+        (folder / "kernel.spv").write_bytes(unsourced((folder / "kernel.spv").read_bytes()))
+        validate(folder, "kernel.spv", "vulkan1.1")
+        return (folder / "kernel.spv").read_bytes()
+
+
+def validate(folder: Path, name: str, environment: str = ENVIRONMENT) -> None:
     """Refuse SPIR-V that is not valid."""
-    run("spirv-val", "--target-env", ENVIRONMENT, name, folder=folder)
+    run("spirv-val", "--target-env", environment, name, folder=folder)
 
 
 def hlsl(binary: bytes, style: str) -> str:

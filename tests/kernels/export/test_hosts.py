@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from pages import browse
 
-from wamnet.kernels.export import tint_runner
+from wamnet.kernels.export import tint_runner, tools
 from wamnet.kernels.export.hosts.host import FILES, SHARED
 from wamnet.kernels.export.hosts.table import HOSTS
 from wamnet.kernels.export.package import Request, export
@@ -245,6 +245,24 @@ def test_the_program_on_vulkan_is_right(tmp_path):
     if not Path("/usr/include/vulkan/vulkan.h").exists():
         pytest.skip("Vulkan's headers are missing: apt-get install libvulkan-dev")
     folder = written(made("vulkan", variant="rank2"), tmp_path)
+    error, allowed = error_of(run(folder, "make", "-s", "run", f"CFLAGS={STRICT}"))
+    assert error <= allowed
+
+
+@pytest.mark.slow
+@pytest.mark.needs("devices")
+@pytest.mark.parametrize("style", tools.HLSL_STYLES)
+def test_slang_reads_the_same_hlsl(style, tmp_path, monkeypatch):
+    """A second reader of what SPIRV-Cross writes: its SPIR-V in the program for Vulkan, in both kernels."""
+    monkeypatch.setenv("PATH", str(HOSTS_FOLDER / "slang/slangtorch/bin"), prepend=os.pathsep)
+    if shutil.which("slangc") is None:
+        pytest.skip("Slang is missing: make hosts installs it")
+    needs("make", "cc")
+    if not Path("/usr/include/vulkan/vulkan.h").exists():
+        pytest.skip("Vulkan's headers are missing: apt-get install libvulkan-dev")
+    folder = written(made("vulkan", variant="rank2"), tmp_path)
+    for binary in folder.glob("*/*.spv"):
+        binary.write_bytes(tools.slang(tools.hlsl(binary.read_bytes(), style)))
     error, allowed = error_of(run(folder, "make", "-s", "run", f"CFLAGS={STRICT}"))
     assert error <= allowed
 

@@ -557,6 +557,7 @@ TABLES: Mapping[str, TableOf] = {
     "reference-mutants": as_printed("reference-mutants", 1),
     "held-back-left": as_printed("held-back", 2),
     "held-back-second-left": as_printed("held-back-second", 2),
+    "held-back-third-left": as_printed("held-back-third", 2),
     "demo-pictures": demo_pictures,
     "demo-runs": demo_runs,
     "departures": departures,

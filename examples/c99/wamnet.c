@@ -332,9 +332,8 @@ static double number_of(const json *from) {
 static double number(const json *in, const char *name) { return number_of(field(in, name)); }
 
 static double whole_of(const json *from, double least, double most, const char *name) {
-    if (from->type != J_NUMBER || floor(from->number) != from->number || !(from->number >= least)
-        || !(from->number <= most))
-        refuse("%s must be a whole number from %.0f to %.0f", name, least, most);
+    if (from->type != J_NUMBER || !from->whole || !(from->number >= least) || !(from->number <= most))
+        refuse("%s must be an integer from %.0f to %.0f", name, least, most);
     return from->number;
 }
 
@@ -1023,7 +1022,8 @@ static scene read_scene(const char *content, size_t length) {
     const json *from = parse(content, length);
     check_keys(from, " format version name camera room boxes spheres quads lights background environment info ");
     if (strcmp(text(from, "format"), "wamnet-scene")) refuse("format must be wamnet-scene");
-    whole_of(field(from, "version"), 1, 1, "version");
+    const json *version = field(from, "version");
+    if (version->type != J_NUMBER || version->number != 1) refuse("version must be 1");
     scene made = {.name = field(from, "name")};
     const json *background = find(from, "background"), *info = find(from, "info");
     if (made.name->type != J_TEXT) refuse("name must be a text");
@@ -1501,7 +1501,8 @@ static scattered sample_conductor(const site *s, double u0, double u1) {
 
 /* DIE-3 */
 static double fresnel(double r, double c, double behind) {
-    double across = (c - r * behind) / (c + r * behind), along = (r * c - behind) / (r * c + behind);
+    double across = (c - r * behind) / fmax(c + r * behind, 1e-30);
+    double along = (r * c - behind) / fmax(r * c + behind, 1e-30);
     return behind == 0 && r > 1 ? 1 : 0.5 * (across * across + along * along);
 }
 
@@ -1921,7 +1922,6 @@ typedef struct {
 static window read_window(const json *in) {
     const json *size = field(in, "size");
     window made = {(size_t)whole_of(size, 1, 64, "the window's size"), !strcmp(text(in, "border"), "zero")};
-    if (!size->whole) refuse("the window's size must be an integer");
     if (!made.zeros && strcmp(text(in, "border"), "clamp")) refuse("the border must be clamp or zero");
     return made;
 }
@@ -2111,6 +2111,8 @@ static const polynomial *sine_with(double amplitude) {
         if (SINES[i].amplitude == amplitude) return &SINES[i];
     refuse("an amplitude is 127 or 511");
 }
+
+static double amplitude_in(const json *in) { return whole_of(field(in, "amplitude"), 0, 511, "amplitude"); }
 
 static int32_t whole_sine(const polynomial *s, uint32_t phase) {
     uint32_t k = phase >> 22 & 1 ? ~phase : phase, m = k >> 6 & 0xffff, z = m * m >> 16;
@@ -2357,7 +2359,7 @@ static whole rounded_on(const network *n, size_t size, double amplitude, const a
 
 static whole read_whole(const json *in) {
     network given = read_parameters(in);
-    whole made = new_whole(&given, number(in, "amplitude"));
+    whole made = new_whole(&given, amplitude_in(in));
     char name[32];
     made.of = given;
     made.fraction = (int)whole_of(field(in, "fraction"), 0, MOST_FRACTION, "the fraction");
@@ -2457,7 +2459,6 @@ static size_t element_size(const char *type) {
 }
 
 static size_t size_of(const json *from) {
-    if (from->type == J_NUMBER && !from->whole) refuse("a size must be an integer");
     return (size_t)whole_of(from, 0, 9e15, "a size");
 }
 
@@ -3157,7 +3158,7 @@ static void do_whole_input(const json *in) {
 }
 
 static void do_whole_sine(const json *in) {
-    const polynomial *sine = sine_with(number(in, "amplitude"));
+    const polynomial *sine = sine_with(amplitude_in(in));
     array phase = array_in(in, "phase", 1);
     if (!whole_within(phase.values, phase.count, 0, 4294967295.0)) refuse("a phase is a word");
     for (size_t i = 0; i < phase.count; i++) phase.values[i] = whole_sine(sine, (uint32_t)phase.values[i]);
@@ -3193,7 +3194,7 @@ static void answer_rounded(const whole *made) {
 static void do_whole_rounded(const json *in) {
     network n = read_network(in);
     size_t size = (size_t)whole_of(field(in, "size"), 1, 64, "the window's size");
-    whole made = rounded(&n, size, number(in, "amplitude"));
+    whole made = rounded(&n, size, amplitude_in(in));
     answer_rounded(&made);
 }
 
@@ -3204,7 +3205,7 @@ static void do_whole_rounded_on(const json *in) {
     if (!windows.count || windows.shape[1] != n.widths[0]) refuse("windows do not fit the first layer");
     for (size_t i = 0; i < windows.count; i++)
         if (!(fabs(windows.values[i]) <= 1)) refuse("a feature is in [-1, 1]");
-    whole made = rounded_on(&n, size, number(in, "amplitude"), &windows);
+    whole made = rounded_on(&n, size, amplitude_in(in), &windows);
     answer_rounded(&made);
 }
 

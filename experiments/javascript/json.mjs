@@ -34,6 +34,19 @@ export function parseJson(text) {
   return value;
 }
 
+// CNF-9: a request as plain objects. A number such as 1.0 becomes a text, which is a
+// number (CNF-2) and no integer.
+export function parseRequest(text) {
+  return plain(parseJson(text));
+}
+
+function plain(value) {
+  if (Array.isArray(value)) return value.map(plain);
+  if (value instanceof Map) return Object.fromEntries([...value].map(([key, entry]) => [key, plain(entry)]));
+  if (!(value instanceof JsonNumber)) return value;
+  return value.isInteger || !Number.isInteger(value.value) ? value.value : String(value.value);
+}
+
 class Parser {
   constructor(text) {
     this.text = text;

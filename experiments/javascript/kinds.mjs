@@ -12,7 +12,7 @@ import { parametersDigest, readModel, widthsOf } from "./model_file.mjs";
 import { adamRun, adamStep, denoise, forward, initNetwork, lossAndGradients } from "./network.mjs";
 import { array, float, floats, nested, text } from "./numbers.mjs";
 import { pcg4d, randomBlock, scramble, sobolBlock, sobolPoint, uniformFloat } from "./random.mjs";
-import { requireInteger } from "./refusal.mjs";
+import { require, requireInteger } from "./refusal.mjs";
 import { render } from "./render.mjs";
 import {
   concentricDisk,
@@ -391,11 +391,47 @@ function mapValues(group, change) {
   return Object.fromEntries(Object.entries(group).map(([key, value]) => [key, change(value)]));
 }
 
-export const KINDS = {
-  ...random,
-  ...mapValues({ ...light, ...intersection, ...material, ...transport }, ofFloats),
-  ...path,
-  ...network,
-  ...file,
-  ...whole,
+// CNF-9: inputs that are one integer each.
+const PIXEL = ["width", "height", "x", "y", "seed", "sample"];
+const RENDERED = ["width", "height", "spp", "seed"];
+const INTEGERS = {
+  "random.pcg4d": ["x", "y", "z", "w"],
+  "random.float": ["word"],
+  "random.block": ["seed", "pixel", "sample", "block"],
+  "random.scrambled": ["fraction", "key"],
+  "random.point": ["index"],
+  "random.sobol": ["seed", "pixel", "sample", "block"],
+  "path.start": PIXEL,
+  "path.scatter": ["seed", "sample", "pixel", "depth", "surface"],
+  "path.whole": PIXEL,
+  "picture.exact": RENDERED,
+  "picture.rendered": RENDERED,
+  "network.init": ["seed"],
+  "image.smoothed": ["levels"],
+  "image.window": ["size", "x", "y"],
+  "image.draws": ["seed", "stream", "count"],
+  "whole.sine": ["amplitude"],
+  "whole.forward": ["amplitude", "fraction"],
+  "whole.rounded": ["size", "amplitude"],
+  "whole.rounded_on": ["size", "amplitude"],
 };
+
+function withIntegers([kind, answer]) {
+  const names = INTEGERS[kind] ?? [];
+  const checked = (input) => {
+    for (const name of names) require(Number.isInteger(input[name]), `${name} ${input[name]}: must be an integer`);
+    return answer(input);
+  };
+  return [kind, checked];
+}
+
+export const KINDS = Object.fromEntries(
+  Object.entries({
+    ...random,
+    ...mapValues({ ...light, ...intersection, ...material, ...transport }, ofFloats),
+    ...path,
+    ...network,
+    ...file,
+    ...whole,
+  }).map(withIntegers),
+);

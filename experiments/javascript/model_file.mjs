@@ -20,7 +20,7 @@ const TYPES = {
   F32: { bytes: 4, read: (data, at) => data.readFloatLE(at) },
 };
 // Tensors of other types may be in a file, and are not read.
-const OTHER_TYPES = { I64: 8, U64: 8, I32: 4, U32: 4, F16: 2, BF16: 2, I16: 2, U16: 2, I8: 1, U8: 1, BOOL: 1 };
+const OTHER_TYPES = { I64: 8, U64: 8, I32: 4, U32: 4, F16: 2, BF16: 2, I16: 2, U16: 2, I8: 1, U8: 1, F8_E5M2: 1, F8_E4M3: 1, BOOL: 1 };
 
 const readTensor = record({
   dtype: required(text),
@@ -42,7 +42,9 @@ function readContainer(bytes) {
   const length = bytes.readBigUInt64LE(0);
   require(length <= BigInt(bytes.length - 8), "the header must be inside of the file");
   const end = 8 + Number(length);
-  const header = parseJson(decodeUtf8(bytes.subarray(8, end)));
+  const headerText = decodeUtf8(bytes.subarray(8, end));
+  require(headerText.startsWith("{"), "the header must begin with {");
+  const header = parseJson(headerText);
   require(header instanceof Map, "the header must be an object");
   const data = bytes.subarray(end);
   const tensors = new Map();

@@ -1,6 +1,7 @@
 // Answers the requests of `wamnet conformance --program "node program.mjs"`, one JSON object a line (CNF-8, CNF-9).
 
 import { createInterface } from "node:readline";
+import { parseRequest } from "./json.mjs";
 import { KINDS } from "./kinds.mjs";
 import { answerText } from "./numbers.mjs";
 import { Refusal } from "./refusal.mjs";
@@ -18,5 +19,5 @@ function answerTo(request) {
 }
 
 for await (const line of createInterface({ input: process.stdin })) {
-  process.stdout.write(`${answerText(answerTo(JSON.parse(line)))}\n`);
+  process.stdout.write(`${answerText(answerTo(parseRequest(line)))}\n`);
 }

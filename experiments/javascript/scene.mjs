@@ -3,9 +3,9 @@
 import { parseJson } from "./json.mjs";
 import {
   boundedNumber,
-  count,
   list,
   matrix,
+  number,
   optional,
   orNull,
   record,
@@ -100,7 +100,7 @@ export const FIELDS = {
 const readCamera = record(FIELDS.camera);
 const readScene = record({
   format: required(text),
-  version: required(count),
+  version: required(number),
   name: required(text),
   camera: required(readCamera),
   room: optional(orNull(record(FIELDS.room)), null),

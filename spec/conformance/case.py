@@ -12,6 +12,7 @@ Versions are X.Y.Z: X changes with the format, Y with the behaviour that is expe
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,7 +24,7 @@ from ...refimpl.errors import InputError
 from ...refimpl.reading import parse_json, plain_name, read_file, refusing
 from .numbers import from_file, from_json, rounded_up, to_json
 
-VERSION = "1.8.0"
+VERSION = "1.9.0"
 """Version of format, behaviour and cases."""
 
 FORMAT = "wamnet-vectors"
@@ -119,6 +120,23 @@ class Kind:
     answer: Callable[[Mapping[str, Any]], Mapping[str, Any]]
     files: Callable[[], Mapping[str, bytes]] = field(default=dict)
     notes: str = ""
+
+    @property
+    def integers(self) -> list[str]:
+        """Return the names of the inputs that are one integer each."""
+        return [name for name, text in self.inputs.items() if _INTEGER.match(text)]
+
+
+_INTEGER = re.compile(r"(integer|pixels|row|column|samples|scatterings)\b(?!\[)")
+"""How the format page begins where it says of a field that it is one integer (CNF-9)."""
+
+
+def check_integers(kind: Kind, inputs: Mapping[str, Any]) -> None:
+    """Refuse a request whose integers are not integers of JSON."""
+    for name in kind.integers:
+        if name in inputs and type(inputs[name]) is not int:
+            rule = "it must be an integer of JSON"
+            raise InputError(name, json.dumps(inputs[name]), rule, "write it without a point")
 
 
 def text_of(kind: Kind) -> str:

@@ -53,7 +53,8 @@ class Function:
     """A function of the reference as a kind of case: `call` has the inputs and the float type of constants.
 
     `given`: inputs of cases with a note, and a clause where it is another one; `draws` more are drawn by
-    `draw` from uniform numbers in [0, 1).
+    `draw` from uniform numbers in [0, 1). `decided`: ties, with note and clause, of numbers that are the same
+    to the bit wherever like operations round alike, so that no rounding decides.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Function:
     given: Sequence[tuple[str, Numbers] | tuple[str, Numbers, str]] = ()
     draw: Callable[[NDArray[np.float64]], Numbers] | None = None
     draws: int = 8
+    decided: Sequence[tuple[str, Numbers, str]] = ()
 
     def kind(self) -> Kind:
         """Return the kind of case."""
@@ -81,11 +83,20 @@ class Function:
             rows += [("", self.draw(drawn(self.name, index)), self.clause) for index in range(self.draws)]
         found = []
         for index, (note, values, clause) in enumerate(rows):
-            inputs = {name: np.asarray(values[name], np.float32).astype(np.float64) for name in self.inputs}
+            inputs = self._rounded(values)
             expected, undecided = self.bounded(inputs)
             flags = ("undecided",) if undecided else ()
             found.append(Case(f"{self.name}/{index}", clause, inputs, expected, flags, note))
+        for note, values, clause in self.decided:
+            inputs = self._rounded(values)
+            found.append(
+                Case(f"{self.name}/{len(found)}", clause, inputs, self._as_decided(inputs), (), note)
+            )
         return found
+
+    def _rounded(self, values: Numbers) -> dict[str, Any]:
+        """Return the inputs of a case, numbers that float32 holds."""
+        return {name: np.asarray(values[name], np.float32).astype(np.float64) for name in self.inputs}
 
     def answer(self, inputs: Numbers) -> Numbers:
         """Return the reference's answer, in float64."""
@@ -109,6 +120,19 @@ class Function:
         if not sure:
             return self._either(inputs, wanted, ranges.evaluate(self.program(), given, guided=True)), True
         return outputs, False
+
+    def _as_decided(self, inputs: Numbers) -> dict[str, Output]:
+        """Return outputs where all decisions fall as the reference's, though ranges touch."""
+        wanted = self.answer(inputs)
+        found = ranges.evaluate(self.program(), components(self.inputs, inputs), guided=True)
+        outputs = {}
+        for name, field in self.outputs.items():
+            value = np.asarray(wanted[name], np.float64)
+            low, high = (_ends(found, name, field, end).reshape(value.shape) for end in ENDS)
+            bound = np.maximum(high - value, value - low)
+            assert np.all(np.isfinite(bound) & (bound >= 0.0)), f"{self.name}: no bound at {inputs}"
+            outputs[name] = Output(value, bound, GUIDED, clause=field.clause)
+        return outputs
 
     def _either(
         self, inputs: Numbers, wanted: Numbers, guided: Mapping[str, ranges.Range]
@@ -181,6 +205,9 @@ roundings of single precision."""
 
 APART = 2.0**-10
 """Answers that differ by more than this, relative to 1 or to their size, are two."""
+
+GUIDED = "range of single precision with decisions as the reference takes them: what ties is equal to the bit"
+"""Where the bounds of ties come from that no rounding decides."""
 
 EITHER = "range of single precision with decisions as the reference takes them, or as it does 2^-20 away"
 """Where the bounds of undecided cases come from."""

@@ -39,9 +39,9 @@ from ...refimpl.light.render import Job
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.dataset import Window
 from ...refimpl.network.whole import INPUT_LEVELS, Whole
-from .case import given
+from .case import check_integers, given
 from .functions import Function, components, names
-from .kinds import FUNCTIONS
+from .kinds import FUNCTIONS, KINDS
 from .kinds.files import model_from
 from .kinds.images import frame_of
 from .kinds.paths import VERTEX
@@ -68,6 +68,7 @@ class OnExecutor:
     def answer(self, kind: str, inputs: Mapping[str, Any], profile: str) -> Mapping[str, Any]:
         """Return the executor's outputs."""
         profile_named(profile)
+        check_integers(KINDS[kind], inputs)
         if kind in self._own:
             return self._own[kind]({name: given(value) for name, value in inputs.items()}, profile)
         function, kernels = FUNCTIONS[kind], self._compiled(kind, profile)

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TextIO
 
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
-from .case import given
+from .case import check_integers, given
 from .kinds import KINDS
 from .numbers import to_json
 
@@ -48,16 +47,9 @@ def _answered(request: Mapping[str, Any], kinds: Sequence[str], answer: Answer) 
         return {"refused": str(error)}
 
 
-_INTEGER = re.compile(r"(integer|pixels|row|column|samples|scatterings)\b(?!\[)")
-"""How the format page begins where it says of a field that it is one integer (CNF-9)."""
-
-
 def of_reference(kind: str, inputs: Mapping[str, Any], profile: str) -> Mapping[str, Any]:
     """Return the reference's answer."""
-    for name, text in KINDS[kind].inputs.items():
-        if name in inputs and _INTEGER.match(text) and type(inputs[name]) is not int:
-            rule = "it must be an integer of JSON"
-            raise InputError(name, json.dumps(inputs[name]), rule, "write it without a point")
+    check_integers(KINDS[kind], inputs)
     return KINDS[kind].answer({name: given(value) for name, value in inputs.items()})
 
 

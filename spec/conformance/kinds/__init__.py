@@ -9,6 +9,7 @@ from ..functions import Function
 from . import (
     files,
     images,
+    integers,
     light,
     materials,
     network,
@@ -28,7 +29,7 @@ FUNCTIONS: Mapping[str, Function] = {
 """Kinds that are functions of numbers, which executors can run."""
 
 KINDS: Mapping[str, Kind] = {
-    kind.name: kind
+    kind.name: integers.asked(kind)
     for kind in (
         *numbers.KINDS,
         *light.KINDS,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import math
 import struct
 import tempfile
 from collections.abc import Callable, Mapping
@@ -399,6 +400,108 @@ LATER_RULES = {
 """Clauses of those, by what a note says of them."""
 
 
+EVERY_TYPE = {
+    "BOOL": 1, "U8": 1, "I8": 1, "F8_E5M2": 1, "F8_E4M3": 1, "U16": 2, "I16": 2, "F16": 2, "BF16": 2,
+    "U32": 4, "I32": 4, "F32": 4, "U64": 8, "I64": 8, "F64": 8,
+}  # fmt: skip
+"""The types of tensors, with their size in bytes (MOD-1)."""
+
+
+def _beside(*entries: Mapping[str, Any]) -> bytes:
+    """Return the file with tensors more, which are ignored: of each its shape, and its type if not U8."""
+    header, data = _parts(file_of(MODEL))
+    for number, entry in enumerate(entries):
+        size = math.prod(entry["shape"]) * EVERY_TYPE[entry.get("dtype", "U8")]
+        span = {"data_offsets": [len(data), len(data) + size]}
+        header[f"more{number}"] = {"dtype": "U8", **entry, **span}
+        data += bytes(size)
+    return _joined(header, data)
+
+
+def _odd(size: int = 6, **entry: Any) -> bytes:
+    """Return the file with a tensor more of 6 bytes in 2 rows, whose entry is changed, ... being left out."""
+    header, data = _parts(file_of(MODEL))
+    made = {"dtype": "U8", "shape": [2, 3], "data_offsets": [len(data), len(data) + size], **entry}
+    header["more"] = {key: value for key, value in made.items() if value is not ...}
+    return _joined(header, data + bytes(size))
+
+
+def _header(before: bytes = b"", after: bytes = b"", texts: Any = None) -> bytes:
+    """Return the file with bytes before and after the header's object, or with other texts."""
+    header, data = _parts(file_of(MODEL))
+    if texts is not None:
+        header["__metadata__"] = texts
+    return _joined(before + json.dumps(header).encode() + after, data)
+
+
+def _other_biases(count: int) -> bytes:
+    """Return the file with another number of biases in the first layer."""
+    return _made_of({**_tensors(), "layer0.bias": np.full(count, 0.5, np.float32)})
+
+
+ENTRY_GOOD: Mapping[str, Callable[[], bytes]] = {
+    **{
+        f"a tensor of {dtype} that is not known": lambda dtype=dtype: _beside(  # type: ignore[misc]
+            {"dtype": dtype, "shape": [3]}
+        )
+        for dtype in EVERY_TYPE
+    },
+    "tensors that are not known: a number, and none": lambda: _beside(
+        {"shape": []}, {"shape": [2, 0]}, {"shape": [1]}
+    ),
+    "a header that ends in every white space": lambda: _header(after=b" \t\r\n"),
+}
+"""Containers that are read: what they have beside the model is ignored (MOD-1)."""
+
+ENTRY_BAD: Mapping[str, Callable[[], bytes]] = {
+    "a byte order mark before the header": lambda: _header(b"\xef\xbb\xbf"),
+    "a space before the header": lambda: _header(b" "),
+    "a line end before the header": lambda: _header(b"\n"),
+    "a zero after the header": lambda: _header(after=b"\0"),
+    "texts in a list": lambda: _header(texts=["format"]),
+    "a number among the texts": lambda: _header(texts={**_parts(file_of(MODEL))[0]["__metadata__"], "n": 1}),
+    "two sides below 0": lambda: _odd(shape=[-2, -3]),
+    "a side below 0, none beside it": lambda: _odd(0, shape=[-2, 0]),
+    "a side with a point": lambda: _odd(shape=[2.0, 3]),
+    "a side as text": lambda: _odd(shape=["2", 3]),
+    "a side that is true": lambda: _odd(shape=[True, 6]),
+    "a side that is null": lambda: _odd(shape=[None, 6]),
+    "sides in a list of lists": lambda: _odd(shape=[[2, 3]]),
+    "a shape that is a number": lambda: _odd(shape=6),
+    "no shape": lambda: _odd(shape=...),
+    "no type": lambda: _odd(dtype=...),
+    "no offsets": lambda: _odd(data_offsets=...),
+    "a type that is a number": lambda: _odd(dtype=8),
+    "a type in small letters": lambda: _odd(dtype="u8"),
+    "a type that is not known, of a tensor that is not": lambda: _odd(dtype="F4"),
+    "a key too many in an entry": lambda: _odd(strides=[3, 1]),
+    "an entry that is a list": lambda: _entry(["U8", [0], [0, 0]]),
+    "an entry that is null": lambda: _entry(None),
+    "one offset": lambda: _odd(data_offsets=[496]),
+    "three offsets": lambda: _odd(data_offsets=[0, 6, 6]),
+    "offsets with a point": lambda: _offsets(float),
+    "offsets as text": lambda: _offsets(str),
+    "fewer bytes than numbers": lambda: _odd(5),
+    "more bytes than numbers": lambda: _odd(7),
+    "a byte after the last tensor": lambda: file_of(MODEL) + b"\0",
+    "a bias too many": lambda: _other_biases(5),
+    "a bias too few": lambda: _other_biases(3),
+}
+"""Containers that are refused, whatever is wrong with them being in an entry that no model needs."""
+
+
+def _entry(value: Any) -> bytes:
+    """Return the file with an entry of another kind."""
+    header, data = _parts(file_of(MODEL))
+    return _joined({**header, "more": value}, data)
+
+
+def _offsets(form: Callable[[int], Any]) -> bytes:
+    """Return the file with the offsets of a tensor more in another form."""
+    end = len(_parts(file_of(MODEL))[1])
+    return _odd(data_offsets=[form(end), form(end + 6)])
+
+
 GOVERNING = {
     "scale": "MOD-6", "position_center": "MOD-6", "exposure_stops": "MOD-6", "pixel": "DAT-9",
     "parameter": "MOD-6", "omega_0 ": "MOD-6", "biases": "DEN-1", "weights": "DEN-1", "outputs": "DEN-1",
@@ -445,6 +548,11 @@ def _model_cases() -> list[Case]:
         clause = next((known for part, known in LATER_RULES.items() if part in note), otherwise)
         refusal = "MOD-6" if read else ""
         cases.append(Case(f"file.model/{len(cases)}", clause, inputs, expected, (), note, refusal))
+    for note, content in [*ENTRY_GOOD.items(), *ENTRY_BAD.items()]:
+        inputs, read = {"content": base64.b64encode(content()).decode()}, note in ENTRY_GOOD
+        expected = {name: Output(value) for name, value in _model(inputs).items()} if read else None
+        clause = "SIR-1" if "a bias" in note else "MOD-1"
+        cases.append(Case(f"file.model/{len(cases)}", clause, inputs, expected, (), note, "MOD-1" * read))
     return cases
 
 

@@ -291,7 +291,19 @@ def _window_cases() -> list[Case]:
         cases.append(Case(f"image.window/{len(cases)}", "DAT-9", inputs, None, (), f"{size}, {border}"))
     inputs = {"image": image, "size": 64, "border": "zero", "x": 0, "y": 1}
     expected = {"window": Output(_window(inputs)["window"])}
-    return [*cases, Case(f"image.window/{len(cases)}", "DAT-9", inputs, expected, (), "the largest window")]
+    cases.append(Case(f"image.window/{len(cases)}", "DAT-9", inputs, expected, (), "the largest window"))
+    for border, x, y in OUTSIDE:
+        inputs = {"image": np.zeros((2, 3, 1), np.int64), "size": 3, "border": border, "x": x, "y": y}
+        note = f"the window of the pixel ({x}, {y}) of an image of 3 x 2 pixels"
+        cases.append(Case(f"image.window/{len(cases)}", "DAT-9", inputs, None, (), note))
+    return cases
+
+
+OUTSIDE = (
+    *(("clamp", x, y) for x, y in ((3, 0), (0, 2), (-1, 0), (0, -1), (3, 2))),
+    *(("zero", x, y) for x, y in ((3, 1), (2, 2), (-1, -1))),
+)
+"""Borders and pixels that the image does not have, the nearest ones: 2 is a column, and no row."""
 
 
 # ---- draws ------------------------------------------------------------------------------------------------
@@ -425,6 +437,15 @@ OTHER_SHAPES = (
 """Shapes of pictures that are not compared, and notes: as many numbers, or some that would repeat."""
 
 
+OTHER_SIZES = (
+    ([*SHAPE[:2], 2], "a file that is longer than its shape"),
+    ([SHAPE[0] - 1, *SHAPE[1:]], "a file that has a row more"),
+    ([SHAPE[0] + 1, *SHAPE[1:]], "a file that is shorter than its shape"),
+    ([*SHAPE, 2], "a file of half of the numbers"),
+)
+"""Shapes that files of [`SHAPE`] do not have, and notes."""
+
+
 def _metric_cases(name: str) -> list[Case]:
     """Return the cases of a metric."""
     clause, function, bound = METRICS[name]
@@ -465,6 +486,11 @@ def _metric_cases(name: str) -> list[Case]:
         bad[-1, -1] = value
         add(square, bad, None, f"{value} in a reference", "MET-1")
     add(bad, bad, None, "-inf in both, at the same place", "MET-1")
+    if name == "mse":
+        whole = _in_file("reference")
+        for shape, note in OTHER_SIZES:
+            add({**whole, "shape": shape}, {**whole, "shape": shape}, None, note, "RDG-4")
+        add(square.tolist(), [[[0.5], [0.5]], [[0.5]]], None, "rows of two lengths", "MET-1")
     return cases
 
 

@@ -97,6 +97,7 @@ MIRROR = Function(
     [
         ("straight down", _at(0.5, 0.5, wo=(0.0, 1.0, 0.0))),
         ("grazing", _at(0.5, 0.5, wo=(1.0, 2.0**-20, 0.0))),
+        ("from behind: n . wo counts as 0", _at(0.5, 0.5, wo=(0.6, -0.8, 0.0))),
     ],
     _vertex,
     draws=4,
@@ -303,6 +304,9 @@ MIRRORED_SHARE = Function(
         ("just before total reflection", {"cosine": 0.75, "behind": 2.0**-12, "ratio": 1.5}),
         ("along the surface behind, on the way in", {"cosine": 0.75, "behind": 0.0, "ratio": 0.75}),
         ("a ratio of 1: nothing is mirrored", {"cosine": 0.5, "behind": 0.5, "ratio": 1.0}),
+        ("along the surface, a ratio of 1: 0/0 counts as 0", {"cosine": 0.0, "behind": 0.0, "ratio": 1.0}),
+        ("hardly a cosine, out: what divides is small", {"cosine": 1e-35, "behind": 0.0, "ratio": 1.5}),
+        ("hardly a cosine behind: it is not 0", {"cosine": 0.0, "behind": 1e-35, "ratio": 1.5}),
     ],
     lambda u: {"cosine": u[0], "behind": u[1], "ratio": 0.25 + 3.0 * u[2]},
     draws=4,

@@ -10,7 +10,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import cache
 from typing import Any, NamedTuple
@@ -30,8 +30,10 @@ from ....refimpl.light.transport import Counters, Path, Settings
 from ....refimpl.reading import to_dataclass
 from ..case import Case, Kind, Output
 from ..functions import SOURCE
+from ..numbers import Decimal
 from .terrace import MIRRORS
 from .views import (
+    NO_INTEGERS,
     SEED,
     SENT,
     WRONG_SETTINGS,
@@ -43,6 +45,7 @@ from .views import (
     glass,
     midway,
     others,
+    overcast,
     picks,
     rounded,
     scene_text,
@@ -283,59 +286,72 @@ def _steps() -> Found:
     """Return the cases of all steps: paths in float64 whose states are rounded to float32 at each step."""
     found = Found([], [], [])
     for view in (*views(16), *terrace(), *foundry(), *others(), *glass(), *tall(), *picks()):
-        given = view.inputs()
-        programs = programs_of(view.scene, view.settings)
-        wanted = start(_with_scene(given, view))
-        _add(
-            found.start,
-            "path.start",
-            "CAM-3",
-            given,
-            wanted,
-            ranges.evaluate(programs.start, _counted(given)),
-        )
-        kept = {name: given[name] for name in ("scene", "settings")}
-        counters = {"seed": view.seed, "pixel": wanted.pop("pixel"), "sample": view.sample}
-        one = np.ones(3)
-        state: dict[str, Any] = {**wanted, "beta": one, "radiance": 0.0 * one, "pdf": transport.CAMERA_PDF}
-        for depth in range(view.depth, view.depth + view.steps):
-            state = {name: rounded(state[name]) for name in PATH}
-            wanted = arrive(_with_scene({**kept, **state}, view))
-            sent = ranges.evaluate(programs.arrive, _flat(state, PATH))
-            inputs = {**kept, **state}
-            of_light = _of_emission(view, state["direction"], wanted)
-            _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, sent, of_light)
-            surface = {name: rounded(wanted[name]) for name in SURFACE}
-            inputs = {
-                **kept,
-                **counters,
-                "depth": depth,
-                **state,
-                "radiance": rounded(wanted["radiance"]),
-                **surface,
-            }
-            wanted = scatter(_with_scene(inputs, view))
-            flat = {**_flat(inputs, PATH), **_flat(inputs, SURFACE), **_counted(inputs)}
-            sent = ranges.evaluate(programs.scatter, flat)
-            _add(
-                found.scatter,
-                "path.scatter",
-                "LTR-7",
-                inputs,
-                wanted,
-                sent,
-                view.clause * (depth == view.depth),
-            )
-            if not wanted["alive"]:
-                break
-            state = wanted
+        _walk(found, view)
     _sent_midway(found)
-    given = foundry_settings()
-    for clause, name, value in WRONG_SETTINGS:
-        inputs = {**given, "settings": {**given["settings"], name: value}}
-        case = Case(f"path.start/{len(found.start)}", clause, inputs, None, (), f"{name} = {value}")
-        found.start.append(case)
+    _refuse(found, WRONG_SETTINGS)
+    for view in overcast():
+        _walk(found, view)
+    _refuse(found, NO_INTEGERS)
     return found
+
+
+def _refuse(found: Found, settings: Sequence[tuple[str, str, Any]]) -> None:
+    """Add settings that are refused: clause, name and value."""
+    given = foundry_settings()
+    for clause, name, value in settings:
+        inputs = {**given, "settings": {**given["settings"], name: value}}
+        note = f"{name} = {json.dumps(value)}" if isinstance(value, Decimal) else f"{name} = {value}"
+        found.start.append(Case(f"path.start/{len(found.start)}", clause, inputs, None, (), note))
+
+
+def _walk(found: Found, view: View) -> None:
+    """Add the steps of a path, each from the state that the step before has left."""
+    given = view.inputs()
+    programs = programs_of(view.scene, view.settings)
+    wanted = start(_with_scene(given, view))
+    _add(
+        found.start,
+        "path.start",
+        "CAM-3",
+        given,
+        wanted,
+        ranges.evaluate(programs.start, _counted(given)),
+    )
+    kept = {name: given[name] for name in ("scene", "settings")}
+    counters = {"seed": view.seed, "pixel": wanted.pop("pixel"), "sample": view.sample}
+    one = np.ones(3)
+    state: dict[str, Any] = {**wanted, "beta": one, "radiance": 0.0 * one, "pdf": transport.CAMERA_PDF}
+    for depth in range(view.depth, view.depth + view.steps):
+        state = {name: rounded(state[name]) for name in PATH}
+        wanted = arrive(_with_scene({**kept, **state}, view))
+        sent = ranges.evaluate(programs.arrive, _flat(state, PATH))
+        inputs = {**kept, **state}
+        of_light = _of_emission(view, state["direction"], wanted)
+        _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, sent, of_light)
+        surface = {name: rounded(wanted[name]) for name in SURFACE}
+        inputs = {
+            **kept,
+            **counters,
+            "depth": depth,
+            **state,
+            "radiance": rounded(wanted["radiance"]),
+            **surface,
+        }
+        wanted = scatter(_with_scene(inputs, view))
+        flat = {**_flat(inputs, PATH), **_flat(inputs, SURFACE), **_counted(inputs)}
+        sent = ranges.evaluate(programs.scatter, flat)
+        _add(
+            found.scatter,
+            "path.scatter",
+            "LTR-7",
+            inputs,
+            wanted,
+            sent,
+            view.clause * (depth == view.depth),
+        )
+        if not wanted["alive"]:
+            break
+        state = wanted
 
 
 def _sent_midway(found: Found) -> None:

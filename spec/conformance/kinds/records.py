@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ....refimpl.light import scene as scene_module
-from ....refimpl.light.scene import Camera
+from ....refimpl.light.scene import Camera, Scene
 from ....refimpl.reading import LONGEST_NUMBER, parse_json, to_dataclass
 from ..case import Case, Kind, Output
 
@@ -24,6 +24,7 @@ def _camera(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the numbers of a camera."""
     data = parse_json(inputs["text"], "camera", "fix the text")
     camera = to_dataclass(Camera, data, "camera", largest=scene_module.LARGEST_NUMBER)
+    scene_module.validate(Scene("camera", camera))
     vectors = {name: np.array(getattr(camera, name)) for name in ("position", "look_at", "up")}
     return {**vectors, "vertical_fov_deg": np.float64(camera.vertical_fov_deg)}
 
@@ -158,6 +159,20 @@ NO_RECORD = {
 """Texts that are JSON and no camera."""
 
 
+NO_CAMERA = {
+    "an angle of 0": _text(vertical_fov_deg=0),
+    "an angle of 180 degrees": _text(vertical_fov_deg=180),
+    "an angle below 0": _text(vertical_fov_deg=-45),
+    "a camera that looks at itself": _text(look_at=FACTS["position"]),
+    "a camera that looks along its up": _text(up=[-1, 3, -8]),
+    "an up of no direction": _text(up=[0, 0, 0]),
+}
+"""Cameras that see nothing."""
+
+DEEPEST = 20_000
+"""Objects in objects: a reader that calls itself for each and counts none runs out of its stack."""
+
+
 def _cases() -> list[Case]:
     """Return texts that are read, and those that are refused for their form or for what they hold."""
     cases: list[Case] = []
@@ -173,6 +188,11 @@ def _cases() -> list[Case]:
             cases.append(Case(f"file.camera/{len(cases)}", clause, inputs, expected, (), note, refusal))
     for note, text in no_json():
         cases.append(Case(f"file.camera/{len(cases)}", "RDG-2", {"text": text}, None, (), note))
+    for clause, note, text in (
+        ("RDG-2", "objects in objects in objects", '{"":' * DEEPEST),
+        *(("SCN-7", note, text) for note, text in NO_CAMERA.items()),
+    ):
+        cases.append(Case(f"file.camera/{len(cases)}", clause, {"text": text}, None, (), note))
     return cases
 
 

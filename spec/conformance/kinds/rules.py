@@ -279,6 +279,8 @@ def last_good() -> Iterator[tuple[str, str]]:
     yield "quads.0.material.roughness = 1", changed(("quads.0.material.roughness", 1))
     for name in ("\x7f\x80\x9f", "\u2028\ufeff\uffff", "\U0001f3e0"):
         yield f"name = {json.dumps(name)} as it is: letters that need no escape", _named(name)
+    for version in ("1.0", "1e0", "10E-1", "0.1e+1"):
+        yield f"version {version}: the number 1", _versioned(version)
     yield "name: every escape", _named(r"\"\\\/\b\f\n\r\t\u00e9\u00E9\uD83C\udfe0")
 
 
@@ -293,6 +295,15 @@ def last_bad() -> Iterator[tuple[str, str]]:
         "camera: up along a view from a place off all axes",
         changed(("camera.position", [2, 3, 5]), ("camera.look_at", [3, 4, 6]), ("camera.up", [1, 1, 1])),
     )
+    for version in ("1.5", "0", "-1", '"1"', "[1]", "null", "10", "1.0000000000000002"):
+        yield f"version {version}: not the number 1", _versioned(version)
+    for count in (1, 5):
+        yield f"room.materials: {count} for six walls", changed(("room.materials", [MIRROR] * count))
+
+
+def _versioned(text: str) -> str:
+    """Return the text of that scene with another version."""
+    return changed().replace('"version": 1,', f'"version": {text},')
 
 
 def no_texts() -> Iterator[tuple[str, str]]:

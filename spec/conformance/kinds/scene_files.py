@@ -77,9 +77,14 @@ def _letters() -> str:
     return json.dumps(data).replace("7.0]", "-0]")
 
 
+MATTE = {"kind": "lambertian"}
+"""The material of what names none; who names it keeps it in the canonical text (SCN-6)."""
+
 SCENE_LATER: Mapping[str, Callable[[], str]] = {
     "letters that are escaped, zeros with a sign": _letters,
     "six walls that name no material": lambda: _changed("room.materials", [None] * 6),
+    "walls of which one is said to be matte": lambda: _changed("room.materials", [MATTE, *[None] * 5]),
+    "a block that is said to be matte": lambda: _changed("boxes.0.material", MATTE),
 }
 """Scenes that are read, which come last: those before keep their numbers."""
 

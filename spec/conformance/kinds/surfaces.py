@@ -129,6 +129,15 @@ BOXES = Function(
         ("out of a corner", _ray((0.25, -0.25, -0.375), (0.5, 0.5, 1.5))),
     ],
     _aimed,
+    decided=[
+        # At x = 0.75 the ray enters at (2 - 0.5)/|d|, and leaves at (0.75 + 0.75)/|d| through y = 0.25.
+        ("through an edge, where entry and exit are equal", _ray((2.25, -1.25, 0.125), (-1, 1, 0)), "ISC-4"),
+        # 0.5/|d| - 0.5/|d| is 0 whatever 1/|d| is rounded to.
+        ("from a face into the box: the entry is 0", _ray((0.75, -0.5, 0.125), (-1, 0, 0)), "ISC-4"),
+        ("from a face, aslant", _ray((0.75, -0.5, 0.125), (-0.6, 0.0, 0.8)), "ISC-4"),
+        ("from a face out of the box: the exit is 0", _ray((0.75, -0.5, 0.125), (1, 0, 0)), "ISC-4"),
+        ("out of an edge of x and y", _ray((0.0, -0.5, 0.125), (1, 1, 0)), "ISC-8"),
+    ],
 )
 """Rays and a box."""
 
@@ -169,6 +178,12 @@ ROOMS = Function(
         ("to the ceiling", _ray((0, 0, 0), (0.125, 1, 0.25))),
     ],
     _aimed,
+    decided=[
+        # Both exits are 3/|d|: (0 + 1)/|d| + 2/|d| is rounded as 3/|d| is.
+        ("equal exits of x and z: the first axis", _ray((-1, 0.25, 0), (1, 0, 1)), "ISC-13"),
+        ("equal exits of x and z, the other way", _ray((1, 0.25, 0), (-1, 0, -1)), "ISC-13"),
+        ("on a wall, leaving: its exit is 0", _ray((2, 0, 0), (1, 0, 0)), "ISC-4"),
+    ],
 )
 """Rays and a room."""
 

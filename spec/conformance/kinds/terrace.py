@@ -13,7 +13,8 @@
 7. [`DARK`]: lamps without power or colour.
 8. [`PLATE`]: a matte floor under a distant lamp, whose samples hardly differ.
 9. [`LENS`], [`PANE`] and [`BUBBLE`]: glass as the first of two kinds of material, the second, and by itself.
-10. [`GLOW`]: no lamp and no sky, and a surface of each kind and material that emits; [`DUSK`] is the same
+10. [`OVERCAST`]: a sky without a sun beside a lamp without power; [`SHEET`]: a turned box whose centre cancels.
+11. [`GLOW`]: no lamp and no sky, and a surface of each kind and material that emits; [`DUSK`] is the same
     with a lamp in it.
 """
 
@@ -209,6 +210,31 @@ BUBBLE = replace(LENS, name="bubble", quads=(), lights=())
 
 LAMP = replace(LENS, name="lamp", spheres=(), quads=())
 """The lamp by itself: a scene without a material."""
+
+OVERCAST = Scene(
+    "overcast",
+    NIGHT.camera,
+    quads=NIGHT.quads,
+    lights=(replace(NIGHT.lights[0], power=0.0),),
+    environment=Sky((0.25, 0.5, 1.0), (0.5, 0.625, 0.75), (0.125, 0.125, 0.0625)),
+)
+"""A floor under a sky whose sun has no light, so that its share is 0, and a lamp without power."""
+
+SHEET = Scene(
+    "sheet",
+    Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0)),
+    boxes=(
+        Box(
+            (4.02, -5.36, 0.0),
+            (3.2e-15, 8.0, 1.0),
+            (0.75, 0.5, 0.25),
+            ((0.8, 0.6, 0.0), (-0.6, 0.8, 0.0), (0.0, 0.0, 1.0)),
+        ),
+    ),
+    background=(0.125, 0.25, 0.5),
+)
+"""A turned sheet through the origin: 0.8 * 4.02 - 0.6 * 5.36 is 0, and -4.4e-16 where each product is rounded.
+A ray along the sheet leaves it after 3.2, because the least component of a direction is 1e-15 (ISC-5)."""
 
 SHINE: dict[str, Any] = {"reflectance": (0.5, 0.75, 0.25), "emission": (0.25, 0.5, 1.0)}
 """A surface that emits and reflects."""

@@ -19,6 +19,7 @@ from ....refimpl import rng
 from ....refimpl.light import render, scenes, transport
 from ....refimpl.light import scene as scene_module
 from ....refimpl.light.transport import Settings
+from ..numbers import Decimal
 from .terrace import (
     BARE,
     BUBBLE,
@@ -30,8 +31,10 @@ from .terrace import (
     LENS,
     MIRRORS,
     NIGHT,
+    OVERCAST,
     PANE,
     PLATE,
+    SHEET,
     TERRACE,
     YARD,
 )
@@ -43,7 +46,7 @@ OWN = {
     scene.name: scene
     for scene in (
         *(TERRACE, FOUNDRY, YARD, MIRRORS, PLATE, BARE, NIGHT, DARK, LENS, PANE, BUBBLE),
-        *(GLOW, DUSK, LAMP),
+        *(GLOW, DUSK, LAMP, OVERCAST, SHEET),
     )
 }
 """Scenes of the vectors' own."""
@@ -237,6 +240,18 @@ def picks() -> Iterator[View]:
                 yield View(scene, VARIANTS[0], x, y, sample_between(low, high, x, y), clause, steps=1)
 
 
+FIRST_OF_ALL = 5_706_185
+"""The first sample of the pixel (8, 12) whose first light number is 0."""
+
+
+def overcast() -> Iterator[View]:
+    """Yield paths whose light is sampled from a sky without a sun: by the number 0, and by others."""
+    for sample, variant in ((FIRST_OF_ALL, 0), (0, 0), (1, 1), (2, 2)):
+        yield View(
+            OVERCAST.name, VARIANTS[variant], 8, 12, sample, "ENV-2" if not variant else "ENV-4", steps=1
+        )
+
+
 def sample_between(low: float, high: float, x: int, y: int) -> int:
     """Return the first sample of a pixel whose number that chooses a light lies between two numbers."""
     samples = np.arange(1 << 16, dtype=np.uint32)
@@ -316,6 +331,7 @@ LAMPLIT: tuple[tuple[str, Place, Place], ...] = (
     (DUSK.name, (-0.875, 1.875, 0.0), (-0.75, 1.75, 0.25)),
     (LAMP.name, (0.0, 0.5, 0.0), (0.125, 2.5, 0.0625)),
     (LAMP.name, (0.0, 3.0, 0.0), (0.125, 2.5, 0.0625)),
+    (SHEET.name, (0.0, 0.0, 4.0), (0.0, 0.0, 3.0)),
 )
 """Rays of scenes to lamps, from both sides, and to what is behind everything: in some no lamp is sampled."""
 
@@ -371,6 +387,16 @@ WRONG_SETTINGS: tuple[tuple[str, str, Any], ...] = (
     ("LTR-8", "roulette_depth", 1.5),
 )
 """Settings that are refused, with their clauses."""
+
+NO_INTEGERS: tuple[tuple[str, str, Any], ...] = (
+    ("LTR-9", "roulette_depth", Decimal(1.5)),
+    ("LTR-9", "roulette_depth", Decimal(1.0)),
+    ("LTR-9", "roulette_depth", True),
+    ("LTR-8", "max_depth", Decimal(2.0)),
+    ("LTR-8", "max_depth", "2"),
+    ("LTR-8", "max_depth", None),
+)
+"""Counts that are no integers of JSON: they are refused too."""
 
 
 def rounded(value: Any) -> Any:

@@ -181,6 +181,7 @@ def _forward_cases() -> list[Case]:
         ("colours of 1 - 2^31", "WHO-6", most, np.full(4, -INPUT_LEVELS)),
         ("the largest last bias", "WHO-1", replace(one, biases=(np.full(3, 2.0**24 - 1.0),)), np.zeros(4)),
         ("the largest factor", "WHO-1", _zeros(factor=2.0**24 - 1.0), np.zeros(4)),
+        ("factors of 0", "WHO-1", _zero_factors(), np.array([127, 90, -64, -5])),
         ("the least last bias", "WHO-1", replace(one, biases=(np.full(3, -(2.0**24)),)), np.zeros(4)),
     ):
         rows.append((note, clause, network, n))
@@ -230,6 +231,12 @@ def _zeros(factor: float = 1.0, bias: float = 0.0) -> Whole:
     return replace(
         one, weights=(one.weights[0] * 0,), factors=(np.full(3, factor),), biases=(np.full(3, bias),)
     )
+
+
+def _zero_factors() -> Whole:
+    """Return a layer of which one factor is 0: what its row sums up to does not count."""
+    one = _network(3)
+    return replace(one, factors=(one.factors[0] * np.array([0.0, 1.0, 0.0]),))
 
 
 def _with_hidden_bias(value: float) -> Whole:

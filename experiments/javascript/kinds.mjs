@@ -277,11 +277,16 @@ function layersOf(input, names) {
   return layers;
 }
 
-const networkOf = (input) => ({
-  layers: layersOf(input, ["weight", "bias"]),
-  omegaFirst: float(input.omega_0_first),
-  omegaHidden: float(input.omega_0_hidden),
-});
+// SIR-1: a layer takes what the one before gives, and has as many biases as rows.
+function networkOf(input) {
+  const layers = layersOf(input, ["weight", "bias"]);
+  layers.forEach(({ weight, bias }, l) => {
+    const wide = l > 0 ? layers[l - 1].weight.length : weight[0]?.length;
+    const fits = weight.every((row) => row.length === wide) && bias.length === weight.length;
+    require(fits, `layer ${l} does not fit`);
+  });
+  return { layers, omegaFirst: float(input.omega_0_first), omegaHidden: float(input.omega_0_hidden) };
+}
 
 // Outputs by name and layer: weight_0, bias_0, weight_1, ...
 function namedByLayer(layers, names, prefix = "") {
@@ -308,7 +313,9 @@ const network = {
     return namedByLayer(layers, ["weight", "bias"]);
   },
   "network.forward": (input) => {
-    const { outputs } = forward(networkOf(input), floats(input.x));
+    const given = networkOf(input);
+    require(input.x.length === given.layers[0].weight[0].length, "x does not fit the first layer");
+    const { outputs } = forward(given, floats(input.x));
     return Object.fromEntries(outputs.map((output, l) => [`layer_${l}`, output]));
   },
   "network.gradient": (input) => {

@@ -16,6 +16,7 @@ from . import (
     numbers,
     paths,
     pictures,
+    rare,
     records,
     scene_files,
     smoothing,
@@ -29,7 +30,7 @@ FUNCTIONS: Mapping[str, Function] = {
 """Kinds that are functions of numbers, which executors can run."""
 
 KINDS: Mapping[str, Kind] = {
-    kind.name: integers.asked(kind)
+    kind.name: integers.asked(rare.asked(kind))
     for kind in (
         *numbers.KINDS,
         *light.KINDS,

@@ -6,7 +6,7 @@ by step.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -22,6 +22,7 @@ from ....compiler.proof import bounds, ranges
 from ....compiler.proof.ranges import Range
 from ....compiler.training.lower_step import ADAM_INPUTS, lower_adam, step_of
 from ....compiler.training.step import SQUARES, sum_errors
+from ....refimpl.errors import InputError
 from ....refimpl.network import adam, siren, train
 from ....refimpl.network.siren import Siren
 from ..case import Case, Kind, Output
@@ -80,7 +81,17 @@ def _from_inputs(inputs: Mapping[str, Any]) -> Siren:
         tuple(np.asarray(inputs[f"{name}_{layer}"], np.float64) for layer in range(count))
         for name in ("weight", "bias")
     )
+    _check_fit(weights, biases)
     return Siren(weights, biases, float(inputs["omega_0_first"]), float(inputs["omega_0_hidden"]))
+
+
+def _check_fit(weights: Sequence[Array], biases: Sequence[Array]) -> None:
+    """Raise InputError where layers do not fit one another, or biases their layer (SIR-1)."""
+    for layer, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
+        wide = weights[layer - 1].shape[0] if layer else weight.shape[1]
+        if weight.shape[1] != wide or bias.shape != weight.shape[:1]:
+            rule = f"it must take {wide} numbers, and have as many biases as rows"
+            raise InputError(f"layer {layer}", weight.shape, rule, "give layers that fit one another")
 
 
 def _numbers(index: int, shape: tuple[int, ...], scale: float = 1.0) -> Array:
@@ -145,6 +156,9 @@ def activations(network: Siren, x: Any) -> dict[str, Any]:
 def _forward(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the activations of one input vector."""
     network, x = _from_inputs(inputs), np.asarray(inputs["x"], np.float64)[np.newaxis]
+    if x.shape[1:] != network.widths[:1]:
+        rule = f"the first layer takes {network.widths[0]} numbers"
+        raise InputError("x", x.shape[1:], rule, "give as many")
     found = activations(network, x)
     found[f"layer_{len(network.weights) - 1}"] = siren.forward(network, x)
     return {name: value[0] for name, value in found.items()}

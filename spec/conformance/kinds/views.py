@@ -20,6 +20,7 @@ from ....refimpl.light import render, scenes, transport
 from ....refimpl.light import scene as scene_module
 from ....refimpl.light.transport import Settings
 from ..numbers import Decimal
+from .deep import DEEP, TWINS
 from .terrace import (
     BARE,
     BUBBLE,
@@ -47,6 +48,7 @@ OWN = {
     for scene in (
         *(TERRACE, FOUNDRY, YARD, MIRRORS, PLATE, BARE, NIGHT, DARK, LENS, PANE, BUBBLE),
         *(GLOW, DUSK, LAMP, OVERCAST, SHEET),
+        *(DEEP, TWINS),
     )
 }
 """Scenes of the vectors' own."""

@@ -44,7 +44,10 @@ def _lamp(axis: int) -> Light:
 
 
 DEEP = Scene(
-    "deep", EYE, quads=tuple(_floor(axis) for axis in range(3)), lights=tuple(_lamp(axis) for axis in range(3))
+    "deep",
+    EYE,
+    quads=tuple(_floor(axis) for axis in range(3)),
+    lights=tuple(_lamp(axis) for axis in range(3)),
 )
 """Floors and lamps far out, the first along x."""
 

@@ -179,12 +179,17 @@ def _on_windows() -> list[Case]:
 
 
 def _models() -> list[Case]:
-    """Return files whose header has a byte that begins no character before ten that continue one, and others."""
+    """Return files whose header is no UTF-8, though each byte but one continues a character, and others."""
     stray = b"\xff" + b"\x80" * 6 + b"\x84\x8f\xbf\xbf"
     header, data = files._parts(files.file_of(files.MODEL))
     texts = {**header["__metadata__"], "later": 1}
+    # As many bytes as letters, so that nothing else of the file is wrong.
+    assert len(stray) == len("rough paper")
     rows = {
-        "RDG-2": ("a byte 255 before ten of 10xxxxxx", files._text("note", "rough").replace(b"rough", stray)),
+        "RDG-2": (
+            "a byte 255 before ten of 10xxxxxx",
+            files._text("note", "rough paper").replace(b"rough paper", stray),
+        ),
         "MOD-6": (
             "a number among the texts, which is not known",
             files._joined({**header, "__metadata__": texts}, data),

@@ -216,7 +216,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     some, kept = chosen(options.words, options.count, options.seed, options.c99), read(path)
     asked(some, kept, path, options)
     some.sort(key=lambda m: (m.module, m.start))
-    print(table("module", _grouped(some, _place), kept))
+    print(table("chapter" if options.c99 else "module", _grouped(some, _place), kept))
     print(table("change", _grouped(some, lambda m: m.operator), kept))
     known = reasons()
     fair = [m for m in some if kept[m.name].asked and not excuse(m, known)]

@@ -555,6 +555,7 @@ TABLES: Mapping[str, TableOf] = {
     "claims": claims("verdicts"),
     "claims-exposures": claims("exposures"),
     "reference-mutants": as_printed("reference-mutants", 1),
+    "c99-mutants": as_printed("c99-mutants", 1),
     "held-back-left": as_printed("held-back", 2),
     "held-back-second-left": as_printed("held-back-second", 2),
     "held-back-third-left": as_printed("held-back-third", 2),

@@ -179,7 +179,7 @@ def _on_windows() -> list[Case]:
 
 
 def _models() -> list[Case]:
-    """Return files whose header is no UTF-8, though each byte but one continues a character, and others."""
+    """Return a file whose header is not UTF-8, by one byte before ten that continue, and one of a number."""
     stray = b"\xff" + b"\x80" * 6 + b"\x84\x8f\xbf\xbf"
     header, data = files._parts(files.file_of(files.MODEL))
     texts = {**header["__metadata__"], "later": 1}

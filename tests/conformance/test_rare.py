@@ -1,0 +1,65 @@
+"""Cases that changes of the C program survived: they come last, are refused rightly, and nothing in them ties."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.light.shapes.shape import LEAST_COMPONENT
+from wamnet.refimpl.network import whole as reference
+from wamnet.spec.conformance.kinds import KINDS, network, rare, surfaces, whole
+
+
+def test_cases_come_after_the_kinds_own():
+    kind = KINDS["network.forward"]
+    cases = kind.make()
+    assert [case.id for case in cases] == [f"network.forward/{n}" for n in range(len(cases))]
+    own = network._forward_cases()
+    assert [case.note for case in cases[: len(own)]] == [case.note for case in own]
+    assert [case.note for case in cases[len(own) :]] == [case.note for case in rare.MORE[kind.name]()]
+
+
+def test_each_kind_of_more_cases_is_a_kind():
+    assert set(rare.MORE) <= set(KINDS)
+    untouched = KINDS["random.block"]
+    assert rare.asked(untouched) is untouched
+
+
+def test_layers_and_inputs_that_do_not_fit_are_refused():
+    for case in rare.MORE["network.forward"]():
+        said = "the first layer takes 4 numbers" if "input" in case.note else "as many biases as rows"
+        with pytest.raises(InputError, match=said):
+            KINDS["network.forward"].answer(case.inputs)
+
+
+def test_components_of_rays_are_between_the_guard_and_twice_it():
+    for case in rare.MORE["intersection.slabs"]():
+        # LEAST_COMPONENT is where ISC-5 begins to guard.
+        least = np.min(np.abs(case.inputs["direction"]))
+        assert LEAST_COMPONENT < least < 2.0 * LEAST_COMPONENT
+        # A guard of twice the size would move a distance by a quarter at least, beyond each bound.
+        assert all(np.all(out.bound <= np.abs(out.value).max() / 100) for out in case.expected.values())
+        assert surfaces.SLABS.answer(case.inputs).keys() == case.expected.keys()
+
+
+def test_integers_on_windows_do_not_tie():
+    # Sums in any order are off by some 2^-48: a change by 2^-40 is more than what two programs differ by.
+    for case in rare.MORE["whole.rounded_on"]():
+        for scale in (1.0 - 2.0**-40, 1.0 + 2.0**-40):
+            moved = {n: v * scale if n.startswith("weight_") else v for n, v in case.inputs.items()}
+            found = whole._rounded_on({n: np.asarray(v, np.float64) for n, v in moved.items()})
+            assert all(np.array_equal(found[name], out.value) for name, out in case.expected.items())
+
+
+def test_windows_of_few_steps_are_decided_by_the_least_spread(monkeypatch):
+    quiet, _ = rare.MORE["whole.rounded_on"]()
+    monkeypatch.setattr(reference, "SPREAD", 2.0 * reference.SPREAD)
+    found = whole._rounded_on(quiet.inputs)
+    assert any(not np.array_equal(found[name], out.value) for name, out in quiet.expected.items())
+    assert np.mean(np.var(reference.steps_of(np.asarray(quiet.inputs["windows"])), axis=0)) < 1.0
+
+
+def test_the_first_of_two_equal_shapes_is_met():
+    found = [int(case.expected["surface"].value) for case in rare.MORE["path.arrive"]()]
+    assert found == [0, 0, 2, 2, 4]

@@ -1,4 +1,4 @@
-"""Cases that changes of the C program survived: they come last, are refused rightly, and nothing in them ties."""
+"""Cases that changes of the C program survived: they come last, are refused rightly, and do not tie."""
 
 from __future__ import annotations
 

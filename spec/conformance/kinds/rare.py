@@ -18,7 +18,7 @@ from ....compiler.scenes.lower_scene import PATH, SURFACE
 from ....refimpl.network import siren
 from ..case import Case, Kind, Output
 from ..functions import drawn
-from . import files, network, paths, surfaces, whole
+from . import files, network, paths, rules, scene_files, surfaces, whole
 from .deep import FAR, GRAY, Place, along
 from .views import SEED, VARIANTS, View, midway, rounded, sample_between
 
@@ -180,25 +180,43 @@ def _on_windows() -> list[Case]:
 
 def _models() -> list[Case]:
     """Return a file whose header is not UTF-8, by one byte before ten that continue, and one of a number."""
-    stray = b"\xff" + b"\x80" * 6 + b"\x84\x8f\xbf\xbf"
+    end = b"\x84\x8f\xbf\xbf"
+    stray, shorter = b"\xff" + b"\x80" * 6 + end, b"\xff" + b"\x80" * 4 + end
     header, data = files._parts(files.file_of(files.MODEL))
     texts = {**header["__metadata__"], "later": 1}
     # As many bytes as letters, so that nothing else of the file is wrong.
-    assert len(stray) == len("rough paper")
-    rows = {
-        "RDG-2": (
-            "a byte 255 before ten of 10xxxxxx",
-            files._text("note", "rough paper").replace(b"rough paper", stray),
-        ),
-        "MOD-6": (
-            "a number among the texts, which is not known",
-            files._joined({**header, "__metadata__": texts}, data),
-        ),
-    }
+    texts_of = {"rough paper": stray, "rough end": shorter}
+    rows = [
+        (
+            "RDG-2",
+            f"a byte 255 before {len(some) - 1}",
+            files._text("note", note).replace(note.encode(), some),
+        )
+        for note, some in texts_of.items()
+    ]
+    numbered = files._joined({**header, "__metadata__": texts}, data)
+    rows.append(("MOD-6", "a number among the texts, which is not known", numbered))
     return [
         Case("", clause, {"content": base64.b64encode(content).decode()}, None, (), note)
-        for clause, (note, content) in rows.items()
+        for clause, note, content in rows
     ]
+
+
+def _scenes() -> list[Case]:
+    """Return a scene whose name escapes the characters beside halves of others, and one of a matte box."""
+    cases = []
+    for note, clause, text in (
+        ("escapes beside halves of characters", "RDG-2", rules._named(r"\ud7ff\ue000")),
+        (
+            "boxes.0.material = lambertian",
+            "SCN-8",
+            rules.changed(("boxes.0.material", {"kind": "lambertian"})),
+        ),
+    ):
+        inputs = {"text": text}
+        expected = {name: Output(v, clause="SCN-8") for name, v in scene_files._scene(inputs).items()}
+        cases.append(Case("", clause, inputs, expected, (), note, "RDG-2" if "halves" in note else "SCN-7"))
+    return cases
 
 
 MORE: Mapping[str, Callable[[], list[Case]]] = {
@@ -208,5 +226,6 @@ MORE: Mapping[str, Callable[[], list[Case]]] = {
     "network.forward": _unfit,
     "whole.rounded_on": _on_windows,
     "file.model": _models,
+    "file.scene": _scenes,
 }
 """More cases, by kind; their numbers follow those of the kind's own."""

@@ -29,7 +29,7 @@ BUDGET = {
     "kernels/bench": 4850,
     "kernels/export": 3975,
     "kernels/verify": 2925,
-    "spec/conformance": 8000,
+    "spec/conformance": 8050,
     "cli": 300,
     "cli/commands": 5510,
     "cli/common": 1050,

@@ -16,6 +16,7 @@ entries and types are checked here too [`_check_entry`].
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -30,8 +31,9 @@ from safetensors import SafetensorError, deserialize
 from ..refimpl.errors import InputError
 from ..refimpl.network import train
 from ..refimpl.network.activation import SINE, activation_named
-from ..refimpl.network.dataset import Window, normalization_from_json
+from ..refimpl.network.dataset import Normalization, Window, normalization_from_json
 from ..refimpl.network.denoise import Model, check_model
+from ..refimpl.network.imported import Imported, Source, Step
 from ..refimpl.network.siren import Siren
 from ..refimpl.network.train import TrainState
 from ..refimpl.network.whole import Whole
@@ -55,6 +57,9 @@ ACTIVATION_VERSION = "2"
 
 WHOLE_VERSION = "3"
 """Version of models of integers."""
+
+IMPORTED_VERSION = "4"
+"""Version of networks that were imported."""
 
 INFO_PREFIX = "info."
 """Put before the names of a model's own facts in the header, so that they cannot hide a field."""
@@ -93,12 +98,18 @@ def save_model(path: str | os.PathLike[str], model: Model) -> None:
         factors = enumerate(model.siren.factors)
         tensors |= {f"layer{layer}.factor": factor.astype(np.int32) for layer, factor in factors}
     texts = {
-        "features": json.dumps(model.features),
         "window": json.dumps(asdict(model.window), sort_keys=True),
+        **{INFO_PREFIX + name: text for name, text in model.info.items()},
+    }
+    if isinstance(model.siren, Imported):
+        texts |= _imported_texts(model.siren) | {"version": IMPORTED_VERSION}
+        _write(Path(path), _encode(MODEL_FORMAT, tensors, texts))
+        return
+    texts |= {
+        "features": json.dumps(model.features),
         "omega_0_first": repr(model.siren.omega_0_first),
         "omega_0_hidden": repr(model.siren.omega_0_hidden),
         "normalization": json.dumps(asdict(model.normalization), sort_keys=True),
-        **{INFO_PREFIX + name: text for name, text in model.info.items()},
     }
     if isinstance(model.siren, Whole):
         texts |= {name: repr(getattr(model.siren, name)) for name in WHOLE_TEXTS} | {"version": WHOLE_VERSION}
@@ -110,34 +121,92 @@ def save_model(path: str | os.PathLike[str], model: Model) -> None:
 def load_model(path: str | os.PathLike[str]) -> Model:
     """Read a model, or raise InputError that says what is wrong with the file."""
     path = Path(path)
-    tensors, texts = _read(path, MODEL_FORMAT, (VERSION, ACTIVATION_VERSION, WHOLE_VERSION))
-    model = Model(
-        siren=_network(path, tensors, texts),
-        features=_parsed(path, texts, "features", _names),
-        window=_parsed(path, texts, "window", _window),
-        normalization=_parsed(path, texts, "normalization", normalization_from_json),
-        info={
-            name.removeprefix(INFO_PREFIX): text
-            for name, text in sorted(texts.items())
-            if name.startswith(INFO_PREFIX)
-        },
-    )
+    versions = (VERSION, ACTIVATION_VERSION, WHOLE_VERSION, IMPORTED_VERSION)
+    tensors, texts = _read(path, MODEL_FORMAT, versions)
+    window = _parsed(path, texts, "window", _window)
+    info = {
+        name.removeprefix(INFO_PREFIX): text
+        for name, text in sorted(texts.items())
+        if name.startswith(INFO_PREFIX)
+    }
+    if texts["version"] == IMPORTED_VERSION:
+        network = _imported(path, tensors, texts)
+        model = imported_model(network, window, info)
+    else:
+        model = Model(
+            siren=_network(path, tensors, texts),
+            features=_parsed(path, texts, "features", _names),
+            window=window,
+            normalization=_parsed(path, texts, "normalization", normalization_from_json),
+            info=info,
+        )
     _check(path, check_model, model)
     return model
 
 
-def _network(path: Path, tensors: Tensors, texts: Texts) -> Siren:
-    """Return the network of a model file."""
+def imported_model(network: Imported, window: Window, info: Texts) -> Model:
+    """Return the model of an imported network, whose features are its images."""
+    return Model(network, tuple(source.name for source in network.sources), window, Normalization(), info)
+
+
+def _imported_texts(network: Imported) -> dict[str, str]:
+    """Return the texts of an imported network."""
+    ends = (network.low, network.high)
+    return {
+        "images": json.dumps([asdict(source) for source in network.sources], sort_keys=True),
+        "steps": json.dumps([asdict(step) for step in network.steps], sort_keys=True),
+        "clip": json.dumps([end if math.isfinite(end) else None for end in ends]),
+    }
+
+
+def _imported(path: Path, tensors: Tensors, texts: Texts) -> Imported:
+    """Return the imported network of a model file."""
+    weights, biases = _layers(path, tensors)
+    sources = _parsed(path, texts, "images", lambda text: _records(Source, text, "images"))
+    steps = _parsed(path, texts, "steps", lambda text: _records(Step, text, "steps"))
+    low, high = _parsed(path, texts, "clip", _ends)
+    return Imported(weights, biases, 1.0, 1.0, SINE, steps, low, high, sources)
+
+
+def _records(kind: type[Any], text: str, name: str) -> tuple[Any, ...]:
+    """Return the records of a JSON list of objects."""
+    held = parse_json(text, name, "import the network again")
+    if not isinstance(held, list):
+        raise ValueError("a list of objects is needed")
+    return tuple(to_dataclass(kind, each, f"{name}[{i}]", whole=True) for i, each in enumerate(held))
+
+
+def _ends(text: str) -> tuple[float, float]:
+    """Return both ends of a JSON list of two numbers, or null where there is none."""
+    held = parse_json(text, "clip", "import the network again")
+    if (
+        not isinstance(held, list)
+        or len(held) != 2
+        or any(type(x) not in (int, float, type(None)) for x in held)
+    ):
+        raise ValueError("a list of two numbers, or null, is needed")
+    low, high = held
+    return -math.inf if low is None else float(low), math.inf if high is None else float(high)
+
+
+def _layers(path: Path, tensors: Tensors) -> tuple[tuple[NDArray[Any], ...], tuple[NDArray[Any], ...]]:
+    """Return weights and biases of all layers."""
     layers = range(max(sum(name.endswith(".weight") for name in tensors), 1))
     weights, biases = (
         tuple(_tensor(path, tensors, f"layer{layer}.{name}") for layer in layers)
         for name in ("weight", "bias")
     )
+    return weights, biases
+
+
+def _network(path: Path, tensors: Tensors, texts: Texts) -> Siren:
+    """Return the network of a model file."""
+    weights, biases = _layers(path, tensors)
     first, hidden = (_parsed(path, texts, name, _decimal) for name in ("omega_0_first", "omega_0_hidden"))
     omegas = first, hidden
     if texts.get("version") != WHOLE_VERSION:
         return Siren(weights, biases, *omegas, _activation(path, texts))
-    factors = tuple(_tensor(path, tensors, f"layer{layer}.factor") for layer in layers)
+    factors = tuple(_tensor(path, tensors, f"layer{layer}.factor") for layer in range(len(weights)))
     for array in (*weights, *biases, *factors):
         if array.dtype.kind != "i":
             rule = "a model of integers has tensors of I8 and I32"

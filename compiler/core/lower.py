@@ -10,10 +10,14 @@ import numpy as np
 
 from ...refimpl.network.dataset import DISPLAY_FORMULA, FEATURES, Normalization
 from ...refimpl.network.denoise import Model, as_dtype, check_model, denoise_pixel
+from ...refimpl.network.imported import Imported
 from ...refimpl.network.whole import INPUT_LEVELS
 from .ir import OUTPUT_ENCODING, Gather, Image, Program, Type
 from .trace import trace
 from .verify import verify
+
+OWN_NUMBERS = "as the network was trained"
+"""What is said about the numbers of images, and of the result, of a network that was imported."""
 
 
 def lower(model: Model, keep_places: bool = False) -> Program:
@@ -22,14 +26,9 @@ def lower(model: Model, keep_places: bool = False) -> Program:
     `keep_places`: its nodes know the lines of the reference that they came from, for listings.
     """
     check_model(model)
-    scales = model.normalization
-    gather = Gather(model.window, images_of(model.features, scales, model.is_whole))
     siren = as_dtype(model.siren, np.float32)
-    info = {
-        **model.info,
-        "normalization": json.dumps(asdict(scales), sort_keys=True),
-        OUTPUT_ENCODING: DISPLAY_FORMULA.format_map(asdict(scales)),
-    }
+    images, encoded = _read_by(model)
+    gather, info = Gather(model.window, images), {**model.info, **encoded}
     program = trace(
         lambda window: denoise_pixel(siren, window),
         {"window": Type(shape=(gather.n_inputs,))},
@@ -38,6 +37,18 @@ def lower(model: Model, keep_places: bool = False) -> Program:
         keep_places=keep_places,
     )
     return verify(program, "lowered model")
+
+
+def _read_by(model: Model) -> tuple[tuple[Image, ...], dict[str, str]]:
+    """Return the images that a model reads, and how they and its output are encoded."""
+    if isinstance(model.siren, Imported):
+        found = (Image(s.name, s.channels, s.low, s.high, OWN_NUMBERS) for s in model.siren.sources)
+        return tuple(found), {OUTPUT_ENCODING: OWN_NUMBERS}
+    scales = model.normalization
+    return images_of(model.features, scales, model.is_whole), {
+        "normalization": json.dumps(asdict(scales), sort_keys=True),
+        OUTPUT_ENCODING: DISPLAY_FORMULA.format_map(asdict(scales)),
+    }
 
 
 def images_of(

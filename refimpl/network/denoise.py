@@ -24,6 +24,7 @@ from ..frame import Frame
 from . import dataset
 from .activation import activation_named
 from .dataset import Normalization, Window
+from .imported import Imported, check_imported, forward_imported
 from .siren import LARGEST_PARAMETER, Siren, check_shape, forward
 from .whole import Whole, check_whole, forward_whole, round_image
 
@@ -51,9 +52,19 @@ class Model:
         """Return whether the network, and the images that it reads, are of integers."""
         return isinstance(self.siren, Whole)
 
+    @property
+    def is_imported(self) -> bool:
+        """Return whether another program has trained the network: it reads images, not features of frames."""
+        return isinstance(self.siren, Imported)
+
 
 def check_model(model: Model) -> None:
     """Refuse a model whose parts do not fit each other or whose parameters are not finite numbers."""
+    if isinstance(model.siren, Imported):
+        dataset.check_window(model.window)
+        _check_layers(model.siren)
+        check_imported(model.siren, model.window)
+        return
     dataset.check_features(model.features)
     dataset.check_window(model.window)
     dataset.check_normalization(model.normalization)
@@ -103,9 +114,14 @@ def learned_feature_spp(model: Model) -> int:
 
 
 def denoise_pixel(siren: Siren, window_vector: Any) -> Any:
-    """Map window vectors (..., D_in) to display-encoded colours (..., 3) in [0, 1]; may be traced."""
+    """Map window vectors (..., D_in) to display-encoded colours (..., 3) in [0, 1]; may be traced.
+
+    An imported network has outputs of its own.
+    """
     if isinstance(siren, Whole):
         return forward_whole(siren, window_vector)
+    if isinstance(siren, Imported):
+        return forward_imported(siren, window_vector)
     return np.minimum(np.maximum(forward(siren, window_vector), 0.0), 1.0)
 
 

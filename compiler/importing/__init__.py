@@ -1,0 +1,1 @@
+"""Networks of other programs: graphs in ONNX's form become models."""

@@ -30,6 +30,7 @@ from .commands import (
     demo,
     denoise,
     export,
+    importing,
     listing,
     render,
     train,
@@ -89,6 +90,7 @@ _register(render.render, render.RENDER_EXAMPLES)
 _register(render.scene, render.SCENE_EXAMPLES)
 _register(dataset.dataset, dataset.EXAMPLES)
 _register(train.train, train.EXAMPLES)
+_register(importing.import_model, importing.EXAMPLES, "import")
 _register(compile_model, COMPILE_EXAMPLES, "compile")
 _register(listing.listing, listing.EXAMPLES)
 _register(export.export, export.EXAMPLES)

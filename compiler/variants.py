@@ -362,6 +362,7 @@ def vary(variant: Variant, model: Model) -> Varied:
     siren = model.siren
     is_made = isinstance(siren, whole.Whole) and variant.steps
     _check(variant.name, not is_made, "the model is one of integers, which come last", FULL)
+    _check(variant.name, not (model.is_imported and variant.steps), "an imported network has none", FULL)
     wide = [[array.astype(np.float64) for array in arrays] for arrays in (siren.weights, siren.biases)]
     kept = tuple(np.arange(weight.shape[1]) for weight in siren.weights)
     varied = Varied(

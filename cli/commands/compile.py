@@ -163,8 +163,11 @@ def _compiled_model(
     from ...compiler.variants import FULL, plan_model
 
     check_request(request, variant)
-    model = load_model(path)
+    model = load_model(path, imported=True)
     if request.limited:
+        if model.is_imported:
+            rule = "limits are measured on frames, which an imported network does not read"
+            raise InputError("limits", "given", rule, "leave them out")
         if here:
             rule = "limits choose the schedule too"
             raise InputError("--here", "given", rule, "leave it out")

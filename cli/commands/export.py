@@ -251,7 +251,7 @@ def _export(
     loaded = motion.scenes[0] if motion else load_scene(scene, *moment) if scene else None
     variant, weights, schedule = (text or "" for text in asked)
     options_of = (weights, variant or FULL, settings, schedule, motion, place[1])
-    return exported(Request(load_model(model), place[0], loaded, profile, *options_of))
+    return exported(Request(load_model(model, imported=True), place[0], loaded, profile, *options_of))
 
 
 def _tell(made: Export) -> None:

@@ -55,13 +55,20 @@ def model_path(path: Path) -> Path:
     return MODELS / f"{name}.safetensors"
 
 
-def load_model(path: Path) -> Model:
-    """Read a model; a checkpoint is refused with the name of the model that belongs to it."""
+def load_model(path: Path, imported: bool = False) -> Model:
+    """Read a model; a checkpoint is refused with the name of the model that belongs to it.
+
+    `imported`: networks of other programs too, which do not read frames.
+    """
     from ...compiler import model_file
 
     path = model_path(path)
     try:
-        return model_file.load_model(path)
+        found = model_file.load_model(path)
+        if not found.is_imported or imported:
+            return found
+        rule = f"it was imported and reads {', '.join(found.features)}, not the features of a frame"
+        raise InputError("model", str(path), rule, "use it with wamnet compile, listing or export --check")
     except InputError as error:
         if error.value != model_file.CHECKPOINT_FORMAT:
             raise

@@ -129,12 +129,14 @@ WAY_OUT = "import a network of fewer channels, fewer layers or smaller kernels"
 
 
 def _window(spots: Sequence[Spot] | dict[Spot, int], sources: int) -> int:
-    """Return the size of the smallest odd window that holds all places of images that are read."""
-    reach = max((max(abs(dy), abs(dx)) for value, dy, dx in spots if value < sources), default=0)
-    if 2 * reach + 1 > LARGEST_WINDOW_PX:
+    """Return the size of the smallest window that holds all places of images that are read."""
+    places = [place for value, *both in spots if value < sources for place in both]
+    # Of an even number of taps there is one more before the middle.
+    size = max(-2 * min(places, default=0), 2 * max(places, default=0) + 1)
+    if size > LARGEST_WINDOW_PX:
         rule = f"at most {LARGEST_WINDOW_PX} pixels"
-        raise InputError("window that a pixel depends on", 2 * reach + 1, rule, WAY_OUT)
-    return 2 * reach + 1
+        raise InputError("window that a pixel depends on", size, rule, WAY_OUT)
+    return size
 
 
 def _step_of(values: Sequence[Value]) -> Step:

@@ -110,6 +110,8 @@ def export(request: Request) -> Export:
         rule = f"must be one of {', '.join(NAMES)}, html"
         raise InputError("--target", request.target, rule, "choose one of these")
     request = _hosted(request)
+    if request.model.is_imported:
+        _check_imported(request)
     if request.target == ONNX:
         return _graph(request)
     row = TARGETS[request.target]
@@ -143,6 +145,17 @@ def export(request: Request) -> Export:
     facts["scene"] = _scene(request, programs)
     facts["kernels"] = bindings.kernels(row, denoiser, path, encoder, passes)
     return _finished(request, facts, files, denoiser, path, encoder, passes, pair)
+
+
+def _check_imported(request: Request) -> None:
+    """Refuse what only a model of features has: a scene before it, a graph that it was not made of."""
+    way_out = "leave it out"
+    if request.scene is not None:
+        rule = f"the model was imported and reads {', '.join(request.model.features)}, not a scene's features"
+        raise InputError("--scene", request.scene.name, rule, way_out)
+    if request.target == ONNX:
+        rule = "the model was imported from a graph in this form"
+        raise InputError("--target", request.target, rule, "use that file")
 
 
 def _hosted(request: Request) -> Request:

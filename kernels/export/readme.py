@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...compiler.artifact import Artifact
+from ...compiler.core.lower import OWN_NUMBERS
 from ...compiler.languages.c import whole
 from ...compiler.languages.interface import SCENE_NUMBERS, WEIGHTS
 from ...compiler.reading.languages import is_read
@@ -81,7 +82,7 @@ def readme(facts: Mapping[str, Any], denoiser: Artifact | None, host: Host | Non
         _code(facts),
         "```",
         "",
-        "Rows: row 0 of every image is the picture's TOP row. Colour is encoded for the display already.",
+        f"Rows: row 0 of every image is the picture's TOP row.{_encoded(facts)}",
         "",
         *_moving(facts),
         "## Proof",
@@ -98,6 +99,12 @@ def readme(facts: Mapping[str, Any], denoiser: Artifact | None, host: Host | Non
         "",
     ]
     return "\n".join(lines)
+
+
+def _encoded(facts: Mapping[str, Any]) -> str:
+    """Return the sentence about the output's colour; an imported network has numbers of its own."""
+    own = facts["output"]["encoding"] == OWN_NUMBERS
+    return "" if own else " Colour is encoded for the display already."
 
 
 def _hosted(host: Host | None) -> list[str]:

@@ -203,7 +203,7 @@ DAMAGE = {
     "shape": (with_tensor("layer1.weight", np.zeros((3, 5), np.float32)), r"layer 1 is weights \(3, 5\)"),
     "type": (with_tensor("layer1.bias", np.zeros(3, np.int64)), "types of the parameters is float32, int64"),
     "format": (with_text("format", "other"), "format is other: must be wamnet-model"),
-    "version": (with_text("version", "5"), "version is 5: this program reads version 1 and 2 and 3 and 4; use"),
+    "version": (with_text("version", "5"), "version is 5: this program reads version 1 and 2 and 3 and 4"),
     "activation missing": (with_text("version", "2"), "'activation' must be among them"),
     "activation in version 1": (
         with_text("activation", "relu"),

@@ -13,8 +13,16 @@ from typing import Any
 
 import pytest
 
-PACKAGES = {"torch": "PyTorch", "pyoidn": "Open Image Denoise"}
+PACKAGES = {
+    "torch": "PyTorch",
+    "pyoidn": "Open Image Denoise",
+    "onnx": "ONNX",
+    "onnxruntime": "ONNX Runtime",
+}
 """Their names for Python and for people."""
+
+EXTRAS = {"onnx": "targets", "onnxruntime": "targets"}
+"""Which extra brings a package, where it is not `baselines`."""
 
 FOUND: dict[str, str] = {}
 """What has been found of each requested one: "ok (version)" or "MISSING: reason"."""
@@ -31,7 +39,8 @@ def needed(name: str) -> Any:
         module = importlib.import_module(name)
     except (ImportError, OSError) as error:
         FOUND[name] = (
-            f"MISSING: {PACKAGES[name]} cannot be imported ({error}); pip install 'wamnet[baselines]'"
+            f"MISSING: {PACKAGES[name]} cannot be imported ({error}); "
+            f"pip install 'wamnet[{EXTRAS.get(name, 'baselines')}]'"
         )
         if name in required():
             pytest.fail(f"package {name} is required and {FOUND[name]}", pytrace=False)

@@ -1,0 +1,114 @@
+"""`wamnet import`: a network of another program becomes a model, which compiles as any other."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ...refimpl.errors import InputError
+from ..common.inputs import check_input
+from ..common.terminal import say
+from ..files.outputs import check_output
+
+if TYPE_CHECKING:
+    from ...compiler.importing.network import Found
+
+EXAMPLES = """Examples:
+
+wamnet import network.onnx -o network.safetensors
+
+wamnet import coordinates.onnx --range -1:1
+
+wamnet import guided.onnx --range 0:1 --range normal=-1:1
+
+wamnet import filter.onnx --border zero"""
+"""Shown below the help of `wamnet import`."""
+
+SUFFIX = ".safetensors"
+"""How the names of models end."""
+
+
+def import_model(
+    network: Annotated[
+        Path,
+        typer.Argument(metavar="NETWORK", help="Network in ONNX's form (.onnx).", show_default=False),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Model (.safetensors).", show_default="the network's name"
+        ),
+    ] = None,
+    ranges: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--range",
+            metavar="[INPUT=]LOW:HIGH",
+            help="Range of the numbers that an input, or every other input, is given; bounds hold for it.",
+            show_default="0:1",
+        ),
+    ] = None,
+    border: Annotated[
+        str | None,
+        typer.Option(
+            metavar="RULE",
+            help="What is outside of the picture, zero or clamp, where the network pads what it computes.",
+            show_default="the network's own margins",
+        ),
+    ] = None,
+) -> None:
+    """Import a small network in ONNX's form as a model: compile, export and certify take it as any other.
+
+    It is made of Gemm, MatMul, Conv, sums, scales, Sin, Relu, LeakyRelu and Clip, as PyTorch exports them. A
+    convolution becomes a layer on a window; the border of the picture is that of the network's own margins.
+    What cannot be a kernel is refused with the node's name.
+    """
+    from ...compiler.importing.network import import_network
+    from ...compiler.model_file import save_model
+
+    check_input(network)
+    path = output or Path(network.with_suffix(SUFFIX).name)
+    check_output(path, (SUFFIX,), [network])
+    given = dict(map(_range, ranges or []))
+    if len(given) < len(ranges or []):
+        raise InputError("--range", ", ".join(ranges or []), "each input once", "leave one out")
+    found = import_network(network, given, border or "")
+    save_model(path, found.model)
+    say(str(path))
+    for line in said_of(found):
+        say(line)
+
+
+def _range(text: str) -> tuple[str, tuple[float, float]]:
+    """Return the input, "" for all others, and the range of [INPUT=]LOW:HIGH."""
+    name, _, ends = text.rpartition("=")
+    try:
+        low, high = map(float, ends.split(":"))
+    except ValueError:
+        low = high = math.nan
+    if not low < high or math.isinf(high - low):
+        rule = "it must be LOW:HIGH or INPUT=LOW:HIGH, two numbers in order"
+        raise InputError("--range", text, rule, "give what the network is run on, as in --range -1:1")
+    return name, (low, high)
+
+
+def said_of(found: Found) -> list[str]:
+    """Return what a user must know of a network that was imported, as lines."""
+    network, window = found.model.siren, found.model.window
+    widths = " -> ".join(map(str, network.widths))
+    lines = [f"layers {widths}; window {window.size} x {window.size}, border {window.border}"]
+    lines += [
+        f"image {each.name}: {each.channels} channels in [{each.low:g}, {each.high:g}], for which bounds hold"
+        for each in getattr(network, "sources", ())
+    ]
+    if found.moved:
+        lines.append(
+            f"the network pads what it computes: {found.margin} pixels and more from the picture's edge the "
+            "model is the network, nearer to it the model is another function"
+        )
+    if found.rounded:
+        lines.append(f"{found.rounded} weights are products of the network's, rounded to float32 once")
+    return lines

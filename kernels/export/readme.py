@@ -28,6 +28,16 @@ expected, bound = (np.fromfile(f"check/{{n}}.f32", "<f4").reshape(result.shape) 
 print("largest error", np.abs(result - expected).max(), "expected at most", bound.max())"""
 """A program for a graph, which checks itself."""
 
+PRECISIONS = (
+    "* Precision: a graph states float32, and some runtimes compute in fewer bits unless they are told not to,",
+    "  far beyond the bound of the check pair. OpenVINO: `INFERENCE_PRECISION_HINT` is `f32`; it takes bfloat16 on",
+    "  processors and 16-bit floats on graphics processors that have them. TensorRT: no flags `FP16`, `BF16` or",
+    "  `INT8`, and `TF32` cleared, which is set by default. Core ML: `compute_precision` is `FLOAT32` when it is",
+    "  converted, 16 bits by default, and the Neural Engine has no others. ONNX Runtime: the CPU provider computes in",
+    "  float32; for CUDA `use_tf32` is 0. Run the check pair on each.",
+)
+"""What a README says of runtimes' defaults."""
+
 IMAGE_LINES: Mapping[str, str] = {
     "names": 'bind_texture({number}, {name}, "{name}");',
     "channels": "   {slot}: {name}",
@@ -72,6 +82,7 @@ def readme(facts: Mapping[str, Any], denoiser: Artifact | None, host: Host | Non
         "",
         *_hosted(host),
         *_facts(facts),
+        *(PRECISIONS if facts["target"] == ONNX else ()),
         "",
         "## Kernels, in the order in which they run",
         "",

@@ -72,6 +72,7 @@ ROOMS = {
         "reading": ("core", "proof"),
         "schedules": ("core", "languages", "proof"),
         "": ("core", "languages", "proof", "schedules"),
+        "importing": ("core", ""),
         "scenes": ("core", "languages", "proof", "schedules", ""),
         "training": ("core", "languages", "proof", "schedules", ""),
     },

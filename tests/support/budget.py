@@ -16,6 +16,7 @@ BUDGET = {
     "refimpl/network": 2275,
     "compiler": 1725,
     "compiler/core": 3475,
+    "compiler/importing": 1000,
     "compiler/languages": 2475,
     "compiler/proof": 3100,
     "compiler/reading": 4050,

@@ -29,12 +29,12 @@ print("largest error", np.abs(result - expected).max(), "expected at most", boun
 """A program for a graph, which checks itself."""
 
 PRECISIONS = (
-    "* Precision: a graph states float32, and some runtimes compute in fewer bits unless they are told not to,",
-    "  far beyond the bound of the check pair. OpenVINO: `INFERENCE_PRECISION_HINT` is `f32`; it takes bfloat16 on",
-    "  processors and 16-bit floats on graphics processors that have them. TensorRT: no flags `FP16`, `BF16` or",
-    "  `INT8`, and `TF32` cleared, which is set by default. Core ML: `compute_precision` is `FLOAT32` when it is",
-    "  converted, 16 bits by default, and the Neural Engine has no others. ONNX Runtime: the CPU provider computes in",
-    "  float32; for CUDA `use_tf32` is 0. Run the check pair on each.",
+    "* Precision: a graph states float32, and some runtimes compute in fewer bits unless they are told not",
+    "  to, far beyond the bound of the check pair; run it on each. OpenVINO: `INFERENCE_PRECISION_HINT` is",
+    "  `f32`; by default it is bfloat16 on processors that have it, 16-bit floats on graphics processors.",
+    "  TensorRT: no flags `FP16`, `BF16` or `INT8`, and `TF32` cleared, which is set by default. Core ML:",
+    "  convert with `compute_precision=FLOAT32`, since 16 bits are the default. ONNX Runtime computes in",
+    "  float32 on processors; its provider for CUDA wants `use_tf32` to be 0.",
 )
 """What a README says of runtimes' defaults."""
 

@@ -32,7 +32,7 @@ def test_a_kernel_is_beside_onnx_runtime(stranger, denoiser):
     """Both are within the bound of float64's picture, so that they are within twice the bound of each other.
 
     The bound is for any order of sums in float32, which is what ONNX Runtime's processor provider computes.
-    Its Sin is within 2^-22 of the sine, as the emitted one is: ONNX promises nothing of it.
+    ONNX promises nothing of Sin: the runtime's is taken to be as near as the emitted one is promised to be.
     """
     onnxruntime = needed("onnxruntime")
     plan, image = plan_model(model_of(stranger), denoiser.name), stranger.image()

@@ -30,7 +30,6 @@ from .commands import (
     demo,
     denoise,
     export,
-    importing,
     listing,
     render,
     train,
@@ -43,6 +42,7 @@ from .commands.compile import compile_model
 from .commands.measure import exports, pipeline, primitives
 from .commands.measure import render as measure_render
 from .commands.measure import train as measure_train
+from .commands.networks import importing
 from .commands.verify import renderer as verify_renderer
 from .common.default_command import CommandWithOthers
 from .common.terminal import tell

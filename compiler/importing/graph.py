@@ -83,7 +83,7 @@ def read(path: Path) -> Graph:
     except InputError:
         raise
     except (*BROKEN, RuntimeError, _decoding(), onnx.checker.ValidationError) as error:
-        rule = f"it is no valid graph ({error})"
+        rule = f"it cannot be read as a graph ({error})"
         raise InputError("network", str(path), rule, way_out) from None
 
 

@@ -29,8 +29,8 @@ print("largest error", np.abs(result - expected).max(), "expected at most", boun
 """A program for a graph, which checks itself."""
 
 PRECISIONS = (
-    "* Precision: a graph states float32, and some runtimes compute in fewer bits unless they are told not",
-    "  to, far beyond the bound of the check pair; run it on each. OpenVINO: `INFERENCE_PRECISION_HINT` is",
+    "* Precision: a graph states float32, and some runtimes compute in fewer bits by default, which is",
+    "  far beyond the bound of the check pair; run it on each. OpenVINO: `INFERENCE_PRECISION_HINT` is",
     "  `f32`; by default it is bfloat16 on processors that have it, 16-bit floats on graphics processors.",
     "  TensorRT: no flags `FP16`, `BF16` or `INT8`, and `TF32` cleared, which is set by default. Core ML:",
     "  convert with `compute_precision=FLOAT32`, since 16 bits are the default. ONNX Runtime computes in",

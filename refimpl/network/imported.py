@@ -162,7 +162,7 @@ def check_imported(network: Imported, window: Window) -> None:
 
 
 def _check_sources(sources: Sequence[Source]) -> None:
-    """Refuse images without channels, of one name, or whose ranges are none."""
+    """Refuse images without channels, of one name, or whose ranges are empty."""
     names = [source.name for source in sources]
     if not names or len(set(names)) != len(names) or not all(map(NAME.fullmatch, names)):
         rule = "at least one, each once, of letters, digits and _, at most 40"

@@ -1,4 +1,4 @@
-"""`wamnet import`: a model from a stranger's network, and what is said of it."""
+"""`wamnet import`: a model from another program's network, and what is said of it."""
 
 from __future__ import annotations
 

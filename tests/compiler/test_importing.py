@@ -103,7 +103,7 @@ def test_it_has_a_certificate(stranger, tmp_path):
     plan = plan_model(imported(stranger).model, "opencl")
     write(compile_plan(plan), tmp_path / "kernel")
     held = check(tmp_path / "kernel" / CERTIFICATE_NAME)
-    assert max(held["bound"]["output"]) < 1e-3
+    assert held["bound"]["output"] == list(plan.bound.output)
 
 
 def test_an_export_comes_back_to_the_bit(tmp_path):
@@ -292,7 +292,9 @@ def test_a_damaged_file_is_refused_in_one_line(tmp_path, onnx):
     content = path.read_bytes()
     for cut in range(0, len(content), 3):
         path.write_bytes(content[:cut])
-        with pytest.raises(InputError, match=r"network is .*graph.onnx: it is no valid graph|operators is"):
+        with pytest.raises(
+            InputError, match=r"network is .*graph.onnx: it cannot be read as a graph|operators is"
+        ):
             import_network(path, {})
     model = onnx.load_from_string(content)
     model.graph.initializer.add(name="w", data_type=1, dims=[1], data_location=1)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ...refimpl.errors import InputError
-from ..common.inputs import check_input
-from ..common.terminal import say
-from ..files.outputs import check_output
+from ....refimpl.errors import InputError
+from ...common.inputs import check_input
+from ...common.terminal import say
+from ...files.outputs import check_output
 
 if TYPE_CHECKING:
-    from ...compiler.importing.network import Found
+    from ....compiler.importing.network import Found
 
 EXAMPLES = """Examples:
 
@@ -66,8 +66,8 @@ def import_model(
     convolution becomes a layer on a window; the border of the picture is that of the network's own margins.
     What cannot be a kernel is refused with the node's name.
     """
-    from ...compiler.importing.network import import_network
-    from ...compiler.model_file import save_model
+    from ....compiler.importing.network import import_network
+    from ....compiler.model_file import save_model
 
     check_input(network)
     path = output or Path(network.with_suffix(SUFFIX).name)

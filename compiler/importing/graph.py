@@ -157,7 +157,7 @@ def _folded(node: GraphNode, proto: Any, constants: Mapping[str, NDArray[Any]], 
 
     given = {name: constants[name] for name in node.inputs if name}
     if node.op == "Constant" and "value" in node.attributes:
-        return numpy_helper.to_array(node.attributes["value"])
+        return np.asarray(numpy_helper.to_array(node.attributes["value"]))
     if node.op == "ConstantOfShape":
         (shape,) = given.values()
         if np.prod(shape.astype(np.float64)) > MOST_FOLDED or np.any(shape < 0):

@@ -179,7 +179,8 @@ class Carrier:
         """Return weights, biases and step of a level, whose neurons take the place of those before."""
         own = [spot for spot in sorted(self.spots) if self.values[spot[0]].level == level]
         step = _step_of([self.values[spot[0]] for spot in own])
-        wanted, new = [], {}
+        wanted: list[tuple[tuple[int, ...], Field, int]] = []
+        new: dict[tuple[Spot, int], Parts] = {}
         for spot in own:
             argument = self.values[spot[0]].argument
             assert argument is not None
@@ -225,7 +226,8 @@ class Carrier:
             what = str(value.node) if value.node else "an image"
             rule = f"what {what} gives skips past it, which only a rectifier lets through exactly"
             node.refuse(step.kind, rule, "use Relu where values are skipped past")
-        rows, parts = [], []
+        rows: list[Array] = []
+        parts: Parts = []
         for index, factor in before:
             for sign in signs:
                 row = np.zeros(self.width)

@@ -65,7 +65,8 @@ def import_network(path: Path, ranges: Mapping[str, tuple[float, float]], border
         if name and name not in graph.inputs:
             known = ", ".join(graph.inputs)
             raise InputError("--range", name, "the network has no such input", f"inputs are {known}")
-    reader, sources = Reader(graph, border), []
+    reader = Reader(graph, border)
+    sources: list[Source] = []
     for name, sizes in graph.inputs.items():
         layout = _layout(name, sizes)
         source = _source(name, sizes[layout.index("C")], ranges, [source.name for source in sources])

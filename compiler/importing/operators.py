@@ -423,8 +423,8 @@ def _slice(reader: Reader, node: GraphNode) -> Field:
             )
         elif label in (ROWS, COLUMNS) and not x.loose and start >= 0 and (end < 0 or end >= 2**31 - 1):
             cut = start + (-end if end < 0 else 0)
-            by = (start, 0) if label == ROWS else (0, start)
-            x = x.moved(*by, (-cut, 0) if label == ROWS else (0, -cut))
+            rows, columns = (1, 0) if label == ROWS else (0, 1)
+            x = x.moved(start * rows, start * columns, (-cut * rows, -cut * columns))
         else:
             rule = "channels, or rows and columns counted from both sides"
             node.refuse(f"axis {label} from {start} to {end}", rule, "crop by a number at each side")

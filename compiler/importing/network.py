@@ -103,10 +103,10 @@ def _source(
         rule = f"a size from 1 to {MOST_CHANNELS} that the graph states"
         way_out = "export with a fixed number of channels"
         raise InputError(f"input {name}: channels", "any" if channels is None else channels, rule, way_out)
-    plain = re.sub("[^A-Za-z0-9_]", "_", name)[:36]
+    plain = re.sub("[^A-Za-z0-9]+", "_", name)[:32].strip("_")
     plain = plain if re.match("[A-Za-z]", plain) else f"x{plain}"
-    while plain in taken:
-        plain += "_"
+    if plain in taken:
+        plain = f"{plain}_{len(taken)}"
     return Source(plain, channels, *ranges.get(name, ranges.get("", RANGE)))
 
 

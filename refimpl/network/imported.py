@@ -34,8 +34,8 @@ MOST_CHANNELS = 1024
 MOST_OUTPUTS = 4
 """Most channels of the result: those of a colour buffer."""
 
-NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,39}")
-"""What an image may be called: kernels have it in the names of their arguments."""
+NAME = re.compile("(?=.{1,40}$)[A-Za-z](_?[A-Za-z0-9])*")
+"""What an image may be called: kernels have it in names, and languages reserve those with two _ in a row."""
 
 AGAIN = "import the network again"
 """The way out of what no import writes."""
@@ -165,7 +165,7 @@ def _check_sources(sources: Sequence[Source]) -> None:
     """Refuse images without channels, of one name, or whose ranges are empty."""
     names = [source.name for source in sources]
     if not names or len(set(names)) != len(names) or not all(map(NAME.fullmatch, names)):
-        rule = "at least one, each once, of letters, digits and _, at most 40"
+        rule = "at least one, each once, of at most 40 letters, digits and single _"
         raise InputError("names of the images", ", ".join(names), rule, AGAIN)
     for source in sources:
         if not 1 <= source.channels <= MOST_CHANNELS:

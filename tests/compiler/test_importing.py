@@ -337,5 +337,5 @@ def test_names_fit_kernels(tmp_path):
     found = import_network(path, {"1:in": (-2.0, 3.0)}).model.siren.sources
     assert [(each.name, each.low, each.high) for each in found] == [
         ("x1_in", 0.0, 1.0),
-        ("x1_in_", -2.0, 3.0),
+        ("x1_in_1", -2.0, 3.0),
     ]

@@ -50,6 +50,8 @@ def test_a_picture_by_hand():
 WRONG = {
     "no image": ({"sources": ()}, "names of the images is : at least one"),
     "a name": ({"sources": (Source("1", 1, 0.0, 1.0),)}, "names of the images is 1: at least one"),
+    "two signs": ({"sources": (Source("a__b", 1, 0.0, 1.0),)}, "names of the images is a__b: at least one"),
+    "a long name": ({"sources": (Source("a" * 41, 1, 0.0, 1.0),)}, "names of the images is a+: at least one"),
     "channels": ({"sources": (Source("x", 0, 0.0, 1.0),)}, "channels of image x is 0: 1 to 1024"),
     "range": ({"sources": (Source("x", 1, 1.0, 1.0),)}, "range of image x is .*: two numbers in order"),
     "inputs": ({"sources": (Source("x", 2, 0.0, 1.0),)}, "inputs of the first layer is 9: 3 x 3 pixels of 2"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from packages import needed
@@ -58,6 +60,25 @@ def test_its_text_is_read(stranger, target, tmp_path):
     path = tmp_path / "kernel" / artifact.CERTIFICATE_NAME
     assert check(path)["bound"]["output"] == list(plan.bound.output)
     assert check_text(path)["sums"] > 0
+
+
+def test_a_graph_says_its_operators_and_what_runtimes_round():
+    """The manifest and the README state the version; the README names what computes in fewer bits."""
+    needed("onnx")
+    from wamnet.cli.common.inputs import load_model
+
+    made = export(Request(load_model(Path("minicubes")), "onnx"))
+    text = made.contents()["README.md"].decode()
+    assert made.manifest["language"].startswith("ONNX, operators 17:")
+    for word in (
+        "operators 17",
+        "`INFERENCE_PRECISION_HINT` is",
+        "TensorRT",
+        "`TF32`",
+        "Core ML",
+        "`use_tf32`",
+    ):
+        assert word in text
 
 
 def test_exports_are_of_kernels_only():

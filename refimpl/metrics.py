@@ -134,7 +134,11 @@ METRICS: Mapping[str, Metric] = {
 
 def _pair(image: Floats, reference: Floats) -> tuple[Float64, Float64]:
     """Return both arrays (...) in float64, or refuse different shapes, no value, NaN and infinity."""
-    x, r = np.asarray(image, np.float64), np.asarray(reference, np.float64)
+    try:
+        x, r = np.asarray(image, np.float64), np.asarray(reference, np.float64)
+    except (TypeError, ValueError):
+        rule = "both must be numbers in rows of one length"
+        raise InputError("the images", "lists of other lengths", rule, "give a matching pair") from None
     if x.shape != r.shape or x.size == 0:
         shapes = f"{x.shape} against {r.shape}"
         raise InputError(

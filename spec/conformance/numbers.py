@@ -21,7 +21,7 @@ from ...refimpl.reading import read_file, refusing
 
 
 class Decimal(float):
-    """A number that a case gives as JSON writes it, `1.0`: where an integer is due, it must be refused."""
+    """A number that a case gives as JSON writes it, `1.0`: for an integer, it must be refused."""
 
 
 def number_text(value: float) -> str:

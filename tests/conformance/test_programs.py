@@ -103,7 +103,8 @@ def test_wrong_program(program, verdicts, name):
     count = Counter(v.verdict for v in found)
     assert count[verdict] > 0, count
     assert set(count) <= {verdict, "pass"}
-    assert {v.clause for v in found if v.verdict == verdict} == {clause}
+    # Where no answer is right, those that must be refused are not either (CNF-9).
+    assert {clause} <= {v.clause for v in found if v.verdict == verdict} <= {clause, "CNF-9"}
     assert all(v.failed == (v.verdict not in ("pass", "unsupported")) for v in found)
 
 
@@ -116,13 +117,13 @@ def test_a_crash_tells_the_status_and_the_last_words(program, verdicts):
 def test_a_program_that_crashes_is_started_again(program, verdicts):
     crash = 'KINDS[request["kind"]](request["input"]) if request["id"][-1] != "3" else sys.exit(7)'
     found = verdicts(program(('KINDS[request["kind"]](request["input"])', crash)), ["random.block"])
-    assert Counter(v.verdict for v in found) == {"pass": 14, "crash": 2}
+    assert Counter(v.verdict for v in found) == {"pass": 20, "crash": 2}
 
 
 def test_a_program_that_hangs_is_given_up(program, verdicts):
     hang = (ANSWER, '__import__("time").sleep(60)')
     found = verdicts(program(hang), ["random.block"], 0.5)
-    assert Counter(v.verdict for v in found) == {"timeout": 16}
+    assert Counter(v.verdict for v in found) == {"timeout": 22}
     assert found[0].text == "no answer within 0.5 s"
     assert found[3].text == "not asked: 3 cases of this kind had no answer in time"
 

@@ -204,7 +204,7 @@ def written(tmp_path: Path, **changes) -> Path:
 
 def test_a_file_comes_back_as_it_was_made():
     kind, cases = case.load(vectors.FOLDER / "random.block.json")
-    assert (kind, len(cases)) == ("random.block", 16)
+    assert (kind, len(cases)) == ("random.block", 22)
     assert cases[0].expected["words"].value == list(KINDS["random.block"].make()[0].expected["words"].value)
 
 

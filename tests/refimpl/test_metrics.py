@@ -204,3 +204,9 @@ def test_data_range_must_be_positive(metric: Callable[..., float], data_range: f
         InputError, match=r"data_range is .*: the distance from black to white must be positive"
     ):
         metric(picture(8), picture(9), data_range)
+
+
+def test_rows_of_two_lengths_are_refused():
+    """NumPy's own error went through."""
+    with pytest.raises(InputError, match=r"both must be numbers in rows of one length"):
+        metrics.mse([[1.0], [1.0, 2.0]], [[1.0], [1.0, 2.0]])

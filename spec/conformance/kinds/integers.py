@@ -1,4 +1,4 @@
-"""Requests whose integers are none of JSON: every kind that is given integers must refuse them (CNF-9).
+"""Requests with numbers that JSON does not write as integers: every kind given integers refuses them (CNF-9).
 
 A program that takes `true` for 1, or `"7"` for 7, answers what was not asked. Each integer of a kind is
 replaced in one valid case: the first of the kind in every form [`FORMS`], the others in one form each.

@@ -13,7 +13,7 @@
 7. [`DARK`]: lamps without power or colour.
 8. [`PLATE`]: a matte floor under a distant lamp, whose samples hardly differ.
 9. [`LENS`], [`PANE`] and [`BUBBLE`]: glass as the first of two kinds of material, the second, and by itself.
-10. [`OVERCAST`]: a sky without a sun, a lamp without power; [`SHEET`]: a turned box whose centre cancels.
+10. [`OVERCAST`]: a sky without a sun by a lamp without power; [`SHEET`]: a turned box whose centre cancels.
 11. [`GLOW`]: no lamp and no sky, and a surface of each kind and material that emits; [`DUSK`] is the same
     with a lamp in it.
 """
@@ -233,7 +233,7 @@ SHEET = Scene(
     ),
     background=(0.125, 0.25, 0.5),
 )
-"""A turned sheet through the origin: 0.8 * 4.02 - 0.6 * 5.36 is 0, -4.4e-16 where each product is rounded.
+"""A turned sheet through the origin: 0.8 * 4.02 - 0.6 * 5.36 is 0, and -4.4e-16 with rounded products.
 A ray along the sheet leaves it after 3.2, because the least component of a direction is 1e-15 (ISC-5)."""
 
 SHINE: dict[str, Any] = {"reflectance": (0.5, 0.75, 0.25), "emission": (0.25, 0.5, 1.0)}

@@ -398,7 +398,7 @@ NO_INTEGERS: tuple[tuple[str, str, Any], ...] = (
     ("LTR-8", "max_depth", "2"),
     ("LTR-8", "max_depth", None),
 )
-"""Counts that are no integers of JSON: they are refused too."""
+"""Counts that JSON does not write as integers: they are refused too."""
 
 
 def rounded(value: Any) -> Any:

@@ -24,6 +24,7 @@ import typer
 from ...compiler.core.writing import remove_temporaries
 from ...refimpl.errors import InputError
 from ..common import options
+from ..common.domain import Watch
 from ..common.effort import said_of_rendering
 from ..common.inputs import load_model, model_path, unlike_training
 from ..common.options import ExecutorName, Renderer
@@ -131,13 +132,14 @@ def animate(
         working_in(folder, "drawing pictures"),
         hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"),
     ):
-        made = _draw(shots, folder, network, (executor, renderer), rank)
+        made, watch = _draw(shots, folder, network, (executor, renderer), rank)
         if is_film:
             movie.write_movie(output, [shot.path for shot in shots], fps)
             _remove(shots)
     if is_film:
         with suppress(OSError):  # there is more in it than the pictures that have become the film
             folder.rmdir()
+    watch.report(output)
     say(f"{output}: {len(shots)} pictures, {made} of them made now")
 
 
@@ -149,12 +151,13 @@ def _remove(shots: Sequence[Shot]) -> None:
 
 def _draw(
     shots: Sequence[Shot], folder: Path, network: Model, by: tuple[ExecutorName, Renderer], rank: int
-) -> int:
-    """Draw the pictures that are not in the folder, which only this process uses; return how many."""
+) -> tuple[int, Watch]:
+    """Draw the pictures that are not in the folder, which only this process uses: how many, how far off."""
     from ...compiler.variants import FULL, with_rank
     from ...kernels import open_executor
 
     executor, renderer = by
+    watch = Watch(network)
     # It was another process's until now.
     left = missing(folder, shots)
     remove_temporaries(folder)
@@ -164,11 +167,11 @@ def _draw(
         open_executor(executor.value) as runner,
         progress("drawing", len(left)) as advance,
     ):
-        together = _one_device(executor, renderer, shots[0].noisy, network.features)
+        together = _one_device(executor, renderer, shots[0].noisy, watch.model.features)
         draw = draw_frames if together else draw_apart
-        for _ in draw(left, network, runner, renderer.value, with_rank(FULL, rank)):
+        for _ in draw(left, watch, runner, renderer.value, with_rank(FULL, rank)):
             advance(1)
-    return len(left)
+    return len(left), watch
 
 
 def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job, features: Sequence[str]) -> bool:
@@ -290,7 +293,7 @@ def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
 
 
 def draw_apart(
-    shots: Sequence[Shot], model: Model, executor: Executor, renderer: str, variant: str
+    shots: Sequence[Shot], watch: Watch, executor: Executor, renderer: str, variant: str
 ) -> Iterator[None]:
     """Render, denoise and write pictures, rendering and denoising on different devices."""
     from ...kernels import denoise_on
@@ -298,9 +301,10 @@ def draw_apart(
     from ...kernels.run.render_on import Frames
     from ...refimpl.encoding import to_display
 
-    frames = Frames([shot.scene for shot in shots])
+    frames, model = Frames([shot.scene for shot in shots]), watch.model
     for shot in shots:
         frame = render_frame(renderer, shot.scene, shot.noisy, workers=None, frames=frames).frame
+        watch.see_frame(shot.path.name, frame)
         noisy = to_display(frame["color"], model.normalization.exposure_stops)
         denoised = denoise_on(executor, model, frame, variant=variant, pictures=len(shots)).image
         reference = None
@@ -312,7 +316,7 @@ def draw_apart(
 
 
 def draw_frames(
-    shots: Sequence[Shot], model: Model, executor: Executor, renderer: str, variant: str
+    shots: Sequence[Shot], watch: Watch, executor: Executor, renderer: str, variant: str
 ) -> Iterator[None]:
     """Render, denoise and write pictures by one pipeline, on the device that does both."""
     from ...kernels import Pipeline, render_on
@@ -321,7 +325,7 @@ def draw_frames(
 
     if not shots:
         return
-    first, scenes = shots[0], [shot.scene for shot in shots]
+    first, scenes, model = shots[0], [shot.scene for shot in shots], watch.model
     # A reference is traced by the pipeline's kernel, unless that has rays of features too, or sees more.
     apart = feature_job(first.noisy) is not None or first.noisy.seen
     frames = Frames(scenes) if apart else None
@@ -342,7 +346,7 @@ def draw_frames(
         for shot in shots:
             pipeline.set_scene(shot.scene)
             pipeline.draw(shot.noisy.seed)
-            drawn, frame = pipeline.later("color"), None
+            drawn, frame = pipeline.later(*dict.fromkeys(("color", *watch.features))), None
             if shot.reference:
                 moment = pipeline.moment if frames is None else None
                 frame = render_on(executor, shot.scene, shot.reference, moment=moment, frames=frames).frame
@@ -350,16 +354,17 @@ def draw_frames(
             if before is not None:
                 before()
                 yield
-            before = partial(_write_drawn, shot, model, drawn, frame)
+            before = partial(_write_drawn, shot, watch, drawn, frame)
         if before is not None:
             before()
             yield
 
 
-def _write_drawn(shot: Shot, model: Model, drawn: Callable[[], Drawn], reference: Frame | None) -> None:
-    """Write a picture that a pipeline has drawn, when it is there."""
+def _write_drawn(shot: Shot, watch: Watch, drawn: Callable[[], Drawn], reference: Frame | None) -> None:
+    """Write a picture that a pipeline has drawn, when it is there, and measure its features."""
     found = drawn()
-    write_shot(shot, model, found.images["color"], found.picture, reference)
+    watch.see_images(shot.path.name, found.images)
+    write_shot(shot, watch.model, found.images["color"], found.picture, reference)
 
 
 def write_shot(shot: Shot, model: Model, noisy: Any, denoised: Any, reference: Frame | None) -> None:

@@ -9,7 +9,8 @@ import typer
 
 from ...refimpl.errors import ExecutorUnavailable
 from ..common import options
-from ..common.inputs import load_model, need_layers, unlike_training
+from ..common.domain import check_domain
+from ..common.inputs import load_model, need_layers
 from ..common.options import ExecutorName
 from ..common.terminal import say, table
 from ..files.outputs import check_output
@@ -55,6 +56,9 @@ def denoise(
     schedule: options.Schedule = None,
     rank: options.CutRank = 0,
     variant: options.Variant = None,
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="Denoise another program's frame that is unlike the training's.")
+    ] = False,
     context: options.OpenGLContext = None,
 ) -> None:
     """Denoise a frame with a trained model.
@@ -73,8 +77,7 @@ def denoise(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )
     _say_what_is_no_number(frame, noisy, network)
-    for what in unlike_training(network, noisy.info):
-        say(f"{frame}: {what}")
+    check_domain(frame, noisy, network, anyway)
     with open_executor(executor.value) as runner:
         result = denoise_on(runner, network, noisy, profile, schedule, with_rank(variant or FULL, rank))
         first = first_time(runner, result.kernel, result.seconds_compile)

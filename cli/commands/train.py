@@ -158,7 +158,7 @@ def train(
             _round_only(begin, pairs, output, recipe)
             return
         state = _fit_to_the_end(recipe, pairs, output, state, network, executor.value)
-        say(f"{output}: {state.step} steps; checkpoint in {saved}")
+        _say_what_there_is(output, state.step)
 
 
 def _wanted(
@@ -400,7 +400,7 @@ def fit(
                 on_checkpoint=lambda now: save_checkpoint(saved, now),
             )
     seconds = monotonic() - started
-    model = model_of(state, facts(pairs))
+    model = with_domain(model_of(state, facts(pairs)), pairs)
     if recipe.whole:
         model = whole_of(model, pairs, recipe.whole, recipe.seed)
     save_model(output, model)
@@ -438,6 +438,34 @@ def facts(pairs: Sequence[tuple[Frame, Frame]]) -> dict[str, str]:
         for name, found in values.items()
         if len(found) == 1 or not drawn
     }
+
+
+def with_domain(model: Model, pairs: Sequence[tuple[Frame, Frame]]) -> Model:
+    """Return the model with the domain of its training frames among its facts, if they are enough."""
+    from ...refimpl.network.domain import DOMAIN, domain_of_frames, to_json
+
+    domain = domain_of_frames(model, [noisy for noisy, _ in pairs])
+    return replace(model, info={**model.info, DOMAIN: to_json(domain)}) if domain else model
+
+
+def _say_what_there_is(path: Path, steps: int) -> None:
+    """Say what a run has written, and what the model states as its domain."""
+    say(f"{path}: {steps} steps; checkpoint in {checkpoint_path(path)}")
+    say(f"{path}: {_said_of_domain(path)}")
+
+
+def _said_of_domain(path: Path) -> str:
+    """Return what a model states as its domain."""
+    from ...refimpl.network.domain import LEAST_FRAMES, of_model
+    from ..common.inputs import load_model
+
+    domain = of_model(load_model(path))
+    if domain is None:
+        return (
+            f"no domain, for which {LEAST_FRAMES} frames are needed: a frame unlike them may pass unnoticed"
+        )
+    share = f"of frames like them 1 in {1.0 / domain.rate:.0f} is farther"
+    return f"its domain is that of {domain.frames} frames, up to distance {domain.threshold:.3g}; {share}"
 
 
 def checkpoint_path(output: Path) -> Path:

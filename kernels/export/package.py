@@ -37,6 +37,7 @@ from ...refimpl.errors import InputError
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.denoise import Model, learned_feature_spp
+from ...refimpl.network.domain import of_model
 from ...refimpl.network.whole import Whole
 from ...refimpl.reading import SIZES
 from . import bindings, check_pair, onnx_export, readme
@@ -274,7 +275,9 @@ def _scene(request: Request, programs: PathPrograms | None) -> dict[str, Any] | 
 def _model(request: Request) -> dict[str, Any]:
     """Return what a manifest says about the model."""
     varied = vary(parse(request.variant), request.model).model
+    domain = of_model(request.model)
     return {
+        **({"domain": asdict(domain)} if domain else {}),
         "features": list(varied.features),
         "widths": [varied.siren.weights[0].shape[1], *(len(b) for b in varied.siren.biases)],
         "variant": request.variant,

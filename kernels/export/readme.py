@@ -163,8 +163,20 @@ def _facts(facts: Mapping[str, Any]) -> list[str]:
         f"* Output: {facts['output']['encoding'] or 'linear'}.",
         *images,
         *_rays(facts),
+        *_domain(facts["model"]),
         "* Size: no image, and no buffer of sums, may hold 2^31 numbers or more.",
         *(f"* Limit: {x['name']}: needs {x['needs']} of {x['most']}." for x in facts["limits"]),
+    ]
+
+
+def _domain(model: Mapping[str, Any]) -> list[str]:
+    """Return the line about the frames that the model has learned."""
+    if "domain" not in model:
+        return []
+    frames, threshold = model["domain"]["frames"], model["domain"]["threshold"]
+    return [
+        f"* Domain: `model.domain` in the manifest describes the features of {frames} frames that it has "
+        f"learned (DOM-1); a frame farther than {threshold:.3g} from them may be denoised poorly (DOM-2)."
     ]
 
 

@@ -23,7 +23,7 @@ from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network import siren
+from wamnet.refimpl.network import domain, siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
 from wamnet.spec.conformance.numbers import to_json
@@ -192,6 +192,21 @@ def test_what_is_drawn_shows_which_numbers_move(kind):
     assert all(each["formula"] for each in motion.facts(programs)["list"])
     assert inputs.fits(tables_of(scene, settings), tables_of(new, settings))
     assert not np.array_equal(motion.other(settings), inputs.values(scene))
+
+
+def test_the_domain_is_exported():
+    """DOM-6: the manifest has what the model states, the README its threshold; without one neither."""
+    rng = np.random.default_rng(1)
+    found = domain.domain_of([rng.random((5, 4, 6)) for _ in range(9)], ("color", "normal"))
+    stating = replace(model(), info={domain.DOMAIN: domain.to_json(found)})
+    made = export(Request(stating, "glsl"))
+    schema = json.loads((ROOT / "spec/export.schema.json").read_text())
+    jsonschema.Draft202012Validator(schema).validate(made.manifest)
+    assert domain.from_json(json.dumps(made.manifest["model"]["domain"])) == found
+    assert f"a frame farther than {found.threshold:.3g}" in made.files["README.md"].decode()
+    plain = export(Request(model(), "glsl"))
+    assert "domain" not in plain.manifest["model"]
+    assert "Domain" not in plain.files["README.md"].decode()
 
 
 def test_the_manifest_is_of_the_schema_and_names_every_file(exported):

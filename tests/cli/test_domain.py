@@ -1,0 +1,155 @@
+"""Tests of what the commands say of frames that a model has not learned, and of foreign ones they refuse."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wamnet.cli.commands import animate, train
+from wamnet.cli.common.domain import Watch
+from wamnet.cli.files import exr
+from wamnet.compiler.model_file import load_model, save_model
+from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.light.render import Job, render
+from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.network import domain
+
+LEARNED = 10
+"""Frames that the model has learned: one more than a domain needs."""
+
+SIZE = (13, 12)
+"""Width and height of all frames, in pixels."""
+
+BEYOND = "outside of the model's domain: distance "
+
+
+def shot(time: float, scene: str = "minicubes") -> Frame:
+    """Return a frame of a canonical scene."""
+    return render(canonical(scene, time=time), Job(*SIZE, 1, round(10 * time))).frame
+
+
+@pytest.fixture(scope="module")
+def stating(samples, tmp_path_factory):
+    """Return a folder with a model that states its domain, and with frames inside and outside."""
+    folder = tmp_path_factory.mktemp("domain")
+    pairs = [(frame, frame) for frame in (shot(0.8 * k) for k in range(LEARNED))]
+    model = train.with_domain(load_model(samples / "model.safetensors"), pairs)
+    save_model(folder / "m.safetensors", replace(model, info={**model.info, **train.facts(pairs)}))
+    own, other = shot(0.5), shot(0.5, "cornell")
+    exr.write_frame(folder / "own.exr", own)
+    exr.write_frame(folder / "cornell.exr", other)
+    exr.write_frame(folder / "foreign.exr", Frame(own.layers))
+    flipped = {**own.layers, "normal": -own["normal"]}
+    exr.write_frame(folder / "flipped.exr", Frame(flipped))
+    return folder
+
+
+@pytest.fixture
+def here(stating, tmp_path):
+    """Put model and frames into the working folder."""
+    shutil.copytree(stating, tmp_path, dirs_exist_ok=True)
+    return tmp_path
+
+
+def test_a_frame_inside_is_no_matter(wamnet, here) -> None:
+    """Nothing is said; of another program's frame, which layers are read."""
+    assert BEYOND not in wamnet("denoise", "m.safetensors", "own.exr").out
+    outcome = wamnet("denoise", "m.safetensors", "foreign.exr")
+    assert outcome.status == 0
+    assert "foreign.exr: another program's frame, of which the model reads color, normal\n" in outcome.out
+    assert BEYOND not in outcome.out
+
+
+def test_one_sentence_says_all(wamnet, here) -> None:
+    """Another scene of our own: its distance, the channel, and what is known by name; it is denoised."""
+    outcome = wamnet("denoise", "m.safetensors", "cornell.exr")
+    assert outcome.status == 0
+    model = load_model(here / "m.safetensors")
+    found = domain.measure_frame(domain.of_model(model), model, exr.read_frame(here / "cornell.exr"))
+    (line,) = [line for line in outcome.out.splitlines() if BEYOND in line]
+    assert f"distance {found.distance:.3g}, threshold {found.threshold:.3g} (1 in 11 frames" in line
+    assert f"farthest off is the {found.statistic} of {found.channel}: {found.value:.3g}, in" in line
+    assert line.endswith(
+        "; it shows cornell, and the model has learned only minicubes: expect a poor picture"
+    )
+    assert outcome.out.count("it shows cornell") == 1
+
+
+def test_a_foreign_frame_outside_is_refused(wamnet, refused, here) -> None:
+    """Normals of another sign: nothing is written, and the way out works."""
+    line = refused("denoise", "m.safetensors", "flipped.exr")
+    assert "flipped.exr: distance from the model's domain is " in line
+    assert "of another program's frame it reads color, normal; farthest off is the mean of normal" in line
+    assert "give --anyway" in line
+    outcome = wamnet("denoise", "m.safetensors", "flipped.exr", "--anyway")
+    assert outcome.status == 0
+    assert BEYOND in outcome.out
+    assert (here / "denoised.png").exists()
+
+
+@pytest.mark.parametrize("text", ["{}", "[", '{"features": ["color"]}'])
+def test_a_domain_that_cannot_be_read(refused, here, text) -> None:
+    model = load_model(here / "m.safetensors")
+    save_model(here / "m.safetensors", replace(model, info={domain.DOMAIN: text}))
+    assert "domain" in refused("denoise", "m.safetensors", "own.exr")
+
+
+def test_an_animation_counts_its_pictures(wamnet, here) -> None:
+    """All pictures of another scene are outside, none of the one that was learned."""
+    short = ("--seconds", 0.4, "--fps", 5, "--size", 13, "--feature-spp", 0)
+    assert "outside" not in wamnet("animate", "m.safetensors", *short, "--start", 3, "-o", "own").out
+    outcome = wamnet("animate", "m.safetensors", *short, "--scene", "cornell", "-o", "other")
+    assert "other: 2 of 2 pictures are outside of the model's domain; the farthest is 0000" in outcome.out
+    assert "png: distance " in outcome.out
+
+
+@pytest.mark.parametrize("name", ["opencl", "opengl"])
+def test_a_pipeline_measures_the_same_pictures(here, monkeypatch, executor_named, wamnet, name) -> None:
+    """Its images are those of the separate way within rounding: distances differ by little.
+
+    Encodings are at most 1e-5 apart, and paths that differ by rounding may go another way in few pixels; both
+    move a mean by less than 1e-3, which is a quarter of the least scale.
+    """
+    executor_named({"opengl": "opengl-egl"}.get(name, name))
+    seen: list[Watch] = []
+    monkeypatch.setattr(Watch, "report", lambda watch, _output: seen.append(watch))
+    devices = ("--executor", name, "--renderer", name, "--seconds", 0.4, "--fps", 5, "--size", 13)
+    for folder in ("one", "apart"):
+        assert wamnet("animate", "m.safetensors", *devices, "--scene", "cornell", "-o", folder).status == 0
+        monkeypatch.setattr(animate, "draw_frames", animate.draw_apart)
+    one, apart = ([found for _, found in watch.pictures] for watch in seen)
+    assert len(one) == len(apart) == 2
+    assert all(abs(a.distance - b.distance) <= 0.3 for a, b in zip(one, apart, strict=True))
+
+
+def test_a_model_without_a_domain_watches_nothing(samples, tmp_path) -> None:
+    watch = Watch(load_model(samples / "model.safetensors"))
+    watch.see_frame("a", shot(0.0))
+    watch.see_images("a", {})
+    watch.report(tmp_path)
+    assert (watch.features, watch.pictures) == ((), [])
+
+
+def test_training_states_the_domain(wamnet, here) -> None:
+    """Of ten frames a domain, of one none; the network is the same."""
+    named = [option for _ in range(LEARNED) for option in ("-i", "own.exr", "-t", "own.exr")]
+    short = ("--features", "color,normal", "--steps", 1)
+    outcome = wamnet("train", *named, *short, "-o", "ten.safetensors")
+    found = domain.of_model(load_model(here / "ten.safetensors"))
+    assert found is not None
+    assert f"domain is that of 10 frames, up to distance {found.threshold:.3g}; of frames" in outcome.out
+    assert (found.frames, found.features) == (LEARNED, ("color", "normal"))
+    assert wamnet("train", *named[:4], *short, "-o", "one.safetensors").status == 0
+    assert domain.DOMAIN not in load_model(here / "one.safetensors").info
+
+
+def test_distances_are_of_the_frame_s_own_numbers(here) -> None:
+    """A pixel that is not a number counts as 0, as it does to the network."""
+    model, frame = load_model(here / "m.safetensors"), exr.read_frame(here / "own.exr")
+    frame["color"][0, 0] = np.nan
+    zero = Frame({**frame.layers, "color": np.nan_to_num(frame["color"])})
+    found = domain.of_model(model)
+    assert domain.measure_frame(found, model, frame) == domain.measure_frame(found, model, zero)

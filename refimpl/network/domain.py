@@ -113,14 +113,17 @@ def describe(image: NDArray[Any]) -> Array:
     Roughness is the root of the mean square of differences between neighbours; of noise that is different in
     each pixel it is sqrt(2) deviations. Spread is the standard deviation without that noise.
     """
-    values = image.astype(np.float64)
-    channels = values.shape[-1]
-    pixels = values.reshape(-1, channels)
-    steps = [np.diff(values, axis=axis).reshape(-1, channels) for axis in (0, 1)]
-    squares = np.concatenate(steps) ** 2
-    square = squares.mean(axis=0) if len(squares) else np.zeros(channels)
-    spread = np.sqrt(np.maximum(pixels.var(axis=0) - square / 2.0, 0.0))
-    return np.stack([pixels.mean(axis=0), spread, np.sqrt(square)])
+    # Channel by channel: a large picture's features in float64 would fill the memory.
+    return np.stack([_described(image[..., c].astype(np.float64)) for c in range(image.shape[-1])], axis=-1)
+
+
+def _described(values: Array) -> Array:
+    """Return mean, spread and roughness (3,) of one channel (H, W)."""
+    steps = [np.diff(values, axis=axis) for axis in (0, 1)]
+    count = sum(step.size for step in steps)
+    square = sum(float(np.sum(step * step)) for step in steps) / count if count else 0.0
+    spread = np.sqrt(np.maximum(values.var() - square / 2.0, 0.0))
+    return np.array([values.mean(), spread, np.sqrt(square)])
 
 
 def _middle_and_scale(descriptions: Array) -> tuple[Array, Array]:

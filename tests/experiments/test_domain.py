@@ -35,7 +35,7 @@ def found(tmp_path_factory):
 
 
 def test_each_kind_has_its_record(found) -> None:
-    """So many frames, each with a distance, and with a loss but for those that nothing is lost against."""
+    """So many frames, each with a distance, and with a loss except for those held back."""
     for name in KINDS:
         values = found.get(f"cornell: {name}", 0)
         held = name == domain.HELD_BACK

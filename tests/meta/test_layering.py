@@ -90,7 +90,8 @@ ROOMS = {
         "common": (),
         "files": ("common",),
         "reports": ("common", "files"),
-        "commands": ("common", "files", "reports"),
+        "course": ("common", "files", "reports"),
+        "commands": ("common", "files", "reports", "course"),
         "": ("commands", "common"),
     },
 }

@@ -1,8 +1,16 @@
-"""A right answer to exercise 5, for the tests of its grader."""
+"""A right answer to this lab, for the tests of its grader."""
 
 from __future__ import annotations
 
 import numpy as np
+
+
+def feature_image(albedo, normal, depth, depth_scale):
+    if not depth_scale > 0:
+        raise ValueError(f"depth_scale {depth_scale}")
+    albedo, normal, depth = (np.asarray(a, np.float64) for a in (albedo, normal, depth))
+    parts = [np.clip(albedo, 0, 1), np.clip(normal, -1, 1), np.clip(depth / depth_scale, 0, 1)]
+    return np.concatenate(parts, axis=-1).astype(np.float32)
 
 
 def window(image, x, y, size, border):

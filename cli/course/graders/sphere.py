@@ -1,0 +1,196 @@
+"""Grades lab 1: rays whose distances are known, the spec's vectors, random rays, a sphere far away."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..frame import Check, Likely, Wrong, expect, hold, kind_of_number, normals, numbers_of, spread, vectors
+
+CENTER, RADIUS = np.array([0.25, -0.5, 0.125]), 0.75
+"""The sphere of the vectors."""
+
+FAR = 1000.0
+"""Where the ray of the last check begins; the sphere has radius 1."""
+
+BOUND = 1e-12
+"""A dozen operations on numbers below 10, in float64."""
+
+NEAR_ROOT = "inside, the near root is behind the ray: take the far one where the near one is below 0"
+
+
+def one(student: Any, center: Sequence[float], radius: float, origin: Any, direction: Any) -> Any:
+    """Return the distance of one ray in float64."""
+    given = (np.array(v, np.float64) for v in (origin, direction))
+    found = student.meet_sphere(np.array(center, np.float64), np.float64(radius), *given)
+    return numbers_of("ISC-6", "the distance of one ray", found, ())
+
+
+def _ray(what: str, origin: Any, direction: Any, wanted: float, likely: Likely, otherwise: str = "") -> Any:
+    """Return a check of one ray at the sphere of radius 2 around (0, 0, 5)."""
+
+    def run(student: Any) -> None:
+        found = one(student, (0, 0, 5), 2.0, origin, direction)
+        expect("ISC-6", f"the distance of a ray {what}", found, wanted, BOUND, likely, otherwise)
+
+    return run
+
+
+from_outside = _ray(
+    "from (0, 0, 0) along +z, to radius 2 around (0, 0, 5)",
+    (0, 0, 0),
+    (0, 0, 1),
+    3.0,
+    [
+        (7.0, "that is the exit: from outside the smaller root is the entry"),
+        (-3.0, "the sign of b: b = -(origin - center) . direction"),
+        (-7.0, "the sign of b: b = -(origin - center) . direction"),
+        (1e30, "the centre is not subtracted from the origin, or the discriminant has the other sign"),
+        (5.0, "the root of the discriminant is missing: t = b - sqrt(discriminant)"),
+        (1.0, "the discriminant itself is subtracted, not its root"),
+        (5.0 - 2**0.5, "the discriminant has the radius and not its square"),
+        (6.0, "divided by 2 too little or too often: with a unit direction t = b - sqrt(b * b - c)"),
+        (1.5, "divided by 2 too often: with b and not 2 b there is no 2 to divide by"),
+    ],
+    "the quadratic equation's coefficients: b = -f . d, c = f . f - r * r, f = origin - center",
+)
+aside = _ray(
+    "beside the middle: from (1, 0, 0) along +z, to radius 2 around (0, 0, 5)",
+    (1, 0, 0),
+    (0, 0, 1),
+    5.0 - 3.0**0.5,
+    [(1e30, "a sum over all axes where the components are meant, or a wrong discriminant")],
+    "the distance of the centre from the ray is not subtracted: r * r - f_perp . f_perp under the root",
+)
+from_inside = _ray(
+    "from inside, (0, 0, 5) along +z",
+    (0, 0, 5),
+    (0, 0, 1),
+    2.0,
+    [(-2.0, NEAR_ROOT), (1e30, "from inside there is always an exit: a near root below 0 is no miss")],
+    NEAR_ROOT,
+)
+behind = _ray(
+    "that looks away from the sphere",
+    (0, 0, 0),
+    (0, 0, -1),
+    1e30,
+    [
+        (-3.0, "both roots are behind the ray: a miss, where the far root is not above 0"),
+        (-7.0, "both roots are behind the ray: a miss, where the far root is not above 0"),
+        (3.0, "an absolute value: the sphere is behind the ray"),
+        (7.0, "an absolute value: the sphere is behind the ray"),
+    ],
+    "a sphere behind the ray is a miss",
+)
+beside = _ray(
+    "that passes beside the sphere",
+    (3, 0, 0),
+    (0, 0, 1),
+    1e30,
+    [(5.0, "the root of max(discriminant, 0) is 0 where the discriminant is below 0: that is a miss")],
+    "a discriminant below 0 is a miss: np.where(discriminant > 0, ..., MISS)",
+)
+
+
+def grazing(student: Any) -> None:
+    """A ray that cuts the edge of the sphere: a depth of 0.05 of a radius of 2."""
+    found = one(student, (0, 0, 5), 2.0, (1.95, 0, 0), (0, 0, 1))
+    wanted = 5.0 - (4.0 - 1.95**2) ** 0.5
+    late = "a threshold other than 0 for the discriminant, or a radius that is too small"
+    expect("ISC-6", "the distance of a ray at the sphere's edge", found, wanted, BOUND, [(1e30, late)], late)
+
+
+def many(student: Any) -> None:
+    """Arrays of rays (2, 3): each has a distance of its own, and no argument is changed."""
+    origin = [*np.zeros((2, 3, 3)), 0.0, 0.0, -4.0]
+    origin[..., 0] = np.arange(6.0).reshape(2, 3) / 4
+    kept = origin.copy()
+    direction = np.broadcast_to(np.array([0.0, 0.0, 1.0]), origin.shape)
+    found = student.meet_sphere(np.zeros(3), np.float64(1.0), origin, direction)
+    numbers_of("ISC-6", "the distances of rays (2, 3)", found, (2, 3))
+    square = 1.0 - kept[..., 0] ** 2
+    wanted = np.where(square > 0, 4.0 - np.sqrt(np.maximum(square, 0.0)), 1e30)
+    expect("ISC-6", "the distances of rays (2, 3)", found, wanted, BOUND)
+    hold(
+        "ISC-2",
+        "the argument `origin`",
+        np.array_equal(origin, kept),
+        "no change",
+        "a change",
+        "`-=` or `+=`",
+    )
+
+
+def the_vectors(student: Any) -> None:
+    """The cases intersection.sphere."""
+
+    def answer(given: Any) -> Any:
+        found = student.meet_sphere(CENTER, np.float64(RADIUS), given["origin"], given["direction"])
+        return {"t": numbers_of("ISC-6", "the distance of one ray", found, ())}
+
+    vectors("intersection.sphere", answer, likely="rays that begin on the sphere, or look away from it")
+
+
+def random_rays(student: Any) -> None:
+    """Hits are on the sphere, and nothing is nearer."""
+    origin, direction = spread(11, (2000, 3), -2.0, 2.0), normals(12, (2000, 3))
+    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+    t = student.meet_sphere(CENTER, np.float64(RADIUS), origin, direction)
+    t = numbers_of("ISC-6", "the distances of 2000 rays", t, (2000,))
+    hit = t < 1e30
+    away = np.linalg.norm(origin + np.where(hit, t, 0.0)[:, None] * direction - CENTER, axis=-1)
+    # Some ten operations on numbers below 10, in float64; tangents lose half of the digits.
+    off = float(np.abs(away - RADIUS)[hit].max(initial=0.0))
+    hold(
+        "ISC-6",
+        "hits' distance from the sphere",
+        off <= 1e-6,
+        "at most 1e-6",
+        off,
+        "not a root of the equation",
+    )
+    hold("ISC-2", "the least distance", np.all(t > 0.0), "above 0", t.min(), NEAR_ROOT)
+    inside = np.linalg.norm(origin - CENTER, axis=-1) < RADIUS
+    missed = int(np.count_nonzero(inside & ~hit))
+    hold("ISC-6", "misses from inside the sphere", missed == 0, "none", missed, NEAR_ROOT)
+    steps = np.linspace(0, 0.999, 50)[:, None] * np.where(hit, t, 8.0)[:, None, None]
+    outside = np.linalg.norm(origin[:, None] + steps * direction[:, None] - CENTER, axis=-1) > RADIUS
+    through = int(np.count_nonzero(~np.all(outside, axis=1) & ~inside))
+    text = "the far root from outside, or a miss that is none"
+    hold("ISC-2", "rays that went through the sphere before their hit", through == 0, "none", through, text)
+
+
+def far_away(student: Any) -> None:
+    """The distance is known to some 16 ulp of itself, 1000 * 16 * 2**-24, times the slant of at most 2.3."""
+    across = np.linspace(0.0, 0.9, 200, dtype=np.float32)
+    origin = np.stack([across, 0 * across, np.full_like(across, FAR)], axis=-1)
+    direction = np.broadcast_to(np.array([0, 0, -1], np.float32), origin.shape)
+    t = student.meet_sphere(np.zeros(3, np.float32), np.float32(1.0), origin, direction)
+    kind_of_number("ISC-6", "distances of float32 rays", t, np.float32)
+    numbers_of("ISC-6", "the distances of 200 rays", t, (200,))
+    error = float(np.abs(t - (FAR - np.sqrt(1.0 - across.astype(np.float64) ** 2))).max())
+    bound = 2.3 * FAR * 16 * 2.0**-24
+    if not error <= bound:
+        lost = (
+            "b * b - (f . f - r * r) loses the radius: measure the discriminant at the nearest point f + b d"
+        )
+        what = f"the error at a distance of {FAR:g} in float32"
+        raise Wrong("ISC-6", what, f"at most {bound:.3g}", f"{error:.3g}", lost)
+
+
+CHECKS = (
+    Check("a ray from outside", from_outside),
+    Check("a ray beside the middle", aside),
+    Check("a ray from inside", from_inside),
+    Check("a ray that looks away", behind),
+    Check("a ray that misses", beside),
+    Check("a ray at the edge", grazing),
+    Check("arrays of rays", many),
+    Check("the spec's vectors", the_vectors),
+    Check("random rays", random_rays),
+    Check("a small sphere far away in float32", far_away),
+)
+"""In the order of what a mistake is best told by."""

@@ -1,0 +1,206 @@
+"""Grades lab 12: sums in any order, phases, every angle, the spec's vectors, and the compiler's proof."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ....compiler.core.ir import Gather, Image, Type
+from ....compiler.core.trace import trace
+from ....compiler.proof.whole import Rounds, known
+from ....refimpl.network import siren
+from ....refimpl.network.dataset import Window
+from ....refimpl.network.whole import SINES, TURN, colour, rounded, whole_sine
+from ....spec.conformance.kinds.whole import network_from
+from ..frame import Check, Wrong, expect, kind_of_number, numbers_of, spread, vectors
+
+PHASES = 64
+"""Random phases that are looked at."""
+
+STEP = 64
+"""Every phase that differs in more than its last 6 bits is looked at."""
+
+
+def whole(stream: int, shape: tuple[int, ...], least: int, most: int) -> Any:
+    """Return random integers in [least, most]."""
+    return np.floor(spread(stream, shape, least, most + 1)).astype(np.int64)
+
+
+def largest(student: Any) -> None:
+    """Each part of a sum is a partial sum in some order: the largest has the weights' magnitudes."""
+    weights = whole(111, (5, 40), -127, 127)
+    w, size = weights.astype(np.float32), np.abs(weights)
+    found = numbers_of("WHO-3", "largest sums", student.largest_sums(w, 127), (5,))
+    likely = [
+        (127 * np.abs(weights.sum(axis=1)), "the sum of the magnitudes, not the magnitude of the sum"),
+        (127 * weights.sum(axis=1), "the sum of the magnitudes: weights have both signs"),
+        (size.sum(axis=1), "times the largest input"),
+        (127 * size.max(axis=1), "the sum over the row, not its largest weight"),
+        (127 * 40 * size.max(axis=1), "a sum of these weights: no row has 40 times its largest"),
+        (np.full(5, 127 * 127 * 40), "a sum of these weights, not of the largest that there are"),
+        (127 * np.maximum(np.maximum(weights, 0).sum(axis=1), np.maximum(-weights, 0).sum(axis=1)),
+         "the inputs have both signs: negative weights count with positive ones"),
+        (128 * size.sum(axis=1), "inputs are in [-most, most]"),
+        (127 * np.sqrt((weights**2).sum(axis=1)), "a bound of all inputs: the sum of magnitudes, not a norm"),
+    ]  # fmt: skip
+    expect(
+        "WHO-3",
+        "largest sums",
+        found,
+        127 * size.sum(axis=1),
+        0.0,
+        likely,
+        "most * sum of |weights| of a row",
+    )
+
+
+def phases(student: Any) -> None:
+    """Against Python's integers, which do not wrap: the last 24 bits count."""
+    sums = whole(112, (PHASES,), 1 - TURN, TURN - 1)
+    sums[:2] = [1 - TURN, -1]
+    for factor, bias in ((1, 0), (1, 5), (62, 5_000_000), (TURN - 1, TURN - 1)):
+        one, other = (np.full(PHASES, value, np.float32) for value in (factor, bias))
+        found = student.phase(sums.astype(np.float32), one, other)
+        kind_of_number("WHO-4", "phases", found, np.uint32)
+        wanted = np.array([(int(a) * factor + bias) % TURN for a in sums])
+        rounds = (sums.astype(np.float32) * one + other).astype(np.float64)
+        likely = [
+            (np.array([int(a) * factor % TURN for a in sums]), "the bias is missing"),
+            (
+                np.array([(int(a) + bias) * factor % TURN for a in sums]),
+                "sums * factor + bias: the bias is added last",
+            ),
+            (np.array([(int(a) + bias) % TURN for a in sums]), "the factor is missing"),
+            (np.array([(int(a) * factor - bias) % TURN for a in sums]), "the bias is added"),
+            (np.array([(abs(int(a)) * factor + bias) % TURN for a in sums]), "sums below 0 keep their sign"),
+            (
+                np.array([(max(int(a), 0) * factor + bias) % TURN for a in sums]),
+                "a float below 0 becomes uint32 by way of int32",
+            ),
+            (
+                np.mod(rounds, TURN),
+                "float32 has 24 bits: the product needs words that wrap, so convert first",
+            ),
+        ]
+        text = "words first, then product and sum: float32 rounds what is above 2^24"
+        what = f"phases of sums * {factor} + {bias}, modulo 2^24"
+        expect("WHO-4", what, np.asarray(found) % TURN, wanted, 0.0, likely, text)
+
+
+def single(student: Any) -> None:
+    """Angles whose sines are known."""
+    for amplitude in SINES:
+        at = np.array(
+            [0, TURN // 4, TURN // 2, 3 * TURN // 4, TURN // 12, TURN // 3, TURN - TURN // 12], np.uint32
+        )
+        found = numbers_of("WHO-5", "sines", student.sine(at, amplitude), at.shape)
+        wanted = whole_sine(at, amplitude)
+        kind_of_number("WHO-5", "sines", found, np.float32)
+        likely = [
+            (np.abs(wanted), "the sign of the second half turn is missing: bit 23"),
+            (-wanted, "the sign: the first half turn is positive"),
+            (wanted / amplitude, "integers in [-amplitude, amplitude], not numbers in [-1, 1]"),
+            (np.round(amplitude * np.cos(2 * np.pi * at / TURN)), "a cosine"),
+        ]
+        text = "the second and fourth quarter run backwards: bit 22 turns the phase around"
+        if not np.all(found == np.floor(found)):
+            text = "a sine is an integer: shift, do not divide"
+        expect("WHO-5", f"sines of amplitude {amplitude}", found, wanted, 0.0, likely, text)
+
+
+def every_angle(student: Any) -> None:
+    """All 262,144 phases that differ in more than their last 6 bits, and some that are beyond a turn."""
+    at = np.arange(0, TURN, STEP, dtype=np.uint32)
+    for amplitude in SINES:
+        found = numbers_of("WHO-5", "sines", student.sine(at, amplitude), at.shape)
+        wanted = whole_sine(at, amplitude)
+        off = np.flatnonzero(found != wanted)
+        if off.size:
+            high = float(np.abs(found).max())
+            text = "half of the last place, 1 << (shift - 1), is added before the shift"
+            text = "np.minimum(..., amplitude): rounded up it may be one more" if high > amplitude else text
+            text = "a coefficient, a shift, or the place of a shift" if off.size > at.size // 2 else text
+            what = f"sine({at[off[0]]}, {amplitude}); {off.size} of {at.size} angles differ"
+            raise Wrong("WHO-5", what, f"{wanted[off[0]]:g}", f"{found[off[0]]:g}", text)
+        beyond = at[::997] + np.uint32(TURN)
+        text = "only the last 24 bits of a phase count: mask them, & 0xFFFF after the shift"
+        expect("WHO-5", "sines beyond a turn", student.sine(beyond, amplitude), wanted[::997], 0.0, (), text)
+
+
+def sine_vectors(student: Any) -> None:
+    """The cases whole.sine."""
+
+    def answer(given: Any) -> Any:
+        at = np.asarray(given["phase"]).astype(np.uint32)
+        return {"value": student.sine(at, int(given["amplitude"]))}
+
+    vectors("whole.sine", answer, likely="the last bits of a phase")
+
+
+def forward(student: Any, network: Any, numbers: Any) -> list[Any]:
+    """Return what each of the student's layers gives."""
+    found = []
+    for row in zip(network.weights[:-1], network.factors, network.biases, strict=False):
+        numbers = student.layer(*row, network.amplitude, numbers)
+        found.append(numbers)
+    return found
+
+
+def one_layer(student: Any) -> None:
+    """A layer, from its parts."""
+    weights, numbers = whole(113, (4, 3), -127, 127), whole(114, (5, 3), -127, 127)
+    factor, bias = whole(115, (4,), 1, 4000), whole(116, (4,), 0, TURN - 1)
+    given = (a.astype(np.float32) for a in (weights, factor, bias))
+    found = student.layer(*given, 127, numbers.astype(np.float32))
+
+    def made(factor: Any, bias: Any) -> Any:
+        return whole_sine(((numbers @ weights.T) * factor + bias).astype(np.int64).astype(np.uint32), 127)
+
+    likely = [
+        (made(factor, 0), "the bias is missing"),
+        (made(1, bias), "the factor is missing"),
+        (numbers @ weights.T, "the sine is missing"),
+    ]
+    text = "sine(phase(numbers @ weights.T, factor, bias), amplitude)"
+    expect("WHO-5", "a layer", found, made(factor, bias), 0.0, likely, text)
+
+
+def network_vectors(student: Any) -> None:
+    """The cases whole.forward; the last layer is not the student's, nor is what refuses a network."""
+
+    def answer(given: Any) -> Any:
+        network = network_from(given)
+        numbers = np.asarray(given["n"], np.float32)
+        layers = forward(student, network, numbers)
+        sums = (layers or [numbers])[-1] @ network.weights[-1].T
+        named = {f"layer_{index}": values for index, values in enumerate(layers)}
+        return {**named, "color": colour(network, sums)}
+
+    vectors("whole.forward", answer, likely="sine(phase(numbers @ weights.T, factor, bias), amplitude)")
+
+
+def nothing_rounds(student: Any) -> None:
+    """The compiler's own proof, of a network of the student's layers."""
+    network = rounded(siren.init([12, 8, 8, 3], 30.0, 30.0, seed=1), 2)
+    gather = Gather(Window(2), (Image("color", 3, -127.0, 127.0, whole=True),))
+    types = {"window": Type(shape=(gather.n_inputs,))}
+    program = trace(lambda window: forward(student, network, window)[-1], types, gather)
+    try:
+        known(program)
+    except Rounds as reason:
+        text = "right in NumPy perhaps; a kernel's words have 32 bits and its floats 24"
+        raise Wrong("WHO-3", "the compiler's proof", "that nothing rounds", str(reason), text) from None
+
+
+CHECKS = (
+    Check("largest partial sums", largest),
+    Check("phases", phases),
+    Check("sines of known angles", single),
+    Check("every angle", every_angle),
+    Check("the vectors of the sine", sine_vectors),
+    Check("a layer", one_layer),
+    Check("the vectors of a network", network_vectors),
+    Check("nothing rounds", nothing_rounds),
+)
+"""In the order of what a mistake is best told by."""

@@ -1,7 +1,7 @@
 """The command `wamnet`: its commands, and the one place where errors become a line and an exit status.
 
 1. Commands are registered with typer in the order of a first session [`app`]; `bench`, which has commands
-   of its own [common/default_command.py], comes last.
+   of its own [common/default_command.py], comes last, and `course` before it.
 2. [`main`] runs one of them. Whatever a user can cause ends in one line on standard error and status 2;
    Ctrl-C ends in status 130 and SIGTERM in 143; anything else is a bug and shows its traceback.
 
@@ -26,6 +26,7 @@ from .commands import (
     certify,
     compare,
     conformance,
+    course,
     dataset,
     demo,
     denoise,
@@ -72,6 +73,8 @@ benches = typer.Typer(
     cls=CommandWithOthers, invoke_without_command=True, subcommand_metavar="| COMMAND [OPTIONS]"
 )
 
+courses = typer.Typer(invoke_without_command=True)
+
 
 def _help(command: Callable[..., None]) -> str:
     """Return a command's docstring, each paragraph on one line, as typer wants it."""
@@ -110,6 +113,11 @@ _register(measure_train.train, measure_train.EXAMPLES, to=benches)
 _register(pipeline.pipeline, pipeline.EXAMPLES, to=benches)
 _register(exports.exports, exports.EXAMPLES, to=benches)
 _register(primitives.primitives, primitives.EXAMPLES, to=benches)
+_register(course.start, course.START_EXAMPLES, to=courses)
+_register(course.check, course.CHECK_EXAMPLES, to=courses)
+_register(course.grade, course.GRADE_EXAMPLES, to=courses)
+courses.callback(help=_help(course.course))(course.course)
+app.add_typer(courses, name="course")
 benches.callback(help=_help(bench.bench), epilog=bench.EXAMPLES)(bench.bench)
 app.add_typer(benches, name="bench")
 

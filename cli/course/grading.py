@@ -26,7 +26,7 @@ from typing import IO, Any
 from ...refimpl.errors import InputError
 from .frame import Wrong
 from .labs import LABS, Lab
-from .sandbox import MEGABYTE, Limits
+from .sandbox import LIMITS, MEGABYTE, Limits
 from .worker import LOADING
 
 LARGEST_FILE = MEGABYTE
@@ -69,7 +69,7 @@ def copied(source: Path, target: Path) -> None:
             shutil.copyfile(path, target / path.name)
 
 
-def grade(lab: Lab, folder: Path, limits: Limits = Limits(), shows: bool = False) -> Result:  # noqa: B008
+def grade(lab: Lab, folder: Path, limits: Limits = LIMITS, shows: bool = False) -> Result:
     """Grade a lab in a student's folder; `shows`: what the code prints is shown."""
     with tempfile.TemporaryDirectory(prefix="wamnet-course-", ignore_cleanup_errors=True) as made:
         place = Path(made)
@@ -192,7 +192,7 @@ def students_of(folder: Path) -> list[Path]:
 def grade_class(
     folder: Path,
     labs: Sequence[Lab] = LABS,
-    limits: Limits = Limits(),  # noqa: B008
+    limits: Limits = LIMITS,
     workers: int = 2,
     on_progress: Callable[[int], None] = lambda count: None,
 ) -> list[Student]:

@@ -34,6 +34,10 @@ class Limits(NamedTuple):
         return 3 * self.seconds + 30
 
 
+LIMITS = Limits()
+"""What suits all labs."""
+
+
 class Forbidden(BaseException):
     """What a student's code may not do while it is graded."""
 

@@ -105,7 +105,8 @@ def grazing(student: Any) -> None:
 
 def many(student: Any) -> None:
     """Arrays of rays (2, 3): each has a distance of its own, and no argument is changed."""
-    origin = [*np.zeros((2, 3, 3)), 0.0, 0.0, -4.0]
+    origin = np.full((2, 3, 3), -4.0)
+    origin[..., 1] = 0.0
     origin[..., 0] = np.arange(6.0).reshape(2, 3) / 4
     kept = origin.copy()
     direction = np.broadcast_to(np.array([0.0, 0.0, 1.0]), origin.shape)

@@ -37,7 +37,7 @@ demo: ## Render, train, compile, run and compare; results in out/demo (5 minutes
 	@.ci/setup opencl,opengl,cli,report
 	@$(VENV)/bin/wamnet demo -o out/demo
 
-docs: ## Build the web site: spec, tutorial, exercises; open out/site/index.html
+docs: ## Build the web site: spec, tutorial, course; open out/site/index.html
 	@.ci/setup opencl,opengl,cli,report,docs
 	@$(VENV)/bin/python docs/site/build.py
 

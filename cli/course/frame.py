@@ -15,6 +15,7 @@ import math
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -23,11 +24,14 @@ from numpy.typing import NDArray
 
 from ...refimpl import rng
 from ...refimpl.errors import shown
-from ...spec.conformance import vectors as all_vectors
+from ...spec.conformance import case as cases
 from ...spec.conformance.case import Case, given, load
 from ...spec.conformance.numbers import to_json
 from ...spec.conformance.run import judge
 from .sandbox import Forbidden
+
+VECTORS = Path(cases.__file__).resolve().parents[1] / "vectors"
+"""The spec's vectors."""
 
 SIGNIFICANCE = 0.01
 """Chance that a statistical check rejects a right answer: always or never, since its numbers are fixed."""
@@ -164,7 +168,7 @@ def vectors(
     kind: str, answer: Answer, only: Sequence[str] = (), likely: str = "", explain: Explain | None = None
 ) -> None:
     """Ask all cases of a kind; `only` are the outputs that count. Wrong names the case and its clause."""
-    for case in load(all_vectors.FOLDER / f"{kind}.json")[1]:
+    for case in load(VECTORS / f"{kind}.json")[1]:
         if only and case.expected is not None:
             case = replace(case, expected={name: case.expected[name] for name in only})
         inputs = {name: given(value) for name, value in case.inputs.items()}

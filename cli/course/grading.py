@@ -132,11 +132,11 @@ def _read(lab: Lab, lines: str, status: int | None, limits: Limits, notes: list[
     if not ended:
         found[begun or LOADING] = _stopped(begun or LOADING, status, limits, tail)
     elif LOADING not in found:
-        return Result(lab, tuple((name, found[name]) for name in names), tuple(notes))
+        return Result(lab, tuple((name, found[name]) for name in names), tuple(dict.fromkeys(notes)))
     cause = found.get(LOADING) or found.get(begun)
     missing = Wrong("", "this check", "an answer", "none", "what stopped the process before it")
     checks = [(name, found.get(name, cause if LOADING in found else missing)) for name in names]
-    return Result(lab, tuple(checks), tuple(notes))
+    return Result(lab, tuple(checks), tuple(dict.fromkeys(notes)))
 
 
 def _stopped(begun: str, status: int | None, limits: Limits, tail: str) -> Wrong:

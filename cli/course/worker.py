@@ -33,16 +33,15 @@ def load(lab: Lab, folder: Path) -> ModuleType | Wrong:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    # Last, so that a file named numpy.py does not hide NumPy.
-    sys.path.append(str(folder))
+    # Last, so that a file named numpy.py does not hide NumPy; it stays, for imports within functions.
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))
     try:
         spec.loader.exec_module(module)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # noqa: BLE001
         return of_exception(error, LOADING, str(path))
-    finally:
-        sys.path.remove(str(folder))
     return module
 
 

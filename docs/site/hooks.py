@@ -70,13 +70,21 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
     config.nav = [
         "index.md",
         {"Tutorial": pages("tutorial")},
-        {"Exercises": pages("exercises")},
+        {"Course": course(docs)},
         {"Guide": ["guide/index.md", "first-kernel.md", *(f"guide/{name}" for name in in_order(docs))]},
         {"Results": ["results.md", "speed.md", "listing.md"]},
         {"Spec": parts},
         "recipes.md",
     ]
     return config
+
+
+def course(docs: Path) -> list[str]:
+    """Return the pages of the course: its index, the labs, the extras, and the page for teachers."""
+    names = sorted(path.name for path in (docs / "course").glob("*.md"))
+    labs = [name for name in names if name.startswith("lab")]
+    extras = [name for name in names if name.startswith("extra")]
+    return [f"course/{name}" for name in ("index.md", *labs, *extras, "teach.md")]
 
 
 def by_number(names: Iterable[str]) -> list[str]:

@@ -206,6 +206,7 @@ EXPLAINED = (
     (UnboundLocalError, "", "a name that is set only on another path"),
     (ValueError, "truth value of an array", "`if`, `and`, `or`, `min` or `max` on an array: np.where, &, |"),
     (TypeError, "can be converted to", "a function of `math`, or float(), on an array: take that of np"),
+    (TypeError, "not supported for the input types", "a number of another kind: keep constants as they are"),
     (TypeError, "can not be traced", "an operation that a kernel does not have"),
     (ValueError, "broadcast", "axes that do not fit: a number per ray goes with vectors as t[..., None]"),
     (ValueError, "matmul", "the matrix is (D_out, D_in): x @ W.T"),

@@ -213,6 +213,8 @@ class Lane:
         name = callee[1]
         values = [self.value(tree) for tree in arguments]
         if name == "get_global_id" and self.language == "opencl":
+            if values != [0]:
+                raise TextError("another get_global_id than that of 0", "the numbers are along axis 0")
             return np.int32(self.item)
         if name not in BUILTINS[self.language]:
             raise TextError(

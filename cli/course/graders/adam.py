@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..frame import Check, expect, hold, numbers_of, spread, vectors
+from ..frame import Check, alike, expect, hold, numbers_of, spread, vectors
 
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8
 """The source's values."""
@@ -26,8 +26,9 @@ def adam(gradients: Any, how: str = "", rates: Any = None, theta: Any = None) ->
     for t in range(1, count + 1):
         g = gradients(theta) if callable(gradients) else gradients[t - 1]
         beta_1, beta_2 = (BETA_2, BETA_1) if how == "betas" else (BETA_1, BETA_2)
+        before = m
         m = beta_1 * m + (1.0 if how == "heavy" else 1 - beta_1) * g
-        m = beta_1 * g + (1 - beta_1) * m if how == "turned" else m
+        m = beta_1 * g + (1 - beta_1) * before if how == "turned" else m
         square = np.abs(g) if how == "magnitude" else g if how == "no square" else g * g
         square = (g - m) ** 2 if how == "centred" else square
         v = beta_2 * v + (1 - beta_2) * square
@@ -85,7 +86,9 @@ def compare(student: Any, slopes: Any, what: str) -> None:
         same = all(np.array_equal(a, b) for a, b in zip((theta, g, m, v), kept, strict=True))
         hold("ADM-1", "the arguments of step", same, "no change", "a change", "`*=` or `+=` on an argument")
         for number, name in enumerate(("theta", "m", "v")):
-            likely = [(steps[t - 1][number], told) for steps, told in wrong]
+            # The mistake that gives all three comes first.
+            whole = [pair for pair in wrong if all(map(alike, found, pair[0][t - 1]))]
+            likely = [(steps[t - 1][number], told) for steps, told in (*whole, *wrong)]
             # Few roundings of numbers of at most 400.
             bound = 1e-12 * max(1.0, float(np.abs(right[t - 1][number]).max())) if number else 1e-12
             expect("ADM-1", f"{name} after {what} {t}", found[number], right[t - 1][number], bound, likely)
@@ -125,16 +128,16 @@ def decay(student: Any) -> None:
     """The learning rate."""
     for k, wanted in (
         (0, 1.0),
-        (5, 0.5),
         (2, (1 + np.cos(np.pi / 5)) / 2),
+        (5, 0.5),
         (9, (1 + np.cos(0.9 * np.pi)) / 2),
     ):
         c = np.cos(np.pi * k / 10)
         likely = [
             (2 * RATE * wanted, "half of 1 + cos"),
-            (RATE * c, "(1 + cos) / 2, so that it never is below 0"),
             (RATE * (1 - c) / 2, "1 + cos: it falls"),
             (RATE * (1 + np.cos(2 * np.pi * k / 10)) / 2, "half a wave: pi k / steps"),
+            (RATE * c, "(1 + cos) / 2, so that it never is below 0"),
             (RATE * (1 + np.cos(np.pi / 2 * k / 10)) / 2, "half a wave: pi k / steps"),
             (RATE * (1 + np.cos(np.pi * (k + 1) / 10)) / 2, "k is counted from 0"),
             (RATE * (1 + np.cos(np.pi * (k - 1) / 10)) / 2, "k is counted from 0"),
@@ -176,6 +179,9 @@ def training(student: Any) -> None:
         "theta is changed in place: make a new array",
     )
     once = "gradient(theta) once a step, where theta is by then"
+    lost = not np.all(np.isfinite(np.asarray(found, np.float64)))
+    text = "t is counted from 1: with t = 0 the corrections divide by 0"
+    hold("TRN-4", "theta after the steps", not lost, "numbers", found, text)
     hold("TRN-2", "the number of slopes", len(calls) == count, str(count), str(len(calls)), once)
     rates = [rate * (1 + np.cos(np.pi * k / count)) / 2 for k in range(count)]
 

@@ -60,7 +60,7 @@ def density(student: Any) -> None:
 
 def furnace(student: Any) -> None:
     """Check f cos / pdf, which is a number: walls that reflect a and emit 1 have the radiance 1 / (1 - a)."""
-    for a in (0.5, 0.8):
+    for a in (0.4, 0.8):
         wi, weight, _ = bounced(student, a)
         z = wi[:, 2]
         likely = [

@@ -42,8 +42,8 @@ def sums(student: Any, samples: Any) -> tuple[Any, Any, Any]:
 
 
 def few(student: Any) -> None:
-    """Three samples, 1, 2 and 6: mean 3, sum of squared distances 14."""
-    samples = np.array([1.0, 2.0, 6.0])[:, None]
+    """Three samples, 2, 3 and 7: mean 4, sum of squared distances 14."""
+    samples = np.array([2.0, 3.0, 7.0])[:, None]
     n, total, squares = sums(student, samples[:1])
     expect("RND-4", "n after one sample", n, 1, 0, [(0, "n is not counted up")])
     expect("RND-1", "the sum after one sample", total, samples[0], 0.0, (), "sum + x")
@@ -52,13 +52,15 @@ def few(student: Any) -> None:
     n, total, squares = sums(student, samples)
     expect("RND-4", "n after three samples", n, 3, 0)
     likely: Likely = [
-        ([3.0], "the sum, not the mean: divide when all samples are there"),
-        ([6.0], "only the last sample"),
+        ([4.0], "the sum, not the mean: divide when all samples are there"),
+        ([7.0], "only the last sample"),
     ]
-    expect("RND-1", "the sum after three samples", total, np.array([9.0]), 1e-12, likely, "sum + x")
+    expect("RND-1", "the sum after three samples", total, np.array([12.0]), 1e-12, likely, "sum + x")
     x, wrong = samples[:, 0], []
     for told, step in (
         ("squares of the samples: (n x - S)^2 / (n (n + 1))", lambda n, s, x: x * x),
+        ("the squares are summed", lambda n, s, x: (n * x - s) ** 2 / 6 * (n == 2)),
+        ("squares of the samples: (n x - S)^2 / (n (n + 1))", lambda n, s, x: x * x if n else 0),
         ("divided by n (n + 1)", lambda n, s, x: (n * x - s) ** 2),
         ("divided by n (n + 1), not n", lambda n, s, x: (n * x - s) ** 2 / max(n, 1)),
         ("divided by n (n + 1), not n + 1", lambda n, s, x: (n * x - s) ** 2 / (n + 1) if n else 0),
@@ -91,6 +93,7 @@ def divided(student: Any) -> None:
         1e-12,
         likely,
     )
+    expect("RND-4", "the variance of 2 samples whose squares are 3", student.variance(2, 3.0), 3.0, 1e-12)
     text = "one sample says nothing of its variance: divide by max(n - 1, 1)"
     expect(
         "RND-4", "the variance of one sample", student.variance(1, np.zeros(2)), np.zeros(2), 0.0, (), text
@@ -223,7 +226,7 @@ def needed(student: Any) -> None:
         (np.array([16.0, 0.0, 4.0, 9.0]), "at least one sample"),
         (np.array([1.0, 1.0, 1.0, 1.0]), "multiplied by the error's square: divide"),
         (np.array([64.0, 1.0, 4.0, 21.0]), "the variance is squared already"),
-        (np.array([4.0, 1.0, 2.0, 3.0]), "variance / error^2: the variance has no root here"),
+        (np.array([8.0, 1.0, 4.0, 6.0]), "variance / error^2: the variance has no root here"),
     ]
     expect(
         "RND-4",

@@ -23,12 +23,22 @@ FUNCTIONS: dict[str, tuple[Callable[[Any, Any], Any], list[str], str]] = {
     ),
     "(-a) + b": (lambda a, b: (-a) + b, ["subtract"], "the negation may be the first operand too: b - a"),
     "a + b": (lambda a, b: a + b, ["add"], "only additions of a negation change"),
+    "a + a * b": (
+        lambda a, b: a + a * b,
+        ["add", "multiply"],
+        "only additions of a negation change",
+    ),
     "a - (-b)": (lambda a, b: a - (-b), ["negative", "subtract"], "only additions change, not subtractions"),
     "(-a) * b": (lambda a, b: (-a) * b, ["multiply", "negative"], "only additions change, not products"),
     "(-b) * (a + (-b))": (
         lambda a, b: (-b) * (a + (-b)),
         ["multiply", "negative", "subtract"],
         "a negation that another node reads stays",
+    ),
+    "(a - b) * (a + (-b)) + (-(a * b))": (
+        lambda a, b: (a - b) * (a + (-b)) + (-(a * b)),
+        ["multiply", "multiply", "subtract", "subtract"],
+        "operands are those in the new program: args, not node.args",
     ),
     "(a + (-b)) + (-(a * b))": (
         lambda a, b: (a + (-b)) + (-(a * b)),

@@ -47,10 +47,17 @@ from_outside = _ray(
         (7.0, "that is the exit: from outside the smaller root is the entry"),
         (-3.0, "the sign of b: b = -(origin - center) . direction"),
         (-7.0, "the sign of b: b = -(origin - center) . direction"),
-        (1e30, "the centre is not subtracted from the origin, or the discriminant has the other sign"),
+        (
+            1e30,
+            "the sign of b, the centre is not subtracted, or the discriminant is wrong",
+        ),
         (5.0, "the root of the discriminant is missing: t = b - sqrt(discriminant)"),
         (1.0, "the discriminant itself is subtracted, not its root"),
         (5.0 - 2**0.5, "the discriminant has the radius and not its square"),
+        (21 / (5.0 + 2**0.5), "the discriminant has the radius and not its square"),
+        (4.2, "the root of the discriminant is missing: t = b - sqrt(discriminant)"),
+        (21 / 9.0, "the discriminant itself is subtracted, not its root"),
+        (2.0, "the centre is not subtracted from the origin"),
         (6.0, "divided by 2 too little or too often: with a unit direction t = b - sqrt(b * b - c)"),
         (1.5, "divided by 2 too often: with b and not 2 b there is no 2 to divide by"),
     ],
@@ -65,11 +72,11 @@ aside = _ray(
     "the distance of the centre from the ray is not subtracted: r * r - f_perp . f_perp under the root",
 )
 from_inside = _ray(
-    "from inside, (0, 0, 5) along +z",
-    (0, 0, 5),
+    "from inside, (0, 0, 4) along +z",
+    (0, 0, 4),
     (0, 0, 1),
-    2.0,
-    [(-2.0, NEAR_ROOT), (1e30, "from inside there is always an exit: a near root below 0 is no miss")],
+    3.0,
+    [(-1.0, NEAR_ROOT), (1.0, NEAR_ROOT), (1e30, "from inside there is always an exit: no miss")],
     NEAR_ROOT,
 )
 behind = _ray(
@@ -106,23 +113,19 @@ def grazing(student: Any) -> None:
 def many(student: Any) -> None:
     """Arrays of rays (2, 3): each has a distance of its own, and no argument is changed."""
     origin = np.full((2, 3, 3), -4.0)
-    origin[..., 1] = 0.0
+    origin[..., 1] = 2.0
+    center = np.array([0.0, 2.0, 0.0])
     origin[..., 0] = np.arange(6.0).reshape(2, 3) / 4
     kept = origin.copy()
     direction = np.broadcast_to(np.array([0.0, 0.0, 1.0]), origin.shape)
-    found = student.meet_sphere(np.zeros(3), np.float64(1.0), origin, direction)
+    found = student.meet_sphere(center, np.float64(1.0), origin, direction)
     numbers_of("ISC-6", "the distances of rays (2, 3)", found, (2, 3))
+    same = np.array_equal(origin, kept)
+    hold("ISC-2", "the argument `origin`", same, "no change", "a change", "`-=` or `+=` on an argument")
     square = 1.0 - kept[..., 0] ** 2
     wanted = np.where(square > 0, 4.0 - np.sqrt(np.maximum(square, 0.0)), 1e30)
-    expect("ISC-6", "the distances of rays (2, 3)", found, wanted, BOUND)
-    hold(
-        "ISC-2",
-        "the argument `origin`",
-        np.array_equal(origin, kept),
-        "no change",
-        "a change",
-        "`-=` or `+=`",
-    )
+    text = "a sum over all rays: np.sum(..., axis=-1) is one for each"
+    expect("ISC-6", "the distances of rays (2, 3)", found, wanted, BOUND, (), text)
 
 
 def the_vectors(student: Any) -> None:

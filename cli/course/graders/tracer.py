@@ -99,6 +99,7 @@ def given() -> dict[str, Any]:
 
 
 FUNCTIONS: dict[str, tuple[Callable[..., Any], str]] = {
+    "a, after b * c": (lambda a, b, c: (b * c, a)[1], "the output's value, not the last node's"),
     "a - b": (lambda a, b, c: a - b, "the order of the operands"),
     "2.5 - a": (
         lambda a, b, c: 2.5 - a,
@@ -226,6 +227,7 @@ def refusals(student: Any) -> None:
     cases: Sequence[tuple[str, Callable[..., Any], str]] = (
         ("np.exp2(a)", np.exp2, "a ufunc that OPS does not have: raise TypeError"),
         ("np.add.reduce(a)", np.add.reduce, "method is not `__call__`: raise TypeError"),
+        ("np.clip(a, 0, 1)", lambda a: np.clip(a, 0, 1), "any function but np.where: raise TypeError"),
         ("np.sort(a)", np.sort, "any function but np.where: raise TypeError"),
         ("1.0 if a > 0 else a", lambda a: 1.0 if a > 0 else a, BRANCH),
         ("np.add(a, 1, where=False)", lambda a: np.add(a, 1, where=False), "a ufunc with options: TypeError"),

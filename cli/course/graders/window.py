@@ -58,6 +58,8 @@ MISTAKES = (
 def inside(student: Any) -> None:
     """Windows that are inside of the image."""
     found = student.window(IMAGE, 2, 1, 1, "clamp")
+    flat = np.shape(found) == (2,) or np.size(found) != 2
+    hold("DAT-4", "the shape of a window", flat, "(2,)", str(np.shape(found)), "one vector: ravel()")
     likely = [(IMAGE[1, 2][::-1], "the channels are in their order")]
     likely += [(IMAGE[2, 1], "image[y, x]: the row is y, the column is x")]
     expect("DAT-4", "a window of one tap", found, IMAGE[1, 2], 0.0, likely, "image[y, x]")
@@ -88,7 +90,7 @@ def borders(student: Any) -> None:
 
 def refused(student: Any) -> None:
     """What is no window."""
-    for size, border in ((0, "clamp"), (65, "clamp"), (-1, "zero"), (3, "mirror"), (3, "")):
+    for size, border in ((0, "clamp"), (0, "zero"), (65, "clamp"), (-1, "zero"), (3, "mirror"), (3, "")):
         try:
             student.window(IMAGE, 0, 0, size, border)
         except ValueError:

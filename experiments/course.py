@@ -1,0 +1,159 @@
+"""Wrong answers to the labs of the course: how many are caught, and how many get the right explanation.
+
+    python experiments/course.py
+    python experiments/course.py --lab 1 --missed
+
+1. Right answers are in tests/course/solutions; a wrong one is such an answer with one piece of text replaced
+   [tests/course/wrong]. Each was written with the mistake in words, and with words of the explanation.
+2. It is caught when a check fails, and explained when the first finding's likeliest mistake, or the finding's
+   text where that is asked for, has these words.
+3. Mechanical changes come on top: one sign or number of a right answer is another one [`mutants`], at places
+   that are spread over it. They have no explanation; those that change nothing count as not caught.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import os
+import re
+import signal
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from wamnet.cli.course.frame import Wrong, outcome
+from wamnet.cli.course.labs import LABS, Lab, lab_named
+from wamnet.cli.course.worker import load
+
+COURSE = Path(__file__).resolve().parents[1] / "tests/course"
+"""Right and wrong answers."""
+
+
+CHANGES = ((" + ", " - "), (" - ", " + "), (" * ", " / "), (" / ", " * "), (" < ", " >= "), (" > ", " <= "))
+"""Signs and what replaces them; a number grows by one."""
+
+MUTANTS = 12
+"""Mechanical changes of each lab."""
+
+LONGEST_S = 60
+"""A changed answer that takes longer does not end, and is caught."""
+
+
+class Answer(NamedTuple):
+    """A wrong answer: pieces of text, the mistake, and words (a pattern) of the explanation."""
+
+    old: str
+    new: str
+    mistake: str
+    words: str
+
+
+def answers(lab: Lab) -> list[Answer]:
+    """Return the wrong answers to a lab."""
+    path = COURSE / "wrong" / f"{lab.name.partition('_')[0]}.py"
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return [Answer(*row) for row in module.WRONG]
+
+
+def finding(lab: Lab, text: str, folder: Path) -> Wrong | None:
+    """Return the first thing that is wrong with an answer."""
+    (folder / lab.file).write_text(text, encoding="utf-8")
+    module = load(lab, folder)
+    if isinstance(module, Wrong):
+        return module
+    return next(filter(None, (outcome(check, module) for check in lab.checks)), None)
+
+
+def judged(lab: Lab, folder: Path) -> Iterator[tuple[Answer, Wrong | None, bool]]:
+    """Yield each wrong answer, what is found, and whether the explanation is right."""
+    right = (COURSE / "solutions" / lab.file).read_text(encoding="utf-8")
+    for answer in answers(lab):
+        assert right.count(answer.old) >= 1, f"{lab.name}: {answer.old!r} is gone"
+        wrong = finding(lab, right.replace(answer.old, answer.new, 1), folder)
+        yield answer, wrong, wrong is not None and bool(re.search(answer.words, wrong.likely))
+
+
+def mutants(text: str) -> list[str]:
+    """Return a right answer with one sign or number changed, MUTANTS times, at places spread over it."""
+    found = []
+    for number, line in enumerate(lines := text.splitlines(keepends=True)):
+        if line.startswith(('"""', "from ", "import ", "def ", "class ")) or "#" in line:
+            continue
+        changed = [
+            line[:at] + new + line[at + len(old) :] for old, new in CHANGES for at in places(line, old)
+        ]
+        numbers = re.finditer(r"(?<![\w.])\d+(?![\w.])", line)
+        changed += [f"{line[: m.start()]}{int(m[0]) + 1}{line[m.end() :]}" for m in numbers]
+        found += ["".join([*lines[:number], one, *lines[number + 1 :]]) for one in changed]
+    step = max(1, len(found) // MUTANTS)
+    return found[::step][:MUTANTS]
+
+
+def places(line: str, old: str) -> list[int]:
+    """Return where a text begins in a line."""
+    return [m.start() for m in re.finditer(re.escape(old), line)]
+
+
+def difference(lab: Lab, text: str) -> str:
+    """Return the changed line."""
+    right = (COURSE / "solutions" / lab.file).read_text(encoding="utf-8")
+    pairs = zip(right.splitlines(), text.splitlines(), strict=True)
+    return next(other.strip() for one, other in pairs if one != other)
+
+
+def caught(lab: Lab, text: str, folder: Path) -> bool:
+    """Tell whether a changed answer is caught; one that does not end is."""
+
+    def stop(*_: Any) -> None:
+        raise TimeoutError("it does not end")
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.alarm(LONGEST_S)
+    try:
+        return finding(lab, text, folder) is not None
+    except TimeoutError:
+        return True
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print a table with a line a lab."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--lab", nargs="+", default=[lab.name for lab in LABS], help="labs by name or number")
+    parser.add_argument("--missed", action="store_true", help="show what is not caught or not explained")
+    options = parser.parse_args(arguments)
+    labs = [lab_named(word) for word in options.lab]
+    rows: list[tuple[Any, ...]] = []
+    with tempfile.TemporaryDirectory() as made:
+        os.chdir(made)
+        for lab in labs:
+            found = list(judged(lab, Path(made)))
+            seen, told = sum(w is not None for _, w, _ in found), sum(good for _, _, good in found)
+            changed = mutants((COURSE / "solutions" / lab.file).read_text(encoding="utf-8"))
+            noticed = [caught(lab, text, Path(made)) for text in changed]
+            rows.append((lab.name, len(found), seen, told, len(changed), sum(noticed)))
+            if options.missed:
+                for text in (t for t, good in zip(changed, noticed, strict=True) if not good):
+                    print(f"{lab.name}: not caught: {difference(lab, text)}")
+            for answer, wrong, good in found:
+                if options.missed and not good:
+                    print(f"{lab.name}: {answer.mistake}: wanted {answer.words!r}: {wrong or 'not caught'}")
+        os.chdir(COURSE)
+    print("| lab | wrong answers | caught | explained | changes | noticed |\n|" + " --- |" * 6)
+    rows.append(("all", *(sum(row[i] for row in rows) for i in range(1, 6))))
+    for row in rows:
+        print(f"| {' | '.join(map(str, row))} |")
+
+
+if __name__ == "__main__":
+    main()

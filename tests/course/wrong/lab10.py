@@ -1,0 +1,113 @@
+"""Wrong answers to lab 10: the old text, the new one, the mistake, and words of the explanation."""
+
+WRONG = [
+    ('digits += "f" if language == "opencl" else ""', "", "doubles in OpenCL", "2.0 is a double"),
+    ('f"{float(value):.9g}"', 'f"{float(value):f}"', "six places", "nine digits"),
+    ('f"{float(value):.9g}"', 'f"{float(value):.6g}"', "six digits", "nine digits"),
+    ('        digits += ".0"\n', "        pass\n", "integers", "point"),
+    (
+        'return f"({digits})" if digits.startswith("-") else digits',
+        "return digits.lstrip('-')",
+        "no sign",
+        "nine digits|",
+    ),
+    (
+        '"absolute": "fabs", "minimum": "fmin", "maximum": "fmax"',
+        '"absolute": "abs", "minimum": "fmin", "maximum": "fmax"',
+        "abs in OpenCL",
+        "of integers in OpenCL",
+    ),
+    (
+        '"absolute": "abs", "minimum": "min"',
+        '"absolute": "fabs", "minimum": "min"',
+        "fabs in GLSL",
+        "calls it abs",
+    ),
+    (
+        '"minimum": "min", "maximum": "max"',
+        '"minimum": "fmin", "maximum": "fmax"',
+        "fmin in GLSL",
+        "calls it min",
+    ),
+    (
+        '"minimum": "fmin", "maximum": "fmax"',
+        '"minimum": "fmax", "maximum": "fmin"',
+        "exchanged",
+        "fmin in OpenCL|fmax in OpenCL",
+    ),
+    (
+        '"less": "<", "greater": ">"',
+        '"less": ">", "greater": "<"',
+        "exchanged",
+        "where true : where false|less is <",
+    ),
+    (
+        "{args[0]} {SIGNS[node.op]} {args[1]}",
+        "{args[1]} {SIGNS[node.op]} {args[0]}",
+        "operands exchanged",
+        "order of the operands",
+    ),
+    (
+        "{args[0]} ? {args[1]} : {args[2]}",
+        "{args[0]} ? {args[2]} : {args[1]}",
+        "branches exchanged",
+        "where true : where false",
+    ),
+    (
+        'kind = "bool" if node.op in ("less", "greater") else "float"',
+        'kind = "float"',
+        "truth values as floats",
+        "bool",
+    ),
+    (
+        "    int i = get_global_id(0);\\n    if (i >= count) return;\\n",
+        "    int i = get_global_id(0);\\n",
+        "no guard",
+        "beyond the end run too",
+    ),
+    ("if (i >= count) return;", "if (i > count) return;", "a guard one too late", "beyond the end run too"),
+    (
+        "if (i >= count) return;",
+        "if (i >= count - 1) return;",
+        "a guard one too early",
+        "guard is i >= count",
+    ),
+    ("    int i = get_global_id(0);\\n", "", "no index", "after its operands|declared"),
+    (
+        "result[i] = v{program.output};",
+        "result[i] = v{len(program.nodes) - 1};",
+        "the last node in OpenCL",
+        "program.output",
+    ),
+    (
+        "return v{program.output};",
+        "return v{len(program.nodes) - 1};",
+        "the last node in GLSL",
+        "program.output",
+    ),
+    ("return v{program.output};", "v{program.output};", "nothing returned", "return v"),
+    (
+        "'__global float *result', 'int count'",
+        "'int count', '__global float *result'",
+        "arguments exchanged",
+        "in their order",
+    ),
+    (
+        'f"__global const float *in_{given}"',
+        'f"__global const float *{given}"',
+        "other names",
+        "in their order",
+    ),
+    ('f"float in_{given}"', 'f"float {given}"', "other names in GLSL", "after in_"),
+    (
+        '[node.value for node in program.nodes if node.op == "input"]',
+        'sorted(node.value for node in program.nodes if node.op == "input")',
+        "sorted inputs",
+        "in their order",
+    ),
+    ('= {value};\\n"', '= {value}\\n"', "no semicolon", "semicolon"),
+    ("__kernel void {name}(", "__kernel void kernel_(", "another name", "name that is given"),
+    ('return f"-{args[0]}"', 'return f"{args[0]}"', "no sign", "-v0"),
+    ('f"in_{given}[i]"', 'f"in_{given}[0]"', "the first number for all", ""),
+]
+"""Old, new, the mistake in words, and what the explanation must hold."""

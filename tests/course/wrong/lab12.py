@@ -1,0 +1,148 @@
+"""Wrong answers to lab 12: the old text, the new one, the mistake, and words of the explanation."""
+
+WRONG = [
+    (
+        "most * np.sum(np.abs(weights), axis=1)",
+        "most * np.abs(np.sum(weights, axis=1))",
+        "a magnitude of the sum",
+        "not the magnitude of the sum",
+    ),
+    (
+        "most * np.sum(np.abs(weights), axis=1)",
+        "most * np.sum(weights, axis=1)",
+        "no magnitudes",
+        "both signs",
+    ),
+    (
+        "most * np.sum(np.abs(weights), axis=1)",
+        "np.sum(np.abs(weights), axis=1)",
+        "no inputs",
+        "largest input",
+    ),
+    (
+        "most * np.sum(np.abs(weights), axis=1)",
+        "most * np.max(np.abs(weights), axis=1)",
+        "one weight",
+        "sum over the row",
+    ),
+    (
+        "most * np.sum(np.abs(weights), axis=1)",
+        "most * np.sum(np.abs(weights))",
+        "a sum over all rows",
+        "axis=-1",
+    ),
+    (
+        "most * np.sum(np.abs(weights), axis=1)",
+        "most * np.sum(np.abs(weights), axis=0)",
+        "the other axis",
+        "axis",
+    ),
+    (
+        "most * np.sum(np.abs(weights), axis=1)",
+        "most * np.sum(np.maximum(weights, 0), axis=1)",
+        "only positive weights",
+        "sum of \\|weights\\||both signs",
+    ),
+    (
+        "sums.astype(np.int32).astype(np.uint32)",
+        "np.maximum(sums, 0).astype(np.int32).astype(np.uint32)",
+        "no negative sums",
+        "by way of int32",
+    ),
+    (
+        "sums.astype(np.int32).astype(np.uint32)",
+        "np.abs(sums).astype(np.int32).astype(np.uint32)",
+        "magnitudes",
+        "keep their sign",
+    ),
+    (
+        "words * factor.astype(np.uint32) + bias.astype(np.uint32)",
+        "words * factor.astype(np.uint32)",
+        "no bias",
+        "bias is missing",
+    ),
+    (
+        "words * factor.astype(np.uint32) + bias.astype(np.uint32)",
+        "words * factor.astype(np.uint32) - bias.astype(np.uint32)",
+        "a difference",
+        "bias is added",
+    ),
+    (
+        "words * factor.astype(np.uint32) + bias.astype(np.uint32)",
+        "(words + bias.astype(np.uint32)) * factor.astype(np.uint32)",
+        "the bias first",
+        "added last",
+    ),
+    (
+        "words * factor.astype(np.uint32) + bias.astype(np.uint32)",
+        "(sums * factor + bias).astype(np.int64).astype(np.uint32)",
+        "a product in float32",
+        "convert first|words first",
+    ),
+    (
+        "words * factor.astype(np.uint32) + bias.astype(np.uint32)",
+        "words + bias.astype(np.uint32)",
+        "no factor",
+        "factor is missing",
+    ),
+    (
+        "words * factor.astype(np.uint32) + bias.astype(np.uint32)",
+        "(words * factor.astype(np.uint32) + bias.astype(np.uint32)).astype(np.float32)",
+        "floats",
+        "uint32",
+    ),
+    ("return size * (1.0 - 2.0 * half)", "return size", "no sign", "second half turn"),
+    (
+        "return size * (1.0 - 2.0 * half)",
+        "return size * (2.0 * half - 1.0)",
+        "the other sign",
+        "first half turn is positive",
+    ),
+    (
+        "return size * (1.0 - 2.0 * half)",
+        "return size * (1.0 - 2.0 * half) / amplitude",
+        "in [-1, 1]",
+        "not numbers in|is an integer",
+    ),
+    ("back = (phases >> 22) & 1", "back = (phases >> 23) & 1", "another bit", "run backwards"),
+    (
+        "x = ((phases ^ (0 - back)) >> 6) & 0xFFFF",
+        "x = (phases >> 6) & 0xFFFF",
+        "no way back",
+        "run backwards",
+    ),
+    (
+        "x = ((phases ^ (0 - back)) >> 6) & 0xFFFF",
+        "x = (phases ^ (0 - back)) >> 6",
+        "no mask",
+        "mask|backwards",
+    ),
+    ("x * q + (1 << (shift - 1))", "x * q", "rounded down", "half of the last place|backwards"),
+    (
+        "np.minimum((x * q + (1 << (shift - 1))) >> shift, amplitude).astype(np.float32)",
+        "np.floor((x * q + (1 << (shift - 1))).astype(np.float32) / 2**shift)",
+        "a division in floats",
+        "words have 32 bits|half of the last|coefficient",
+    ),
+    (
+        "((z * (c3 - ((z * c5) >> 16))) >> 16)",
+        "((z * (c3 + ((z * c5) >> 16))) >> 16)",
+        "a sign in the polynomial",
+        "backwards|coefficient",
+    ),
+    (
+        "return sine(phase(np.matmul(numbers, weights.T), factor, bias), amplitude)",
+        "return np.matmul(numbers, weights.T)",
+        "no sine",
+        "sine is missing",
+    ),
+    ("factor, bias), amplitude)", "factor, 0 * bias), amplitude)", "no bias in the layer", "bias is missing"),
+    (
+        "factor, bias), amplitude)",
+        "0 * factor + 1, bias), amplitude)",
+        "no factor in the layer",
+        "factor is missing",
+    ),
+    ("np.matmul(numbers, weights.T)", "np.matmul(numbers, weights)", "no transpose", "x @ W.T"),
+]
+"""Old, new, the mistake in words, and what the explanation must hold."""

@@ -33,6 +33,7 @@ def test_wrong_answers_are_changes_of_the_right_one(lab):
     found = measured.answers(lab)
     assert len(found) >= 5
     assert [answer.mistake for answer in found if answer.old not in right or answer.old == answer.new] == []
+    assert [answer.mistake for answer in found if re.search(answer.words, "")] == []
     pieces = [(answer.old, answer.new) for answer in found]
     assert len(set(pieces)) == len(pieces)
 

@@ -180,6 +180,17 @@ def one_layer(student: Any) -> None:
             "`*=` or `+=`",
         )
         right = step(w, b, omega, low, high, sine)
+        parts = [numbers_of("CER-2", name, v, (2,)) for name, v in zip(NAMES, found, strict=True)]
+        text = "the order is: the largest argument, the rounding error, the error with the sine's"
+        told = f"{number_text(parts[2])} and {number_text(parts[1])}"
+        hold(
+            "CER-2",
+            "error and rounding error",
+            np.all(parts[2] >= parts[1]),
+            "the error is larger",
+            told,
+            text,
+        )
         for number, name in enumerate(NAMES):
             wrong = [(step(w, b, omega, low, high, sine, how)[number], told) for how, told in MISTAKES]
             kind = "a hidden layer" if sine is not None else "the last layer"

@@ -22,7 +22,9 @@ BOUND = 1e-12
 def ray(student: Any, camera: Camera, *given: Any) -> tuple[Any, Any]:
     """Return origin and direction as arrays."""
     found = student.camera_ray(camera, *given)
-    hold("CAM-2", "the result", isinstance(found, tuple) and len(found) == 2, "a pair", type(found).__name__)
+    good = isinstance(found, tuple) and len(found) == 2
+    text = "there is no `return`" if found is None else "return both: origin, direction"
+    hold("CAM-2", "the result", good, "a pair", type(found).__name__, text)
     return numbers_of("CAM-2", "the origin", found[0]), numbers_of("CAM-2", "the direction", found[1])
 
 

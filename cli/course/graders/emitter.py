@@ -182,6 +182,8 @@ def compare(student: Any, language: str, name: str, program: Program, likely: st
         at = int(np.flatnonzero(~near)[0])
         what = f"{name} in {language} at a = {given['a'][at]:g}, b = {given['b'][at]:g}"
         missed = "not every number is written: the guard is i >= count" if np.isnan(found[at]) else likely
+        if np.all(found == found[0]) and not np.all(wanted == wanted[0]):
+            missed = "item i reads number i: in_a[i]"
         raise Wrong(clause, what, f"{wanted[at]:.9g}", f"{found[at]:.9g}", missed)
 
 
@@ -215,6 +217,7 @@ def literals(student: Any) -> None:
                 "KER-1", f"the kind of {what}", right, "float", f"{found!r}, a {type(number).__name__}", text
             )
             text = "nine digits bring every float32 back: %.9g, or repr(float(np.float32(value)))"
+            text = "the sign is lost" if number == -np.float32(value) else text
             hold(
                 "KER-1",
                 what,

@@ -128,6 +128,7 @@ def taken(student: Any, spp: int = SPP) -> tuple[Any, Any, list[int]]:
             np.shape(x) == (WIDTH * HEIGHT,),
             "all pixels (W * H,)",
             str(np.shape(x)),
+            "one array of all columns: np.mgrid's are (H, W), so ravel() them",
         )
         hold(
             "RND-1",

@@ -78,7 +78,10 @@ def short(student: Any) -> None:
     hold("IR-1", "the program of a + b", nodes == wanted, "input a, input b, add (0, 1)", listed(found), text)
     hold("IR-1", "the output of a + b", found.output == 2, "2", str(found.output), "the index of the result")
     found = traced(student, lambda a, b: a, "ab")
-    hold("IR-1", "the program of a function that returns a", found.output == 0, "output 0", listed(found))
+    text = "the output is the index of what is returned, not the last node"
+    hold(
+        "IR-1", "the program of a function that returns a", found.output == 0, "output 0", listed(found), text
+    )
     found = traced(student, lambda a: 3.0, "a")
     node = found.nodes[found.output]
     text = "a function may return a number: it is a constant then"

@@ -104,13 +104,12 @@ def refused(student: Any) -> None:
         text = "raise ValueError for a size outside 1 to 64, and for an unknown border"
         raise Wrong("DAT-9", f"size {size} and border {border!r}", "ValueError", found, text)
     for size in (1, 64):
-        hold(
-            "DAT-9",
-            f"the length of a window of size {size}",
-            len(student.window(IMAGE, 0, 0, size, "zero")) == 2 * size**2,
-            str(2 * size**2),
-            "another",
-        )
+        what = f"the length of a window of size {size}"
+        try:
+            length = len(student.window(IMAGE, 0, 0, size, "zero"))
+        except ValueError:
+            raise Wrong("DAT-9", what, str(2 * size**2), "ValueError", "1 and 64 are sizes") from None
+        hold("DAT-9", what, length == 2 * size**2, str(2 * size**2), length)
 
 
 def untouched(student: Any) -> None:

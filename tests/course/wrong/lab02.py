@@ -43,7 +43,7 @@ WRONG = [
         "no unit vector",
         "divided by its length",
     ),
-    ("return position, unit(", "return unit(", "no origin", ""),
+    ("return position, unit(", "return unit(", "no origin", "return both"),
     ("up = np.cross(right, forward)", "up = np.array(camera.up)", "the world's up", "not the world's up"),
     ("up = np.cross(right, forward)", "up = np.cross(forward, right)", "down", "exchanged|row 0"),
     (
@@ -64,7 +64,7 @@ WRONG = [
         "return position, unit(forward + across * right + upwards * up)",
         "position, unit(forward + across * right + upwards * up)",
         "no return",
-        "without `return`|`return`|",
+        "no `return`",
     ),
     (
         "forward + across * right + upwards * up",

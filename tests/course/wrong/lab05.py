@@ -76,7 +76,7 @@ WRONG = [
         "y, x = (v.ravel() for v in np.mgrid[0:height, 0:width])",
         "y, x = np.mgrid[0:height, 0:width]",
         "not flat",
-        "pixels|",
+        "ravel",
     ),
     ("mean.reshape(shape),", "mean.reshape(shape)[::-1],", "upside down", "at the top"),
     (

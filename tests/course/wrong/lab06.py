@@ -100,7 +100,7 @@ WRONG = [
         "reach the other end|tap",
     ),
     ("1 <= size <= 64", "1 <= size <= 65", "65 is accepted", "outside 1 to 64"),
-    ("1 <= size <= 64", "1 <= size < 64", "64 is refused", ""),
+    ("1 <= size <= 64", "1 <= size < 64", "64 is refused", "1 and 64 are sizes"),
     (
         '    if border not in ("clamp", "zero"):\n        raise ValueError(f"border {border}")\n',
         "",

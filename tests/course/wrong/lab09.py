@@ -18,7 +18,7 @@ WRONG = [
         "return node.op, node.args, type(node.value), repr(node.value)",
         "return node.args, type(node.value), repr(node.value)",
         "the operation does not count",
-        "",
+        "belongs to what is compared",
     ),
     (
         "        if key(known) == key(node):\n            return index\n",
@@ -92,7 +92,7 @@ WRONG = [
         "return Program(tuple(nodes), output)",
         "return Program(tuple(nodes), len(nodes) - 1)",
         "the last node is the output",
-        "",
+        "not the last node",
     ),
     (
         "return Program(tuple(nodes), output)",
@@ -134,6 +134,6 @@ WRONG = [
         "another text of constants",
         "repr",
     ),
-    ('f"output %{program.output}\\n"', '""', "no output line", "line's end|%INDEX|"),
+    ('f"output %{program.output}\\n"', '""', "no output line", "%INDEX"),
 ]
 """Old, new, the mistake in words, and what the explanation must hold."""

@@ -9,7 +9,7 @@ WRONG = [
         'return f"({digits})" if digits.startswith("-") else digits',
         "return digits.lstrip('-')",
         "no sign",
-        "nine digits|",
+        "sign is lost",
     ),
     (
         '"absolute": "fabs", "minimum": "fmin", "maximum": "fmax"',
@@ -108,6 +108,6 @@ WRONG = [
     ('= {value};\\n"', '= {value}\\n"', "no semicolon", "semicolon"),
     ("__kernel void {name}(", "__kernel void kernel_(", "another name", "name that is given"),
     ('return f"-{args[0]}"', 'return f"{args[0]}"', "no sign", "-v0"),
-    ('f"in_{given}[i]"', 'f"in_{given}[0]"', "the first number for all", ""),
+    ('f"in_{given}[i]"', 'f"in_{given}[0]"', "the first number for all", "reads number i"),
 ]
 """Old, new, the mistake in words, and what the explanation must hold."""

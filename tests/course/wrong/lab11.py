@@ -43,7 +43,7 @@ WRONG = [
         "return argument * WIDER, added * WIDER, error * WIDER",
         "return argument * WIDER, error * WIDER, added * WIDER",
         "exchanged",
-        "",
+        "the order is",
     ),
     (
         "            high = np.full(len(bias), 1 + sine_error)\n",

@@ -26,7 +26,6 @@ from .commands import (
     certify,
     compare,
     conformance,
-    course,
     dataset,
     demo,
     denoise,
@@ -40,6 +39,7 @@ from .commands import (
 )
 from .commands.compile import EXAMPLES as COMPILE_EXAMPLES
 from .commands.compile import compile_model
+from .commands.course import labs as course
 from .commands.measure import exports, pipeline, primitives
 from .commands.measure import render as measure_render
 from .commands.measure import train as measure_train

@@ -5,8 +5,7 @@
 
 1. Right answers are in tests/course/solutions; a wrong one is such an answer with one piece of text replaced
    [tests/course/wrong]. Each was written with the mistake in words, and with words of the explanation.
-2. It is caught when a check fails, and explained when the first finding's likeliest mistake, or the finding's
-   text where that is asked for, has these words.
+2. It is caught when a check fails, and explained when the first finding's likeliest mistake has these words.
 3. Mechanical changes come on top: one sign or number of a right answer is another one [`mutants`], at places
    that are spread over it. They have no explanation; those that change nothing count as not caught.
 """

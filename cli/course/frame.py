@@ -145,7 +145,7 @@ def alike(found: Any, value: Any, bound: float = 0.0) -> bool:
 
 
 def hold(clause: str, what: str, good: Any, expected: str, found: Any, likely: str = "") -> None:
-    """Refuse what does not hold: `good` is a truth value."""
+    """Refuse what does not hold: `good` is a boolean."""
     if not bool(good):
         raise Wrong(clause, what, expected, found if isinstance(found, str) else number_text(found), likely)
 
@@ -204,7 +204,7 @@ EXPLAINED = (
     (NameError, "'math'", "`import math` is missing; on arrays use np instead"),
     (NameError, "", "a misspelt name, or one that is set only on another path"),
     (UnboundLocalError, "", "a name that is set only on another path"),
-    (ValueError, "truth value of an array", "`if`, `and`, `or`, `min` or `max` on an array: np.where, &, |"),
+    (ValueError, "is ambiguous", "`if`, `and`, `or`, `min` or `max` on an array: np.where, &, |"),
     (TypeError, "can be converted to", "a function of `math`, or float(), on an array: take that of np"),
     (TypeError, "not supported for the input types", "a number of another kind: keep constants as they are"),
     (TypeError, "can not be traced", "an operation that a kernel does not have"),
@@ -247,7 +247,7 @@ def of_exception(error: BaseException, name: str, file: str) -> Wrong:
 
 
 def outcome(check: Check, student: ModuleType) -> Wrong | None:
-    """Return what a check finds wrong with a student's module, or None; only Ctrl-C goes on."""
+    """Return what a check finds wrong with a student's module, or None; Ctrl-C is passed on."""
     try:
         with np.errstate(all="ignore"):
             check.run(student)

@@ -90,7 +90,7 @@ BINARY: Mapping[str, Callable[[Any, Any], Any]] = {
 def parsed(source: str) -> Text:
     """Return a text, parsed; TextError for what is not in the language."""
     if not isinstance(source, str):
-        raise TextError(f"{type(source).__name__} is no text", "return the text")
+        raise TextError(f"{type(source).__name__} is not a text", "return the text")
     try:
         return Parser(source).parse()
     except Unread as error:
@@ -146,12 +146,10 @@ class Lane:
         truth = isinstance(value, (bool, np.bool_))
         if kind == "bool":
             if self.language == "glsl" and not truth:
-                raise TextError(
-                    f"{name} is a bool and gets a number", "less and greater give truth values only"
-                )
+                raise TextError(f"{name} is a bool and gets a number", "less and greater give booleans only")
             return bool(value)
         if truth and self.language == "glsl":
-            raise TextError(f"{name} is a {kind} and gets a truth value", "less and greater give a bool")
+            raise TextError(f"{name} is a {kind} and gets a boolean", "less and greater give a bool")
         if kind == "float32" and self.language == "glsl" and isinstance(value, np.int32):
             raise TextError(f"{name} is a float and gets an integer", "a float literal has a point: 2.0")
         return {"float32": np.float32, "int32": np.int32, "uint32": np.uint32}.get(kind, np.float32)(value)

@@ -69,7 +69,7 @@ LABS = (
     Lab("lab09_tracer", "An intermediate representation and a tracer", "IR-1, IR-2, IR-3", 120),
     Lab("lab10_emitter", "An emitter for OpenCL and GLSL", "KER-1, IR-1", 120),
     Lab("lab11_bound", "A bound and a certificate", "PRO-6, CER-2, CER-3", 120),
-    Lab("lab12_integers", "Whole numbers, the same bits", "WHO-3, WHO-4, WHO-5", 75),
+    Lab("lab12_integers", "Integers, the same bits", "WHO-3, WHO-4, WHO-5", 75),
     Lab("extra1_sine", "A sine for kernels", "SIN-1, SIN-3, SIN-4", 90),
     Lab("extra2_rewrite", "A pass of the compiler", "IR-1, IR-2, IR-8", 60),
     Lab("extra3_suite", "Faults, and who is blamed", "CNF-3, CNF-11, CNF-13", 60),

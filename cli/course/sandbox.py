@@ -2,8 +2,8 @@
 
 1. The operating system limits computing time, memory and the size of a file [`limit`], `resource.setrlimit`.
 2. A hook of Python refuses what leaves the folder: other files, processes, signals, the network [`confine`].
-   A hook cannot be removed. It stops mistakes; it is no wall against somebody who means harm, because code in
-   C that Python loads does not ask it. Grade strangers' code in a container or a virtual machine.
+   A hook cannot be removed. It stops mistakes; it does not stop somebody who means harm, because code in
+   C that Python loads does not ask it. Grade untrusted code in a container or a virtual machine.
 3. Each refusal is an exception that `except Exception` does not catch [`Forbidden`], and is noted as well.
 """
 

@@ -31,7 +31,7 @@ dl { margin-left: 1em } dt { font-weight: bold; margin-top: .6em }
 
 
 def _cell(text: str) -> str:
-    """Return a text as a cell of CSV that is no formula."""
+    """Return a text as a cell of CSV that is not a formula."""
     return f"'{text}" if text.startswith(FORMULA) else text
 
 

@@ -46,7 +46,7 @@ def load(lab: Lab, folder: Path) -> ModuleType | Wrong:
 
 
 def graded(lab: Lab, folder: Path, tell: Callable[[dict[str, Any]], None]) -> None:
-    """Load and check a lab; tell what begins, and what each check finds."""
+    """Load and check a lab; report what begins, and what each check finds."""
     tell({"begun": LOADING})
     module = load(lab, folder)
     if isinstance(module, Wrong):

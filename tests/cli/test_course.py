@@ -1,4 +1,4 @@
-"""`wamnet course`: what it writes and prints, its exit status, every refusal; pytest and make in its folder."""
+"""`wamnet course`: what it writes and prints, its exit status, refusals; pytest and make in its folder."""
 
 from __future__ import annotations
 

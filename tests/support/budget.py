@@ -34,7 +34,7 @@ BUDGET = {
     "cli": 300,
     "cli/commands": 5725,
     "cli/common": 1160,
-    "cli/course": 5200,
+    "cli/course": 5250,
     "cli/files": 1250,
     "cli/reports": 1450,
 }

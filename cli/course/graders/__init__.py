@@ -1,1 +1,1 @@
-"""One grader a lab: checks in the order of what a wrong answer is best told by."""
+"""One grader a lab: checks in the order in which they explain a wrong answer best."""

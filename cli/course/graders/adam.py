@@ -236,4 +236,4 @@ CHECKS = (
     Check("training", training),
     Check("a line of least squares", learns),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

@@ -342,4 +342,4 @@ CHECKS = (
     Check("errors that are met", measured),
     Check("a certificate", certificate),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

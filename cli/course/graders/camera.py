@@ -175,4 +175,4 @@ CHECKS = (
     Check("arrays of pixels", arrays),
     Check("the spec's vectors", the_vectors),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

@@ -260,4 +260,4 @@ CHECKS = (
     Check("constants", constants),
     Check("the same text again", stable),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

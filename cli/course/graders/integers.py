@@ -203,4 +203,4 @@ CHECKS = (
     Check("the vectors of a network", network_vectors),
     Check("nothing rounds", nothing_rounds),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

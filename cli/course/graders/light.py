@@ -94,7 +94,7 @@ def weights(student: Any) -> None:
     ]
     expect("LTR-5", "the weight of densities 2 and 1", found, 0.8, 1e-12, likely, "pdf^2 / (pdf^2 + other^2)")
     zero = student.power_weight(np.float64(0.0), np.float64(0.0))
-    text = "a pdf below 1e-15 counts as 1e-15: then 0 / 0 is none"
+    text = "a pdf below 1e-15 counts as 1e-15: then there is no 0 / 0"
     expect("LTR-5", "the weight of densities 0 and 0", zero, 1.0, 1e-12, (), text)
     large = student.power_weight(np.float32(1e30), np.float32(1e30))
     text = "a square of 1e30 is beyond float32: square the ratio other / pdf"
@@ -214,4 +214,4 @@ CHECKS = (
     Check("points of a light", light_density),
     Check("both ways and their sum", both),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

@@ -152,7 +152,7 @@ def slopes(student: Any) -> None:
         shape, own = np.shape(dw[layer]), w[layer].shape
         told = "the first layer of the list is the first of the network" if shape != own[::-1] else "dy.T @ x"
         hold("SIR-7", f"the shape of dW of layer {layer}", shape == own, str(own), str(shape), told)
-        # A mistake that changes nothing here is none here.
+        # A mistake that changes nothing in this layer explains nothing.
         likely = [(v[1][layer], told) for v, told in wrong if not alike(v[1][layer], right[1][layer])]
         expect("SIR-7", f"dW of layer {layer}", dw[layer], right[1][layer], 1e-11, likely, text)
         likely = [(v[2][layer], told) for v, told in wrong if not alike(v[2][layer], right[2][layer])]
@@ -217,4 +217,4 @@ CHECKS = (
     Check("the spec's vectors, backwards", backward_vectors),
     Check("central differences", differences),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ....refimpl import rng
+from ....refimpl.errors import InputError
 from ..frame import (
     SIGNIFICANCE,
     Check,
@@ -118,7 +119,7 @@ def colours(x: Any, y: Any, n: int) -> Any:
 
 
 def taken(student: Any, spp: int = SPP) -> tuple[Any, Any, list[int]]:
-    """Return the student's picture, its variance, and the numbers of the samples that were asked for."""
+    """Return the student's picture, its variance, and the numbers of the samples that it took."""
     asked: list[int] = []
 
     def radiance(x: Any, y: Any, n: int) -> Any:
@@ -163,7 +164,7 @@ def whole(student: Any) -> None:
     mean, variance, asked = taken(student)
     text = "each of the samples 0 to spp - 1 once"
     told = f"{len(asked)}, the first {asked[:3]}"
-    hold("RND-1", "the samples that are asked for", asked == list(range(SPP)), f"0 to {SPP - 1}", told, text)
+    hold("RND-1", "the samples that are taken", asked == list(range(SPP)), f"0 to {SPP - 1}", told, text)
     samples = right_picture()
     likely = [
         (samples.sum(axis=0), "the sum is not divided by the number of samples"),
@@ -274,7 +275,7 @@ def errors(student: Any) -> None:
             or not image.size
             or not np.isfinite([image.sum(), reference.sum()]).all()
         ):
-            raise ValueError("not asked")
+            raise InputError("image", "this case", "MET-1 refuses it", "it is not asked")
         return {"value": student.mse(image, reference)}
 
     vectors("metric.mse", answer, likely="single precision: convert to float64 before subtracting")
@@ -305,4 +306,4 @@ CHECKS = (
     Check("samples that are needed", needed),
     Check("the mean squared error", errors),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

@@ -210,4 +210,4 @@ CHECKS = (
     Check("the density", density),
     Check("the way back", way_back),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

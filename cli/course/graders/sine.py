@@ -81,4 +81,4 @@ CHECKS = (
     Check("the error everywhere", everywhere),
     Check("the spec's vectors", the_vectors),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

@@ -19,6 +19,7 @@ BOUND = 1e-12
 """A dozen operations on numbers below 10, in float64."""
 
 NEAR_ROOT = "inside, the near root is behind the ray: take the far one where the near one is below 0"
+"""The explanation of a distance below 0, and of its like."""
 
 
 def one(student: Any, center: Sequence[float], radius: float, origin: Any, direction: Any) -> Any:
@@ -163,7 +164,7 @@ def random_rays(student: Any) -> None:
     steps = np.linspace(0, 0.999, 50)[:, None] * np.where(hit, t, 8.0)[:, None, None]
     outside = np.linalg.norm(origin[:, None] + steps * direction[:, None] - CENTER, axis=-1) > RADIUS
     through = int(np.count_nonzero(~np.all(outside, axis=1) & ~inside))
-    text = "the far root from outside, or a miss that is none"
+    text = "the far root from outside, or a miss where there is a hit"
     hold("ISC-2", "rays that went through the sphere before their hit", through == 0, "none", through, text)
 
 
@@ -197,4 +198,4 @@ CHECKS = (
     Check("random rays", random_rays),
     Check("a small sphere far away in float32", far_away),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

@@ -167,7 +167,7 @@ def constants(student: Any) -> None:
     words = np.array([5, 7], np.uint32)
     program = traced(student, lambda v: (v ^ (v >> np.uint32(1))) * np.uint32(3), "v")
     found = student.evaluate(program, {"v": words})
-    text = "constants are kept as they are given: np.uint32(3) is no float"
+    text = "constants are kept as they are given: np.uint32(3) is not a float"
     kind_of_number("IR-3", "(v ^ (v >> 1)) * 3 of words", found, np.uint32)
     wanted = (words ^ (words >> np.uint32(1))) * np.uint32(3)
     hold("IR-3", "(v ^ (v >> 1)) * 3 of words", np.array_equal(found, wanted), str(wanted), str(found), text)
@@ -340,4 +340,4 @@ CHECKS = (
     Check("the text", shown),
     Check("a function of the reference", reference),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

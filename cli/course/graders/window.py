@@ -89,7 +89,7 @@ def borders(student: Any) -> None:
 
 
 def refused(student: Any) -> None:
-    """What is no window."""
+    """What is not a window."""
     for size, border in ((0, "clamp"), (0, "zero"), (65, "clamp"), (-1, "zero"), (3, "mirror"), (3, "")):
         try:
             student.window(IMAGE, 0, 0, size, border)
@@ -216,4 +216,4 @@ CHECKS = (
     Check("the image is left as it was", untouched),
     Check("the spec's vectors", the_vectors),
 )
-"""In the order of what a mistake is best told by."""
+"""In the order in which they explain a mistake best."""

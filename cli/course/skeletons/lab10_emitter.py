@@ -2,7 +2,7 @@
 
 A program has `nodes` (each with op, args, value) and `output`, as in lab 9; its operations are here add,
 subtract, multiply, divide, negative, absolute, sqrt, floor, sin, cos, minimum, maximum, less, greater,
-select, input and const. All numbers are float; less and greater give truth values, which only select takes.
+select, input and const. All numbers are float; less and greater give booleans, which only select takes.
 
 Write one statement a node: `float v3 = v1 * v2;`. Both languages are like C, and differ in small things:
 

@@ -77,7 +77,7 @@ class Traced(NDArrayOperatorsMixin):
         return Traced(self.nodes, add(self.nodes, Node("select", indices)))
 
     def __bool__(self):
-        raise TypeError("a traced value has no truth value: use np.where")
+        raise TypeError("a traced value is not a boolean: use np.where")
 
 
 def trace(function, names):

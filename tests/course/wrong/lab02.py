@@ -49,7 +49,7 @@ WRONG = [
     (
         "right = unit(np.cross(forward, camera.up))",
         "right = np.cross(forward, camera.up)",
-        "right is no unit vector",
+        "right is not a unit vector",
         "not made a unit vector",
     ),
     ("np.cross(forward, camera.up)", "np.cross(forward, (0, 1, 0))", "a fixed up", "camera.up is not used"),

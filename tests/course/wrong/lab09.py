@@ -45,8 +45,7 @@ WRONG = [
         "float64|kept",
     ),
     (
-        "    def __bool__(self):\n"
-        '        raise TypeError("a traced value has no truth value: use np.where")\n',
+        '    def __bool__(self):\n        raise TypeError("a traced value is not a boolean: use np.where")\n',
         "",
         "no __bool__",
         "takes one branch",

@@ -56,7 +56,7 @@ WRONG = [
     (
         'kind = "bool" if node.op in ("less", "greater") else "float"',
         'kind = "float"',
-        "truth values as floats",
+        "booleans as floats",
         "bool",
     ),
     (

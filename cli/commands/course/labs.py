@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ...refimpl.errors import InputError
-from ..common.terminal import progress, say, table
-from ..files.outputs import making_folder, write_text
+from ....refimpl.errors import InputError
+from ...common.terminal import progress, say, table
+from ...files.outputs import making_folder, write_text
 
 if TYPE_CHECKING:
-    from ..course.grading import Result
-    from ..course.labs import Lab
-    from ..course.sandbox import Limits
+    from ...course.grading import Result
+    from ...course.labs import Lab
+    from ...course.sandbox import Limits
 
 START_EXAMPLES = """Examples:
 
@@ -68,7 +68,7 @@ def start(
     ],
 ) -> None:
     """Write the skeletons of all labs, a Makefile and a README to a new folder."""
-    from ..course.start import begin
+    from ...course.start import begin
 
     with making_folder(folder) as new:
         names = begin(new)
@@ -94,8 +94,8 @@ def check(
 
     Your code runs in a process of its own, on a copy of your Python files, with limits on time and memory.
     """
-    from ..course.grading import grade
-    from ..course.labs import LABS, lab_named
+    from ...course.grading import grade
+    from ...course.labs import LABS, lab_named
 
     limits = _limits(seconds, memory)
     if not folder.is_dir():
@@ -110,7 +110,7 @@ def check(
 
 def _limits(seconds: int, memory: int) -> Limits:
     """Return the limits, or refuse them."""
-    from ..course.sandbox import Limits
+    from ...course.sandbox import Limits
 
     for name, value, most in (("--seconds", seconds, MOST_SECONDS), ("--memory", memory, MOST_MEMORY_MB)):
         if not 1 <= value <= most:
@@ -158,8 +158,8 @@ def grade(
     Each lab of each student runs in a process of its own, in a temporary folder, with limits on time, memory
     and files. Endless loops and the like are named in the tables, and stop nobody else. No network is needed.
     """
-    from ..course import table as tables
-    from ..course.grading import grade_class, students_of
+    from ...course import table as tables
+    from ...course.grading import grade_class, students_of
 
     limits = _limits(seconds, memory)
     if workers is not None and workers < 1:
@@ -179,6 +179,6 @@ def grade(
 
 def _labs(words: Sequence[str] | None) -> Sequence[Lab]:
     """Return the labs that are named, all without names."""
-    from ..course.labs import LABS, lab_named
+    from ...course.labs import LABS, lab_named
 
     return tuple(lab_named(word) for word in words) if words else LABS

@@ -117,13 +117,19 @@ def animate(
     _check_names(output, model, fps)
     model = model_path(model)
     network = load_model(model)
-    facts = [hashlib.sha256(model.read_bytes()).hexdigest(), executor.value, renderer.value]
-    facts += cut_facts(network, rank)
+    digest = hashlib.sha256(model.read_bytes()).hexdigest()
+    facts = [digest, executor.value, renderer.value, *cut_facts(network, rank)]
     rays = feature_rays(network) if feature_spp is None else feature_spp
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     named = scene or scene_of(network), _parameters(parameters), view
-    times = animation_times(start, seconds, fps)
-    shots = plan_shots(folder, named, times, (size, reference_spp, seed, rays), facts, network.features)
+    shots = plan_shots(
+        folder,
+        named,
+        animation_times(start, seconds, fps),
+        (size, reference_spp, seed, rays),
+        facts,
+        network.features,
+    )
     if is_film:
         check_real_folder(folder)
     missing(folder, shots)

@@ -260,8 +260,8 @@ def outcome(check: Check, student: ModuleType) -> Wrong | None:
 
 def uniforms(stream: int, count: int, block: int = 0) -> tuple[NDArray[np.float64], ...]:
     """Return four arrays of uniform numbers (count,) in [0, 1), named by a stream and a block."""
-    counters = (rng.counter(c) for c in (stream, np.arange(count), 0, block))
-    return rng.uniforms(*counters, dtype=np.float64)
+    first, second, third, fourth = (rng.counter(c) for c in (stream, np.arange(count), 0, block))
+    return rng.uniforms(first, second, third, fourth, np.float64)
 
 
 def spread(stream: int, shape: tuple[int, ...], low: float, high: float) -> NDArray[np.float64]:

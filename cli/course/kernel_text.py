@@ -152,7 +152,8 @@ class Lane:
             raise TextError(f"{name} is a {kind} and gets a boolean", "less and greater give a bool")
         if kind == "float32" and self.language == "glsl" and isinstance(value, np.int32):
             raise TextError(f"{name} is a float and gets an integer", "a float literal has a point: 2.0")
-        return {"float32": np.float32, "int32": np.int32, "uint32": np.uint32}.get(kind, np.float32)(value)
+        made: dict[str, Any] = {"float32": np.float32, "int32": np.int32, "uint32": np.uint32}
+        return made.get(kind, np.float32)(value)
 
     def value(self, tree: Any) -> Any:
         """Return the value of an expression."""

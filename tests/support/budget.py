@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 BUDGET = {
     "refimpl": 1150,
     "refimpl/light": 4325,
-    "refimpl/network": 2545,
+    "refimpl/network": 2750,
     "compiler": 1825,
     "compiler/core": 3500,
     "compiler/importing": 1150,
@@ -32,7 +32,7 @@ BUDGET = {
     "kernels/verify": 2925,
     "spec/conformance": 8400,
     "cli": 300,
-    "cli/commands": 5725,
+    "cli/commands": 5875,
     "cli/common": 1160,
     "cli/course": 5250,
     "cli/files": 1250,

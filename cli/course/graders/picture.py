@@ -58,7 +58,7 @@ def few(student: Any) -> None:
     ]
     expect("RND-1", "the sum after three samples", total, np.array([12.0]), 1e-12, likely, "sum + x")
     x, wrong = samples[:, 0], []
-    for told, step in (
+    steps: tuple[tuple[str, Any], ...] = (
         ("squares of the samples: (n x - S)^2 / (n (n + 1))", lambda n, s, x: x * x),
         ("the squares are summed", lambda n, s, x: (n * x - s) ** 2 / 6 * (n == 2)),
         ("squares of the samples: (n x - S)^2 / (n (n + 1))", lambda n, s, x: x * x if n else 0),
@@ -71,7 +71,8 @@ def few(student: Any) -> None:
         ("the square is missing", lambda n, s, x: (n * x - s) / (n * (n + 1)) if n else 0),
         ("n is that before x", lambda n, s, x: ((n + 1) * x - s - x) ** 2 / ((n + 1) * (n + 2)) if n else 0),
         ("n is that before x", lambda n, s, x: ((n + 1) * x - s) ** 2 / ((n + 1) * (n + 2))),
-    ):  # fmt: skip
+    )  # fmt: skip
+    for told, step in steps:
         wrong.append((np.array([sum(step(n, x[:n].sum(), x[n]) for n in range(3))]), told))
     text = "(n x - S)^2 / (n (n + 1)) is added, n and S being those before x"
     expect("RND-4", "the sum of squares after three samples", squares, np.array([14.0]), 1e-12, wrong, text)
@@ -113,8 +114,9 @@ def cancellation(student: Any) -> None:
 
 def colours(x: Any, y: Any, n: int) -> Any:
     """Return colours (P, 2): uniform in [x, x + 1) and in [0, y + 1), of known mean and variance."""
-    counters = (rng.counter(v) for v in (77, np.asarray(y) * WIDTH + np.asarray(x), n, 0))
-    u0, u1, _, _ = rng.uniforms(*counters, dtype=np.float64)
+    pixel = np.asarray(y) * WIDTH + np.asarray(x)
+    first, second, third, fourth = (rng.counter(v) for v in (77, pixel, n, 0))
+    u0, u1, _, _ = rng.uniforms(first, second, third, fourth, np.float64)
     return np.stack([x + u0, (y + 1) * u1], axis=-1)
 
 

@@ -196,7 +196,7 @@ def new_case(student: Any) -> None:
         for name, output in function.bounded(inputs)[0].items()
     }
     case = Case(f"{DISPLAY}/new", function.clause, to_json(inputs), outputs)
-    single = encoding.to_display(np.float32(inputs["linear"]))
+    single = encoding.to_display(np.asarray(inputs["linear"], np.float32))
     found = judge(DISPLAY, case, {"output": {"encoded": to_json(float(single))}})
     what = f"the case linear = {inputs['linear']:g}"
     hold("CNF-3", what, not found.failed, "accepts a right program", "refuses it", "choose another value")

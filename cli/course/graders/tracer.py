@@ -28,7 +28,7 @@ def listed(program: Any) -> str:
 def traced(student: Any, function: Callable[..., Any], names: Sequence[str]) -> Any:
     """Return the student's program, which is checked to be one."""
     program = student.trace(function, tuple(names))
-    nodes = getattr(program, "nodes", None)
+    nodes: Any = getattr(program, "nodes", None)
     good = isinstance(nodes, (tuple, list)) and all(hasattr(n, "op") and hasattr(n, "args") for n in nodes)
     hold(
         "IR-1",

@@ -149,22 +149,22 @@ def features(student: Any) -> None:
         return np.concatenate([a, n, d], axis=-1).astype(np.float32)
 
     likely = [
-        (made(albedo, *parts[1:]), "albedo is clipped to [0, 1]"),
-        (made(np.clip(albedo, -1, 1), *parts[1:]), "albedo is clipped to [0, 1], not to [-1, 1]"),
-        (
-            made(parts[0], np.clip(normal, 0, 1), parts[2]),
-            "a normal is clipped to [-1, 1]: it has both signs",
-        ),
+        (made(albedo, parts[1], parts[2]), "albedo is clipped to [0, 1]"),
+        (made(np.clip(albedo, -1, 1), parts[1], parts[2]), "albedo is clipped to [0, 1], not to [-1, 1]"),
+        (made(parts[0], np.clip(normal, 0, 1), parts[2]), "a normal has both signs: clip to [-1, 1]"),
         (made(parts[0], normal, parts[2]), "a normal is clipped to [-1, 1]"),
         (made(parts[0], (parts[1] + 1) / 2, parts[2]), "a normal keeps its range [-1, 1]"),
-        (made(*parts[:2], depth / 8.0), "depth / depth_scale is clipped to [0, 1]"),
-        (made(*parts[:2], np.clip(depth, 0, 1)), "depth is divided by depth_scale"),
-        (made(*parts[:2], np.clip(depth, 0, 1) / 8.0), "divided by depth_scale first, clipped then"),
-        (made(*parts[:2], np.clip(depth * 8.0, 0, 1)), "depth is divided by depth_scale, not multiplied"),
+        (made(parts[0], parts[1], depth / 8.0), "depth / depth_scale is clipped to [0, 1]"),
+        (made(parts[0], parts[1], np.clip(depth, 0, 1)), "depth is divided by depth_scale"),
+        (made(parts[0], parts[1], np.clip(depth, 0, 1) / 8.0), "divided by depth_scale first, clipped then"),
+        (
+            made(parts[0], parts[1], np.clip(depth * 8.0, 0, 1)),
+            "depth is divided by depth_scale, not multiplied",
+        ),
         (made(parts[1], parts[0], parts[2]), "the order: albedo, normal, depth"),
         (made(parts[2], parts[0], parts[1]), "the order: albedo, normal, depth"),
         (made(parts[2], parts[1], parts[0]), "the order: albedo, normal, depth"),
-        (made(*parts[:2], 1 - parts[2]), "depth grows with the distance"),
+        (made(parts[0], parts[1], 1 - parts[2]), "depth grows with the distance"),
     ]
     expect(
         "DAT-1",

@@ -488,8 +488,8 @@ def _metric_cases(name: str) -> list[Case]:
     add(bad, bad, None, "-inf in both, at the same place", "MET-1")
     if name == "mse":
         whole = _in_file("reference")
-        for shape, note in OTHER_SIZES:
-            add({**whole, "shape": shape}, {**whole, "shape": shape}, None, note, "RDG-4")
+        for sides, note in OTHER_SIZES:
+            add({**whole, "shape": sides}, {**whole, "shape": sides}, None, note, "RDG-4")
         add(square.tolist(), [[[0.5], [0.5]], [[0.5]]], None, "rows of two lengths", "MET-1")
     return cases
 

@@ -122,14 +122,8 @@ def animate(
     rays = feature_rays(network) if feature_spp is None else feature_spp
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     named = scene or scene_of(network), _parameters(parameters), view
-    shots = plan_shots(
-        folder,
-        named,
-        animation_times(start, seconds, fps),
-        (size, reference_spp, seed, rays),
-        facts,
-        network.features,
-    )
+    times = animation_times(start, seconds, fps)
+    shots = plan_shots(folder, named, times, (size, reference_spp, seed, rays), facts, network.features)
     if is_film:
         check_real_folder(folder)
     missing(folder, shots)
@@ -140,8 +134,7 @@ def animate(
     ):
         made, watch = _draw(shots, folder, network, (executor, renderer), rank)
         if is_film:
-            movie.write_movie(output, [shot.path for shot in shots], fps)
-            _remove(shots)
+            _join(output, shots, fps)
     if is_film:
         with suppress(OSError):  # there is more in it than the pictures that have become the film
             folder.rmdir()
@@ -149,8 +142,9 @@ def animate(
     say(f"{output}: {len(shots)} pictures, {made} of them made now")
 
 
-def _remove(shots: Sequence[Shot]) -> None:
-    """Remove the pictures that have become a film."""
+def _join(output: Path, shots: Sequence[Shot], fps: float) -> None:
+    """Make a film of the pictures, and remove them."""
+    movie.write_movie(output, [shot.path for shot in shots], fps)
     for shot in shots:
         shot.path.unlink()
 

@@ -442,7 +442,6 @@ void main()
     /* the features of further camera rays */
     for (int n = 0; n < 3; ++n) {
         uint sample_number = first_sample + uint(n) + 1u;
-        uint pixel;
         float origin_x;
         float origin_y;
         float origin_z;
@@ -657,7 +656,6 @@ void main()
             radiance_g = 0.0f;
             radiance_b = 0.0f;
             pdf = 1.00000002e+30f;
-            pixel = t8;
         }
 
         /* arrive: the first surface */

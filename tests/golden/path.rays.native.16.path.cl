@@ -438,7 +438,6 @@ __kernel void wamnet_trace(
     /* the features of further camera rays */
     for (int n = 0; n < 3; ++n) {
         uint16 sample_number = (uint16)(first_sample + (uint)n) + (uint16)(1u);
-        uint16 pixel;
         float16 origin_x;
         float16 origin_y;
         float16 origin_z;
@@ -653,7 +652,6 @@ __kernel void wamnet_trace(
             radiance_g = (float16)(0.0f);
             radiance_b = (float16)(0.0f);
             pdf = (float16)(1.00000002e+30f);
-            pixel = t8;
         }
 
         /* arrive: the first surface */

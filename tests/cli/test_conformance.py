@@ -79,7 +79,7 @@ def test_reports(wamnet, program, tmp_path):
     assert done.status == 1
     report = json.loads((tmp_path / "a.json").read_text())
     found = report["kinds"]["random.block"]
-    assert found["cases"] == 16 == found["pass"] + found["crash"]
+    assert found["cases"] == 22 == found["pass"] + found["crash"]
     assert [v["verdict"] for v in report["verdicts"] if v["kind"] == "sine"] == ["unsupported"]
     suites = {suite.get("name"): suite for suite in ElementTree.parse(tmp_path / "a.xml").getroot()}
     assert suites["random.block"].get("errors") == str(found["crash"])

@@ -272,6 +272,8 @@ def errors(student: Any) -> None:
     def answer(given: Any) -> Any:
         image, reference = given["image"], given["reference"]
         # What MET-1 refuses is not asked here.
+        if isinstance(reference, list):
+            raise InputError("reference", "this case", "MET-1 refuses it", "it is not asked")
         if (
             image.shape != reference.shape
             or not image.size

@@ -18,6 +18,8 @@ def window(image, x, y, size, border):
         raise ValueError(f"size {size}")
     if border not in ("clamp", "zero"):
         raise ValueError(f"border {border}")
+    if not (0 <= y < len(image) and 0 <= x < len(image[0])):
+        raise ValueError(f"pixel ({x}, {y}) is outside of the image")
     height, width, _ = image.shape
     taps = []
     for dy in range(size):

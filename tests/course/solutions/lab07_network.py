@@ -6,6 +6,8 @@ import numpy as np
 
 
 def layers(weights, biases, omegas, x):
+    if any(len(b) != len(w) for w, b in zip(weights, biases, strict=True)):
+        raise ValueError("a layer has as many biases as outputs")
     inputs, angles = [], []
     for layer, (w, b) in enumerate(zip(weights, biases, strict=True)):
         inputs.append(x)

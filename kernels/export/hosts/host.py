@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -47,6 +48,17 @@ def _file(folder: str, name: str) -> bytes:
 
 Written = Callable[[Mapping[str, Any]], str]
 """A file that follows from what the manifest says."""
+
+
+def page(title: str, imports: tuple[str, str] | None = None) -> Mapping[str, Written]:
+    """Return the page of a host; `imports`: what its module is called, and where npm puts it."""
+    named = {imports[0]: f"./node_modules/{imports[1]}"} if imports else {}
+
+    def write(facts: Mapping[str, Any]) -> str:
+        text = _file(SHARED, "index.html").decode().replace("@host@", title)
+        return text.replace("@imports@", json.dumps({"imports": named}))
+
+    return {"index.html": write}
 
 
 @dataclass(frozen=True)

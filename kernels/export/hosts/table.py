@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 from ....refimpl.errors import InputError
 from . import calls, launches
-from .host import EIGHT_BITS, Host
+from .host import EIGHT_BITS, Host, page
 
 PAGE = ("wamnet.js", "serve.mjs")
-"""What pages share."""
+"""What pages share, beside the page itself [`page`]."""
 
 BROWSE = "npm install && npm start"
 """How a page is shown."""
@@ -21,10 +21,11 @@ ON_PAGE = "both on the page"
 """Where pages draw."""
 
 
-def _on_webgl(name: str, text: str, ranks: bool = False) -> Host:
+def _on_webgl(name: str, engine: str, imports: tuple[str, str], ranks: bool = False) -> Host:
     """Return the row of an engine on WebGL."""
-    files = ("index.html", "main.js", "package.json")
-    return Host(name, text, "glsl-es", files, BROWSE, PAGES_NEED, ON_PAGE, PAGE, ranks=ranks)
+    files, made = ("main.js", "package.json"), page(engine, imports)
+    text = f"a page with {engine}"
+    return Host(name, text, "glsl-es", files, BROWSE, PAGES_NEED, ON_PAGE, PAGE, made, ranks=ranks)
 
 
 ROWS = (
@@ -77,16 +78,17 @@ ROWS = (
         "webgpu",
         "a page, and a program of Node without one",
         "wgsl",
-        ("index.html", "main.js", "denoiser.js", "node.mjs", "package.json"),
+        ("main.js", "denoiser.js", "node.mjs", "package.json"),
         BROWSE,
         "Node with npm, and a browser with WebGPU; without one: npm install && node node.mjs",
         ON_PAGE,
         PAGE,
+        page("WebGPU"),
         scenes=True,
     ),
-    _on_webgl("three", "a page with three.js", ranks=True),
-    _on_webgl("babylon", "a page with Babylon.js"),
-    _on_webgl("playcanvas", "a page with PlayCanvas"),
+    _on_webgl("three", "three.js", ("three", "three/build/three.module.js"), ranks=True),
+    _on_webgl("babylon", "Babylon.js", ("@babylonjs/core/", "@babylonjs/core/")),
+    _on_webgl("playcanvas", "PlayCanvas", ("playcanvas", "playcanvas/build/playcanvas.mjs")),
     Host(
         "godot",
         "a project of Godot 4",
@@ -102,11 +104,12 @@ ROWS = (
         "onnxruntime-web",
         "a page with ONNX Runtime, as WebAssembly",
         "onnx",
-        ("index.html", "main.js", "package.json"),
+        ("main.js", "package.json"),
         BROWSE,
         "Node with npm, and a browser",
         ON_PAGE,
         PAGE,
+        page("ONNX Runtime", ("onnxruntime-web", "onnxruntime-web/dist/ort.wasm.min.mjs")),
     ),
     Host(
         "onnxruntime",

@@ -38,7 +38,7 @@ WAYS: Mapping[str, Way] = {
     "opencl": Way(lambda: open_executor("opencl")),
     "glsl": Way(lambda: open_executor("opengl")),
     "glsl-es": Way(_opener("gl_runner", "ESRunner")),
-    "glsl-compute": Way(_opener("compute_runner", "ComputeRunner")),
+    "glsl-compute": Way(_opener("gl_runner", "ComputeRunner")),
     "glsl-vulkan": Way(_opener("wgpu_runner", "vulkan_runner"), "SPIR-V, wgpu, "),
     "spirv": Way(_opener("wgpu_runner", "vulkan_runner"), "wgpu, "),
     "hlsl": Way(_opener("wgpu_runner", "hlsl_runner"), "back to SPIR-V, wgpu, "),

@@ -30,6 +30,8 @@ wamnet export model.safetensors --scene minicubes --host c -o program
 
 wamnet export model.safetensors --target c --weights inline --check -o header
 
+wamnet export model.safetensors --target opencl --measure -o timed
+
 wamnet export model.safetensors --target cuda --schedule plain -o to-read
 
 wamnet export model.safetensors --target hlsl --variant window8+rank16 -o for-direct3d
@@ -126,6 +128,10 @@ Checked = Annotated[
     bool,
     typer.Option("--check", help="Compile and run it here, and compare with the reference's picture."),
 ]
+Measured = Annotated[
+    bool,
+    typer.Option("--measure", help="Measure on this machine how long it takes, and say so in the README."),
+]
 
 
 @dataclass(frozen=True)
@@ -172,6 +178,7 @@ def export(
     seconds: Seconds = None,
     fps: Fps = None,
     check: Checked = False,
+    measure: Measured = False,
 ) -> None:
     """Write a denoiser for another program: kernels, a manifest, a README, and a pair to check with.
 
@@ -186,6 +193,7 @@ def export(
     if target == HTML:
         of_kernels = {"--weights": weights, "--variant": variant, "--check": check or None, "--time": time}
         of_kernels |= {"--schedule": schedule, "--moving": moving, "--seconds": seconds, "--fps": fps}
+        of_kernels["--measure"] = measure or None
         _refuse(of_kernels, "a web page has its own", "leave it out")
         _write(folder, {PAGE_NAME: webpage.page_of(model, scene, parameters or [], None).encode()})
         return
@@ -201,7 +209,7 @@ def export(
     moment, paths = (time, parameters or []), (max_depth, sampler)
     span = None if moving is None else Span(tuple(moving.split(",")), seconds, fps)
     asked = (variant, weights, schedule)
-    made = _export(model, (target, host or ""), scene, moment, paths, profile, asked, span)
+    made = _export(model, (target, host or ""), scene, moment, paths, profile, asked, span, measure)
     _write(folder, made.contents())
     _tell(made)
     if check:
@@ -236,22 +244,28 @@ def _export(
     profile: str,
     asked: tuple[str | None, str | None, str | None],
     span: Span | None,
+    measured: bool,
 ) -> Export:
     """Return the export that the options ask for.
 
-    `place`: target and host; `asked`: variant, place of the weights and schedule.
+    `place`: target and host; `asked`: variant, place of the weights and schedule; `measured`: whether it says
+    how long it takes.
     """
     from ...compiler.variants import FULL
-    from ...kernels.export.package import Request
+    from ...kernels.export.package import Request, with_speed
     from ...kernels.export.package import export as exported
+    from ...kernels.export.speed import check_measured, measure
     from ...refimpl.light.transport import Settings
 
+    if measured:
+        check_measured(place[0])
     settings = replace(Settings(max_depth=paths[0]), sampler=paths[1].value)
     motion = span.motion(scene, *moment) if scene and span else None
     loaded = motion.scenes[0] if motion else load_scene(scene, *moment) if scene else None
     variant, weights, schedule = (text or "" for text in asked)
     options_of = (weights, variant or FULL, settings, schedule, motion, place[1])
-    return exported(Request(load_model(model, imported=True), place[0], loaded, profile, *options_of))
+    made = exported(Request(load_model(model, imported=True), place[0], loaded, profile, *options_of))
+    return with_speed(made, measure(made).facts()) if measured else made
 
 
 def _tell(made: Export) -> None:

@@ -58,6 +58,9 @@ LICENCE = (
 MANIFEST_NAME, README_NAME = "manifest.json", "README.md"
 """Files of every export."""
 
+FILES, DIGEST = "files", "digest"
+"""Entries of a manifest that hold the hashes of all files, and the hash of these."""
+
 EXPECTED_NAME = "expected.png"
 """What a host shows of the check pair, as the reference draws it."""
 
@@ -217,18 +220,32 @@ def _finished(
 ) -> Export:
     """Return the export with its README and manifest, which has hashes and lengths of all other files."""
     facts = {"schema": SCHEMA, "target": request.target, "licence": LICENCE, "check": pair.facts(), **facts}
-    host = host_named(request.host) if request.host else None
-    if host:
+    if request.host:
+        host = host_named(request.host)
         facts["host"] = host.facts()
         first = next(iter(pair.images.values()))
         seen = first if first.shape[2] == 3 else pair.output
         files = {**files, **host.contents(facts), EXPECTED_NAME: beside(seen, pair.output)}
-    files = {**files, README_NAME: readme.readme(facts, denoiser, host).encode()}
+    return _closed(Export(request, files, facts, denoiser, path, encoder, passes, pair))
+
+
+def _closed(export: Export) -> Export:
+    """Return an export with its README, and with hashes and lengths of all files in its manifest."""
+    facts = {name: value for name, value in export.manifest.items() if name not in (FILES, SIZES, DIGEST)}
+    host = host_named(export.request.host) if export.request.host else None
+    files = {name: data for name, data in export.files.items() if name != README_NAME}
+    text = readme.readme(facts, export.denoiser, host, {name: len(data) for name, data in files.items()})
+    files[README_NAME] = text.encode()
     hashes = {name: sha256(data) for name, data in sorted(files.items())}
     digest = sha256(*(value.encode() for value in hashes.values()))
-    named = {"files": hashes, SIZES: {name: len(files[name]) for name in hashes}, "digest": digest}
+    named = {FILES: hashes, SIZES: {name: len(files[name]) for name in hashes}, DIGEST: digest}
     manifest = json.loads(json.dumps({**facts, **named}, allow_nan=False))
-    return Export(request, files, manifest, denoiser, path, encoder, passes, pair)
+    return replace(export, files=files, manifest=manifest)
+
+
+def with_speed(export: Export, speed: Mapping[str, Any]) -> Export:
+    """Return an export that says how long it takes: `speed` in its manifest, a line in its README."""
+    return _closed(replace(export, manifest={**export.manifest, "speed": speed}))
 
 
 def _facts(

@@ -70,10 +70,16 @@ pipeline = create_pipeline({file}, "{entry}");
 """Lines that call a kernel on buffers with numbers."""
 
 
-def readme(facts: Mapping[str, Any], denoiser: Artifact | None, host: Host | None = None) -> str:
+def readme(
+    facts: Mapping[str, Any],
+    denoiser: Artifact | None,
+    host: Host | None = None,
+    sizes: Mapping[str, int] | None = None,
+) -> str:
     """Return the text for what a manifest says.
 
-    `denoiser`: the kernel, None where it is a graph; `host`: the program around it, if there is one.
+    `denoiser`: the kernel, None where it is a graph; `host`: the program around it, if there is one; `sizes`:
+    the bytes of files by path.
     """
     lines = [
         f"# Denoiser for {facts['target']}",
@@ -86,7 +92,7 @@ def readme(facts: Mapping[str, Any], denoiser: Artifact | None, host: Host | Non
         "",
         "## Kernels, in the order in which they run",
         "",
-        *(line for kernel in facts["kernels"] for line in _kernel(kernel)),
+        *(line for kernel in facts["kernels"] for line in _kernel(kernel, sizes or {})),
         "## Integration",
         "",
         f"```{'python' if facts['target'] == ONNX else 'text'}",
@@ -160,6 +166,7 @@ def _facts(facts: Mapping[str, Any]) -> list[str]:
         f"* Window: {window['size']} x {window['size']} pixels, border rule `{window['border']}`.",
         f"* Weights: {weights['count'] or 'all'} numbers, {weights['where']}.",
         *_schedule(facts),
+        *_speed(facts),
         f"* Output: {facts['output']['encoding'] or 'linear'}.",
         *images,
         *_rays(facts),
@@ -188,6 +195,19 @@ def _schedule(facts: Mapping[str, Any]) -> list[str]:
     others = [name for name in facts["schedules"] if name != picked["name"]]
     besides = f" Others, by `--schedule`: {', '.join(others)}." if others else ""
     return [f"* Schedule: {text(picked)}.{besides}"]
+
+
+def _speed(facts: Mapping[str, Any]) -> list[str]:
+    """Return the line about the time of a picture."""
+    speed = facts.get("speed")
+    if speed is None:
+        return []
+    between = f"{speed['least_ms']:.3g} to {speed['most_ms']:.3g}, {speed['rounds']} runs"
+    return [
+        f"* Speed: {speed['ms']:.3g} ms ({between}) for {speed['size']} x {speed['size']} pixels",
+        f"  on {speed['device']}, with copies of the images there and back;",
+        f"  {speed['compile_s']:.2g} s to compile. `wamnet export --measure` measures it again.",
+    ]
 
 
 WRITTEN = "write_buffer(scene_numbers, rows + {count} * moment); /* {slot} of the path kernel */"
@@ -300,13 +320,15 @@ def _check(check: Mapping[str, Any]) -> list[str]:
     return found
 
 
-def _kernel(kernel: Mapping[str, Any]) -> list[str]:
+def _kernel(kernel: Mapping[str, Any], sizes: Mapping[str, int]) -> list[str]:
     """Return the lines about one kernel."""
     rows = []
     for b in kernel["bindings"]:
         shape = ", ".join(map(str, b["shape"])) or "1"
         rows.append(f"| {b['slot']} | `{b['name']}` | {b['access']} | {b['type']} | {shape} |")
-    named = ", ".join(f"`{name}`" for name in kernel["files"])
+    named = ", ".join(
+        f"`{name}`" + (f" ({sizes[name]:,} bytes)" if name in sizes else "") for name in kernel["files"]
+    )
     return [
         f"**{kernel['role']}**: {named}, entry point `{kernel['entry_point']}`.",
         "",

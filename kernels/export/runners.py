@@ -18,10 +18,14 @@ Opener = Callable[[], Executor]
 
 @dataclass(frozen=True)
 class Way:
-    """How a target's kernels are run; `route`: what they are translated to before, if they are."""
+    """How a target's kernels are run; `route`: what they are translated to before, if they are.
+
+    `stands_in`: what runs them computes the same, but is nothing that the target's users have.
+    """
 
     open: Opener
     route: str = ""
+    stands_in: bool = False
 
 
 def _opener(module: str, name: str, *arguments: str) -> Opener:
@@ -43,9 +47,9 @@ WAYS: Mapping[str, Way] = {
     "spirv": Way(_opener("wgpu_runner", "vulkan_runner"), "wgpu, "),
     "hlsl": Way(_opener("wgpu_runner", "hlsl_runner"), "back to SPIR-V, wgpu, "),
     "wgsl": Way(_opener("wgpu_runner", "WgpuRunner"), "wgpu, "),
-    "metal": Way(_opener("host_runner", "MetalRunner"), "as C++ with a shim, "),
+    "metal": Way(_opener("host_runner", "MetalRunner"), "as C++ with a shim, ", stands_in=True),
     "c": Way(_opener("host_runner", "CRunner")),
-    "cuda": Way(_opener("host_runner", "CUDARunner"), "as C++ with a shim, "),
+    "cuda": Way(_opener("host_runner", "CUDARunner"), "as C++ with a shim, ", stands_in=True),
     "shadertoy": Way(_opener("host_pass_runner", "ShadertoyRunner"), "its uniforms declared, "),
     "godot": Way(_opener("host_pass_runner", "GodotRunner"), "its words declared, "),
 }

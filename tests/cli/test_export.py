@@ -109,3 +109,20 @@ def test_help_names_every_target():
 def test_refusals(refused, samples, tmp_path, arguments, told):
     (tmp_path / "noisy.exr").write_bytes(b"")
     assert told in refused("export", samples / "model.safetensors", *arguments)
+
+
+@pytest.mark.parametrize("target", ["cuda", "metal", "onnx", "html"])
+def test_a_target_without_its_own_device_is_refused(wamnet, tmp_path, target):
+    outcome = wamnet("export", "minicubes", "--target", target, "--measure", "-o", tmp_path / "new")
+    assert outcome.status == 2
+    assert "--measure" in outcome.err
+    assert not (tmp_path / "new").exists()
+
+
+def test_the_command_writes_a_time(wamnet, executor_named, tmp_path):
+    executor_named("opencl")
+    outcome = wamnet("export", "minicubes", "--target", "opencl", "--measure", "-o", tmp_path / "new")
+    assert outcome.status == 0, outcome.err
+    speed = json.loads((tmp_path / "new/manifest.json").read_text())["speed"]
+    assert 0 < speed["least_ms"] <= speed["ms"] <= speed["most_ms"]
+    assert f"{speed['ms']:.3g} ms" in (tmp_path / "new" / "README.md").read_text()

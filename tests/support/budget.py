@@ -28,7 +28,7 @@ BUDGET = {
     "kernels/run": 3000,
     "kernels/judge": 1475,
     "kernels/bench": 4850,
-    "kernels/export": 4050,
+    "kernels/export": 4250,
     "kernels/verify": 2925,
     "spec/conformance": 8400,
     "cli": 300,

@@ -33,7 +33,7 @@ ROWS = {kernel_of(row).relative_to(SHELF).as_posix(): row for row in rows()}
 """Rows of the index by the folders of their kernels."""
 
 USUAL = ("cornell/glsl-es", "glossy/wgsl", "minicubes/c", "minicubes/cuda")
-"""Kernels that every run certifies, of which each takes seconds; the others are slow tests."""
+"""Kernels that every run certifies, of which each takes seconds; the others are for the night."""
 
 
 def test_the_index_has_a_row_for_each_kernel():
@@ -42,7 +42,7 @@ def test_the_index_has_a_row_for_each_kernel():
 
 
 @pytest.mark.parametrize(
-    "name", [name if name in USUAL else pytest.param(name, marks=pytest.mark.slow) for name in ROWS]
+    "name", [name if name in USUAL else pytest.param(name, marks=pytest.mark.nightly) for name in ROWS]
 )
 def test_the_index_says_what_certify_finds(wamnet, name):
     """CER-6, TXT-1: bound, schedule, and that the text computes the certified program."""

@@ -44,8 +44,7 @@ from wamnet.kernels.bench.peers import peer_onnxruntime
 from wamnet.kernels.devices.executor import Executor
 from wamnet.kernels.export import tools
 from wamnet.kernels.export.check import digest_of
-from wamnet.kernels.export.gl_runner import ComputeRunner
-from wamnet.kernels.export.gl_runner import ESRunner
+from wamnet.kernels.export.gl_runner import ComputeRunner, ESRunner
 from wamnet.kernels.export.host_pass_runner import GodotRunner
 from wamnet.kernels.export.host_runner import CRunner, CUDARunner, MetalRunner
 from wamnet.kernels.export.tint_runner import TintRunner

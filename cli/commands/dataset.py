@@ -15,7 +15,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -27,7 +27,7 @@ from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files
 
 if TYPE_CHECKING:
-    from ...kernels.run.frame_plan import FramePlan, Request
+    from ...kernels.run.frame_plan import FramePlan, Request, Task
 
 EXAMPLES = """Examples:
 
@@ -190,13 +190,18 @@ def make(
         for name in again:
             say(f"{folder / name}: damaged, is made again")
         if made:
-            _render(store, workers, scheduler)
-    for name in store.changed:
-        say(f"{folder / name}: has other bytes than before; another NumPy or processor made it")
+            _render(store, request, frames[0], workers, scheduler)
     for line in summed_up(nearest):
         say(line)
-    count = len(store.pictures)
-    say(f"{folder}: {count} pictures of {len(frames)} frames, {made} of them made now")
+    say_what_was_made(store, made)
+
+
+def say_what_was_made(store: dataset_files.Store[Any], made: int) -> None:
+    """Say how many pictures there are, and which have other bytes than an earlier run's."""
+    for name in store.changed:
+        say(f"{store.folder / name}: has other bytes than before; another NumPy or processor made it")
+    count = f"{len(store.pictures)} pictures of {len(store.frames)} frames"
+    say(f"{store.folder}: {count}, {made} of them made now")
 
 
 def compared(frames: Sequence[FramePlan]) -> dict[str, dict[str, float]]:
@@ -219,21 +224,27 @@ def summed_up(nearest: Mapping[str, Mapping[str, float]]) -> list[str]:
     ]
 
 
-def _render(store: dataset_files.Store, workers: int | None, scheduler: str | None) -> None:
-    """Do the tasks that are left in the store."""
-    from ...kernels.run.frame_plan import Task, carry_out
+def _render(
+    store: dataset_files.Store[Task],
+    request: Request,
+    first: FramePlan,
+    workers: int | None,
+    scheduler: str | None,
+) -> None:
+    """Do the tasks that are left in the store; the scene of the `first` frame says what they take."""
+    from ...kernels.run.frame_plan import KINDS, carry_out
     from ...kernels.run.render_frame import renderer
     from ...refimpl.frame import Frame
 
     tasks = store.tasks()
     total = sum(task.samples for task in tasks)
     if workers is None:
-        alone = total < LEAST_SAMPLES or renderer(store.request.executor).shares_work
+        alone = total < LEAST_SAMPLES or renderer(request.executor).shares_work
         workers = 1 if alone else len(os.sched_getaffinity(0))
     if not tasks:
         return
-    shown, pixels = next(iter(store.pictures.values())).scene, store.request.size_px**2
-    for line in said_of_rendering(shown, total, pixels, store.request.executor, workers):
+    shown, pixels = first.pictures[KINDS[0]].scene, request.size_px**2
+    for line in said_of_rendering(shown, total, pixels, request.executor, workers):
         say(line)
     with progress("rendering", total) as advance:
         if scheduler is None and workers == 1:

@@ -27,7 +27,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from ...compiler.core.writing import TEMPORARY_NAME, is_regular, remove_temporaries
 from ...refimpl.errors import InputError
@@ -36,7 +36,6 @@ from .alone import working_in
 from .outputs import check_real_folder, write_text
 
 if TYPE_CHECKING:
-    from ...kernels.run.frame_plan import FramePlan, Picture, Request, Task
     from ...kernels.run.render_frame import Rows
     from ...refimpl.frame import Frame
 
@@ -81,6 +80,59 @@ class Sum:
 
 Sums = Mapping[str, Sum]
 """Pictures that were finished once, by name."""
+
+
+class Asked(Protocol):
+    """A request: all that determines a data set, except for the version."""
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as JSON's types."""
+
+
+class Band(Protocol):
+    """A task: rows [first, last) of a picture."""
+
+    @property
+    def picture(self) -> Pictured[Any]:
+        """Return the picture."""
+
+    @property
+    def rows(self) -> Rows:
+        """Return its rows."""
+
+
+BandT = TypeVar("BandT", bound=Band)
+"""Tasks of one kind of data sets."""
+
+Made_co = TypeVar("Made_co", bound=Band, covariant=True)
+"""Tasks, of what only gives them."""
+
+
+class Pictured(Protocol[Made_co]):
+    """A picture of a data set."""
+
+    @property
+    def name(self) -> str:
+        """Return the file's name within the data set, with slashes."""
+
+    @property
+    def height(self) -> int:
+        """Return the number of its rows."""
+
+    def tasks(self) -> Sequence[Made_co]:
+        """Return the tasks that make it, top to bottom."""
+
+
+class Planned(Protocol[Made_co]):
+    """A frame: its pictures by kind."""
+
+    @property
+    def pictures(self) -> Mapping[str, Pictured[Made_co]]:
+        """Return its pictures."""
+
+    def describe(self) -> dict[str, Any]:
+        """Return it as JSON's types: its split, and of each picture the name and what determines it."""
+
 
 Look = Callable[[int], None]
 """Called with a number of bytes that were just compared."""
@@ -135,8 +187,8 @@ def bytes_of(manifest: Mapping[str, Any]) -> int:
 
 
 def manifest_of(
-    request: Request,
-    frames: Sequence[FramePlan],
+    request: Asked,
+    frames: Sequence[Planned[Band]],
     sums: Sums,
     nearest: Mapping[str, Mapping[str, float]] | None = None,
 ) -> dict[str, Any]:
@@ -144,9 +196,9 @@ def manifest_of(
 
     `nearest` says of each split of test frames how far the nearest training frame is.
     """
-    from ...kernels.run.frame_plan import describe, version
+    from ...kernels.run.frame_plan import version
 
-    facts = [describe(frame) for frame in frames]
+    facts = [frame.describe() for frame in frames]
     for frame in facts:
         for kind in KINDS:
             known = sums.get(frame[kind]["file"])
@@ -257,14 +309,14 @@ def refuse_wrong(folder: Path, wrong: Mapping[str, str]) -> None:
 # ---- making a data set -----------------------------------------------------------------------------------
 
 
-class Store:
+class Store(Generic[BandT]):
     """An open folder of a data set that is being made; made by [`Store.open`]."""
 
     def __init__(
         self,
         folder: Path,
-        request: Request,
-        frames: Sequence[FramePlan],
+        request: Asked,
+        frames: Sequence[Planned[BandT]],
         before: Sums,
         nearest: Mapping[str, Mapping[str, float]],
     ) -> None:
@@ -282,11 +334,11 @@ class Store:
     def open(
         cls,
         folder: Path,
-        request: Request,
-        frames: Sequence[FramePlan],
+        request: Asked,
+        frames: Sequence[Planned[BandT]],
         on_look: Look | None = None,
         nearest: Mapping[str, Mapping[str, float]] | None = None,
-    ) -> Iterator[Store]:
+    ) -> Iterator[Store[BandT]]:
         """Yield the store of a new data set, or of the same one begun before; refuse every other folder.
 
         When the block ends well and nothing is missing, the data set is finished.
@@ -340,23 +392,21 @@ class Store:
         elif _is_own(path):
             path.unlink()
 
-    def tasks(self) -> list[Task]:
+    def tasks(self) -> list[BandT]:
         """Return the tasks that are left."""
-        from ...kernels.run.frame_plan import tasks_of
-
         return [
             task
             for name in self.missing
-            for task in tasks_of(self.pictures[name])
+            for task in self.pictures[name].tasks()
             if task.rows not in self._bands[name]
         ]
 
-    def put(self, task: Task, band: Frame) -> None:
+    def put(self, task: Band, band: Frame) -> None:
         """Keep a rendered band; when it is its picture's last one, finish the picture."""
         self._publish(task.picture, task.rows, band)
         self._join_if_whole(task.picture)
 
-    def _publish(self, picture: Picture, rows: Rows, band: Frame) -> None:
+    def _publish(self, picture: Pictured[Band], rows: Rows, band: Frame) -> None:
         """Write a band under a name that ends in its checksum."""
         from . import exr
 
@@ -367,14 +417,14 @@ class Store:
         path = self.unfinished / f"{stem}.{first}-{last}.{sum_of(new).sha256}.exr"
         self._bands[picture.name][rows] = new.replace(path)
 
-    def _join_if_whole(self, picture: Picture) -> None:
+    def _join_if_whole(self, picture: Pictured[Band]) -> None:
         """Finish a picture whose bands are all there; one that covers all rows is the picture."""
-        from ...kernels.run.frame_plan import join, tasks_of
+        from ...kernels.run.frame_plan import join
         from . import exr
 
-        bands, whole = self._bands[picture.name], (0, picture.job.height)
+        bands, whole = self._bands[picture.name], (0, picture.height)
         if whole not in bands:
-            if not all(task.rows in bands for task in tasks_of(picture)):
+            if not all(task.rows in bands for task in picture.tasks()):
                 return
             parts = [exr.read_frame(path) for _, path in sorted(bands.items())]
             self._publish(picture, whole, join(parts))
@@ -412,7 +462,7 @@ def _visible(folder: Path) -> bool:
     return any(not path.name.startswith(".") for path in folder.iterdir())
 
 
-def _known_before(folder: Path, request: Request, frames: Sequence[FramePlan]) -> dict[str, Sum]:
+def _known_before(folder: Path, request: Asked, frames: Sequence[Planned[Band]]) -> dict[str, Sum]:
     """Return the sums in the manifest of a folder, or refuse it if it is another data set."""
     there, wanted = read_manifest(folder), manifest_of(request, frames, {})
     if there["wamnet"] != wanted["wamnet"]:

@@ -5,7 +5,7 @@
 2. Each draw has a noisy picture and a target, each with random numbers of its own [`plan`].
 3. What the frames show is compared: test frames that repeat one another or a training frame are refused
    [`compared`].
-4. A picture is cut into bands of rows, each an independent task [`tasks_of`]; how is a function of the
+4. A picture is cut into bands of rows, each an independent task [`Picture.tasks`]; how is a function of the
    request only, so that an interrupted run finds its bands again whatever the number of workers is.
 5. A task is carried out anywhere [`carry_out`], and the bands of a picture are joined [`join`].
 
@@ -136,6 +136,22 @@ class Picture:
         """Return the scene, made again each time: thousands of pictures are kept, and few are looked at."""
         return self.request.scene_at(self.draw)
 
+    @property
+    def height(self) -> int:
+        """Return the number of its rows."""
+        return self.job.height
+
+    def tasks(self) -> list[Task]:
+        """Return its tasks, top to bottom.
+
+        A band has about TASK_SAMPLES samples, but a tile of pixels at least: smaller ones would be slow.
+        """
+        job = self.job
+        rows = max(TASK_SAMPLES // (job.samples // job.height), TILE_PIXELS // job.width, 1)
+        bands = [(first, min(first + rows, job.height)) for first in range(0, job.height, rows)]
+        here = version()
+        return [Task(self, band, here) for band in bands]
+
 
 @dataclass(frozen=True)
 class FramePlan:
@@ -149,6 +165,30 @@ class FramePlan:
     def name(self) -> str:
         """Return what its pictures have in common: split and number."""
         return self.pictures[KINDS[0]].name.removesuffix(f"-{KINDS[0]}.exr")
+
+    def describe(self) -> dict[str, Any]:
+        """Return a frame as JSON's types: split, scene, draw, and of each picture its name and its job."""
+        scene, variation = self.pictures[KINDS[0]].scene, self.draw.variation
+        facts: dict[str, Any] = {
+            "split": self.split,
+            "time_s": self.draw.time_s,
+            "yaw_deg": variation.yaw_deg,
+            "pitch_deg": variation.pitch_deg,
+            "distance": variation.distance,
+            "lights": [list(light.color) for light in scene.lights],
+            "scene": scene.name,
+            "scene_digest": scene_digest(scene),
+        }
+        if self.draw.outside:
+            facts["outside"] = self.draw.outside
+        for kind, picture in self.pictures.items():
+            job = picture.job
+            facts[kind] = {"file": picture.name, "width": job.width, "height": job.height}
+            facts[kind] |= {"spp": job.spp, "seed": job.seed}
+            if job.feature_spp:
+                facts[kind]["feature_spp"] = job.feature_spp
+                facts[kind] |= {FEATURE_SAMPLER: source} if (source := other_sampler(job)) else {}
+        return facts
 
 
 @dataclass(frozen=True)
@@ -258,43 +298,6 @@ def compared(
         shown[frame.split].append(Shown(frame.name, frame.draw.time_s, scene))
     train = shown.pop(TRAIN)
     return compare(train, shown, on_progress) if any(shown.values()) else {}
-
-
-def describe(frame: FramePlan) -> dict[str, Any]:
-    """Return a frame as JSON's types: split, scene, draw, and of each picture its name and its job."""
-    scene, variation = frame.pictures[KINDS[0]].scene, frame.draw.variation
-    facts: dict[str, Any] = {
-        "split": frame.split,
-        "time_s": frame.draw.time_s,
-        "yaw_deg": variation.yaw_deg,
-        "pitch_deg": variation.pitch_deg,
-        "distance": variation.distance,
-        "lights": [list(light.color) for light in scene.lights],
-        "scene": scene.name,
-        "scene_digest": scene_digest(scene),
-    }
-    if frame.draw.outside:
-        facts["outside"] = frame.draw.outside
-    for kind, picture in frame.pictures.items():
-        job = picture.job
-        facts[kind] = {"file": picture.name, "width": job.width, "height": job.height}
-        facts[kind] |= {"spp": job.spp, "seed": job.seed}
-        if job.feature_spp:
-            facts[kind]["feature_spp"] = job.feature_spp
-            facts[kind] |= {FEATURE_SAMPLER: source} if (source := other_sampler(job)) else {}
-    return facts
-
-
-def tasks_of(picture: Picture) -> list[Task]:
-    """Return the tasks of a picture, top to bottom.
-
-    A band has about TASK_SAMPLES samples, but a tile of pixels at least: smaller ones would be slow.
-    """
-    job = picture.job
-    rows = max(TASK_SAMPLES // (job.samples // job.height), TILE_PIXELS // job.width, 1)
-    bands = [(first, min(first + rows, job.height)) for first in range(0, job.height, rows)]
-    here = version()
-    return [Task(picture, band, here) for band in bands]
 
 
 def carry_out(task: Task, on_progress: Progress | None = None) -> Frame:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wamnet.kernels.run import frame_plan
-from wamnet.kernels.run.frame_plan import Request, carry_out, frame_draws, join, plan, tasks_of
+from wamnet.kernels.run.frame_plan import Request, carry_out, frame_draws, join, plan
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.render import render
 from wamnet.refimpl.light.scenes import canonical
@@ -48,7 +48,7 @@ def test_splits_and_draws() -> None:
         *("outside/00000", "outside/00001", "outside/00002"),
     ]
     assert [f.draw.outside for f in frames] == ["", "", "", "", "time", "camera", "lamps"]
-    facts = [frame_plan.describe(frame) for frame in frames]
+    facts = [frame.describe() for frame in frames]
     assert [f.get("outside", "") for f in facts] == [f.draw.outside for f in frames]
     assert facts[5]["yaw_deg"] == -34.0
     assert len(facts[0]["lights"]) == 2
@@ -81,7 +81,7 @@ def test_pictures_have_names_and_seeds_of_their_own() -> None:
     assert [picture.job.spp for picture in pictures] == [1, 2] * 3
     scene = canonical("minicubes", time=frames[-1].draw.time_s)
     assert replace(pictures[-1].scene, info={}) == replace(scene, info={})
-    facts = frame_plan.describe(frames[0])
+    facts = frames[0].describe()
     assert (facts["split"], facts["yaw_deg"], facts["noisy"]["spp"]) == ("train", 0.0, 1)
 
 
@@ -92,14 +92,14 @@ def test_rays_of_features_and_samples_of_tests() -> None:
     assert [job["noisy"].feature_spp for job in jobs] == [16, 16, 16]
     assert [job["target"].feature_spp for job in jobs] == [0, 0, 0]
     assert [job["target"].spp for job in jobs] == [2, 2, 5]
-    noisy = frame_plan.describe(plan(request)[0])["noisy"]
+    noisy = plan(request)[0].describe()["noisy"]
     assert (noisy["spp"], noisy["feature_spp"]) == (1, 16)
     assert noisy["feature_sampler"] == request.as_data()["feature_sampler"] == "net"
-    assert not {"feature_spp", "feature_sampler"} & {*frame_plan.describe(plan(TINY)[0])["noisy"]}
+    assert not {"feature_spp", "feature_sampler"} & {*plan(TINY)[0].describe()["noisy"]}
     older = replace(request, feature_sampler="pcg4d")
-    assert "feature_sampler" not in {**older.as_data(), **frame_plan.describe(plan(older)[0])["noisy"]}
+    assert "feature_sampler" not in {**older.as_data(), **plan(older)[0].describe()["noisy"]}
     assert {"feature_spp": 16, "test_spp": 5}.items() <= request.as_data().items()
-    task = tasks_of(plan(request)[0].pictures["noisy"])[0]
+    task = plan(request)[0].pictures["noisy"].tasks()[0]
     assert task.samples == 6 * 6 * (1 + 16)
     assert carry_out(task).info["feature_spp"] == "16"
 
@@ -107,14 +107,14 @@ def test_rays_of_features_and_samples_of_tests() -> None:
 def test_small_pictures_are_one_task_and_large_ones_many() -> None:
     """Bands have at least a tile of pixels; together they are all rows."""
     small, large = plan(TINY)[0].pictures["target"], plan(replace(TINY, size_px=1024, spp=1024))[0].pictures
-    assert [task.rows for task in tasks_of(small)] == [(0, 6)]
-    rows = [task.rows for task in tasks_of(large["target"])]
+    assert [task.rows for task in small.tasks()] == [(0, 6)]
+    rows = [task.rows for task in large["target"].tasks()]
     assert len(rows) == 128
     assert rows[0][0] == 0
     assert rows[-1][1] == 1024
     assert all(a[1] == b[0] for a, b in pairwise(rows))
-    assert sum(task.samples for task in tasks_of(large["target"])) == 1 << 30
-    assert len(tasks_of(large["noisy"])) == 1
+    assert sum(task.samples for task in large["target"].tasks()) == 1 << 30
+    assert len(large["noisy"].tasks()) == 1
 
 
 def test_joined_bands_are_the_reference(monkeypatch) -> None:
@@ -122,7 +122,7 @@ def test_joined_bands_are_the_reference(monkeypatch) -> None:
     monkeypatch.setattr(frame_plan, "TASK_SAMPLES", 1)
     monkeypatch.setattr(frame_plan, "TILE_PIXELS", 12)
     picture = plan(TINY)[1].pictures["target"]
-    tasks = [pickle.loads(pickle.dumps(task)) for task in tasks_of(picture)]
+    tasks = [pickle.loads(pickle.dumps(task)) for task in picture.tasks()]
     assert len(tasks) == 3
     counted: list[int] = []
     got = join([carry_out(task, counted.append) for task in tasks])
@@ -162,7 +162,7 @@ def test_refusals(change, text) -> None:
 
 def test_a_worker_of_another_version_refuses() -> None:
     """Its error keeps its parts on the way through a pickle."""
-    (task,) = tasks_of(plan(TINY)[0].pictures["noisy"])
+    (task,) = plan(TINY)[0].pictures["noisy"].tasks()
     text = "version of wamnet on a worker is .*: the data set is made by 99, and every worker must have the"
     with pytest.raises(InputError, match=text) as caught:
         carry_out(replace(task, version="99"))

@@ -231,6 +231,9 @@ SCENES = {
 }
 """Each material by itself, the sky with and without a lamp, walls with materials, and canonical scenes."""
 
+LONG = ("glossy", "hall")
+"""Scenes that take minutes: what others show of one material each, together."""
+
 LEVEL = sidak(SIGNIFICANCE, len(SCENES))
 """Significance of one scene: that of all is SIGNIFICANCE."""
 
@@ -253,7 +256,9 @@ def picturing(mitsuba, variant):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.nightly] * (name in LONG)) for name in SCENES]
+)
 def test_mitsuba_shows_the_same_materials(executor_named, picturing, name):
     a = ours(executor_named("opencl"), SCENES[name], Settings())
     assert_all_plausible(p_values(a, theirs(picturing, SCENES[name], Settings())), LEVEL)

@@ -20,7 +20,7 @@ PEERS = {
     "numba": ("kernels/bench/peers/peer_numba.py",),
     "pyoidn": ("kernels/bench/peers/peer_oidn.py",),
     "mitsuba": ("kernels/bench/peers/peer_mitsuba.py", "kernels/verify/mitsuba_process.py"),
-    "bpy": ("kernels/bench/peers/cycles_process.py",),
+    "bpy": ("kernels/bench/peers/cycles_process.py", "kernels/blender/process.py"),
 }
 """Packages that are compared with, and the only files of each; one file reads graphs of others by onnx."""
 
@@ -81,6 +81,7 @@ ROOMS = {
         "devices": ("",),
         "run": ("", "devices"),
         "judge": ("", "devices", "run"),
+        "blender": ("", "run"),
         "bench": ("", "devices", "run"),
         "export": ("", "devices", "run", "bench"),
         "verify": ("", "devices", "run", "judge", "bench"),

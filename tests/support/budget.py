@@ -28,14 +28,15 @@ BUDGET = {
     "kernels/run": 3000,
     "kernels/judge": 1475,
     "kernels/bench": 4850,
+    "kernels/blender": 500,
     "kernels/export": 4250,
     "kernels/verify": 2925,
     "spec/conformance": 8400,
     "cli": 300,
-    "cli/commands": 5875,
+    "cli/commands": 6075,
     "cli/common": 1160,
     "cli/course": 5250,
-    "cli/files": 1250,
+    "cli/files": 1325,
     "cli/reports": 1450,
 }
 """Most lines of each room, comments counted; a part by itself is the files above its rooms."""

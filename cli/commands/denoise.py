@@ -31,6 +31,8 @@ wamnet denoise model.safetensors noisy.exr --executor opencl --variant window8+r
 
 wamnet denoise model.safetensors noisy.exr --executor c --profile exact
 
+wamnet denoise hall.safetensors frame0001.exr --keep-layers -o for-the-compositor.exr
+
 wamnet denoise small.safetensors noisy.exr --executor opencl --rank 16"""
 """Shown below the help of `wamnet denoise`."""
 
@@ -38,6 +40,14 @@ EXECUTORS_EXAMPLES = """Example:
 
 wamnet executors"""
 """Shown below the help of `wamnet executors`."""
+
+KeepLayers = Annotated[
+    bool,
+    typer.Option("--keep-layers", help="Write all layers of FRAME too, and the picture as layer wamnet."),
+]
+ViewLayer = Annotated[
+    str, typer.Option(metavar="NAME", help="View layer of FRAME to denoise.", show_default="the only one")
+]
 
 
 def denoise(
@@ -59,6 +69,8 @@ def denoise(
     anyway: Annotated[
         bool, typer.Option("--anyway", help="Denoise another program's frame that is unlike the training's.")
     ] = False,
+    keep_layers: KeepLayers = False,
+    view_layer: ViewLayer = "",
     context: options.OpenGLContext = None,
 ) -> None:
     """Denoise a frame with a trained model.
@@ -69,10 +81,11 @@ def denoise(
     from ...compiler.variants import FULL, with_rank
     from ...kernels import denoise_on, open_executor
     from ...kernels.run.tune import first_time
+    from ...refimpl.encoding import from_display
     from ..files import exr
 
-    check_output(output, (".exr", ".png"), [model, frame])
-    network, noisy = load_model(model), exr.read_frame(frame, finite=False, tell=say)
+    check_output(output, (".exr",) if keep_layers else (".exr", ".png"), [model, frame])
+    network, noisy = load_model(model), exr.read_frame(frame, False, say, view_layer)
     need_layers(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )
@@ -81,7 +94,11 @@ def denoise(
     with open_executor(executor.value) as runner:
         result = denoise_on(runner, network, noisy, profile, schedule, with_rank(variant or FULL, rank))
         first = first_time(runner, result.kernel, result.seconds_compile)
-    write_denoised(output, result.image, network, noisy)
+    if keep_layers:
+        linear = from_display(result.image, network.normalization.exposure_stops)
+        say(f"{output}: layer {exr.write_beside(output, frame, linear, view_layer)} is the denoised picture")
+    else:
+        write_denoised(output, result.image, network, noisy)
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")
     say(f"schedule {result.schedule}; {result.reason}")
     if result.variant:

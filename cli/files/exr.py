@@ -8,6 +8,8 @@
 3. The picture is the data window; where it lies in the display window does not matter to a denoiser.
 4. A depth of 1e9 or more in a file of another program stands for a miss and is read as 0, as ours are.
 5. What comes from a file is checked before anything else sees it; errors start with the file's name.
+6. A denoised picture can be written beside all channels of the file that it was made of, as a layer of its
+   own, for a compositor [`write_beside`].
 """
 
 from __future__ import annotations
@@ -66,6 +68,12 @@ COMPONENTS: Mapping[int, tuple[tuple[str, ...], ...]] = {
 }
 """Last parts of the channels' names of a layer of 3 or 1 channels, lower case, best first."""
 
+DENOISED = "wamnet"
+"""Layer of a denoised picture among another program's channels."""
+
+BOUND = ("channels", "chunkCount", "compression", "name", "tiles", "type", "version")
+"""Attributes that say how a file was written; another one has its own."""
+
 INFO_PREFIX = "wamnet."
 """Before each name of the frame's info among the file's attributes, so that it meets no other program's."""
 
@@ -93,25 +101,52 @@ def write_frame(path: Path, frame: Frame) -> None:
         for layer, values in frame.layers.items()
         for index, name in enumerate(CHANNELS[layer])
     }
-    header = {"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}
-    header |= {INFO_PREFIX + name: text for name, text in frame.info.items()}
+    _write(path, openexr, channels, {INFO_PREFIX + name: text for name, text in frame.info.items()})
+
+
+def write_beside(path: Path, source: Path, color: Floats, view_layer: str = "") -> str:
+    """Write all channels of `source` as they are, and linear colour (H, W, 3) as a layer [`DENOISED`] more.
+
+    It is beside the colour of its view layer, in place of an earlier one. Returns the layer's name.
+    """
+    channels, header = _read_channels(source)
+    planes = _layer(source, "color", _group(_of_view_layer(source, channels, view_layer)))
+    if planes is None:
+        names = ", ".join(sorted(channels))
+        raise InputError(f"{source}: list of channels", names, "no colour is among them", "export it too")
+    beside = planes[0].name.rpartition(".")[0].rpartition(".")[0]
+    layer = f"{beside}.{DENOISED}" if beside else DENOISED
+    kept = {name: channel.pixels for name, channel in channels.items()}
+    own = zip("RGB", np.moveaxis(np.asarray(color, np.float32), -1, 0), strict=True)
+    kept |= {f"{layer}.{name}": np.ascontiguousarray(plane) for name, plane in own}
+    facts = {name: value for name, value in header.items() if name not in BOUND}
+    _write(path, need("OpenEXR", "to write EXR files", "files"), kept, facts)
+    return layer
+
+
+def _write(path: Path, openexr: Any, channels: Mapping[str, Any], header: Mapping[str, Any]) -> None:
+    """Write channels (H, W), losslessly compressed, all of them or nothing."""
+    form = {"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}
     with replacing(path) as new:
         try:
             with _quiet():
-                openexr.File(header, channels).write(str(new))
+                openexr.File({**header, **form}, dict(channels)).write(str(new))
         except (RuntimeError, ValueError, TypeError) as error:
             # The package tells a full disk in this way, with the temporary file's name.
             reason = " ".join(str(error).replace(str(new), str(path)).split())
             raise unwritable(path, RuntimeError(reason)) from None
 
 
-def read_frame(path: Path, finite: bool = True, tell: Callable[[str], None] | None = None) -> Frame:
+def read_frame(
+    path: Path, finite: bool = True, tell: Callable[[str], None] | None = None, view_layer: str = ""
+) -> Frame:
     """Read the known layers of an EXR file as a float32 frame that is valid, `finite` or not.
 
-    `tell` is given a sentence on layers that stand under other names than ours, and on depths of misses.
+    `tell` is given a sentence on layers that stand under other names than ours, and on depths of misses. Of a
+    file with several view layers the one that is named is read.
     """
     channels, header = _read_channels(path)
-    groups = _group(channels)
+    groups = _group(_of_view_layer(path, channels, view_layer))
     found = {name: planes for name in LAYERS if (planes := _layer(path, name, groups)) is not None}
     layers = {name: _stack(path, name, planes) for name, planes in found.items()}
     told = _taken(found)
@@ -172,6 +207,16 @@ def _check_room(path: Path, headers: Sequence[Any]) -> None:
     check_room(needed, "input file", str(path), "cut the picture, or leave channels out")
 
 
+def _of_view_layer(path: Path, channels: Mapping[str, Any], view_layer: str) -> dict[str, Any]:
+    """Return the channels of a view layer, all of them if none is named."""
+    found = {name: c for name, c in channels.items() if not view_layer or name.startswith(f"{view_layer}.")}
+    if not found:
+        known = dict.fromkeys(name.split(".")[0] for name in sorted(channels) if name.count(".") > 1)
+        rule = f"no channel's name begins so; those of the file begin with {', '.join(known) or 'no name'}"
+        raise InputError(f"{path}: view layer", view_layer, rule, "name one of these, or leave it out")
+    return found
+
+
 def _group(channels: Mapping[str, Any]) -> dict[str, dict[str, Group]]:
     """Group channels by layer: alias of the layer -> full prefix -> last part of the name -> pixels."""
     groups: dict[str, dict[str, dict[str, Plane]]] = defaultdict(lambda: defaultdict(dict))
@@ -194,7 +239,7 @@ def _layer(path: Path, name: str, groups: Mapping[str, Mapping[str, Group]]) -> 
         if len(whole) > 1:
             text = ", ".join(sorted(whole))
             rule = f"each of them could be {name}"
-            raise InputError(f"{path}: layers", text, rule, "leave one of them out of the file")
+            raise InputError(f"{path}: layers", text, rule, "name one view layer, or leave others out")
         if whole:
             return next(iter(whole.values()))
     return None

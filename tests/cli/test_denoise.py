@@ -8,6 +8,7 @@ import re
 import shutil
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from wamnet.cli.commands import denoise
@@ -215,6 +216,22 @@ def test_refusals_of_compile(refused, here) -> None:
     )
     assert "Invalid value for '--target'" in refused("compile", "model.safetensors", "--target", "basic")
     assert "Missing option '--target'" in refused("compile", "model.safetensors")
+
+
+def test_the_frame_s_layers_are_kept(wamnet, refused, here, picture) -> None:
+    """FRM-7: the same pixels as without, as linear radiance in a layer of their own."""
+    outcome = wamnet("denoise", "model.safetensors", "noisy.exr", "--keep-layers", "-o", "all.exr")
+    assert outcome.status == 0, outcome.err
+    assert "all.exr: layer wamnet is the denoised picture" in outcome.out
+    frame = exr.read_frame(here / "all.exr")
+    before = exr.read_frame(here / "noisy.exr")
+    assert all((frame[name] == values).all() for name, values in before.layers.items())
+    channels = OpenEXR.File(str(here / "all.exr"), separate_channels=True).channels()
+    got = np.stack([channels[f"wamnet.{name}"].pixels for name in "RGB"], axis=-1)
+    assert (got == encoding.from_display(picture, 0.0).astype(np.float32)).all()
+    assert "its name must end in .exr" in refused(
+        "denoise", "model.safetensors", "noisy.exr", "--keep-layers", "-o", "all.png"
+    )
 
 
 def test_refusals_of_denoise(refused, here) -> None:

@@ -315,3 +315,59 @@ def test_our_own_frames_are_read_as_they_are(tmp_path) -> None:
     told: list[str] = []
     assert np.array_equal(exr.read_frame(tmp_path / "own.exr", tell=told.append)["depth"], depth)
     assert told == []
+
+
+# ---- beside another program's layers -----------------------------------------------------------------------
+
+
+def blender_like(*view_layers: str) -> dict[str, Any]:
+    """Return channels as Blender names them, half floats and an integer among them."""
+    rng = np.random.default_rng(4)
+    found: dict[str, Any] = {}
+    for name in view_layers:
+        found |= {f"{name}.Combined.{c}": rng.random((2, 3)).astype(np.float16) for c in "RGBA"}
+        found |= {f"{name}.Normal.{c}": rng.random((2, 3)).astype(np.float32) for c in "XYZ"}
+        found[f"{name}.IndexOB.X"] = rng.integers(0, 9, (2, 3)).astype(np.uint32)
+    return found
+
+
+def test_a_picture_is_written_beside_all_channels_of_its_source(tmp_path: Path) -> None:
+    """FRM-7: types, bits and attributes stay; a second time replaces the first."""
+    given = blender_like("View")
+    source = write(tmp_path / "in.exr", dict(given), BlenderMultiChannel="Blender V2.55.1 and newer")
+    color = np.random.default_rng(5).random((2, 3, 3))
+    for path, taken in ((tmp_path / "a.exr", source), (tmp_path / "b.exr", tmp_path / "a.exr")):
+        assert exr.write_beside(path, taken, color) == "View.wamnet"
+        file = OpenEXR.File(str(path), separate_channels=True)
+        channels = {name: channel.pixels for name, channel in file.parts[0].channels.items()}
+        assert set(channels) == {*given, *(f"View.wamnet.{c}" for c in "RGB")}
+        for name, pixels in given.items():
+            assert channels[name].dtype == pixels.dtype, name
+            assert channels[name].tobytes() == pixels.tobytes()
+        got = np.stack([channels[f"View.wamnet.{c}"] for c in "RGB"], axis=-1)
+        assert (got == color.astype(np.float32)).all()
+        assert file.header()["BlenderMultiChannel"] == "Blender V2.55.1 and newer"
+
+
+def test_a_file_of_ours_gets_a_layer_without_a_prefix(tmp_path: Path) -> None:
+    frame = random_frame(2, 3)
+    exr.write_frame(tmp_path / "in.exr", frame)
+    assert exr.write_beside(tmp_path / "out.exr", tmp_path / "in.exr", np.zeros((2, 3, 3))) == "wamnet"
+    again = exr.read_frame(tmp_path / "out.exr")
+    assert again.info == frame.info
+    assert all((again[name] == values).all() for name, values in frame.layers.items())
+
+
+def test_one_of_several_view_layers_is_read_by_its_name(tmp_path: Path) -> None:
+    given = blender_like("front", "back")
+    path = write(tmp_path / "in.exr", dict(given))
+    with pytest.raises(InputError, match=r"back.Combined, front.Combined: each of them could be color"):
+        exr.read_frame(path)
+    for name in ("front", "back"):
+        read = exr.read_frame(path, view_layer=name)["color"]
+        assert (read[..., 0] == given[f"{name}.Combined.R"]).all()
+        assert exr.write_beside(tmp_path / "out.exr", path, read, name) == f"{name}.wamnet"
+    with pytest.raises(InputError, match=r"view layer is left: .* begin with back, front"):
+        exr.read_frame(path, view_layer="left")
+    with pytest.raises(InputError, match="no colour is among them"):
+        exr.write_beside(tmp_path / "out.exr", write(tmp_path / "n.exr", {"Z": plane(1.0)}), read)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -85,28 +84,19 @@ def compare(
     pictures. Exit status 1 if anything is unexplained or the test fails.
     """
     if paths is None:
-        _refuse_given(context, (*OF_PATHS, *OF_SCENE), "without --paths SCENE")
+        options.refuse_given(context, (*OF_PATHS, *OF_SCENE), "without --paths SCENE")
         if image is None or reference is None:
             rule = "it needs IMAGE and REFERENCE, or --paths SCENE"
             raise InputError("wamnet compare", "incomplete", rule, "see wamnet compare --help")
         compare_pictures(image, reference, exposure, as_json)
         return
-    _refuse_given(context, OF_PICTURES, "with --paths")
+    options.refuse_given(context, OF_PICTURES, "with --paths")
     from ...refimpl.light.render import Job
     from ...refimpl.light.transport import Settings
     from ..reports.compare_paths import compare_paths
 
     job = Job(width, height, spp, seed, Settings(max_depth=max_depth), first_sample=sample)
     compare_paths(paths, executor.value, job, time, parameters or [], as_json)
-
-
-def _refuse_given(context: typer.Context, names: Sequence[str], where: str) -> None:
-    """Refuse arguments and options that were given and have no meaning."""
-    for name in names:
-        source = context.get_parameter_source(name)
-        if source is not None and source.name != "DEFAULT":
-            shown = {"parameters": "--set", "image": "IMAGE"}.get(name, f"--{name.replace('_', '-')}")
-            raise InputError("argument", shown, f"it has no meaning {where}", "leave it out")
 
 
 def compare_pictures(image: Path, reference: Path, exposure: float, as_json: bool) -> None:

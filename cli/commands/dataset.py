@@ -6,7 +6,8 @@
    [`compared`].
 3. What is missing or damaged is made by this process, or on a cluster [`make`]; the bytes of every file are
    the same.
-4. `--check` compares every file with its checksum and changes nothing [`check`].
+4. `--from-blender` makes frames of a Blender file in place of a scene [blender/dataset.py].
+5. `--check` compares every file with its checksum and changes nothing [`check`].
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ wamnet dataset minicubes --frames 64 --saturation 0:0.9 --power 0.5:1.5 -o lamps
 wamnet dataset minicubes --frames 1000 --test 100 --size 1024 --spp 1024 -o large
 
 wamnet dataset minicubes --frames 1000 --scheduler tcp://10.0.0.1:8786 -o large
+
+wamnet dataset --from-blender hall.blend --frames 12 --percent 50 --spp 256 -o hall
 
 wamnet dataset --check -o cubes"""
 """Shown below the help of `wamnet dataset`."""
@@ -93,12 +96,40 @@ Scheduler = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Running Dask scheduler whose workers share the work.")
 ]
 
+Output = Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the data set.")]
+OnlyCheck = Annotated[
+    bool, typer.Option("--check", help="Compare the files with their checksums; change nothing.")
+]
+FromBlender = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Frames of this Blender file, in place of a scene.",
+        show_default=False,
+    ),
+]
+NoisySpp = Annotated[int, typer.Option(help="Paths per pixel of a noisy picture of Blender.")]
+Percent = Annotated[int, typer.Option(help="Of the width and height that the Blender file says.")]
+ViewLayer = Annotated[
+    str,
+    typer.Option(metavar="NAME", help="View layer of the Blender file.", show_default="the only one"),
+]
+BlenderProgram = Annotated[
+    str | None,
+    typer.Option(metavar="PROGRAM", help="Blender.", show_default="the package bpy, or blender on the path"),
+]
+
+OF_BLENDER = ("noisy_spp", "percent", "view_layer", "blender")
+"""Options that mean nothing without --from-blender."""
+
+OF_BOTH = ("frames", "test", "outside", "spp", "test_spp", "arc", "seed")
+"""Options that mean the same with it and without."""
+
 
 def dataset(
+    command: typer.Context,
     scene: SceneOrNone = None,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the data set.")
-    ] = Path("dataset"),
+    output: Output = Path("dataset"),
     frames: Annotated[int, typer.Option(help="Frames to train on.")] = 8,
     test: Annotated[int, typer.Option(help="Test frames inside of the ranges, at other draws.")] = 2,
     outside: Outside = 0,
@@ -123,9 +154,12 @@ def dataset(
     sampler: options.SamplerName = Sampler.pcg4d,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    only_check: Annotated[
-        bool, typer.Option("--check", help="Compare the files with their checksums; change nothing.")
-    ] = False,
+    from_blender: FromBlender = None,
+    noisy_spp: NoisySpp = 1,
+    percent: Percent = 100,
+    view_layer: ViewLayer = "",
+    blender: BlenderProgram = None,
+    only_check: OnlyCheck = False,
 ) -> None:
     """Render the frames of a data set: noisy pictures and their targets over an animation.
 
@@ -134,24 +168,47 @@ def dataset(
     interruption the same command resumes where it was; a file that is damaged or missing is made again. The
     number of workers changes no byte.
     """
-    from ...kernels.run.frame_plan import Request, plan
+    from ...kernels.run.frame_plan import plan
 
     if only_check:
         check(output, scene)
         return
-    scene = scene or _missing_scene()
+    if from_blender is not None:
+        numbers_of = (frames, test, outside, spp, test_spp, arc, seed, noisy_spp, percent)
+        _make_from_blender(command, output, (from_blender, *numbers_of, view_layer, blender))
+        return
+    options.refuse_given(command, OF_BLENDER, "without --from-blender")
     chosen = options.parse_parameters(parameters or [])
     numbers = (start, seconds, frames, test, size, spp, seed, max_depth)
     ways = (executor.value, sampler.value, feature_spp, test_spp, outside, arc)
     limits = {"--yaw": yaw, "--pitch": pitch, "--distance": distance, "--saturation": saturation}
-    ranges = (text and options.parse_limits(option, text) for option, text in limits.items())
-    request = Request(scene, chosen, *numbers, *ways, *ranges)  # type: ignore[arg-type]
-    request = replace(
-        request, seen=seen, power=None if power is None else options.parse_limits("--power", power)
-    )
+    request = _request((scene or _missing_scene(), chosen, *numbers, *ways), limits, seen, power)
     _check_workers(workers, scheduler)
     with hint_on_interrupt(lambda: f"the same command resumes where it was, in {output}"):
         make(output, request, plan(request), workers, scheduler)
+
+
+def _request(
+    first: tuple[Any, ...], limits: Mapping[str, str | None], seen: bool, power: str | None
+) -> Request:
+    """Return the request of its first fields, of the texts of its ranges by option, and of the last two."""
+    from ...kernels.run.frame_plan import Request
+
+    ranges = (text and options.parse_limits(option, text) for option, text in limits.items())
+    factors = None if power is None else options.parse_limits("--power", power)
+    return replace(Request(*first, *ranges), seen=seen, power=factors)
+
+
+def _make_from_blender(command: typer.Context, folder: Path, asked: tuple[Any, ...]) -> None:
+    """Make a data set of a Blender file; `asked` are the fields of what is made of the options."""
+    from .blender.dataset import Asked
+    from .blender.dataset import make as make_it
+
+    known = {*OF_BOTH, *OF_BLENDER, "from_blender", "output"}
+    others = [each.name for each in command.command.params if each.name and each.name not in known]
+    options.refuse_given(command, others, "with --from-blender")
+    with hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"):
+        make_it(folder, Asked(*asked))
 
 
 def _missing_scene() -> str:

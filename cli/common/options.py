@@ -411,3 +411,13 @@ def _parse_light(text: str) -> tuple[int, Vector]:
 def parse_names(text: str) -> tuple[str, ...]:
     """Return names that are separated by commas."""
     return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def refuse_given(context: typer.Context, names: Sequence[str], where: str) -> None:
+    """Refuse arguments and options that were given and have no meaning."""
+    for name in names:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name != "DEFAULT":
+            option = f"--{name.replace('_', '-')}"
+            shown = {"parameters": "--set", "image": "IMAGE", "scene": "SCENE"}.get(name, option)
+            raise InputError("argument", shown, f"it has no meaning {where}", "leave it out")

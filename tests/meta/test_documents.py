@@ -5,7 +5,9 @@
 2. A block after `<!-- in a clone -->` runs in the repository's root, and writes nothing there.
 3. What a block prints must be the `text` block that follows it after `<!-- printed -->`, to the letter;
    `pytest --update-golden tests/meta/test_documents.py` writes it.
-4. A block after `<!-- not run: reason -->` is left out and reported, with its reason, as a skipped test. Only
+4. A block after `<!-- with Blender -->` runs where the package bpy is, with the project's `examples` in the
+   folder; elsewhere the document is reported as a skipped test.
+5. A block after `<!-- not run: reason -->` is left out and reported, with its reason, as a skipped test. Only
    set-up may be marked so, for CI runs that itself [`SETUP`].
 """
 
@@ -15,6 +17,7 @@ import os
 import re
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,7 +35,7 @@ SETUP = re.compile(
 """Commands that need not run here: they make the environment of this test, or CI calls them itself."""
 
 BLOCK = re.compile(
-    r"(?:<!-- (?:not run: (?P<reason>.+?)|(?P<clone>in a clone)) -->\s*)?"
+    r"(?:<!-- (?:not run: (?P<reason>.+?)|(?P<clone>in a clone)|(?P<blender>with Blender)) -->\s*)?"
     r"^```(?P<language>sh|python)\n(?P<text>.*?)^```$"
     r"(?:\s*<!-- printed -->\s*```text\n(?P<printed>.*?)^```$)?",
     re.MULTILINE | re.DOTALL,
@@ -45,7 +48,7 @@ SECONDS_AT_MOST = 300
 
 class Block(NamedTuple):
     """A fenced block: where it starts, why it is not run (or None), its language and its text; whether it
-    runs in the repository's root, and what it prints (or None)."""
+    runs in the repository's root, what it prints (or None), and whether it wants Blender."""
 
     where: str
     reason: str | None
@@ -53,6 +56,7 @@ class Block(NamedTuple):
     text: str
     clone: bool = False
     printed: str | None = None
+    blender: bool = False
 
 
 def blocks(name: str, text: str) -> list[Block]:
@@ -64,6 +68,7 @@ def blocks(name: str, text: str) -> list[Block]:
             m["text"],
             m["clone"] is not None,
             m["printed"],
+            m["blender"] is not None,
         )
         for m in BLOCK.finditer(text)
     ]
@@ -119,8 +124,12 @@ def rewrite(path: Path, block: Block, printed: str) -> None:
 @pytest.mark.parametrize("document", ALL)
 @pytest.mark.needs("programs")
 def test_commands_of_a_document(document: str, tmp_path: Path, pytestconfig: pytest.Config) -> None:
+    wanting = [block for block in ALL[document] if block.blender]
+    if wanting:
+        (tmp_path / "examples").symlink_to(ROOT / "examples")
+    here = not wanting or find_spec("bpy") is not None
     for block in ALL[document]:
-        if block.reason is None:
+        if block.reason is None and (here or not block.blender):
             found = run(block, tmp_path)
             if block.printed is not None and pytestconfig.getoption("--update-golden"):
                 rewrite(ROOT / document, block, found)
@@ -130,6 +139,9 @@ def test_commands_of_a_document(document: str, tmp_path: Path, pytestconfig: pyt
                     "pytest --update-golden tests/meta/test_documents.py, and read the difference"
                 )
     assert ALL[document] or document != "README.md", "README.md shows at least one command"
+    if not here:
+        what = f"{len(wanting)} blocks of {document} are not run"
+        pytest.skip(f"MISSING: {what}: no Blender as a Python module; pip install --no-deps bpy")
 
 
 @pytest.mark.parametrize(

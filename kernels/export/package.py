@@ -172,7 +172,7 @@ def _hosted(request: Request) -> Request:
         raise InputError("--target", request.target, rule, "leave it out, or leave --host out")
     scene = None if request.scene is None else request.scene.name
     two = vary(parse(request.variant), request.model).rank > 0
-    host.check(scene, request.motion is not None, two, request.variant)
+    host.check(scene, request.motion is not None, two, request.variant, request.model.features)
     weights, schedule = request.weights or host.weights, request.schedule or host.schedule
     return replace(request, weights=weights, schedule=schedule)
 

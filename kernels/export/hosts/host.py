@@ -67,7 +67,8 @@ class Host:
 
     `run`: commands of a shell in the export's folder; `needs`: what must be there; `sees`: what it draws.
     `scenes`, `ranks`: whether it runs kernels of paths, and a first layer in two kernels. `weights`,
-    `schedule`: those that it wants, where they are not the target's usual ones.
+    `schedule`: those that it wants, where they are not the target's usual ones. `features`: those that it can
+    make, where it makes them itself.
     """
 
     name: str
@@ -84,6 +85,7 @@ class Host:
     ranks: bool = True
     weights: str = ""
     schedule: str = ""
+    features: Sequence[str] = ()
 
     def contents(self, facts: Mapping[str, Any]) -> dict[str, bytes]:
         """Return its files by name, for an export of which the manifest says `facts`."""
@@ -99,8 +101,14 @@ class Host:
             "storage": {"name": self.storage.name, "added": self.storage.added, "why": self.storage.why},
         }
 
-    def check(self, scene: str | None, moving: bool, two_kernels: bool, variant: str) -> None:
+    def check(
+        self, scene: str | None, moving: bool, two_kernels: bool, variant: str, features: Sequence[str]
+    ) -> None:
         """Refuse what it does not run."""
+        lacking = [name for name in features if self.features and name not in self.features]
+        if lacking:
+            rule = f"host {self.name} has no such features, but {', '.join(self.features)}"
+            raise InputError("features of the model", ", ".join(lacking), rule, "train it with these")
         if scene is not None and not self.scenes:
             rule = f"the program of host {self.name} denoises, and traces no paths"
             raise InputError("--scene", scene, rule, "leave it out, or export with --target and no --host")

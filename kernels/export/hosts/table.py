@@ -52,6 +52,18 @@ ROWS = (
         scenes=True,
     ),
     Host(
+        "blender",
+        "an add-on for Blender 4.2 or newer",
+        "c",
+        ("__init__.py", "denoiser.py", "check.py", "library.c", "Makefile"),
+        "make run",
+        "make, a C compiler, and Blender, or Python with the package bpy",
+        "seen.ppm",
+        ("wamnet_check.py",),
+        {"host.h": calls.header},
+        features=("color", "highlights", "normal", "albedo", "position", "depth"),
+    ),
+    Host(
         "opencl",
         "a program in C99 that loads OpenCL's library itself",
         "opencl",

@@ -6,12 +6,14 @@ shows: never a green test.
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -25,8 +27,11 @@ from wamnet.kernels.export.hosts.table import HOSTS
 from wamnet.kernels.export.package import Request, export
 from wamnet.kernels.export.shelf import random_model
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
+from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization, channels_of, feature_image
 
 ROOT = Path(__file__).resolve().parents[3]
 """The repository's root folder."""
@@ -180,6 +185,95 @@ def test_the_program_in_cpp_is_right(compiler, tmp_path):
         f"CXX={compiler}",
         "CXXFLAGS=-O2 -Wall -Wextra -Werror -Wno-unused-function",
     )
+
+
+# ---- Blender --------------------------------------------------------------------------------------
+
+
+def module_of(folder, name):
+    """Return a module of an export's folder, as Blender's Python loads it; it needs NumPy only."""
+    spec = importlib.util.spec_from_file_location(f"exported_{name}", folder / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def model_of(features, normalization=None):
+    """Return a network of random weights on these features."""
+    model = random_model()
+    network = siren.init((16 * channels_of(features), 8, 3), 2.0, 2.0, 5, np.float32)
+    scales = normalization or model.normalization
+    return replace(model, siren=network, features=features, normalization=scales)
+
+
+BLENDER = ("color", "highlights", "normal", "albedo", "depth", "position")
+"""Features that Blender has passes of."""
+
+
+def test_blender_s_passes_are_encoded_as_the_reference_encodes_them(tmp_path):
+    """Each feature, from what its manifest says: a miss, NaN, colours above white and scales of some digits.
+
+    Tolerance: both compute in float64 and round once to float32, whose unit is 2^-24 of numbers up to 1; the
+    two orders of operations may round to neighbours.
+    """
+    scales = Normalization(0.7, 12.345678901234567, (0.1, -2.5, 1e-3), 7.25)
+    model = model_of(BLENDER, scales)
+    folder = written(export(Request(model, "c", host="blender")), tmp_path)
+    module, rng = module_of(folder, "denoiser"), np.random.default_rng(3)
+    shape = 9, 7
+    layers = {
+        "color": rng.lognormal(0.0, 2.0, (*shape, 3)),
+        "normal": rng.uniform(-1.0, 1.0, (*shape, 3)),
+        "albedo": rng.uniform(0.0, 1.1, (*shape, 3)),
+        "depth": rng.uniform(0.0, 20.0, (*shape, 1)),
+        "position": rng.uniform(-9.0, 9.0, (*shape, 3)),
+    }
+    layers = {name: values.astype(np.float32) for name, values in layers.items()}
+    layers["color"][0, 0] = np.nan
+    passes = {module.PASSES[name]: layers[{"highlights": "color"}.get(name, name)].copy() for name in BLENDER}
+    passes["Depth"][1, 2], layers["depth"][1, 2] = 1e10, 0.0
+    images = json.loads((folder / "manifest.json").read_text())["images"]
+    found = np.concatenate(
+        [module.encoded(i, passes[module.PASSES[i["name"]]][..., : i["channels"]]) for i in images], axis=-1
+    )
+    assert [image["name"] for image in images] == list(BLENDER)
+    wanted = feature_image(Frame(layers), BLENDER, scales)
+    assert found.shape == wanted.shape
+    assert np.abs(found.astype(np.float64) - wanted).max() <= 2.0**-24
+
+
+@pytest.mark.needs("devices")
+def test_blender_s_library_is_right_and_notices_other_weights(tmp_path):
+    """What Blender's Python loads, loaded by this one."""
+    needs("make", "cc")
+    whole = made("blender")
+    folder = written(whole, tmp_path)
+    subprocess.run(["make", "-s", "kernels.so"], cwd=folder, check=True)
+    denoiser = module_of(folder, "denoiser").Denoiser(folder)
+    result = denoiser.run([whole.pair.images[image["name"]] for image in whole.manifest["images"]])
+    bound = np.fromfile(folder / "check/bound.f32", "<f4").reshape(result.shape)
+    assert (np.abs(result.astype(np.float64) - whole.pair.output) <= bound).all()
+    weights = folder / "denoise/weights.bin"
+    weights.write_bytes(weights.read_bytes()[:-1] + b"!")
+    with pytest.raises(ValueError, match=r"weights\.bin is not as the manifest says"):
+        module_of(folder, "denoiser").Denoiser(folder)
+
+
+@pytest.mark.needs("devices")
+def test_the_add_on_is_right_inside_blender(tmp_path):
+    needs("make", "cc")
+    if importlib.util.find_spec("bpy") is None:
+        pytest.skip("MISSING: Blender as a Python module; pip install --no-deps bpy")
+    told = run(written(made("blender"), tmp_path), "make", "-s", "run", f"PYTHON={sys.executable}")
+    assert "the add-on has denoised a frame" in told
+    error, allowed = error_of(told)
+    assert error <= allowed
+
+
+def test_a_model_of_what_blender_lacks_is_refused():
+    model = model_of(("color", "unshadowed", "direction"))
+    with pytest.raises(InputError, match="is unshadowed, direction: host blender has no such"):
+        export(Request(model, "c", host="blender"))
 
 
 # ---- OpenCL and Vulkan --------------------------------------------------------------------------------

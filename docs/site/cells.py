@@ -4,7 +4,8 @@
    their order [`executed`]. Other fences are only shown.
 2. What a cell prints stands below it. `show(figure, "what is seen")` puts a Matplotlib figure or a picture
    (H, W, 3) or (H, W) with values in [0, 1] there, with its alternative text.
-3. A cell that raises stops the build, with page and line.
+3. `task(4)` prints what lab 4 leaves to write [tasks.py]; a cell that only does this is not shown itself.
+4. A cell that raises stops the build, with page and line.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from html import escape
 from typing import Any
 
 import numpy as np
+import tasks
 from mkdocs.exceptions import PluginError
 
 CELL = re.compile(r"^```python cell\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -58,7 +60,7 @@ def executed(text: str, where: str, on_cell: Callable[[int], None] | None = None
         if on_cell:
             on_cell(line)
         output = _run(match[1], f"{where}:{line}", namespace)
-        shown = f"```python\n{match[1]}```\n"
+        shown = "" if match[1].startswith("task(") else f"```python\n{match[1]}```\n"
         return f'{shown}\n<div class="output">\n{output}\n</div>\n' if output else shown
 
     return CELL.sub(cell, text)
@@ -67,7 +69,7 @@ def executed(text: str, where: str, on_cell: Callable[[int], None] | None = None
 def _run(code: str, place: str, namespace: dict[str, Any]) -> str:
     """Return the HTML of what a cell prints and shows."""
     output, printed = Output(), io.StringIO()
-    namespace["show"] = output.show
+    namespace |= {"show": output.show, "task": tasks.task}
     try:
         with contextlib.redirect_stdout(printed):
             exec(compile(code, place, "exec"), namespace)

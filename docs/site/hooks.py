@@ -2,7 +2,7 @@
 
 1. Bring in the spec from its folder, the page of the vectors' formats, and a page for each source file that a
    text names [`on_files`]; order the pages as spec/README.md does [`on_config`].
-2. Give clauses their anchors, and execute the cells of the tutorial [`on_page_markdown`].
+2. Give clauses their anchors, and execute the cells of tutorial and course [`on_page_markdown`].
 3. Set formulas, and link what is named [`on_page_content`].
 4. Cut the addresses of other hosts out of the theme's scripts, and refuse a site with a link that leads
    nowhere, or to another host [`on_post_build`].
@@ -138,7 +138,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     uri = page.file.src_uri
     if uri.startswith("spec/"):
         return into_site(chapters.anchored(markdown), uri)
-    if uri.startswith("tutorial/"):
+    if uri.startswith(("tutorial/", "course/")):
         markdown = cells.executed(markdown, f"docs/{uri}")
     return into_site(markdown, f"docs/{uri}")
 

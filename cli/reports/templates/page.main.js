@@ -22,6 +22,11 @@ class Page {
   constructor(data) {
     this.data = data;
     data.numbers.rows = decodeFloats(data.numbers.rows);
+    for (const one of data.variants) {
+      if (typeof one.check === "string") {
+        one.check = data.variants.find((other) => other.name === one.check).check; // another schedule of it
+      }
+    }
     this.state = {
       playing: data.times.length > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches,
       clock: 0,

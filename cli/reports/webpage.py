@@ -27,7 +27,13 @@ if TYPE_CHECKING:
 FOLDER = "templates"
 """Folder of the template and its parts, beside this module."""
 
-SCRIPTS = ("page.scene.js", "page.device.js", "page.renderer.js", "page.main.js")
+SCRIPTS = (
+    "page.scene.js",
+    "page.device.js",
+    "page.renderer.js",
+    "page.reference.js",
+    "page.main.js",
+)
 """The page's scripts, in the order in which they are joined to one module."""
 
 FRAMES = 240

@@ -59,7 +59,7 @@ def test_the_model_s_own_scene_is_shown_at_all_its_times(wamnet, here):
 
 @pytest.mark.slow
 def test_the_page_of_the_shipped_model_is_small(wamnet, tmp_path):
-    """Less than 1.5 MB, as WEB-1 says: a telephone loads it in some seconds."""
+    """As WEB-1 says: a telephone loads it in some seconds."""
     outcome = wamnet("view", "minicubes", "-o", "page.html")
     assert outcome.status == 0, outcome.err
     assert 10**5 < (tmp_path / "page.html").stat().st_size < LARGEST_BYTES

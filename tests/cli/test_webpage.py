@@ -27,6 +27,7 @@ from wamnet.kernels.run import page as P
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Ranges, Variation, outside, saturation_of, varied
+from wamnet.refimpl.metrics import psnr
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model
 
@@ -35,6 +36,7 @@ SETTINGS = Settings(max_depth=2)
 FEATURES = ("color", "normal", "position")
 SCALES = dataset.Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 TIMES = tuple((number + 0.5) / 4 for number in range(8))
+AT_REST = "!wamnet.page.preparing && !wamnet.page.dirty && !wamnet.page.renderer.strips.busy"
 COLORS = [[0.9, 0.2, 0.1], [0.3, 0.4, 0.8]]
 RANGES = Ranges((0.0, 8.0), (-24.0, 24.0), (-8.0, 8.0), (0.9, 1.1), (0.0, 0.5))
 TURN = {"yaw": 25.0, "pitch": 8.0, "distance": 0.9}
@@ -112,15 +114,18 @@ def test_the_paths_are_the_reference_s(still, options):
         assert share_alike(found[..., first : first + 3], expected[..., first : first + 3]) >= 0.99, layer
 
 
-def traced(told, features, seed, rays=None):
-    """Return the reference's sums (H, W, planes) of what a page has drawn, and its scene."""
+def traced(told, features, seed, rays=None, samples=(0, 1)):
+    """Return the reference's sums (H, W, planes) of what a page has drawn, and its scene.
+
+    `samples`: the first one's number, and how many.
+    """
     scene = scenes.canonical("minicubes", time=told["time"])
     camera = replace(scene.camera, position=tuple(told["camera"]["position"]))
     pairs = zip(scene.lights, told["colors"], strict=True)
     lights = tuple(replace(light, color=tuple(color)) for light, color in pairs)
     scene = replace(scene, camera=camera, lights=lights)
     kernel = compile_path(lower_scene(scene, SETTINGS, rays=rays), "numpy", groups=layers_of(features))
-    sums = NumpyExecutor().trace(kernel, Part(SIZE, SIZE, 0, SIZE, 0, 1, seed))
+    sums = NumpyExecutor().trace(kernel, Part(SIZE, SIZE, 0, SIZE, *samples, seed))
     return np.moveaxis(sums, 0, -1), scene
 
 
@@ -213,6 +218,51 @@ def test_the_page_measures_its_own_error(still, data):
     assert still.page.evaluate(moved) > 1
 
 
+def test_the_reference_grows_to_that_of_the_reference_implementation(still):
+    """Samples 1 to 24 of the moment that is shown, with sample 0 in the noisy picture; then its distances."""
+    page = still.page
+    page.evaluate("wamnet.go(); wamnet.page.turn({ yaw: 20 }); wamnet.page.change({ samples: 24 })")
+    page.evaluate(f"wamnet.page.change({{ size: {SIZE} }})")
+    page.locator("#variant").select_option("full")
+    still.until(f"wamnet.page.state.variant === 'full' && {AT_REST}")
+    page.locator("#compare").click()
+    still.until(
+        "wamnet.page.reference.count === 24 && document.getElementById('status').textContent.endsWith('dB.')"
+    )
+    told = page.evaluate(
+        "({ ...wamnet.page.moment, time: wamnet.page.data.times[wamnet.page.moment.frame] })"
+    )
+    expected, _ = traced(told, FEATURES, still.state("seed"), samples=(1, 24))
+    assert share_alike(read(still, "reference_sums")[..., :3], expected[..., :3]) >= 0.97
+    clean, noisy, picture = (read(still, name)[..., :3] for name in ("reference", "color", "picture"))
+    encoded = dataset.FEATURES["color"].encode(
+        read(still, "reference_sums")[..., :3].astype(float) / 24, SCALES
+    )
+    assert np.abs(clean - encoded).max() <= 1e-5  # powers of GLSL ES have no bound; a step of 8 bits is 4e-3
+    for name, image in (("noisy-psnr", noisy), ("denoised-psnr", picture)):
+        assert still.text(name) == f"{psnr(image, clean):.1f} dB"
+    assert still.text("denoised-rms") == f"{np.sqrt(np.mean((picture.astype(float) - clean) ** 2)):.4f}"
+    assert still.text("counted") == "24 of 24 samples"
+    assert (still.state("left"), still.text("right-label")) == ("picture", "Reference")
+    # Another network is compared with the same samples, another moment with its own.
+    page.evaluate("wamnet.page.reference.marked = wamnet.page.reference.moment")
+    page.locator("#variant").select_option("fast-texture")
+    still.until(f"wamnet.page.state.variant === 'fast-texture' && {AT_REST}")
+    assert psnr(other := read(still, "picture")[..., :3], clean) != psnr(picture, clean)
+    assert still.text("denoised-psnr") == f"{psnr(other, clean):.1f} dB"
+    assert page.evaluate("wamnet.page.reference.marked === wamnet.page.reference.moment")
+    page.evaluate("wamnet.page.turn({ yaw: 10 })")
+    still.until(
+        "wamnet.page.reference.marked !== wamnet.page.reference.moment && wamnet.page.reference.count === 24"
+    )
+    page.locator("#compare").click()
+    assert (still.state("left"), still.state("right")) == ("color", "picture")
+    assert not page.locator("#compared").is_visible()
+    page.evaluate("wamnet.page.turn(wamnet.parts.REST)")
+    page.locator("#variant").select_option("full")
+    still.until("wamnet.page.state.variant === 'full' && !wamnet.page.preparing")
+
+
 # ---- behaviour -------------------------------------------------------------------------------------------
 
 
@@ -266,8 +316,9 @@ FITS = """[...document.querySelectorAll("main, main *")].every((element) =>
   element.getBoundingClientRect().right <= document.querySelector("header").getBoundingClientRect().right)"""
 """Nothing reaches over the edge that the title keeps."""
 
-BELOW = """[...document.querySelectorAll("figure > *, .controls, footer")].map((element) =>
-  element.getBoundingClientRect().top + scrollY)"""
+BELOW = """[...document.querySelectorAll("figure > *, .controls, footer")]
+  .filter((element) => element.getClientRects().length)
+  .map((element) => element.getBoundingClientRect().top + scrollY)"""
 """Where everything around the sentence is in the document."""
 
 

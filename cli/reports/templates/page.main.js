@@ -11,7 +11,15 @@ const VERY_SLOW_MS = 1500; // a picture that takes longer is no animation
 const REST_MS = 100; // is left this long, at most, to the rest of the page before the next one
 const GRAB_PX = 18; // how near to the line a pointer takes hold of it
 const DEGREES_PER_PX = 0.4;
-const LABELS = { color: "1 sample per pixel", normal: "Normals", albedo: "Albedo", picture: "Denoised" };
+const LABELS = {
+  color: "1 sample per pixel",
+  normal: "Normals",
+  picture: "Denoised",
+  reference: "Reference",
+  difference: "Difference × 4",
+};
+const COMPARED = ["reference", "difference"]; // pictures that there are only while comparing
+const MEASURE_MS = 400; // between two measurements of the distance from the reference
 const TELL_MS = 250; // what is outside is said at most that often: a slider moves in many steps
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 const REST = { yaw: 0, pitch: 0, distance: 1 };
@@ -38,6 +46,8 @@ class Page {
       right: "picture",
       wipe: 0.5,
       seed: 0,
+      comparing: false,
+      samples: COUNTS[1],
     };
     this.auto = { size: AUTO_START, frames: 0, limit: AUTO_LARGEST };
     this.dirty = true;
@@ -57,6 +67,7 @@ class Page {
     try {
       this.device = new Device(canvas, this.leastBuffers());
       this.renderer = new Renderer(this.device, this.data);
+      this.reference = new Reference(this.renderer);
     } catch (error) {
       this.trouble(error);
       throw error;
@@ -134,6 +145,7 @@ class Page {
   restored() {
     this.device.setUp(this.leastBuffers());
     this.renderer.build();
+    this.reference = new Reference(this.renderer);
     this.checks.clear();
     return this.choose(this.state.variant);
   }
@@ -167,11 +179,96 @@ class Page {
     }
     renderer.strips.tick(now);
     const rested = performance.now() >= (this.restUntil || 0);
-    if (this.dirty && rested && !this.held && !renderer.strips.busy && renderer.variant(state.variant).ready) {
+    if (this.dirty && rested && !this.held && !this.reference.adding && !renderer.strips.busy && renderer.variant(state.variant).ready) {
       this.dirty = false;
       this.drawNext();
       renderer.strips.tick(now);
+    } else if (this.isAdding() && rested && !this.held && !renderer.strips.busy) {
+      this.addNext();
+      renderer.strips.tick(now);
     }
+  }
+
+  // ---- the reference ----------------------------------------------------------------------------------
+
+  /** Start or end the comparison with a reference of this moment. */
+  compare(comparing) {
+    const { state } = this;
+    if (comparing === state.comparing) {
+      return;
+    }
+    if (comparing && state.playing) {
+      this.play(false);
+    }
+    const sides = comparing ? { left: "picture", right: "reference" } : this.sidesBefore;
+    this.sidesBefore = { left: state.left, right: state.right };
+    this.compared = null;
+    this.change({ comparing, ...sides });
+    find("left").value = sides.left;
+    find("right").value = sides.right;
+    for (const name of COMPARED) {
+      document.querySelectorAll(`option[value=${name}]`).forEach((one) => (one.disabled = !comparing));
+    }
+    find("compare").textContent = comparing ? "End the comparison" : "Compare with the reference";
+    find("compared").hidden = !comparing;
+    this.tellWipe();
+    this.tellCompared();
+    if (comparing) {
+      this.say(`Rendering a reference of ${state.samples} samples per pixel.`);
+    }
+  }
+
+  isAdding() {
+    const { state, reference, moment } = this;
+    if (!state.comparing || !moment || this.preparing || reference.adding) {
+      return false;
+    }
+    if (!reference.isOf(moment)) {
+      reference.start(moment);
+      this.compared = null;
+    }
+    return reference.count < state.samples;
+  }
+
+  async addNext() {
+    const { reference, state } = this;
+    try {
+      await reference.add(state.samples);
+    } catch (error) {
+      if (!(error instanceof Lost)) {
+        this.trouble(error);
+        throw error;
+      }
+      return;
+    }
+    if (!state.comparing) {
+      return;
+    }
+    this.show();
+    const now = performance.now();
+    const done = reference.count >= state.samples;
+    if (done || !this.compared || now - this.comparedAt > MEASURE_MS) {
+      this.comparedAt = now;
+      this.compared = reference.measure();
+    }
+    this.tellCompared();
+    if (done) {
+      const { noisy, denoised } = this.compared;
+      const told = `${noisy.toFixed(1)} dB, the denoised one ${denoised.toFixed(1)} dB`;
+      this.say(`The reference has ${reference.count} samples per pixel: the noisy picture has ${told}.`);
+    }
+  }
+
+  tellCompared() {
+    const { compared, reference, state } = this;
+    const count = compared ? reference.count : 0;
+    find("counted").textContent = `${count} of ${state.samples} samples`;
+    find("counting").max = state.samples;
+    find("counting").value = count;
+    for (const name of ["noisy", "denoised"]) {
+      find(`${name}-psnr`).textContent = compared ? `${compared[name].toFixed(1)} dB` : "-";
+    }
+    find("denoised-rms").textContent = compared ? compared.rms.toFixed(4) : "-";
   }
 
   async drawNext() {
@@ -179,7 +276,10 @@ class Page {
     state.seed = state.playing ? (state.seed + 1) >>> 0 : state.seed;
     const size = state.size === "auto" ? this.auto.size : state.size;
     try {
-      const ms = await this.renderer.draw(this.request(size));
+      const request = this.request(size);
+      const ms = await this.renderer.draw(request);
+      this.moment = request;
+      this.compared = null; // the reference may be the same, the picture is another
       this.restUntil = performance.now() + (ms > SLOW_MS ? Math.min(REST_MS, ms / 4) : 0);
       this.measured(size, ms);
       this.show();
@@ -234,7 +334,7 @@ class Page {
       find("pixels").textContent = `${size} × ${size}`;
     }
     const { auto } = this;
-    if (this.state.size !== "auto" || ++auto.frames < AUTO_FRAMES) {
+    if (this.state.comparing || this.state.size !== "auto" || ++auto.frames < AUTO_FRAMES) {
       return;
     }
     const place = SIZES.indexOf(size);
@@ -249,7 +349,13 @@ class Page {
 
   show() {
     const { left, right, wipe } = this.state;
-    this.renderer.show(left, right, wipe);
+    const { image } = this.reference;
+    const clean = this.state.comparing && this.reference.size === this.renderer.size ? image : null;
+    this.renderer.show(left, right, wipe, clean);
+    if (clean && !this.compared && !this.renderer.strips.busy) {
+      this.compared = this.reference.measure(); // after another network was chosen
+      this.tellCompared();
+    }
   }
 
   // ---- what is said -----------------------------------------------------------------------------------
@@ -353,15 +459,17 @@ class Page {
   fill() {
     const { data } = this;
     const option = (value, text) => new Option(text, value);
-    const images = ["color", "normal", "picture"];
     for (const side of ["left", "right"]) {
-      find(side).append(...images.map((name) => option(name, LABELS[name])));
+      find(side).append(...Object.keys(LABELS).map((name) => option(name, LABELS[name])));
+      COMPARED.forEach((name) => (find(side).querySelector(`[value=${name}]`).disabled = true));
       find(side).value = this.state[side];
     }
     find("size").append(
       option("auto", "as the device can"),
       ...SIZES.map((size) => option(size, `${size} × ${size}`)),
     );
+    find("samples").append(...COUNTS.map((count) => option(count, `${count} samples per pixel`)));
+    find("samples").value = this.state.samples;
     find("variant").append(...data.variants.map((one) => option(one.name, variantText(one))));
     find("time").max = data.times.length - 1;
     find("animation").hidden = data.times.length < 2;
@@ -407,6 +515,9 @@ class Page {
   }
 
   play(playing) {
+    if (playing) {
+      this.compare(false);
+    }
     this.change({ playing });
     this.tellPlaying();
     this.say(playing ? "The animation is playing." : "The animation is paused.");
@@ -451,6 +562,11 @@ class Page {
     on("size", "change", (value) => {
       this.times = [];
       this.change({ size: value === "auto" ? value : Number(value) });
+    });
+    on("compare", "click", () => this.compare(!this.state.comparing));
+    on("samples", "change", (value) => {
+      this.state.samples = Number(value); // more are added to those that there are
+      this.tellCompared();
     });
     on("variant", "change", (value) => this.choose(value));
     for (const side of ["left", "right"]) {
@@ -557,7 +673,12 @@ function hook(page, started) {
     },
     /** Floats (RGBA, rows from the top) of an image as base64. */
     read(name) {
-      const bytes = new Uint8Array(page.renderer.read(name).buffer);
+      const { reference } = page;
+      const floats =
+        name === "reference" ? page.device.read(reference.encoded, reference.place)
+        : name === "reference_sums" ? page.device.read(reference.sums[0], 0)
+        : page.renderer.read(name);
+      const bytes = new Uint8Array(floats.buffer);
       let text = "";
       for (let i = 0; i < bytes.length; i += 4096) {
         text += String.fromCharCode(...bytes.subarray(i, i + 4096));

@@ -10,7 +10,7 @@ class Strips {
   constructor(device) {
     this.device = device;
     this.jobs = [];
-    this.pixelMs = new Map(); // by shader: what a pixel is believed to cost
+    this.pixelMs = new Map(); // by shader, or a pass's own key: what a pixel is believed to cost
     this.sync = null;
   }
 
@@ -61,23 +61,24 @@ class Strips {
     while (job.at < job.passes.length && this.guess < BATCH_MS) {
       const pass = job.passes[job.at];
       const size = pass.target.size;
-      const known = this.pixelMs.has(pass.shader);
+      const key = pass.key || pass.shader;
+      const known = this.pixelMs.has(key);
       if (!known && this.batch.size) {
         break; // drivers compile when they draw first: this row is measured alone
       }
-      const cost = (known ? this.pixelMs.get(pass.shader) : 1) * size;
+      const cost = (known ? this.pixelMs.get(key) : 1) * size;
       // Devices shade squares of 2 x 2 pixels: a single row would cost as much as two.
       const fit = known ? Math.max(1, Math.floor((BATCH_MS - this.guess) / (2 * cost))) : 1;
       const rows = Math.min(2 * fit, size - job.row);
       this.device.draw(pass.shader, pass.target, pass.textures, pass.set, [job.row, rows]);
-      this.batch.add(pass.shader);
+      this.batch.add(key);
       job.row += rows;
       if (job.row === size) {
         job.at += 1;
         job.row = 0;
       }
       if (!known) {
-        this.pixelMs.set(pass.shader, BATCH_MS / (16 * size)); // from here on 16 rows, then as measured
+        this.pixelMs.set(key, BATCH_MS / (16 * size)); // from here on 16 rows, then as measured
         this.guess = BATCH_MS;
         this.batch.clear();
       }
@@ -104,8 +105,8 @@ class Strips {
   /** Correct what pixels are believed to cost. */
   learn(ms) {
     const factor = ms <= QUICK_MS ? 0.5 : clamp(ms / Math.max(this.guess, 1), 0.5, 4);
-    for (const shader of this.batch) {
-      this.pixelMs.set(shader, this.pixelMs.get(shader) * factor);
+    for (const key of this.batch) {
+      this.pixelMs.set(key, this.pixelMs.get(key) * factor);
     }
   }
 }
@@ -219,26 +220,28 @@ class Renderer {
     });
   }
 
-  /** Draw a frame; resolve with the milliseconds that it took. */
-  async draw({ size, frame, seed, camera, colors, variant }) {
+  /** The pass that adds up samples of a moment, from a first one on, with one of the kernels of paths. */
+  trace(number, { size, frame, seed, camera, colors }, first, samples) {
     const { gl } = this.device;
-    this.resize(size);
-    const picture = this.pictures[this.shown === this.pictures[0] ? 1 : 0];
     const numbers = sceneNumbers(this.data, frame, camera, colors);
+    const set = (place) => {
+      for (const [name, value] of Object.entries({ width: size, height: size, first_row: 0, samples })) {
+        gl.uniform1i(place(name), value);
+      }
+      gl.uniform1ui(place("first_sample"), first);
+      gl.uniform1ui(place("seed_number"), seed);
+      gl.uniform4fv(place("scene_numbers"), numbers);
+    };
+    return { shader: this.paths[number], target: this.sums[number], textures: {}, set };
+  }
+
+  /** Draw a frame; resolve with the milliseconds that it took. */
+  async draw({ variant, ...moment }) {
+    const { gl } = this.device;
+    this.resize(moment.size);
+    const picture = this.pictures[this.shown === this.pictures[0] ? 1 : 0];
     const images = this.images(picture);
-    const tracing = this.paths.map((shader, i) => ({
-      shader,
-      target: this.sums[i],
-      textures: {},
-      set: (place) => {
-        for (const [name, value] of Object.entries({ width: size, height: size, first_row: 0, samples: 1 })) {
-          gl.uniform1i(place(name), value);
-        }
-        gl.uniform1ui(place("first_sample"), 0);
-        gl.uniform1ui(place("seed_number"), seed);
-        gl.uniform4fv(place("scene_numbers"), numbers);
-      },
-    }));
+    const tracing = this.paths.map((_, i) => this.trace(i, moment, 0, 1));
     const sums = this.sums.map((target) =>
       Object.fromEntries(target.textures.map((texture, i) => [`sums_${i}`, texture])),
     );
@@ -298,8 +301,8 @@ class Renderer {
     return { error, share, bits, bound: bound.reduce((a, b) => Math.max(a, b)) };
   }
 
-  /** Show two images of the last picture, left and right of a line at `wipe` (0 to 1). */
-  show(left, right, wipe) {
+  /** Show two images of the last picture, left and right of a line at `wipe` (0 to 1); `reference`: a texture. */
+  show(left, right, wipe, reference = null) {
     if (!this.shown) {
       return;
     }
@@ -307,11 +310,15 @@ class Renderer {
     if (gl.canvas.width !== this.size) {
       gl.canvas.width = gl.canvas.height = this.size;
     }
-    const images = { ...this.images(this.shown), picture: this.shown.result.textures[0] };
-    this.device.draw(this.screen, null, { left: images[left], right: images[right] }, (place) => {
+    const denoised = this.shown.result.textures[0];
+    const clean = reference || denoised;
+    const images = { ...this.images(this.shown), picture: denoised, reference: clean, difference: denoised };
+    const textures = { left: images[left], right: images[right], clean };
+    this.device.draw(this.screen, null, textures, (place) => {
       gl.uniform1f(place("wipe"), wipe);
       gl.uniform2f(place("is_signed"), left === "normal" ? 1 : 0, right === "normal" ? 1 : 0);
-      const levels = (name) => (name === "picture" ? 1 : this.data.check.levels);
+      gl.uniform2f(place("is_difference"), left === "difference" ? 1 : 0, right === "difference" ? 1 : 0);
+      const levels = (name) => (name in OF_COLOUR ? 1 : this.data.check.levels);
       gl.uniform2f(place("levels"), levels(left), levels(right));
     });
   }
@@ -335,6 +342,8 @@ class Renderer {
   }
 }
 
+const OF_COLOUR = { picture: 1, reference: 1, difference: 1 }; // images that are no feature of a network
+
 const SCREEN = `#version 300 es
 precision highp float;
 precision highp int;
@@ -342,7 +351,9 @@ precision highp sampler2D;
 uniform sampler2D left;
 uniform sampler2D right;
 uniform float wipe;
+uniform sampler2D clean;
 uniform vec2 is_signed;
+uniform vec2 is_difference;
 uniform vec2 levels;
 out vec4 color;
 void main()
@@ -353,6 +364,9 @@ void main()
     vec3 r = texelFetch(right, at, 0).rgb / levels.y;
     l = mix(l, 0.5 + 0.5 * l, is_signed.x);
     r = mix(r, 0.5 + 0.5 * r, is_signed.y);
+    vec3 c = texelFetch(clean, at, 0).rgb;
+    l = mix(l, 4.0 * abs(l - c), is_difference.x);
+    r = mix(r, 4.0 * abs(r - c), is_difference.y);
     color = vec4(gl_FragCoord.x < wipe * float(size.x) ? l : r, 1.0);
 }
 `;

@@ -26,7 +26,7 @@ from wamnet.kernels.devices.numpy_executor import NumpyExecutor
 from wamnet.kernels.run import page as P
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.light.variation import Ranges, Variation, outside, saturation_of, varied
+from wamnet.refimpl.light.variation import Ranges, Variation, lamp_color, outside, saturation_of, varied
 from wamnet.refimpl.metrics import psnr
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model
@@ -290,6 +290,7 @@ def test_controls_work(still):
     page.keyboard.press(".")
     assert still.page.evaluate("wamnet.page.frame()") == 1
     assert page.locator("#time").get_attribute("aria-valuetext") == "0.38 seconds"
+    page.locator("#beyond").check()
     page.locator("#yaw").fill("40")
     assert still.state("turn")["yaw"] == 40
     page.locator("#camera-reset").click()
@@ -300,6 +301,7 @@ def test_controls_work(still):
     assert other == list(scenes.COOL)
     page.locator("#lights-reset").click()
     assert still.state("colors")[0] == list(scenes.WARM)
+    page.locator("#beyond").uncheck()
     page.locator("#size").select_option("96")
     still.until("wamnet.page.renderer.size === 96 && !wamnet.page.renderer.strips.busy")
     page.locator("#left").select_option("normal")
@@ -331,7 +333,7 @@ def text_when(tab, condition):
 def test_what_was_not_learned_is_said_beside_the_picture(still):
     """In one sentence, and nothing below it moves; inside of the ranges there is none."""
     page = still.page
-    page.evaluate("wamnet.go(); wamnet.page.turn(wamnet.parts.REST)")
+    page.evaluate("wamnet.go(); wamnet.page.turn(wamnet.parts.REST); wamnet.page.goBeyond(true)")
     assert text_when(still, "return text === '';") == ""
     before = page.evaluate(BELOW)
     page.locator("#yaw").fill("24")
@@ -354,22 +356,70 @@ def test_what_was_not_learned_is_said_beside_the_picture(still):
     text_when(still, "return text === '';")
     assert page.locator("#outside").get_attribute("aria-live") == "polite"
     assert not page.locator("#unknown-ranges").is_visible()
+    page.evaluate("wamnet.page.goBeyond(false)")
+
+
+def test_camera_and_lights_move_inside_of_what_was_learned(still):
+    """The ranges are beside the sliders; a box lets them go beyond, and back brings all inside again."""
+    page = still.page
+    page.evaluate("wamnet.go(); wamnet.page.turn(wamnet.parts.REST)")
+    ends = "[...document.querySelectorAll('#yaw, #pitch, #distance')].map(one => [+one.min, +one.max])"
+    assert page.evaluate(ends) == [[-24, 24], [-8, 8], [0.9, 1.1]]
+    assert still.text("yaw-range") == "learned: -24° to 24°"
+    assert still.text("distance-range") == "learned: × 0.9 to × 1.1"
+    assert still.text("light-0-saturation-range") == "learned: 0 % to 50 %"
+    assert not page.locator("#light-0-power").is_visible()
+    page.evaluate("wamnet.page.turn({ yaw: 170, pitch: -75, distance: 2 })")
+    assert still.state("turn") == {"yaw": 24, "pitch": -8, "distance": 1.1}
+    page.locator("#light-0-hue").fill("240")
+    page.locator("#light-0-saturation").fill("0.4")
+    assert still.state("colors")[0] == pytest.approx(lamp_color(scenes.WARM, 240 / 360, 0.4), rel=1e-14)
+    assert still.state("colors")[1] == list(scenes.COOL)
+    page.locator("#light-0").fill("#ff0000")
+    assert still.state("colors")[0] == pytest.approx(lamp_color(scenes.WARM, 0.0, 0.5), rel=1e-14)
+    assert text_when(still, "return text === '';") == ""
+    page.locator("#beyond").check()
+    page.locator("#yaw").fill("90")
+    page.locator("#light-0-power").fill("2")
+    page.locator("#light-0-saturation").fill("1")
+    assert still.state("colors")[0] == pytest.approx([2 * sum(scenes.WARM), 0, 0], rel=1e-14)
+    assert (
+        "light 1 is 100 % saturated (0 % to 50 %), 2 times as bright as its own (its own power)"
+        in text_when(still, "return text.includes('bright');")
+    )
+    page.locator("#beyond").uncheck()
+    assert still.state("turn")["yaw"] == 24
+    assert still.state("colors")[0] == pytest.approx(lamp_color(scenes.WARM, 0.0, 0.5), rel=1e-14)
+    page.locator("#lights-reset").click()
+    page.locator("#camera-reset").click()
+    assert still.state("colors") == [list(scenes.WARM), list(scenes.COOL)]
 
 
 @pytest.mark.parametrize("times", [(0.0, 8.0), (1.0, 3.0), (7.0, 9.0)], ids=str)
 @pytest.mark.parametrize("saturation", [None, (0.0, 0.5)], ids=str)
-def test_the_page_says_what_the_reference_says(still, times, saturation):
+@pytest.mark.parametrize("power", [None, (0.5, 2.0)], ids=str)
+def test_the_page_says_what_the_reference_says(still, times, saturation, power):
     """Cameras and colours inside, at the limits and outside of ranges: as many things in both."""
-    ranges, own = replace(RANGES, time_s=times, saturation=saturation), [list(scenes.WARM), list(scenes.COOL)]
+    ranges, own = (
+        replace(RANGES, time_s=times, saturation=saturation, power=power),
+        [list(scenes.WARM), list(scenes.COOL)],
+    )
     lights = [[{"color": color} for color in own]]
     counts = []
     for yaw, pitch, distance in ((0, 0, 1), (24, -8, 1.1), (25, 0, 1), (-40, 9, 0.5), (180, -75, 2)):
-        for picked in (own, [[1, 0, 0], [0.5, 1, 0.5]], [[0.2, 0.9, 0.3], own[1]], [[1, 1, 0.499], own[1]]):
+        for factor, picked in (
+            (1, own),
+            (2.5, own),
+            (0.8, [[1, 0, 0], [0.5, 1, 0.5]]),
+            (1, [[0.2, 0.9, 0.3], own[1]]),
+            (1, [[1, 1, 0.499], own[1]]),
+        ):
             for time in (0.0, 2.0, 3.5, 7.5):
                 colors = [
                     color if color in own else still.page.evaluate(f"wamnet.parts.asBright({color}, {lamp})")
                     for color, lamp in zip(picked, own, strict=True)
                 ]
+                colors = [[factor * channel for channel in color] for color in colors]
                 turn = {"yaw": yaw, "pitch": pitch, "distance": distance}
                 moment = {"time": time, "turn": turn, "colors": colors}
                 given = [json.loads(ranges.to_json()), 8.0, moment, *lights]
@@ -482,6 +532,7 @@ def test_people_who_do_not_see_it_can_use_it(chromium, path, options):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     with chromium.tab(path, **NO_MOTION, **options) as tab:
         tab.page.evaluate("wamnet.ready")
+        tab.page.evaluate("wamnet.page.goBeyond(true)")
         before = tab.page.evaluate(BELOW)
         tab.page.evaluate("wamnet.page.turn({ yaw: -170, pitch: -75, distance: 2 })")
         tab.page.locator("#light-0").fill("#ff0000")

@@ -22,6 +22,8 @@ const COMPARED = ["reference", "difference"]; // pictures that there are only wh
 const MEASURE_MS = 400; // between two measurements of the distance from the reference
 const TELL_MS = 250; // what is outside is said at most that often: a slider moves in many steps
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+const FREE = { yaw: [-180, 180], pitch: [-75, 75], distance: [0.4, 2], saturation: [0, 1], power: [0.25, 4] };
+const LAMP = { hue: "Hue", saturation: "Saturation", power: "Power" }; // controls of a light
 const REST = { yaw: 0, pitch: 0, distance: 1 };
 
 const find = (id) => document.getElementById(id);
@@ -40,6 +42,7 @@ class Page {
       clock: 0,
       turn: { ...REST },
       colors: data.lights.map((light) => light.color),
+      beyond: false, // of what the network has learned
       size: "auto",
       variant: data.variants[0].name,
       left: "color",
@@ -49,6 +52,7 @@ class Page {
       comparing: false,
       samples: COUNTS[1],
     };
+    this.lamps = data.lights.map((light) => lampOf(light.color, light.color));
     this.auto = { size: AUTO_START, frames: 0, limit: AUTO_LARGEST };
     this.dirty = true;
     this.held = false; // a test draws; the loop leaves pictures alone
@@ -413,20 +417,102 @@ class Page {
 
   /** The sentence for a camera and colours at this time; empty inside, and where the network does not say. */
   outside(turn, colors, all = false) {
-    const { data, state } = this;
-    const { ranges } = data.variants.find((one) => one.name === state.variant);
+    const { data } = this;
+    const { ranges } = this.facts();
     const moment = { time: data.times[this.frame()], turn, colors };
     return ranges ? outsideSentence(outside(ranges, data.turn_s, moment, data.lights, all)) : "";
   }
 
-  /** Keep room for the longest sentence, so that nothing below it moves when it appears. */
+  /** Keep room for the longest sentence, so that nothing below it moves when it appears; inside there is none. */
   reserveOutside() {
-    const pure = this.data.lights.map(() => [1, 0, 0]);
-    find("outside-room").textContent = this.outside({ yaw: -179, pitch: -75, distance: 0.45 }, pure, true);
+    const pure = this.data.lights.map(({ color }) => lampColor(color, { hue: 0, saturation: 1, power: 0.25 }));
+    const longest = this.outside({ yaw: -179, pitch: -75, distance: 0.45 }, pure, true);
+    find("outside-room").textContent = this.state.beyond ? longest : "";
+  }
+
+  /** What camera and lights may be: what the network has learned, all there is beyond; null: nothing but its own. */
+  limits() {
+    const { ranges } = this.facts();
+    if (!ranges || this.state.beyond) {
+      return FREE;
+    }
+    const { yaw_deg: yaw, pitch_deg: pitch, distance, saturation, power } = ranges;
+    return { yaw, pitch, distance, saturation, power };
+  }
+
+  facts() {
+    return this.data.variants.find((one) => one.name === this.state.variant);
+  }
+
+  /** Give the controls the limits, say what was learned beside them, and bring camera and lights inside. */
+  limit() {
+    const limits = this.limits();
+    const { ranges } = this.facts();
+    const learned = ranges && { ...ranges, yaw: ranges.yaw_deg, pitch: ranges.pitch_deg };
+    const set = (id, name) => {
+      const pair = limits[name] || [0, 0];
+      Object.assign(find(id), { min: pair[0], max: pair[1], disabled: pair[0] === pair[1] });
+      find(`${id}-range`).textContent = learned && learned[name] ? rangeText(name, learned[name]) : "";
+    };
+    ["yaw", "pitch", "distance"].forEach((name) => set(name, name));
+    this.data.lights.forEach((_, i) => {
+      ["saturation", "power"].forEach((name) => {
+        set(`light-${i}-${name}`, name);
+        find(`light-${i}-${name}`).parentElement.hidden = !limits[name];
+      });
+      find(`light-${i}-hue`).parentElement.hidden = !limits.saturation;
+      find(`light-${i}`).disabled = !limits.saturation;
+    });
+    find("beyond-row").hidden = !ranges;
+    find("beyond").checked = this.state.beyond;
+    this.turn(this.state.turn);
+    this.data.lights.forEach((light, i) => {
+      const isOwn = this.state.colors[i] === light.color;
+      this.light(i, isOwn ? null : this.lamps[i]);
+    });
+    this.reserveOutside();
+  }
+
+  goBeyond(beyond) {
+    this.state.beyond = beyond;
+    this.limit();
+  }
+
+  /** Give a light a hue, a saturation and a power, inside of the limits; null: its own. */
+  light(i, values) {
+    const own = this.data.lights[i].color;
+    const { saturation = null, power = null } = this.limits();
+    const lamp = values ? { ...this.lamps[i], ...values } : lampOf(own, own);
+    const at = lampOf(own, own);
+    if (values) {
+      lamp.saturation = saturation ? clamp(lamp.saturation, ...saturation) : at.saturation;
+      lamp.hue = saturation ? lamp.hue : at.hue;
+      lamp.power = power ? clamp(lamp.power, ...power) : 1;
+    }
+    this.lamps[i] = lamp;
+    const color = values ? lampColor(own, lamp) : own;
+    this.change({ colors: this.state.colors.map((old, k) => (k === i ? color : old)) });
+    this.tellLight(i);
+  }
+
+  tellLight(i) {
+    const { hue, saturation, power } = this.lamps[i];
+    const color = this.state.colors[i];
+    find(`light-${i}`).value = hexFromLinear(color.map((channel) => channel / Math.max(1, ...color)));
+    const told = {
+      hue: [360 * hue, `${Math.round(360 * hue)}°`],
+      saturation: [saturation, `${Math.round(100 * saturation)} %`],
+      power: [power, `× ${power.toFixed(2)}`],
+    };
+    for (const [name, [value, text]] of Object.entries(told)) {
+      find(`light-${i}-${name}`).value = value;
+      find(`light-${i}-${name}`).setAttribute("aria-valuetext", text);
+      find(`light-${i}-${name}-value`).textContent = text;
+    }
   }
 
   tellVariant() {
-    const facts = this.data.variants.find((one) => one.name === this.state.variant);
+    const facts = this.facts();
     const check = this.checks.get(facts.name);
     const number = (x) => (x === 0 ? "0" : x.toExponential(1).replace("e-", "\u00a0·\u00a010⁻").replace(/⁻(\d+)$/, raised));
     find("products").textContent = facts.products.toLocaleString("en");
@@ -435,7 +521,7 @@ class Page {
       facts.name === this.data.variants[0].name ? "it is the full one" : `${(100 * facts.rms_to_first).toFixed(1)} %`;
     find("unknown-ranges").hidden = facts.ranges !== null;
     find("rays").textContent = raysSentence(facts.rays, this.data.rays);
-    this.reserveOutside();
+    this.limit();
     this.tellOutside();
     if (check) {
       const held = check.bits ? check.bits.same : check.share <= 1;
@@ -476,26 +562,42 @@ class Page {
     find("lights").hidden = data.lights.length === 0;
     data.lights.forEach((light, i) => find("light-list").append(this.lightRow(light, i)));
     this.tellTime();
-    this.tellTurn();
+    this.limit();
     this.tellWipe();
     this.tellPlaying();
   }
 
+  /** The controls of a light: a colour to pick, and sliders. */
   lightRow(light, i) {
-    const row = document.createElement("p");
-    row.className = "row";
-    const label = document.createElement("label");
-    label.htmlFor = `light-${i}`;
-    label.textContent = `Light ${i + 1}`;
+    const lamp = document.createElement("div");
+    lamp.className = "lamp";
     const input = document.createElement("input");
     Object.assign(input, { type: "color", id: `light-${i}`, value: hexFromLinear(light.color) });
     input.addEventListener("input", () => {
       const isOwn = input.value === hexFromLinear(light.color);
-      const color = isOwn ? light.color : asBright(linearFromHex(input.value), light.color);
-      this.change({ colors: this.state.colors.map((old, k) => (k === i ? color : old)) });
+      const picked = lampOf(asBright(linearFromHex(input.value), light.color), light.color);
+      this.light(i, isOwn ? null : { ...picked, power: this.lamps[i].power });
     });
-    row.append(label, input);
-    return row;
+    lamp.append(row(`Light ${i + 1}`, input));
+    for (const [name, label] of Object.entries(LAMP)) {
+      const slider = document.createElement("input");
+      const [id, step] = [`light-${i}-${name}`, name === "hue" ? 1 : 0.01];
+      Object.assign(slider, { type: "range", id, min: 0, max: 360, step });
+      slider.setAttribute("aria-label", `${label} of light ${i + 1}`);
+      slider.setAttribute("aria-describedby", `${id}-range`);
+      const unit = name === "hue" ? 360 : 1;
+      slider.addEventListener("input", () => this.light(i, { [name]: Number(slider.value) / unit }));
+      const line = row(label, slider);
+      const [output, range] = [document.createElement("output"), document.createElement("small")];
+      Object.assign(output, { id: `${id}-value`, htmlFor: id });
+      range.id = `${id}-range`;
+      if (name === "hue") {
+        range.className = "hues";
+      }
+      line.append(output, range);
+      lamp.append(line);
+    }
+    return lamp;
   }
 
   /** Take new values, and draw what they change. */
@@ -507,9 +609,11 @@ class Page {
 
   turn(values) {
     const turn = { ...this.state.turn, ...values };
+    const limits = this.limits();
     turn.yaw = ((((turn.yaw + 180) % 360) + 360) % 360) - 180;
-    turn.pitch = clamp(turn.pitch, -75, 75);
-    turn.distance = clamp(turn.distance, 0.4, 2);
+    for (const name of Object.keys(REST)) {
+      turn[name] = clamp(turn[name], ...limits[name]);
+    }
     this.change({ turn });
     this.tellTurn();
   }
@@ -556,9 +660,9 @@ class Page {
     }
     on("camera-reset", "click", () => this.turn(REST));
     on("lights-reset", "click", () => {
-      this.data.lights.forEach((light, i) => (find(`light-${i}`).value = hexFromLinear(light.color)));
-      this.change({ colors: this.data.lights.map((light) => light.color) });
+      this.data.lights.forEach((_, i) => this.light(i, null));
     });
+    find("beyond").addEventListener("change", (event) => this.goBeyond(event.target.checked));
     on("size", "change", (value) => {
       this.times = [];
       this.change({ size: value === "auto" ? value : Number(value) });
@@ -578,30 +682,46 @@ class Page {
     this.listenToPicture(find("picture"));
   }
 
-  /** Drag to turn, drag the line to wipe; keys do both. */
+  /** Drag to turn, drag the line to wipe, two fingers to come closer; keys do all of it. */
   listenToPicture(canvas) {
     let held = null;
+    const pointers = new Map();
     const share = (event) => {
       const box = canvas.getBoundingClientRect();
       return (event.clientX - box.left) / box.width;
     };
+    const apart = () => {
+      const [a, b] = [...pointers.values()];
+      return Math.max(1, Math.hypot(a.x - b.x, a.y - b.y));
+    };
     canvas.addEventListener("pointerdown", (event) => {
+      pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
       const width = canvas.getBoundingClientRect().width;
       const near = Math.abs(share(event) - this.state.wipe) * width <= GRAB_PX;
       held = { near, x: event.clientX, y: event.clientY, turn: this.state.turn };
+      held.apart = pointers.size === 2 ? apart() : null;
       canvas.setPointerCapture(event.pointerId);
     });
     canvas.addEventListener("pointermove", (event) => {
-      if (held && held.near) {
+      if (!held || !pointers.has(event.pointerId)) {
+        return;
+      }
+      pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+      if (held.apart) {
+        this.turn({ distance: (held.turn.distance * held.apart) / apart() });
+      } else if (held.near) {
         this.wipeTo(share(event));
-      } else if (held) {
+      } else {
         const yaw = held.turn.yaw - DEGREES_PER_PX * (event.clientX - held.x);
         const pitch = held.turn.pitch + DEGREES_PER_PX * (event.clientY - held.y);
         this.turn({ yaw, pitch });
       }
     });
     for (const name of ["pointerup", "pointercancel"]) {
-      canvas.addEventListener(name, () => (held = null));
+      canvas.addEventListener(name, (event) => {
+        pointers.delete(event.pointerId);
+        held = null; // what is left of two fingers turns nothing
+      });
     }
     canvas.addEventListener("keydown", (event) => {
       const { yaw, pitch, distance } = this.state.turn;
@@ -625,6 +745,27 @@ class Page {
       }
     });
   }
+}
+
+/** A labelled row for a control. */
+function row(text, control) {
+  const line = document.createElement("div");
+  line.className = "row";
+  const label = document.createElement("label");
+  Object.assign(label, { htmlFor: control.id, textContent: text });
+  line.append(label, control);
+  return line;
+}
+
+/** A range that a network has learned, in words. */
+function rangeText(name, pair) {
+  const show = {
+    saturation: (x) => `${Math.round(100 * x)} %`,
+    yaw: (x) => `${Number(x.toFixed(1))}°`,
+    pitch: (x) => `${Number(x.toFixed(1))}°`,
+  };
+  const text = show[name] || ((x) => `× ${Number(x.toFixed(2))}`);
+  return `learned: ${pair.map(text).join(" to ")}`;
 }
 
 function raised(_, digits) {
@@ -653,7 +794,7 @@ function hook(page, started) {
   return {
     ready: started,
     page,
-    parts: { Strips, REST, decodeFloats, outside, asBright },
+    parts: { Strips, REST, decodeFloats, outside, asBright, lampColor, lampOf },
     /** Stop the loop's own pictures, and draw one: {size, frame, seed, turn, colors, variant}. */
     async draw(options) {
       page.held = true;

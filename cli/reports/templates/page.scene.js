@@ -98,11 +98,41 @@ function asBright(color, own) {
   return lit.map((channel) => (channel * sum(own)) / sum(lit));
 }
 
-const SATURATION_TOLERANCE = 0.005; // by rounding to eight bits, as refimpl/light/variation.py
+const mean = (color) => color.reduce((sum, channel) => sum + channel, 0) / color.length;
+
+/** Hue and saturation (HSV of linear RGB, each in [0, 1]) of a colour; grey has the hue 0. */
+function hueAndSaturation(color) {
+  const most = Math.max(...color);
+  const span = most - Math.min(...color);
+  if (span === 0) {
+    return { hue: 0, saturation: 0 };
+  }
+  const at = color.indexOf(most);
+  const sixths = (2 * at + (color[(at + 1) % 3] - color[(at + 2) % 3]) / span + 6) % 6;
+  return { hue: sixths / 6, saturation: span / most };
+}
+
+/** A colour with a hue and a saturation, `power` times as bright as `own`, as refimpl/light/variation.py: lamp_color. */
+function lampColor(own, { hue, saturation, power = 1 }) {
+  const pure = [5, 3, 1].map((n) => {
+    const k = (n + 6 * hue) % 6;
+    return 1 - saturation * Math.max(0, Math.min(k, 4 - k, 1));
+  });
+  const factor = (power * mean(own)) / mean(pure);
+  return pure.map((channel) => channel * factor);
+}
+
+/** What a lamp of this colour is, beside its own: hue, saturation, and power as a factor. */
+function lampOf(color, own) {
+  return { ...hueAndSaturation(color), power: mean(color) / mean(own) };
+}
+
+const BRIGHTNESS_TOLERANCE = 0.02; // both by rounding to eight bits, as refimpl/light/variation.py
+const SATURATION_TOLERANCE = 0.005;
 
 /**
- * What of a picture a network has not learned, as refimpl/light/variation.py: outside; lamps are as bright as their
- * own here. Each with its subject and the range; `all`: what could be said, for the longest sentence.
+ * What of a picture a network has not learned, as refimpl/light/variation.py: outside. Each with its subject and the
+ * range; `all`: what could be said, for the longest sentence.
  */
 function outside(ranges, turnSeconds, { time, turn, colors }, lights, all = false) {
   const found = [];
@@ -126,16 +156,27 @@ function outside(ranges, turnSeconds, { time, turn, colors }, lights, all = fals
   check("the camera is", away, turn.distance, ranges.distance, factor);
   colors.forEach((color, i) => {
     const subject = `light ${i + 1} is`;
-    if (color.every((channel, k) => channel === lights[i].color[k])) {
+    const own = lights[i].color;
+    const power = mean(color) / mean(own);
+    const scale = ranges.power ? power : 1;
+    const isOwn = color.every((channel, k) => Math.abs(channel - scale * own[k]) <= 1e-6 * Math.max(channel, scale * own[k]));
+    if (isOwn && !ranges.power) {
       return;
     }
-    if (!ranges.saturation) {
+    if (!isOwn && !ranges.saturation) {
       found.push({ subject, text: "of another colour", range: "its own" });
       return;
     }
-    const saturation = 1 - Math.min(...color) / Math.max(...color);
-    const percent = (x) => `${Math.round(100 * x)} %`;
-    check(subject, `${percent(saturation)} saturated`, saturation, ranges.saturation, percent, SATURATION_TOLERANCE);
+    if (!isOwn) {
+      const { saturation } = hueAndSaturation(color);
+      const percent = (x) => `${Math.round(100 * x)} %`;
+      check(subject, `${percent(saturation)} saturated`, saturation, ranges.saturation, percent, SATURATION_TOLERANCE);
+    }
+    const [low, high] = ranges.power || [1, 1];
+    if (all || power < low * (1 - BRIGHTNESS_TOLERANCE) || power > high * (1 + BRIGHTNESS_TOLERANCE)) {
+      const range = ranges.power ? `${factor(low)} to ${factor(high)}` : "its own power";
+      found.push({ subject, text: `${factor(power)} times as bright as its own`, range });
+    }
   });
   return found;
 }

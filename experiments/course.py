@@ -2,22 +2,29 @@
 
     python experiments/course.py
     python experiments/course.py --lab 1 --missed
+    python experiments/course.py --students 30
 
 1. Right answers are in tests/course/solutions; a wrong one is such an answer with one piece of text replaced
    [tests/course/wrong]. Each was written with the mistake in words, and with words of the explanation.
 2. It is caught when a check fails, and explained when the first finding's likeliest mistake has these words.
 3. Mechanical changes come on top: one sign or number of a right answer is another one [`mutants`], at places
    that are spread over it. They have no explanation; those that change nothing count as not caught.
+4. With `--students` a class of so many is graded, and timed: every third one is right in a lab, the others
+   have the wrong answers in turn [`graded`].
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import importlib.util
 import os
 import re
 import signal
+import subprocess
+import sys
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -123,6 +130,42 @@ def caught(lab: Lab, text: str, folder: Path) -> bool:
         signal.signal(signal.SIGALRM, before)
 
 
+def class_of(students: int, labs: Sequence[Lab], folder: Path) -> int:
+    """Write the folders of a class; return how many of its answers are wrong."""
+    wrong = 0
+    for lab in labs:
+        right = (COURSE / "solutions" / lab.file).read_text(encoding="utf-8")
+        mistakes = answers(lab)
+        for student in range(students):
+            text = right
+            if student % 3:
+                answer = mistakes[student % len(mistakes)]
+                text, wrong = right.replace(answer.old, answer.new, 1), wrong + 1
+            home = folder / f"student{student:02d}"
+            home.mkdir(exist_ok=True)
+            (home / lab.file).write_text(text, encoding="utf-8")
+    return wrong
+
+
+def graded(students: int, labs: Sequence[Lab]) -> str:
+    """Grade a class by the command, and return a table of one row: its size, what is found, and the time."""
+    with tempfile.TemporaryDirectory() as made:
+        folder, output = Path(made, "class"), Path(made, "grades")
+        folder.mkdir()
+        wrong = class_of(students, labs, folder)
+        command = ["-m", "wamnet.cli", "course", "grade", str(folder), "-o", str(output)]
+        start = time.perf_counter()
+        chosen = [word for lab in labs for word in ("--lab", lab.name)]
+        subprocess.run([sys.executable, *command, *chosen], check=True, stdout=subprocess.DEVNULL)
+        seconds = time.perf_counter() - start
+        with (output / "grades.csv").open(encoding="utf-8") as file:
+            marks = [row[lab.name].split("/") for row in csv.DictReader(file) for lab in labs]
+    complete = sum(passed == checks for passed, checks in marks)
+    row = (students, len(labs), students * len(labs) - wrong, wrong, complete, f"{seconds:.0f}")
+    heads = ("students", "labs", "right answers", "wrong answers", "complete", "seconds")
+    return f"| {' | '.join(heads)} |\n|{' --- |' * len(heads)}\n| {' | '.join(map(str, row))} |"
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print a table with a line a lab."""
     parser = argparse.ArgumentParser(
@@ -130,8 +173,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("--lab", nargs="+", default=[lab.name for lab in LABS], help="labs by name or number")
     parser.add_argument("--missed", action="store_true", help="show what is not caught or not explained")
+    parser.add_argument("--students", type=int, default=0, help="grade and time a class of so many instead")
     options = parser.parse_args(arguments)
     labs = [lab_named(word) for word in options.lab]
+    if options.students:
+        print(graded(options.students, labs))
+        return
     rows: list[tuple[Any, ...]] = []
     with tempfile.TemporaryDirectory() as made:
         os.chdir(made)

@@ -59,6 +59,9 @@ EXAMPLE = "window8+rank12"
 AMPLITUDES = {8: 127, 10: 511}
 """Largest hidden value of networks of integers, by its bits."""
 
+HALF_BITS = 16
+"""Bits of half precision (IEEE 754 binary16)."""
+
 LARGEST_DIFFERENCE = 1.0
 """Colours are clipped to [0, 1] by the reference and by every kernel: no two are farther apart."""
 
@@ -244,6 +247,20 @@ def choose_sine(varied: Varied, degree: int) -> Varied:
     return replace(varied, degree=degree)
 
 
+def halve_weights(varied: Varied, bits: int) -> Varied:
+    """Round weights and biases to half precision: 16 bits hold each, and the kernel computes in float32."""
+    _check(f"half{bits}", bits == HALF_BITS, f"there is half{HALF_BITS}", f"half{HALF_BITS}")
+    _check(f"half{bits}", not varied.rank, "factors of a rank are other numbers", "half16 without a rank")
+    largest = max(float(np.abs(array).max(initial=0.0)) for array in (*varied.weights, *varied.biases))
+    limit = float(np.finfo(np.float16).max)
+    _check(f"half{bits}", largest <= limit, f"a weight is {largest:.3g}, and {limit:g} is the largest", FULL)
+    weights, biases = (
+        tuple(array.astype(np.float16).astype(np.float64) for array in arrays)
+        for arrays in (varied.weights, varied.biases)
+    )
+    return replace(varied, weights=weights, biases=biases)
+
+
 def amplitude_of(bits: int) -> int:
     """Return the largest hidden value of a network of integers, by its bits."""
     known = ", ".join(f"whole{known}" for known in AMPLITUDES)
@@ -272,7 +289,7 @@ def _spread(varied: Varied, left: Indices, channels: int) -> Varied:
     return replace(varied, weights=(weight, *varied.weights[1:]), kept=(chosen, *varied.kept[1:]))
 
 
-NARROWER = ("without-", "window", "hidden", "rank", "sine")
+NARROWER = ("without-", "window", "hidden", "rank", "sine", "half")
 """Kinds that integers come after."""
 
 
@@ -295,6 +312,13 @@ KINDS: Mapping[str, Kind] = {
         # A first layer that is narrowed after the cut would not have its rank any more.
         Kind("rank", "a first layer of rank N: rank12", cut_rank, ("without-", "window", "hidden")),
         Kind("sine", "sines of degree N: sine7", choose_sine),
+        # What is narrowed or cut after it would be sums of halves, which are none.
+        Kind(
+            "half",
+            "weights in half precision: half16",
+            halve_weights,
+            ("without-", "window", "hidden", "rank"),
+        ),
         # What is rounded has no weights that could be spread, cut or counted.
         Kind("whole", "integers of 8 or 10 bits, the same bits everywhere: whole8", make_whole, NARROWER),
     )
@@ -326,7 +350,9 @@ def parse(text: str) -> Variant:
         return Variant()
     steps: list[tuple[str, int | str]] = []
     for part in text.split(PLUS):
-        match = re.fullmatch(r"(without-)([a-z]+)|(window|hidden|rank|sine|whole)([1-9][0-9]{0,3})", part)
+        match = re.fullmatch(
+            r"(without-)([a-z]+)|(window|hidden|rank|sine|half|whole)([1-9][0-9]{0,3})", part
+        )
         if match is None:
             rule = f"{part!r} is not an approximation; there are: {KNOWN}"
             raise InputError("variant", text, rule, f"use {FULL}, or some of them, as in {EXAMPLE}")

@@ -263,6 +263,9 @@ def varied(recipe: Recipe, model: Model, name: str) -> tuple[Recipe, Siren]:
     if varied.degree != sine.DEGREE:
         rule = "the degree of a sine is chosen when a kernel is compiled, not trained"
         raise InputError("--variant", name, rule, "leave it out of the name here")
+    if any(kind == "half" for kind, _ in varied.variant.steps):
+        rule = "weights are rounded to halves when a kernel is compiled, not trained"
+        raise InputError("--variant", name, rule, "leave it out of the name here")
     network = varied.model.siren
     found = replace(
         recipe,

@@ -61,6 +61,9 @@ MANIFEST_NAME, README_NAME = "manifest.json", "README.md"
 FILES, DIGEST = "files", "digest"
 """Entries of a manifest that hold the hashes of all files, and the hash of these."""
 
+HALVES_NAME = "weights16.bin"
+"""The weights in half precision, where they are halves (variant half16): half the bytes, the same numbers."""
+
 EXPECTED_NAME = "expected.png"
 """What a host shows of the check pair, as the reference draws it."""
 
@@ -128,6 +131,8 @@ def export(request: Request) -> Export:
     for kernel, folder in _folders(denoiser):
         files |= _written(kernel, folder)
         files |= {f"{folder}/{n}": data for n, data in row.files("denoise", kernel.source).items()}
+    if halves := _halves(denoiser):
+        files[f"denoise/{HALVES_NAME}"] = halves
     programs = _programs(request, row)
     path, encoder, passes = _of_scene(request, row, programs)
     for name, made in (("path", path), ("encode", encoder)):
@@ -270,9 +275,17 @@ def _facts(
             "count": held["weights"]["count"],
             "file": f"denoise/{artifacts.WEIGHTS_NAME}",
             "order": held["weights"]["order"],
+            **({"half": f"denoise/{HALVES_NAME}"} if _halves(denoiser) else {}),
         },
         "limits": list(limits),
     }
+
+
+def _halves(denoiser: Artifact) -> bytes:
+    """Return the weights as little-endian halves, where these are exactly the same numbers; else nothing."""
+    with np.errstate(over="ignore"):  # what is too large becomes infinite, and is no half
+        halves = denoiser.weights.astype("<f2")
+    return halves.tobytes() if np.array_equal(halves.astype(np.float32), denoiser.weights) else b""
 
 
 def _scene(request: Request, programs: PathPrograms | None) -> dict[str, Any] | None:

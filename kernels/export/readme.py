@@ -165,6 +165,7 @@ def _facts(facts: Mapping[str, Any]) -> list[str]:
         *([f"* This assumes: {facts['assumes']}."] if facts["assumes"] else []),
         f"* Window: {window['size']} x {window['size']} pixels, border rule `{window['border']}`.",
         f"* Weights: {weights['count'] or 'all'} numbers, {weights['where']}.",
+        *_halves(facts),
         *_schedule(facts),
         *_speed(facts),
         f"* Output: {facts['output']['encoding'] or 'linear'}.",
@@ -195,6 +196,16 @@ def _schedule(facts: Mapping[str, Any]) -> list[str]:
     others = [name for name in facts["schedules"] if name != picked["name"]]
     besides = f" Others, by `--schedule`: {', '.join(others)}." if others else ""
     return [f"* Schedule: {text(picked)}.{besides}"]
+
+
+def _halves(facts: Mapping[str, Any]) -> list[str]:
+    """Return the line about weights in half precision."""
+    name = facts["weights"].get("half")
+    if name is None:
+        return []
+    return [
+        f"* `{name}` has the same weights as 16-bit floats: widen them when you load, and nothing changes."
+    ]
 
 
 def _speed(facts: Mapping[str, Any]) -> list[str]:

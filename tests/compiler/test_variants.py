@@ -50,8 +50,14 @@ def denoised(model, picture):
     return denoise_pixel(wide, dataset.all_windows(dataset.pad(picture, model.window), model.window))
 
 
-NAMES = ("window3", "window1", "hidden5", "rank4", "without-color", "without-normal")
-COMBINED = ("window3+rank4", "without-normal+window2+hidden5+rank2", "hidden5+window3", "rank3+sine11")
+NAMES = ("window3", "window1", "hidden5", "rank4", "without-color", "without-normal", "half16")
+COMBINED = (
+    "window3+rank4",
+    "without-normal+window2+hidden5+rank2",
+    "hidden5+window3",
+    "rank3+sine11",
+    "window3+half16",
+)
 
 
 @pytest.mark.parametrize("name", ["full", *NAMES, *COMBINED])
@@ -74,6 +80,8 @@ WRONG = {
     "rank4+window3": "window must come before rank, which it would undo",
     "rank4+without-color": "without must come before rank",
     "rank4+hidden5": "hidden must come before rank",
+    "half16+window3": "window must come before half",
+    "half16+rank4": "rank must come before half",
 }
 
 
@@ -158,6 +166,30 @@ def test_the_middle_of_the_window_stays() -> None:
             found = vary(parse(f"window{narrow}"), model).model
             off = np.abs(denoised(found, image()) - denoised(model, image()))
             assert np.all(off <= 2.0**-33)
+
+
+def test_halves_are_the_nearest_and_hold_what_a_kernel_reads() -> None:
+    """Each weight is off by 2^-11 of itself at most; all numbers of the kernel's weights are halves."""
+    model = small(hidden=(8, 8))
+    found = vary(parse("half16"), model)
+    for rounded, before in zip(found.weights, model.siren.weights, strict=True):
+        wide = before.astype(np.float64)
+        assert np.abs(rounded - wide).max() > 0.0
+        # Below 2^-14 halves are 2^-24 apart.
+        assert (np.abs(rounded - wide) <= np.maximum(2.0**-11 * np.abs(wide), 2.0**-25)).all()
+    for target in ("opencl", "c"):
+        held = compile_plan(plan_model(model, target, variant="half16")).weights
+        assert np.array_equal(held.astype(np.float16).astype(np.float32), held)
+
+
+def test_halves_that_cannot_be_are_refused() -> None:
+    model = small()
+    for name, told in (("half8", "there is half16"), ("rank3+half16", "factors of a rank are other numbers")):
+        with pytest.raises(InputError, match=told):
+            vary(parse(name), model)
+    large = tuple(w * np.float32(1e6) for w in model.siren.weights)
+    with pytest.raises(InputError, match="65504 is the largest"):
+        vary(parse("half16"), replace(model, siren=replace(model.siren, weights=large)))
 
 
 def test_the_heaviest_neurons_stay() -> None:

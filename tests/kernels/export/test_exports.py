@@ -18,6 +18,7 @@ from wamnet.compiler.variants import parse, vary
 from wamnet.kernels.export import check, check_pair, runners, targets, tools
 from wamnet.kernels.export.motion import FORMULAS, KINDS, Motion, drawn
 from wamnet.kernels.export.package import Request, export
+from wamnet.kernels.export.shelf import random_model
 from wamnet.kernels.run.denoise_on import images_of
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.light.render import Job, render
@@ -461,3 +462,16 @@ def test_runners_answer_the_vectors_of_the_profile(name):
     verdicts = [judge(kind, case, answer) for (kind, case), answer in zip(asked, told, strict=True)]
     assert [v for v in verdicts if v.failed] == []
     assert any(v.verdict == "pass" for v in verdicts)
+
+
+def test_halves_are_beside_the_weights_where_they_are_the_same_numbers():
+    """EXP-17: widened, 16 bits hold what the kernel reads; an export of the full network has no such file."""
+    whole, full = (export(Request(random_model(), "c", variant=name)) for name in ("half16", "full"))
+    halves = np.frombuffer(whole.files["denoise/weights16.bin"], "<f2")
+    assert (halves.astype("<f4") == np.frombuffer(whole.files["denoise/weights.bin"], "<f4")).all()
+    assert whole.manifest["weights"]["half"] == "denoise/weights16.bin"
+    assert "denoise/weights16.bin" in whole.contents()["README.md"].decode()
+    assert "half" not in full.manifest["weights"]
+    assert "denoise/weights16.bin" not in full.files
+    schema = json.loads((ROOT / "spec/export.schema.json").read_text())
+    jsonschema.Draft202012Validator(schema).validate(whole.manifest)

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -38,6 +39,7 @@ from ...compiler.scenes.path_kernel import PathArtifact, compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs, varying
 from ...compiler.schedules.emit import kernel_gather, output_channels
 from ...compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
+from ...compiler.variants import parse, vary
 from ...refimpl import rng
 from ...refimpl.errors import InputError
 from ...refimpl.light import transport
@@ -48,10 +50,9 @@ from ...refimpl.light.shapes.quad import quad_area_pdf
 from ...refimpl.light.transport import Settings
 from ...refimpl.light.variation import RANGES, ranges_from_json
 from ...refimpl.network import factored
-from ...refimpl.network.dataset import FEATURES
+from ...refimpl.network.dataset import FEATURES, feature_image
 from ...refimpl.network.denoise import Model, check_model
-from ...refimpl.network.whole import INPUT_LEVELS
-from .denoise_on import images_of
+from ...refimpl.network.whole import INPUT_LEVELS, WEIGHT_LEVELS, round_image
 
 SCHEMA = "wamnet-page-4"
 """Name and version of the form of a page's data."""
@@ -65,6 +66,9 @@ SHOWN = ("color", "normal")
 RANK = 16
 """Rank of the fast variant's first layer, unless another is given: as many numbers as four colour buffers
 hold. Trained in this form it loses nothing (spec/factored.md)."""
+
+WHOLE = "whole8"
+"""The variant of integers."""
 
 MANY, FEW = "packed", "inlined"
 """Schedules: four weights a texel, however many there are; constants of the source where they are few."""
@@ -109,10 +113,11 @@ class Network:
 
 
 def networks_of(model: Model, fast: Model | None = None, rank: int = RANK) -> tuple[Network, ...]:
-    """Return the variants of a page: the full network, and one of low rank with its weights in either way.
+    """Return a page's variants: the full network, one of low rank with its weights in either way, integers.
 
     `fast`: what is cut to the rank, if it is another model, such as one that was trained on in this form.
-    A network of integers is the only one: a rank rounds (WHO-11).
+    A network of integers is the only one: a rank rounds (WHO-11). A network that cannot be rounded has no
+    variant in integers.
     """
     if model.is_whole or (fast is not None and fast.is_whole):
         if fast is not None:
@@ -126,7 +131,15 @@ def networks_of(model: Model, fast: Model | None = None, rank: int = RANK) -> tu
         Network("full", model),
         Network("fast", cut, most, FEW),
         Network("fast-texture", cut, most),
+        *_integers_of(model),
     )
+
+
+def _integers_of(model: Model) -> list[Network]:
+    """Return the network in integers of 8 bits, or nothing where it has no angles, or its sums are too large."""
+    with suppress(InputError):
+        return [Network("whole", vary(parse(WHOLE), model).model)]
+    return []
 
 
 def page_data(
@@ -141,6 +154,12 @@ def page_data(
     scene, first = animation.scenes[0], networks[0].model
     inputs, numbers = moving_numbers(animation, settings)
     together = drawn_together(shown)
+    # What is shown is encoded as for floats, whatever a network reads.
+    read = {
+        levels: {name for one in networks if _levels(one.model) == levels for name in one.model.features}
+        for levels in (1, INPUT_LEVELS)
+    }
+    read[1] |= set(SHOWN)
     # Whole paths give colour; the other features are of their first hit, or of what is seen.
     lengths = [settings, *(feature_settings(settings, sees(part)) for part in together[1:])]
     rays = learned_rays(replace(first, features=shown), settings)
@@ -149,22 +168,6 @@ def page_data(
         for length, part in zip(lengths, together, strict=True)
     ]
     images = check(animation, first, shown, settings, rays)
-    variants: list[dict[str, Any]] = []
-    for network in networks:
-        # Two schedules of one network have one reference and one bound, which take seconds.
-        like = next((n for n in networks[: len(variants)] if n.is_like(network)), None)
-        held = None if like is None else variants[networks.index(like)]["held"]
-        variants.append(variant(network, images, profile, held))
-        if like is not None:
-            variants[-1]["check"] = like.name
-    for one, network in zip(variants, networks, strict=True):
-        one["ranges"] = learned_ranges(network.model, scene.name)
-        one["rays"] = max(feature_rays(network.model), 1)
-        # How far a variant's picture is from the first one's is a fact about the weights, not about a device.
-        off = one["held"].value - variants[0]["held"].value
-        one["rms_to_first"] = float(np.sqrt(np.mean(off**2)))
-    for one in variants:
-        del one["held"]
     return {
         "schema": SCHEMA,
         "scene": scene.name,
@@ -180,17 +183,22 @@ def page_data(
             for one in paths
         ],
         "encoders": [
-            {"path": number, **encoder}
+            {"path": number, "levels": levels, **encoder}
+            for levels, names in read.items()
             for number, (part, path) in enumerate(zip(together, paths, strict=True))
-            for encoder in encoders(part, first, path.planes, profile, rays)
+            for encoder in encoders([n for n in part if n in names], levels, first, path, profile)
         ],
         "check": {
             "size": CHECK_PX,
-            "levels": INPUT_LEVELS if first.is_whole else 1,
             "images": {n: {"channels": a.shape[-1], "values": _packed(a)} for n, a in images.items()},
         },
-        "variants": variants,
+        "variants": variants(networks, images, scene.name, profile),
     }
+
+
+def _levels(model: Model) -> int:
+    """Return what a feature of 1 is to a network: 1, or the largest integer of 8 bits."""
+    return INPUT_LEVELS if model.is_whole else 1
 
 
 def _features(models: Sequence[Model]) -> tuple[str, ...]:
@@ -271,13 +279,37 @@ def _lights(scene: Scene) -> list[dict[str, Any]]:
 
 
 def encoders(
-    features: Sequence[str], model: Model, planes: Sequence[str], profile: str, rays: FeatureRays | None
+    features: Sequence[str], levels: int, model: Model, path: PathArtifact, profile: str
 ) -> list[dict[str, Any]]:
     """Return the encoding as passes of at most as many features as there are colour buffers."""
+    rays = path.programs.rays
     parts = [features[first : first + MOST_BUFFERS] for first in range(0, len(features), MOST_BUFFERS)]
-    given = (model.normalization, TARGET, profile, planes, model.is_whole, rays.count if rays else 0)
+    given = (model.normalization, TARGET, profile, path.planes, levels > 1, rays.count if rays else 0)
     found = [compile_encode(part, *given) for part in parts]
     return [{"source": one.source, "images": [image.facts for image in one.images]} for one in found]
+
+
+def variants(
+    networks: Sequence[Network], images: Mapping[str, NDArray[np.float32]], scene: str, profile: str
+) -> list[dict[str, Any]]:
+    """Return the networks of a page, each with what it has learned and how far it is from the first one."""
+    found: list[dict[str, Any]] = []
+    for network in networks:
+        # Two schedules of one network have one reference and one bound, which take seconds.
+        like = next((n for n in networks[: len(found)] if n.is_like(network)), None)
+        held = None if like is None else found[networks.index(like)]["held"]
+        found.append(variant(network, images, profile, held))
+        if like is not None:
+            found[-1]["check"] = like.name
+    for one, network in zip(found, networks, strict=True):
+        one["ranges"] = learned_ranges(network.model, scene)
+        one["rays"] = max(feature_rays(network.model), 1)
+        # How far a variant's picture is from the first one's is a fact about the weights, not about a device.
+        off = one["held"].value - found[0]["held"].value
+        one["rms_to_first"] = float(np.sqrt(np.mean(off**2)))
+    for one in found:
+        del one["held"]
+    return found
 
 
 def variant(
@@ -291,12 +323,14 @@ def variant(
     program = lower(model)
     plan = plan_program(program, TARGET, profile, network.schedule, rank)
     artifact = compile_plan(plan)
-    held = held or plan.expected({feature: images[feature] for feature in model.features})
+    mine = {name: round_image(images[name]) if model.is_whole else images[name] for name in model.features}
+    held = held or plan.expected(mine)
     bits = sha256(held.value.astype("<f4").tobytes()) if plan.is_whole else None
     whole = artifact.manifest["factored"]["rounding"] if rank else artifact.manifest["bound"]
     return {
         "name": network.name,
         "rank": rank,
+        "levels": _levels(model),
         "schedule": artifact.manifest["schedule"]["name"],
         "features": list(model.features),
         "program": digest(program),
@@ -307,7 +341,7 @@ def variant(
         "passes": [_pass(kernel) for kernel in artifact.kernels],
         "check": {
             "expected": _packed(held.value, "<f8"),
-            "bound": _packed(held.most_from(held.value)),
+            "bound": None if plan.is_whole else _packed(held.most_from(held.value)),
             "sha256": bits,
         },
         "held": held,
@@ -331,11 +365,20 @@ def _pass(kernel: Artifact) -> dict[str, Any]:
     """Return one fragment pass."""
     return {
         "source": kernel.source,
-        "weights": _packed(kernel.weights),
+        "weights": _weights(kernel.weights),
         "reads": [image.name for image in kernel_gather(kernel.program).images],
         "texel": kernel.manifest["schedule"].get(WEIGHTS_A_TEXEL, 1),
         "buffers": -(-output_channels(kernel.program) // 4),
     }
+
+
+def _weights(numbers: NDArray[np.float32]) -> str | dict[str, Any]:
+    """Return floats; or bytes of integers, and by their places those of more bits."""
+    if not numbers.size or np.any(numbers != np.rint(numbers)):
+        return _packed(numbers)
+    small = np.abs(numbers) <= WEIGHT_LEVELS
+    large = [[int(place), int(numbers[place])] for place in np.flatnonzero(~small)]
+    return {"bytes": _packed(np.where(small, numbers, 0), "i1"), "large": large}
 
 
 def check(
@@ -345,12 +388,12 @@ def check(
     settings: Settings,
     rays: FeatureRays | None,
 ) -> dict[str, NDArray[np.float32]]:
-    """Return the encoded features (H, W, C) of a small noisy picture, by name."""
+    """Return the encoded features (H, W, C) of a small noisy picture by name, as floats."""
     job = Job(CHECK_PX, CHECK_PX, 1, CHECK_SEED, settings, seen=sees(features))
     if rays:
         job = replace(job, feature_spp=rays.count, feature_sampler=rays.sampler)
     frame = render(animation.scenes[0], job).frame
-    return dict(images_of(replace(model, features=tuple(features)), frame))
+    return {name: feature_image(frame, (name,), model.normalization) for name in features}
 
 
 def _packed(array: NDArray[Any], kind: str = "<f4") -> str:

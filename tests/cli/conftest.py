@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from small_page import SmallPage, make
 
 from wamnet.cli.files import exr
 from wamnet.cli.main import main
@@ -79,3 +80,9 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model = Model(network, ("color", "normal"), Window(4, "clamp"), Normalization(), {})
     save_model(folder / "model.safetensors", model)
     return folder
+
+
+@pytest.fixture(scope="session")
+def small_page(kit: Any, tmp_path_factory: pytest.TempPathFactory) -> SmallPage:
+    """A page that is drawn in a moment, for the tests in a browser."""
+    return make(kit, tmp_path_factory.mktemp("page"))

@@ -43,7 +43,7 @@ def test_a_page_is_written(wamnet, here):
     text = (here / "page.html").read_text(encoding="utf-8")
     data = data_of(text)
     assert (data["scene"], data["times"]) == ("lone_light", [0.5 / webpage.FPS])
-    assert [one["name"] for one in data["variants"]] == ["full", "fast", "fast-texture"]
+    assert [one["name"] for one in data["variants"]] == ["full", "fast", "fast-texture", "whole"]
     assert not re.search(r"(src|href)=\"(?!data:)", text), "nothing is fetched"
     assert wamnet("view", "model.safetensors", "--scene", "lone_light", "-o", "again.html").status == 0
     assert (here / "again.html").read_text(encoding="utf-8") == text, "a page is a function of its inputs"

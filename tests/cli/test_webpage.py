@@ -5,7 +5,6 @@ A small network and few bounces: SwiftShader traces and denoises 40 x 40 pixels 
 
 from __future__ import annotations
 
-import base64
 import json
 import shutil
 import subprocess
@@ -15,6 +14,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_page import (
+    AT_REST,
+    COLORS,
+    FEATURES,
+    FRAME,
+    NO_MOTION,
+    SCALES,
+    SEED,
+    SETTINGS,
+    SIZE,
+    TIMES,
+    TURN,
+    draw,
+    read,
+)
 
 from wamnet.cli.reports import webpage
 from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
@@ -25,23 +39,11 @@ from wamnet.kernels.devices.executor import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor
 from wamnet.kernels.run import page as P
 from wamnet.refimpl.light import scenes
-from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.light.variation import Ranges, Variation, lamp_color, outside, saturation_of, varied
 from wamnet.refimpl.metrics import psnr
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.whole import forward_whole
 
-SIZE, FRAME, SEED = 40, 3, 5
-SETTINGS = Settings(max_depth=2)
-FEATURES = ("color", "normal", "position")
-SCALES = dataset.Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
-TIMES = tuple((number + 0.5) / 4 for number in range(8))
-AT_REST = "!wamnet.page.preparing && !wamnet.page.dirty && !wamnet.page.renderer.strips.busy"
-COLORS = [[0.9, 0.2, 0.1], [0.3, 0.4, 0.8]]
-RANGES = Ranges((0.0, 8.0), (-24.0, 24.0), (-8.0, 8.0), (0.9, 1.1), (0.0, 0.5))
-TURN = {"yaw": 25.0, "pitch": 8.0, "distance": 0.9}
-
-NO_MOTION = {"reduced_motion": "reduce"}
 WITHOUT_WEBGL = """
 const known = HTMLCanvasElement.prototype.getContext;
 HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
@@ -57,25 +59,18 @@ WebGL2RenderingContext.prototype.getExtension = function (name) {
 
 
 @pytest.fixture(scope="module")
-def model(kit):
-    """A network whose pictures lie within 0.5 +- 0.45, of an odd width."""
-    window = dataset.Window(5, "zero")
-    network = kit.network([dataset.n_inputs(FEATURES, window), 10, 7, 3], (3.0, 3.0))
-    return Model(network, FEATURES, window, SCALES, {"trained_on_ranges": RANGES.to_json()})
+def model(small_page):
+    return small_page.model
 
 
 @pytest.fixture(scope="module")
-def data(model):
-    animation = P.Animation(TIMES, tuple(scenes.canonical("minicubes", time=time) for time in TIMES))
-    return P.page_data(animation, P.networks_of(model, rank=4), SETTINGS)
+def data(small_page):
+    return small_page.data
 
 
 @pytest.fixture(scope="module")
-def path(data, tmp_path_factory):
-    """The page in a file."""
-    file = tmp_path_factory.mktemp("page") / "page.html"
-    file.write_text(webpage.render_page(data), encoding="utf-8")
-    return file
+def path(small_page):
+    return small_page.path
 
 
 @pytest.fixture(scope="module")
@@ -84,17 +79,6 @@ def still(chromium, path):
     with chromium.tab(path, **NO_MOTION) as tab:
         tab.page.evaluate("wamnet.ready")
         yield tab
-
-
-def read(tab, name):
-    """Return the floats (H, W, 4) of an image."""
-    text = tab.page.evaluate("name => wamnet.read(name)", name)
-    return np.frombuffer(base64.b64decode(text), "<f4").reshape(SIZE, SIZE, 4)
-
-
-def draw(tab, **options):
-    """Draw a moment; return what the page says of camera, colours and time."""
-    return tab.page.evaluate("options => wamnet.draw(options)", {"size": SIZE, **options})
 
 
 # ---- pixels ----------------------------------------------------------------------------------------------
@@ -198,6 +182,21 @@ def test_the_pictures_keep_their_bound(still, model, data, number):
     assert np.ptp(value) > bound.max()
 
 
+def test_the_network_in_integers_is_beside_those_of_floats(still, model, data):
+    """The same bits as the reference, on the page's own picture and on the moment that is shown."""
+    whole = P.networks_of(model, rank=4)[3].model
+    assert data["variants"][3]["name"] == "whole"
+    draw(still, frame=FRAME, seed=SEED, variant="whole")
+    joined = np.concatenate([read(still, f"whole_{name}")[..., :3] for name in FEATURES], axis=-1)
+    assert (joined == np.rint(joined)).all()
+    held = forward_whole(whole.siren, dataset.all_windows(dataset.pad(joined, model.window), model.window))
+    assert read(still, "picture")[..., :3].tobytes() == held.astype(np.float32).tobytes()
+    assert still.text("error") == "none: the same bits as the reference"
+    assert still.page.locator("#variant option:checked").text_content() == "integers of 8 bits"
+    assert np.abs(read(still, "color")[..., :3]).max() <= 1
+    draw(still, variant="full")
+
+
 def test_the_page_measures_its_own_error(still, data):
     check = still.page.evaluate("wamnet.page.renderer.check('full')")
     assert 0 < check["share"] <= 1
@@ -273,165 +272,6 @@ def test_nothing_is_asked_for_and_nothing_complained_of(still):
     assert "default-src 'none'" in policy
 
 
-def test_controls_work(still):
-    page = still.page
-    page.evaluate("wamnet.go()")
-    before = still.state("turn")
-    page.locator("#picture").focus()
-    page.keyboard.press("ArrowRight")
-    page.keyboard.press("ArrowUp")
-    page.keyboard.press("+")
-    after = still.state("turn")
-    assert after["yaw"] == before["yaw"] + 5
-    assert after["pitch"] == before["pitch"] + 5
-    assert after["distance"] < before["distance"]
-    page.keyboard.press("0")
-    assert still.state("turn") == {"yaw": 0, "pitch": 0, "distance": 1}
-    page.keyboard.press(".")
-    assert still.page.evaluate("wamnet.page.frame()") == 1
-    assert page.locator("#time").get_attribute("aria-valuetext") == "0.38 seconds"
-    page.locator("#beyond").check()
-    page.locator("#yaw").fill("40")
-    assert still.state("turn")["yaw"] == 40
-    page.locator("#camera-reset").click()
-    page.locator("#light-0").fill("#ff0000")
-    (color, other), own = still.state("colors"), scenes.WARM
-    assert np.mean(color) == pytest.approx(np.mean(own), rel=1e-15)  # some roundings of 2**-53
-    assert saturation_of(color) == pytest.approx(1 - 1e-3, rel=1e-15)
-    assert other == list(scenes.COOL)
-    page.locator("#lights-reset").click()
-    assert still.state("colors")[0] == list(scenes.WARM)
-    page.locator("#beyond").uncheck()
-    page.locator("#size").select_option("96")
-    still.until("wamnet.page.renderer.size === 96 && !wamnet.page.renderer.strips.busy")
-    page.locator("#left").select_option("normal")
-    page.locator("#wipe").fill("30")
-    assert still.state("wipe") == 0.3
-    assert still.text("left-label") == "Normals"
-    assert page.locator("#wipe").get_attribute("aria-valuetext") == "30 percent Normals, the rest Denoised"
-    page.locator("#variant").select_option("fast-texture")
-    still.until("wamnet.page.state.variant === 'fast-texture' && !wamnet.page.preparing")
-    assert "within" in still.text("error")
-
-
-FITS = """[...document.querySelectorAll("main, main *")].every((element) =>
-  element.getBoundingClientRect().right <= document.querySelector("header").getBoundingClientRect().right)"""
-"""Nothing reaches over the edge that the title keeps."""
-
-BELOW = """[...document.querySelectorAll("figure > *, .controls, footer")]
-  .filter((element) => element.getClientRects().length)
-  .map((element) => element.getBoundingClientRect().top + scrollY)"""
-"""Where everything around the sentence is in the document."""
-
-
-def text_when(tab, condition):
-    """Return the sentence about what is outside once it is as it should be."""
-    tab.until(f"(() => {{ const text = document.getElementById('outside').textContent; {condition} }})()")
-    return tab.text("outside")
-
-
-def test_what_was_not_learned_is_said_beside_the_picture(still):
-    """In one sentence, and nothing below it moves; inside of the ranges there is none."""
-    page = still.page
-    page.evaluate("wamnet.go(); wamnet.page.turn(wamnet.parts.REST); wamnet.page.goBeyond(true)")
-    assert text_when(still, "return text === '';") == ""
-    before = page.evaluate(BELOW)
-    page.locator("#yaw").fill("24")
-    page.locator("#yaw").fill("40")
-    said = "Outside of what the network has learned: the camera is 40° to the side (learned: -24° to 24°). "
-    assert text_when(still, "return text !== '';") == f"{said}Expect errors."
-    assert page.locator("#outside").is_visible()
-    page.locator("#pitch").fill("-60")
-    page.locator("#distance").fill("1.5")
-    page.locator("#light-1").fill("#0000ff")
-    text = text_when(still, "return text.includes('light 2');")
-    assert text == (
-        "Outside of what the network has learned: the camera is 40° to the side (learned: -24° to 24°), "
-        "60° down (8° down to 8° up), 1.5 times as far away (0.9 to 1.1), light 2 is 100 % saturated "
-        "(0 % to 50 %). Expect errors."
-    )
-    assert page.evaluate(BELOW) == before
-    page.locator("#lights-reset").click()
-    page.locator("#camera-reset").click()
-    text_when(still, "return text === '';")
-    assert page.locator("#outside").get_attribute("aria-live") == "polite"
-    assert not page.locator("#unknown-ranges").is_visible()
-    page.evaluate("wamnet.page.goBeyond(false)")
-
-
-def test_camera_and_lights_move_inside_of_what_was_learned(still):
-    """The ranges are beside the sliders; a box lets them go beyond, and back brings all inside again."""
-    page = still.page
-    page.evaluate("wamnet.go(); wamnet.page.turn(wamnet.parts.REST)")
-    ends = "[...document.querySelectorAll('#yaw, #pitch, #distance')].map(one => [+one.min, +one.max])"
-    assert page.evaluate(ends) == [[-24, 24], [-8, 8], [0.9, 1.1]]
-    assert still.text("yaw-range") == "learned: -24° to 24°"
-    assert still.text("distance-range") == "learned: × 0.9 to × 1.1"
-    assert still.text("light-0-saturation-range") == "learned: 0 % to 50 %"
-    assert not page.locator("#light-0-power").is_visible()
-    page.evaluate("wamnet.page.turn({ yaw: 170, pitch: -75, distance: 2 })")
-    assert still.state("turn") == {"yaw": 24, "pitch": -8, "distance": 1.1}
-    page.locator("#light-0-hue").fill("240")
-    page.locator("#light-0-saturation").fill("0.4")
-    assert still.state("colors")[0] == pytest.approx(lamp_color(scenes.WARM, 240 / 360, 0.4), rel=1e-14)
-    assert still.state("colors")[1] == list(scenes.COOL)
-    page.locator("#light-0").fill("#ff0000")
-    assert still.state("colors")[0] == pytest.approx(lamp_color(scenes.WARM, 0.0, 0.5), rel=1e-14)
-    assert text_when(still, "return text === '';") == ""
-    page.locator("#beyond").check()
-    page.locator("#yaw").fill("90")
-    page.locator("#light-0-power").fill("2")
-    page.locator("#light-0-saturation").fill("1")
-    assert still.state("colors")[0] == pytest.approx([2 * sum(scenes.WARM), 0, 0], rel=1e-14)
-    assert (
-        "light 1 is 100 % saturated (0 % to 50 %), 2 times as bright as its own (its own power)"
-        in text_when(still, "return text.includes('bright');")
-    )
-    page.locator("#beyond").uncheck()
-    assert still.state("turn")["yaw"] == 24
-    assert still.state("colors")[0] == pytest.approx(lamp_color(scenes.WARM, 0.0, 0.5), rel=1e-14)
-    page.locator("#lights-reset").click()
-    page.locator("#camera-reset").click()
-    assert still.state("colors") == [list(scenes.WARM), list(scenes.COOL)]
-
-
-@pytest.mark.parametrize("times", [(0.0, 8.0), (1.0, 3.0), (7.0, 9.0)], ids=str)
-@pytest.mark.parametrize("saturation", [None, (0.0, 0.5)], ids=str)
-@pytest.mark.parametrize("power", [None, (0.5, 2.0)], ids=str)
-def test_the_page_says_what_the_reference_says(still, times, saturation, power):
-    """Cameras and colours inside, at the limits and outside of ranges: as many things in both."""
-    ranges, own = (
-        replace(RANGES, time_s=times, saturation=saturation, power=power),
-        [list(scenes.WARM), list(scenes.COOL)],
-    )
-    lights = [[{"color": color} for color in own]]
-    counts = []
-    for yaw, pitch, distance in ((0, 0, 1), (24, -8, 1.1), (25, 0, 1), (-40, 9, 0.5), (180, -75, 2)):
-        for factor, picked in (
-            (1, own),
-            (2.5, own),
-            (0.8, [[1, 0, 0], [0.5, 1, 0.5]]),
-            (1, [[0.2, 0.9, 0.3], own[1]]),
-            (1, [[1, 1, 0.499], own[1]]),
-        ):
-            for time in (0.0, 2.0, 3.5, 7.5):
-                colors = [
-                    color if color in own else still.page.evaluate(f"wamnet.parts.asBright({color}, {lamp})")
-                    for color, lamp in zip(picked, own, strict=True)
-                ]
-                colors = [[factor * channel for channel in color] for color in colors]
-                turn = {"yaw": yaw, "pitch": pitch, "distance": distance}
-                moment = {"time": time, "turn": turn, "colors": colors}
-                given = [json.loads(ranges.to_json()), 8.0, moment, *lights]
-                found = still.page.evaluate("given => wamnet.parts.outside(...given)", given)
-                variation = Variation(yaw, pitch, distance, tuple(tuple(color) for color in colors))
-                scene = varied(scenes.canonical("minicubes", time=time), variation)
-                counts.append(len(found))
-                assert counts[-1] == len(outside(ranges, scene.info, own)), moment
-    assert min(counts) == 0
-    assert max(counts) >= 4
-
-
 def changed_page(data, folder, **facts):
     """Write a page whose networks say something else, and return its path."""
     other = json.loads(json.dumps(data))
@@ -459,7 +299,7 @@ def test_features_of_fewer_rays_than_learned_are_said(chromium, data, tmp_path, 
 
 
 def test_rays_are_those_of_the_model(model, data):
-    assert [one["rays"] for one in data["variants"]] == [1, 1, 1]
+    assert [one["rays"] for one in data["variants"]] == [1, 1, 1, 1]
     many = replace(model, info={**model.info, "trained_on_feature_spp": "16, 4"})
     animation = P.Animation(TIMES[:1], (scenes.canonical("minicubes", time=TIMES[0]),))
     assert P.page_data(animation, P.networks_of(many, rank=4)[:1], SETTINGS)["variants"][0]["rays"] == 4
@@ -484,25 +324,6 @@ def test_ready_is_what_has_drawn(chromium, path):
         assert said.index("Checking the network on this device.") < said.index("Drawing the first picture.")
 
 
-def test_the_pointer_turns_the_camera_and_moves_the_line(still):
-    page = still.page
-    page.evaluate("wamnet.go(); wamnet.page.turn(wamnet.parts.REST); wamnet.page.wipeTo(0.5)")
-    box = page.locator("#picture").bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + box["width"] / 4, y)
-    page.mouse.up()
-    assert still.state("wipe") == pytest.approx(0.75, abs=0.01)  # a pixel is a fifth of that
-    assert still.state("turn")["yaw"] == 0
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + 50, y - 20)
-    page.mouse.up()
-    assert still.state("turn") == {"yaw": -20, "pitch": -8, "distance": 1}
-    page.evaluate("wamnet.page.turn(wamnet.parts.REST)")
-
-
 def test_it_plays_where_motion_is_welcome(chromium, path):
     with chromium.tab(path) as tab:
         tab.page.evaluate("wamnet.page.change({ size: 64 })")
@@ -520,29 +341,6 @@ def test_it_stands_still_where_motion_is_not(still):
     paused = "Ready. The animation is paused."
     still.until(f"document.getElementById('status').textContent.startsWith('{paused}')")
     assert still.text("status").startswith(paused)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [{}, {"color_scheme": "dark", "viewport": {"width": 390, "height": 800}}],
-    ids=["light", "dark"],
-)
-def test_people_who_do_not_see_it_can_use_it(chromium, path, options):
-    """axe-core finds nothing; no more scrolling to the side than none on a telephone."""
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
-    with chromium.tab(path, **NO_MOTION, **options) as tab:
-        tab.page.evaluate("wamnet.ready")
-        tab.page.evaluate("wamnet.page.goBeyond(true)")
-        before = tab.page.evaluate(BELOW)
-        tab.page.evaluate("wamnet.page.turn({ yaw: -170, pitch: -75, distance: 2 })")
-        tab.page.locator("#light-0").fill("#ff0000")
-        tab.page.locator("#light-1").fill("#00ff00")
-        text_when(tab, "return text.includes('light 2');")
-        assert tab.page.evaluate(BELOW) == before
-        found = axe.Axe().run(tab.page).response["violations"]
-        assert [(one["id"], one["impact"]) for one in found] == []
-        assert tab.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-        assert tab.page.evaluate(FITS)
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,7 @@ def test_the_page_shows_the_same_bits_and_their_digest(chromium, data, path, mod
         check = tab.page.evaluate("wamnet.page.renderer.check('full')")
         assert (check["error"], check["share"]) == (0, 0)
         tab.page.evaluate("options => wamnet.draw(options)", {"size": SIZE, "seed": 5})
-        joined = np.concatenate([read(tab, name) for name in FEATURES], axis=-1)
+        joined = np.concatenate([read(tab, f"whole_{name}") for name in FEATURES], axis=-1)
         assert (joined == np.rint(joined)).all()
         windows = dataset.all_windows(dataset.pad(joined, model.window), model.window)
         held = forward_whole(model.siren, windows).astype(np.float32)
@@ -95,7 +95,7 @@ def test_the_page_shows_the_same_bits_and_their_digest(chromium, data, path, mod
 
 
 def test_features_are_shown_as_those_of_floats(chromium, path):
-    """Integers are 127 times as large."""
+    """They are encoded twice: as integers for the network, and as numbers up to 1 for people."""
     shown = """name => {
       const { renderer, device: { gl } } = wamnet.page;
       renderer.show(name, name, 1);
@@ -106,7 +106,7 @@ def test_features_are_shown_as_those_of_floats(chromium, path):
     with chromium.tab(path, **NO_MOTION) as tab:
         tab.page.evaluate("wamnet.ready")
         tab.page.evaluate("options => wamnet.draw(options)", {"size": SIZE})
-        for name, of in (("color", lambda x: x / 127), ("normal", lambda x: 0.5 + x / 254)):
+        for name, of in (("color", lambda x: x), ("normal", lambda x: 0.5 + x / 2)):
             found = np.array(tab.page.evaluate(shown, name)).reshape(SIZE, SIZE, 4)[::-1, :, :3]
             assert np.abs(found - 255 * of(read(tab, name))).max() <= 1, name
             assert np.ptp(found) > 100

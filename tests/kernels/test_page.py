@@ -72,7 +72,8 @@ def test_features_are_encoded_in_passes_of_four(model_of):
     features = ("color", "normal", "albedo", "position", "unshadowed")
     data = P.page_data(animation("cornell", 0.0), P.networks_of(model_of(*features), rank=2), SETTINGS)
     names = [[image["name"] for image in encoder["images"]] for encoder in data["encoders"]]
-    assert names == [[*features[:4]], ["unshadowed"]]
+    assert names == 2 * [[*features[:4]], ["unshadowed"]]
+    assert [encoder["levels"] for encoder in data["encoders"]] == [1, 1, 127, 127]
     (path,) = data["paths"]
     assert len(path["planes"]) == 15
     vectors = -(-len(data["numbers"]["names"]) // 4)
@@ -90,7 +91,7 @@ def test_all_features_take_a_second_kernel_that_ends_at_the_first_hit(model_of):
     encoded = [[image["name"] for image in encoder["images"]] for encoder in data["encoders"]]
     for encoder, names in zip(data["encoders"], encoded, strict=True):
         assert set(P.planes_of(names)) <= set(data["paths"][encoder["path"]]["planes"])
-    assert sorted(name for names in encoded for name in names) == sorted(dataset.FIRST_HITS)
+    assert sorted(name for names in encoded for name in names) == sorted(2 * [*dataset.FIRST_HITS])
 
 
 def test_a_second_kernel_follows_what_is_seen(model_of):
@@ -128,7 +129,7 @@ def test_what_a_page_shows_is_encoded_though_no_network_reads_it(model_of):
 def test_variants_say_what_they_cost_and_how_far_they_are(model_of):
     networks = P.networks_of(model_of("color"), rank=1)
     images = {"color": np.random.default_rng(0).uniform(0, 1, (8, 8, 3)).astype(np.float32)}
-    full, fast, texture = (P.variant(network, images, "ieee") for network in networks)
+    full, fast, texture = (P.variant(network, images, "ieee") for network in networks[:3])
     assert full["products"] == 27 * 6 + 6 * 3
     assert fast["products"] == texture["products"] == 9 + 3 * 6 + 6 * 3
     assert (fast["weights"], texture["schedule"], fast["schedule"]) == (0, "packed", "inlined")
@@ -143,10 +144,31 @@ def test_a_network_in_two_schedules_is_checked_with_one_reference(model_of):
     """Half of a page's numbers, and of the time to make it."""
     networks = P.networks_of(model_of("color"), rank=1)
     data = P.page_data(animation("empty", 0.0), networks, SETTINGS)
-    full, fast, texture = data["variants"]
+    full, fast, texture, _ = data["variants"]
     assert texture["check"] == "fast"
     assert fast["check"]["expected"] != full["check"]["expected"]
     assert texture["rms_to_first"] == fast["rms_to_first"] > 0
+
+
+def test_integers_are_a_variant_of_bytes(model_of):
+    """Weights of 8 bits take a byte, the factors and biases of a row their places; sines only are rounded."""
+    model = model_of("color")
+    networks = P.networks_of(model, rank=1)
+    data = P.page_data(animation("empty", 0.0), networks, SETTINGS)
+    one = data["variants"][3]
+    assert (one["name"], one["levels"], one["rank"], one["bound"]) == ("whole", 127, 0, 0)
+    assert one["check"]["bound"] is None
+    assert len(one["check"]["sha256"]) == 64
+    plan = P.plan_program(P.lower(networks[3].model), P.TARGET, "ieee", P.MANY)
+    (kernel,) = P.compile_plan(plan).kernels
+    weights = one["passes"][0]["weights"]
+    found = floats(weights["bytes"], "i1").astype(np.float32)
+    for place, value in weights["large"]:
+        found[place] = value
+    assert np.array_equal(found, kernel.weights)
+    assert 0 < len(weights["large"]) < len(found) / 4
+    relu = replace(model, siren=replace(model.siren, activation="relu"))
+    assert [network.name for network in P.networks_of(relu, rank=1)] == ["full", "fast", "fast-texture"]
 
 
 def test_ranges_are_those_of_the_scene_that_was_learned(model_of):
@@ -165,7 +187,7 @@ def test_ranges_are_those_of_the_scene_that_was_learned(model_of):
         P.learned_ranges(replace(model, info={"trained_on_ranges": "[]"}), "cornell")
     networks = P.networks_of(model, replace(model, info=said), rank=1)
     data = P.page_data(animation("cornell", 0.0), networks, SETTINGS)
-    assert [one["ranges"] for one in data["variants"]] == [None, asdict(ranges), asdict(ranges)]
+    assert [one["ranges"] for one in data["variants"]] == [None, asdict(ranges), asdict(ranges), None]
     assert data["turn_s"] == scenes.TURN_SECONDS
 
 

@@ -515,6 +515,7 @@ class Page {
     const facts = this.facts();
     const check = this.checks.get(facts.name);
     const number = (x) => (x === 0 ? "0" : x.toExponential(1).replace("e-", "\u00a0·\u00a010⁻").replace(/⁻(\d+)$/, raised));
+    find("variant").value = facts.name;
     find("products").textContent = facts.products.toLocaleString("en");
     find("bound").textContent = facts.bound === null ? "none" : number(facts.bound);
     find("first-difference").textContent =
@@ -786,6 +787,9 @@ function bitsSentence({ same, first }) {
 
 function variantText(variant) {
   const place = variant.schedule === "packed" ? ", weights in a texture" : "";
+  if (variant.levels > 1) {
+    return "integers of 8 bits";
+  }
   return variant.rank ? `fast, rank ${variant.rank}${place}` : "full";
 }
 

@@ -12,7 +12,9 @@ class Reference {
   constructor(renderer) {
     this.renderer = renderer;
     this.planes = renderer.data.paths[0].planes;
-    this.encoder = renderer.data.encoders.findIndex((one) => one.images.some(({ name }) => name === "color"));
+    this.encoder = renderer.data.encoders.findIndex(
+      (one) => one.levels === 1 && one.images.some(({ name }) => name === "color"),
+    );
     this.place = renderer.data.encoders[this.encoder].images.findIndex(({ name }) => name === "color");
     // Colour's planes are in one texture, the first ones of the kernel that follows whole paths.
     this.texture = Math.floor(this.planes.indexOf("color_r") / 4);

@@ -127,6 +127,7 @@ class Renderer {
     this.shown = null;
     this.sums = [];
     this.between = [];
+    this.whole = [];
     this.pictures = [];
     this.paths = data.paths.map((path) => device.compile(path.source));
     this.encoders = data.encoders.map((encoder) => device.compile(encoder.source));
@@ -150,7 +151,7 @@ class Renderer {
 
   /** A pass's weights as whole rows of texels of one float or four. */
   weights(pass) {
-    const values = decodeFloats(pass.weights);
+    const values = decodeWeights(pass.weights);
     const row = WEIGHT_COLUMNS * pass.texel;
     const rows = Math.max(1, Math.ceil(values.length / row));
     const padded = new Float32Array(rows * row);
@@ -185,11 +186,12 @@ class Renderer {
     }
     const { device, data } = this;
     const drawn = this.pictures.flatMap((one) => [...one.features, one.result]);
-    [...this.sums, ...this.between, ...drawn].forEach((target) => device.release(target));
+    [...this.sums, ...this.between, ...this.whole, ...drawn].forEach((target) => device.release(target));
     this.sums = data.paths.map((path) => device.target(size, Math.ceil(path.planes.length / 4)));
     this.between = [];
+    this.whole = []; // features of a network of integers, which nobody sees
     this.pictures = [0, 1].map(() => ({
-      features: data.encoders.map((encoder) => device.target(size, encoder.images.length)),
+      features: this.encodersOf(1).map(({ encoder }) => device.target(size, encoder.images.length)),
       result: device.target(size, 1),
     }));
     this.shown = null;
@@ -245,22 +247,44 @@ class Renderer {
     const sums = this.sums.map((target) =>
       Object.fromEntries(target.textures.map((texture, i) => [`sums_${i}`, texture])),
     );
-    const encoding = this.encoders.map((shader, i) => ({
-      shader,
-      target: picture.features[i],
-      textures: sums[this.data.encoders[i].path],
-      set: (place) => gl.uniform1i(place("sample_count"), 1),
-    }));
-    const denoising = this.denoising(this.variant(variant), images, picture.result);
+    const encode = (levels, targets) =>
+      this.encodersOf(levels).map(({ encoder, shader }, i) => ({
+        shader,
+        target: targets[i],
+        textures: sums[encoder.path],
+        set: (place) => gl.uniform1i(place("sample_count"), 1),
+      }));
+    const chosen = this.variant(variant);
+    const { levels } = chosen.facts;
+    const encoding = encode(1, picture.features);
+    let read = images;
+    if (levels > 1) {
+      this.whole = this.whole.length
+        ? this.whole
+        : this.encodersOf(levels).map(({ encoder }) => this.device.target(moment.size, encoder.images.length));
+      encoding.push(...encode(levels, this.whole));
+      read = this.imagesIn(this.whole, levels);
+    }
+    const denoising = this.denoising(chosen, read, picture.result);
     const ms = await this.strips.run([...tracing, ...encoding, ...denoising]);
     this.shown = picture;
     return ms;
   }
 
+  /** The encoders of features as numbers up to 1, or as integers up to `levels`, with their shaders. */
+  encodersOf(levels) {
+    const all = this.data.encoders.map((encoder, i) => ({ encoder, shader: this.encoders[i] }));
+    return all.filter(({ encoder }) => encoder.levels === levels);
+  }
+
   /** Feature textures by name. */
   images(picture) {
-    const pairs = this.data.encoders.flatMap((encoder, i) =>
-      encoder.images.map((image, k) => [image.name, picture.features[i].textures[k]]),
+    return this.imagesIn(picture.features, 1);
+  }
+
+  imagesIn(targets, levels) {
+    const pairs = this.encodersOf(levels).flatMap(({ encoder }, i) =>
+      encoder.images.map((image, k) => [image.name, targets[i].textures[k]]),
     );
     return Object.fromEntries(pairs);
   }
@@ -273,7 +297,7 @@ class Renderer {
     const { device } = this;
     const textures = Object.fromEntries(
       Object.entries(images).map(([image, { channels, values }]) => {
-        const floats = decodeFloats(values);
+        const floats = steps(decodeFloats(values), variant.facts.levels);
         const rgba = new Float32Array(4 * size * size);
         for (let pixel = 0; pixel < size * size; ++pixel) {
           rgba.set(floats.subarray(pixel * channels, (pixel + 1) * channels), 4 * pixel);
@@ -287,7 +311,8 @@ class Renderer {
     Object.values(textures).forEach((texture) => device.gl.deleteTexture(texture));
     device.release(result);
     const expected = decodeFloats(variant.facts.check.expected, Float64Array);
-    const bound = decodeFloats(variant.facts.check.bound);
+    const whole = variant.facts.check.bound === null; // of integers no number may be off
+    const bound = whole ? new Float32Array(expected.length) : decodeFloats(variant.facts.check.bound);
     let error = 0;
     let share = 0;
     expected.forEach((value, i) => {
@@ -318,12 +343,10 @@ class Renderer {
       gl.uniform1f(place("wipe"), wipe);
       gl.uniform2f(place("is_signed"), left === "normal" ? 1 : 0, right === "normal" ? 1 : 0);
       gl.uniform2f(place("is_difference"), left === "difference" ? 1 : 0, right === "difference" ? 1 : 0);
-      const levels = (name) => (name in OF_COLOUR ? 1 : this.data.check.levels);
-      gl.uniform2f(place("levels"), levels(left), levels(right));
     });
   }
 
-  /** Floats of an image of the last picture, or of the path kernels' sums ("sums_0", ...), for tests. */
+  /** Floats of an image of the last picture ("whole_color": as a network of integers reads it), or of the path kernels' sums ("sums_0", ...), for tests. */
   read(name) {
     if (name === "picture") {
       return this.device.read(this.shown.result, 0);
@@ -332,17 +355,16 @@ class Renderer {
       const places = this.sums.flatMap((target) => target.textures.map((_, i) => [target, i]));
       return this.device.read(...places[Number(name.slice(5))]);
     }
-    for (const [i, encoder] of this.data.encoders.entries()) {
-      const number = encoder.images.findIndex((image) => image.name === name);
+    const [levels, targets] = name.startsWith("whole_") ? [127, this.whole] : [1, this.shown.features];
+    for (const [i, { encoder }] of this.encodersOf(levels).entries()) {
+      const number = encoder.images.findIndex((image) => image.name === name.replace("whole_", ""));
       if (number >= 0) {
-        return this.device.read(this.shown.features[i], number);
+        return this.device.read(targets[i], number);
       }
     }
     throw new Error(`there is no image ${name}`);
   }
 }
-
-const OF_COLOUR = { picture: 1, reference: 1, difference: 1 }; // images that are no feature of a network
 
 const SCREEN = `#version 300 es
 precision highp float;
@@ -354,14 +376,13 @@ uniform float wipe;
 uniform sampler2D clean;
 uniform vec2 is_signed;
 uniform vec2 is_difference;
-uniform vec2 levels;
 out vec4 color;
 void main()
 {
     ivec2 size = textureSize(left, 0);
     ivec2 at = ivec2(int(gl_FragCoord.x), size.y - 1 - int(gl_FragCoord.y));
-    vec3 l = texelFetch(left, at, 0).rgb / levels.x;
-    vec3 r = texelFetch(right, at, 0).rgb / levels.y;
+    vec3 l = texelFetch(left, at, 0).rgb;
+    vec3 r = texelFetch(right, at, 0).rgb;
     l = mix(l, 0.5 + 0.5 * l, is_signed.x);
     r = mix(r, 0.5 + 0.5 * r, is_signed.y);
     vec3 c = texelFetch(clean, at, 0).rgb;
@@ -384,6 +405,23 @@ async function compareBits(found, expected, size, sha256) {
   const digits = hash && Array.from(new Uint8Array(hash), (byte) => byte.toString(16).padStart(2, "0"));
   const digest = digits ? digits.join("") : first ? "" : sha256;
   return { first, digest, same: !first && digest === sha256 };
+}
+
+/** Weights from base64 of floats; or from bytes of integers, with those of more bits by their places. */
+function decodeWeights(text) {
+  if (typeof text === "string") {
+    return decodeFloats(text);
+  }
+  const values = Float32Array.from(new Int8Array(decodeBase64(text.bytes).buffer));
+  text.large.forEach(([place, value]) => (values[place] = value));
+  return values;
+}
+
+/** Features as a network reads them: as they are, or integers, as refimpl/network/whole.py: steps_of. */
+function steps(values, levels) {
+  return levels === 1
+    ? values
+    : values.map((x) => clamp(Math.floor(levels * x + 0.5), -levels, levels));
 }
 
 function clamp(x, low, high) {

@@ -312,7 +312,7 @@ KINDS: Mapping[str, Kind] = {
         # A first layer that is narrowed after the cut would not have its rank any more.
         Kind("rank", "a first layer of rank N: rank12", cut_rank, ("without-", "window", "hidden")),
         Kind("sine", "sines of degree N: sine7", choose_sine),
-        # What is narrowed or cut after it would be sums of halves, which are none.
+        # What is narrowed or cut after it would be sums of halves, not halves.
         Kind(
             "half",
             "weights in half precision: half16",

@@ -556,7 +556,7 @@ TABLES: Mapping[str, TableOf] = {
     **{name: as_printed(name, 1) for name in ("reference-mutants", "c99-mutants")},
     "held-back-left": as_printed("held-back", 2),
     **{f"held-back-{which}-left": as_printed(f"held-back-{which}", 2) for which in ("second", "third")},
-    "domain": lambda records: importlib.import_module("domain").rows(records["domain"]),
+    **{n: lambda records, n=n: importlib.import_module(n).rows(records[n]) for n in ("blender", "domain")},
     "demo-pictures": demo_pictures,
     "demo-runs": demo_runs,
     "departures": departures,

@@ -283,7 +283,7 @@ def _facts(
 
 def _halves(denoiser: Artifact) -> bytes:
     """Return the weights as little-endian halves, where these are exactly the same numbers; else nothing."""
-    with np.errstate(over="ignore"):  # what is too large becomes infinite, and is no half
+    with np.errstate(over="ignore"):  # what is too large becomes infinite, not a half
         halves = denoiser.weights.astype("<f2")
     return halves.tobytes() if np.array_equal(halves.astype(np.float32), denoiser.weights) else b""
 

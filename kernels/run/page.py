@@ -136,7 +136,7 @@ def networks_of(model: Model, fast: Model | None = None, rank: int = RANK) -> tu
 
 
 def _integers_of(model: Model) -> list[Network]:
-    """Return the network in integers of 8 bits, or nothing where it has no angles, or its sums are too large."""
+    """Return the network in integers of 8 bits; nothing where it has no angles, or too large sums."""
     with suppress(InputError):
         return [Network("whole", vary(parse(WHOLE), model).model)]
     return []

@@ -8,18 +8,14 @@
 
 from __future__ import annotations
 
-import json
 import shutil
-import subprocess
 import sys
-import tempfile
-from collections.abc import Sequence
-from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from ...refimpl.errors import ExecutorUnavailable, InputError
+from ..run.line_process import LineProcess
 from .plan import Animation, Shot
 from .process import MARK
 
@@ -31,9 +27,6 @@ BLENDER = "blender"
 
 QUIET = ("--background", "--factory-startup", "--disable-autoexec", "--python")
 """Options of Blender: no window, no settings of the user, no scripts of files, and a script to run."""
-
-CLOSING_S = 20.0
-"""Seconds in which the process has to end before it is ended."""
 
 
 def program(named: str | None) -> list[str]:
@@ -54,17 +47,8 @@ class Blender:
 
     def __init__(self, file: Path, view_layer: str = "", named: str | None = None) -> None:
         """Open `file` in the Blender that is `named` [`program`]; the view layer may be the only one."""
-        self._file, command = file, program(named)
-        self._said = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115
-        # A process group of its own: an interrupt is for the one who asks, who then closes this.
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-            text=True,
-            start_new_session=True,
-        )
+        self._file = file
+        self._process = LineProcess(program(named), "Blender has ended", MARK)
         try:
             about = self._answer({"file": str(file.absolute()), "view_layer": view_layer})
             self.animation = Animation(**about)
@@ -81,44 +65,15 @@ class Blender:
 
     def _answer(self, question: dict[str, Any]) -> dict[str, Any]:
         """Return what the process answers."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        line = ""
-        with suppress(BrokenPipeError):
-            self._process.stdin.write(json.dumps(question) + "\n")
-            self._process.stdin.flush()
-            for line in self._process.stdout:
-                if line.startswith(MARK):
-                    break
-        if not line.startswith(MARK):
-            raise ExecutorUnavailable(f"Blender has ended{self._last_words()}")
-        found: dict[str, Any] = json.loads(line.removeprefix(MARK))
+        found = self._process.ask(question)
         if "wrong" in found:
             rule = str(found["wrong"]).rstrip(".")
             raise InputError("Blender file", str(self._file), rule, "change it in Blender, and save it")
         return found
 
-    def _last_words(self) -> str:
-        """Return the last line that it printed as an error, if there is one."""
-        self._said.seek(0)
-        lines: Sequence[str] = self._said.read().strip().splitlines()
-        return f": {lines[-1].strip()}" if lines else ""
-
     def close(self) -> None:
         """End the process."""
-        if self._process.stdin is not None and not self._process.stdin.closed:
-            with suppress(BrokenPipeError):
-                self._process.stdin.close()
-        if sys.exc_info()[0] is not None:
-            self._process.kill()
-        try:
-            self._process.wait(CLOSING_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        if self._process.stdout is not None:
-            self._process.stdout.close()
-        self._said.close()
+        self._process.close()
 
     def __enter__(self) -> Blender:
         return self

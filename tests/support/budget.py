@@ -25,7 +25,7 @@ BUDGET = {
     "compiler/training": 1200,
     "kernels": 150,
     "kernels/devices": 2500,
-    "kernels/run": 3050,
+    "kernels/run": 3125,
     "kernels/judge": 1475,
     "kernels/bench": 4850,
     "kernels/blender": 500,

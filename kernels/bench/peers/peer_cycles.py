@@ -12,12 +12,9 @@ Its rendering is one call, denoising within: the part without is that of picture
 
 from __future__ import annotations
 
-import json
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from contextlib import suppress
 from importlib.util import find_spec
 from itertools import count, cycle
 from pathlib import Path
@@ -29,14 +26,12 @@ from numpy.typing import NDArray
 from ....refimpl.errors import ExecutorUnavailable, InputError
 from ....refimpl.light.scene import Scene, to_json
 from ....refimpl.light.transport import Settings
+from ...run.line_process import LineProcess
 from . import peer_mitsuba
 from .moving import DENOISED, Ways
 
 MEMORY = Path("/dev/shm")
 """Folder in memory of Linux."""
-
-CLOSING_S = 20.0
-"""Seconds in which the process has to end before it is ended."""
 
 PARTS = ("numbers", "rendering", "reading")
 """What is measured of a picture, in its order."""
@@ -63,13 +58,8 @@ class Cycles:
         self._size, self._numbers = size, count()
         where = MEMORY if MEMORY.is_dir() else None
         self._folder = tempfile.TemporaryDirectory(prefix="wamnet-cycles-", dir=where)
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", f"{__package__}.cycles_process", self._folder.name],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
+        command = [sys.executable, "-m", f"{__package__}.cycles_process", self._folder.name]
+        self._process = LineProcess(command, "cycles: Blender's process has ended; try import bpy by itself")
         given = {"size": size, "spp": spp, "edges": settings.max_depth + 1, "scene": to_json(scene)}
         self._version = str(self._asked(given)["version"])
 
@@ -80,18 +70,11 @@ class Cycles:
 
     def _asked(self, question: dict[str, Any]) -> dict[str, Any]:
         """Return what the process answers; one that has ended is reported."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
         try:
-            self._process.stdin.write(json.dumps(question) + "\n")
-            self._process.stdin.flush()
-            answer = self._process.stdout.readline()
-        except BrokenPipeError:
-            answer = ""
-        if not answer:
+            found = self._process.ask(question)
+        except ExecutorUnavailable:
             self.close()
-            raise ExecutorUnavailable("cycles: Blender's process has ended; try import bpy by itself")
-        found: dict[str, Any] = json.loads(answer)
+            raise
         if "wrong" in found:
             raise ExecutorUnavailable(f"cycles: {found['wrong']}")
         return found
@@ -121,14 +104,5 @@ class Cycles:
 
     def close(self) -> None:
         """End the process."""
-        if self._process.stdin is not None and not self._process.stdin.closed:
-            with suppress(BrokenPipeError):
-                self._process.stdin.close()
-        try:
-            self._process.wait(CLOSING_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        if self._process.stdout is not None:
-            self._process.stdout.close()
+        self._process.close()
         self._folder.cleanup()

@@ -1,6 +1,6 @@
 """A program in a process of its own that answers questions: a line of JSON in, a line of JSON back.
 
-1. Answers begin with a mark, so that what the program prints besides is passed over [`LineProcess.ask`].
+1. Answers begin with a mark, so that other lines of the program are passed over [`LineProcess.ask`].
 2. It is in a process group of its own: an interrupt is for the one who asks, who then closes this.
 3. It is closed by closing its input, and killed where it does not end then, or where an error is on its way
    [`LineProcess.close`].

@@ -1,10 +1,11 @@
 """What MkDocs calls while it builds the site; see mkdocs.yml.
 
 1. Bring in the spec from its folder, the page of the vectors' formats, and a page for each source file that a
-   text names [`on_files`]; order the pages as spec/README.md does [`on_config`].
+   text names, and the live page [`on_files`]; order the pages as spec/README.md does [`on_config`].
 2. Give clauses their anchors, and execute the cells of tutorial and course [`on_page_markdown`].
-3. Set formulas, and link what is named [`on_page_content`].
-4. Cut the addresses of other hosts out of the theme's scripts, and refuse a site with a link that leads
+3. Set formulas, give pictures their captions, and link what is named [`on_page_content`].
+4. Name the theme's dialog for search [`on_post_page`].
+5. Cut the addresses of other hosts out of the theme's scripts, and refuse a site with a link that leads
    nowhere, or to another host [`on_post_build`].
 """
 
@@ -28,6 +29,7 @@ from mkdocs.utils import get_relative_url
 sys.path.insert(0, str(Path(__file__).parent))
 import cells
 import chapters
+import figures
 import formulas
 import links
 import listing_page
@@ -108,6 +110,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for path in [*sorted(SPEC.glob("*.md")), SPEC / "vectors/README.md"]:
         name = path.relative_to(ROOT).as_posix()
         files.append(File.generated(config, name, abs_src_path=str(path)))
+    files.append(File.generated(config, figures.LIVE, content=figures.live_page()))
     named = {path for text in texts.values() for path in chapters.named_files(text)}
     for path in sorted(named):
         if (ROOT / path).exists():
@@ -140,7 +143,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         return into_site(chapters.anchored(markdown), uri)
     if uri.startswith(("tutorial/", "course/")):
         markdown = cells.executed(markdown, f"docs/{uri}")
-    return into_site(markdown, f"docs/{uri}")
+    return into_site(figures.with_live(markdown), f"docs/{uri}")
 
 
 def into_site(markdown: str, path: str) -> str:
@@ -169,8 +172,13 @@ def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -
 
     if uri == "listing.md":
         html = listing_page.page(html)
-    html = formulas.rendered(html, f"docs/{uri}")
+    html = figures.captioned(formulas.rendered(html, f"docs/{uri}"))
     return chapters.linked(html, config.extra["places"], config.extra["sources"], link)
+
+
+def on_post_page(output: str, page: Page, config: MkDocsConfig) -> str:
+    """Name the dialog for search, which the theme leaves without a name."""
+    return output.replace('role="dialog"', 'role="dialog" aria-label="Search"')
 
 
 @event_priority(-200)  # after the plugins

@@ -19,9 +19,6 @@ from wamnet.cli.reports import webpage
 from wamnet.compiler.model_file import load_model, save_model
 from wamnet.refimpl.light import scenes
 
-LARGEST_BYTES = 1_500_000
-"""Of the page of the shipped model [WEB-1]."""
-
 
 @pytest.fixture
 def here(samples, tmp_path):
@@ -55,14 +52,6 @@ def test_the_model_s_own_scene_is_shown_at_all_its_times(wamnet, here):
     data = data_of((here / "page.html").read_text(encoding="utf-8"))
     assert data["scene"] == "minicubes"
     assert len(data["times"]) == webpage.FRAMES
-
-
-@pytest.mark.slow
-def test_the_page_of_the_shipped_model_is_small(wamnet, tmp_path):
-    """As WEB-1 says: a telephone loads it in some seconds."""
-    outcome = wamnet("view", "minicubes", "-o", "page.html")
-    assert outcome.status == 0, outcome.err
-    assert 10**5 < (tmp_path / "page.html").stat().st_size < LARGEST_BYTES
 
 
 @pytest.mark.parametrize("name", ["minicubes", "glossy", "daylight"])

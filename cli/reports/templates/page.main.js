@@ -836,6 +836,7 @@ function hook(page, started) {
   };
 }
 
+document.body.classList.toggle("embedded", window.parent !== window);
 const page = new Page(JSON.parse(find("data").textContent));
 const started = page.start();
 started.catch(() => {}); // it has been told; the hook's promise tells tests

@@ -1,0 +1,98 @@
+"""How the site looks and works: live page, captions, no cut text, access in two themes, print."""
+
+from __future__ import annotations
+
+import figures
+import pytest
+
+PAGES = ("index.html", "tutorial/4-frame.html", "course/lab01-sphere.html", "spec/sampling.html")
+"""A page of each kind."""
+
+LARGEST_BYTES = 1_500_000
+"""Of the live page of the shipped model [WEB-1]."""
+
+SCROLLS = """[...document.querySelectorAll(".md-content pre, .md-content pre code, .md-content figure")]
+  .filter((one) => one.clientWidth && one.scrollWidth > one.clientWidth + 1)
+  .map((one) => one.textContent.trim().slice(0, 60))"""
+"""What is wider than its place."""
+
+FIGURES = """[...document.querySelectorAll("figure")].map((one) => [
+  one.querySelector("figcaption")?.textContent, one.querySelector("img").alt,
+  one.clientWidth - one.parentElement.clientWidth])"""
+"""Captions, texts, and how much wider than the text a figure is."""
+
+
+@pytest.mark.parametrize("width", [390, 800, 1280])
+def test_nothing_is_cut(site, chromium, width):
+    """At the widths of a telephone, a tablet and a desktop."""
+    with chromium.tab(site / PAGES[0], viewport={"width": width, "height": 900}) as tab:
+        for name in PAGES:
+            tab.page.goto((site / name).as_uri())
+            assert tab.page.evaluate("document.documentElement.scrollWidth") <= width, name
+            assert tab.page.evaluate(SCROLLS) == [], name
+            for caption, text, wider in tab.page.evaluate(FIGURES):
+                assert caption == text, name
+                assert wider <= 0, name
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_everyone_can_use_it(site, chromium, scheme):
+    """axe-core finds nothing serious or critical, and both themes have their own paper."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    with chromium.tab(site / PAGES[0], color_scheme=scheme, reduced_motion="reduce") as tab:
+        for name in (*PAGES, "results.html"):
+            tab.page.goto((site / name).as_uri())
+            tab.page.wait_for_load_state("load")
+            found = axe.Axe().run(tab.page).response["violations"]
+            grave = [(one["id"], one["nodes"][0]["html"][:100]) for one in found if one["impact"] in GRAVE]
+            assert grave == [], name
+        paper = tab.page.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert paper == {"light": "rgb(250, 249, 245)", "dark": "rgb(20, 22, 26)"}[scheme]
+
+
+GRAVE = ("serious", "critical")
+"""Impacts, as axe-core calls them."""
+
+
+def test_the_index_has_the_live_page_when_the_reader_asks(site, chromium):
+    """In a frame without a title of its own; before, nothing of it is loaded."""
+    assert 10**5 < (site / figures.LIVE).stat().st_size < LARGEST_BYTES
+    with chromium.tab(site / "index.html", reduced_motion="reduce") as tab:
+        assert not any("live.html" in address for address in tab.asked)
+        tab.page.locator(".live button").click()
+        frame = tab.page.frame_locator("figure iframe")
+        frame.locator("#picture").wait_for()
+        assert frame.locator("body").get_attribute("class") == "embedded"
+        assert tab.page.locator("figure iframe").get_attribute("title")
+        assert tab.page.locator(".live button").count() == 0
+
+
+def test_pages_print(site, chromium):
+    """Black on white in either theme, without what only works on a screen, and no line is cut."""
+    with chromium.tab(site / PAGES[1], color_scheme="dark", viewport={"width": 700, "height": 900}) as tab:
+        tab.page.emulate_media(media="print", color_scheme="dark")
+        colors = "(({ backgroundColor, color }) => [backgroundColor, color])(getComputedStyle(document.body))"
+        assert tab.page.evaluate(colors)[0] == "rgb(255, 255, 255)"
+        assert tab.page.evaluate("getComputedStyle(document.querySelector('h1')).color") == "rgb(0, 0, 0)"
+        for what in (".md-header", ".md-sidebar", ".md-footer"):
+            assert not tab.page.locator(what).first.is_visible()
+        assert tab.page.locator("figure img").first.is_visible()
+        assert tab.page.evaluate(SCROLLS) == []
+
+
+def test_pictures_that_stand_alone_have_captions():
+    html = '<p><img alt="A cube" src="a.png" /></p><p>See <img alt="b" src="b.png" /></p>'
+    assert figures.captioned(html) == (
+        '<figure><img alt="A cube" src="a.png" /><figcaption aria-hidden="true">A cube</figcaption></figure>'
+        '<p>See <img alt="b" src="b.png" /></p>'
+    )
+    shown = '<img class="shown pixels" alt="Two &lt; three" src="data:,">'
+    assert figures.captioned(shown).endswith(
+        '<figcaption aria-hidden="true">Two &lt; three</figcaption></figure>'
+    )
+    assert "figcaption" not in figures.captioned('<p><img alt="Pictures of x" src="a.png"></p>')
+
+
+def test_the_mark_is_the_place_of_the_live_page():
+    assert figures.with_live(f"a\n\n{figures.MARK}\n") == f"a\n\n{figures.FRAME}\n"
+    assert figures.with_live("a\n") == "a\n"

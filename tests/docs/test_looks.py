@@ -61,8 +61,8 @@ def test_the_index_has_the_live_page_when_the_reader_asks(site, chromium):
         assert not any("live.html" in address for address in tab.asked)
         tab.page.locator(".live button").click()
         frame = tab.page.frame_locator("figure iframe")
-        frame.locator("#picture").wait_for()
-        assert frame.locator("body").get_attribute("class") == "embedded"
+        frame.locator("body.embedded #picture").wait_for()
+        assert frame.locator("header").bounding_box()["height"] == 1
         assert tab.page.locator("figure iframe").get_attribute("title")
         assert tab.page.locator(".live button").count() == 0
 
@@ -74,6 +74,8 @@ def test_pages_print(site, chromium):
         colors = "(({ backgroundColor, color }) => [backgroundColor, color])(getComputedStyle(document.body))"
         assert tab.page.evaluate(colors)[0] == "rgb(255, 255, 255)"
         assert tab.page.evaluate("getComputedStyle(document.querySelector('h1')).color") == "rgb(0, 0, 0)"
+        paper = "getComputedStyle(document.querySelector('pre code')).backgroundColor"
+        assert tab.page.evaluate(paper) == "rgb(244, 244, 244)"
         for what in (".md-header", ".md-sidebar", ".md-footer"):
             assert not tab.page.locator(what).first.is_visible()
         assert tab.page.locator("figure img").first.is_visible()

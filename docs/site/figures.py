@@ -1,4 +1,4 @@
-"""Figures: a picture that stands alone has its alternative text as a caption; the index has the live page.
+"""Figures: a picture by itself has its alternative text as a caption; the index has the live page.
 
 1. A paragraph that holds nothing but a picture becomes a figure, as does a picture that a cell shows; its
    text becomes the caption, too [`captioned`]. Readers of screens hear it once: the caption is for eyes.

@@ -259,8 +259,9 @@ def _data(model: Model, images: Mapping[str, NDArray[np.float32]], size: int) ->
     data = page.page_data(animation, (page.Network("full", model),), Settings(max_depth=0))
     held = data["check"]["images"]
     data["check"]["size"] = size
+    levels = data["variants"][0]["levels"]  # the page rounds features to integers itself
     for name, image in images.items():
-        held[name]["values"] = base64.b64encode(np.ascontiguousarray(image, "<f4").tobytes()).decode()
+        held[name]["values"] = base64.b64encode((image / levels).astype("<f4").tobytes()).decode()
     for name in set(held) - set(images):
         del held[name]
     nothing = base64.b64encode(np.zeros(3 * size * size, "<f8").tobytes()).decode()

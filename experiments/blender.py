@@ -7,6 +7,8 @@
    by colour, albedo and normal [`Film.peer`].
 4. Both are scored by PSNR, display-encoded, on three kinds of frames: between those of the training, of a
    part of the film that training leaves out, and of the film by a camera from a path aside [`KINDS`].
+5. One sample a pixel has jags at edges, which a network of the film can learn to smooth. So pixels with no
+   edge of albedo or normal around them are scored by themselves, too [`away_from_edges`].
 
     python experiments/blender.py -o out/blender
 
@@ -27,8 +29,9 @@ from typing import Any
 import numpy as np
 from lab import command, tables, training
 from lab.ground import write_table
-from lab.intervals import paired
+from lab.intervals import interval, paired
 from lab.results import PER_FRAME, Results, fill
+from numpy.typing import NDArray
 
 from wamnet.cli.commands.blender.dataset import Asked, make
 from wamnet.cli.files import dataset_files, exr
@@ -39,6 +42,7 @@ from wamnet.kernels.run.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats, Frame
 from wamnet.refimpl.metrics import psnr
+from wamnet.refimpl.network.dataset import Window, all_windows, pad
 from wamnet.refimpl.network.train import SHORT
 
 SCENES = ("hall", "yard")
@@ -58,6 +62,19 @@ ARC_S = 0.5
 
 OURS, PEER, NOISY = "network", "oidn", "noisy"
 """Names of the scores, in dB."""
+
+
+EDGE = 0.1
+"""Difference of albedo or normal within 3 x 3 pixels from which on there is an edge."""
+
+
+def away_from_edges(frame: Frame) -> NDArray[np.bool_]:
+    """Return (H, W): whether albedo and normal of the 3 x 3 pixels around each differ by less than EDGE."""
+    guides = np.concatenate([frame["albedo"], frame["normal"]], axis=-1).astype(np.float64)
+    around = all_windows(pad(guides, Window(3, "clamp")), Window(3, "clamp"))
+    taps = around.reshape(*guides.shape[:2], 9, -1)
+    smooth: NDArray[np.bool_] = (np.ptp(taps, axis=2) < EDGE).all(axis=-1)
+    return smooth
 
 
 @dataclass(frozen=True)
@@ -175,12 +192,19 @@ class Study:
             for name, found in ((OURS, ours), (PEER, peers), (NOISY, inputs))
         }
         gains = [a - b for a, b in zip(scores[OURS], scores[PEER], strict=True)]
+        inside = [away_from_edges(noisy) for noisy, _ in pairs]
+        flat = [
+            psnr(a[where], c[where]) - psnr(b[where], c[where])
+            for a, b, c, where in zip(ours, peers, clean, inside, strict=True)
+        ]
         return {
             "seconds": seconds,
             "frames": len(pairs),
             "gain": float(np.mean(gains)),
+            "flat gain": float(np.mean(flat)),
+            "flat share": float(np.mean(inside)),
             **{name: float(np.mean(found)) for name, found in scores.items()},
-            PER_FRAME: {**scores, "gain": gains},
+            PER_FRAME: {**scores, "gain": gains, "flat gain": flat},
         }
 
     def works(self) -> dict[str, Callable[[int], dict[str, Any]]]:
@@ -196,12 +220,20 @@ def rows(results: Results) -> str:
             continue
         means = [f"{results.summary(name, score).mean:.2f}" for score in (NOISY, PEER, OURS)]
         gain = paired(results.per_pose(name, OURS), results.per_pose(name, PEER))
-        seconds = max(results.of(name, "seconds"))
-        found.append([name, *means, gain.text(), f"{seconds:.0f}"])
+        flat, seconds = interval(results.per_pose(name, "flat gain")), max(results.of(name, "seconds"))
+        found.append([name, *means, gain.text(), flat.text(), f"{seconds:.0f}"])
     return tables.markdown(HEADS, found)
 
 
-HEADS = ("frames", "noisy, dB", "Open Image Denoise, dB", "network, dB", "gain, dB", "training, s")
+HEADS = (
+    "frames",
+    "noisy, dB",
+    "Open Image Denoise, dB",
+    "network, dB",
+    "gain, dB",
+    "away from edges, dB",
+    "training, s",
+)
 """Heads of the table."""
 
 

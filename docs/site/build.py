@@ -44,6 +44,9 @@ def build_site(folder: Path) -> Path:
 def main() -> int:
     """Build the site that the command line asks for."""
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
+    if len(sys.argv) > 2 or any(word.startswith("-") for word in sys.argv[1:]):
+        print("usage: python docs/site/build.py [FOLDER]; out/site without one", file=sys.stderr)
+        return 2
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "out/site"
     if folder.exists() and any(folder.iterdir()) and not (folder / "search").exists():
         print(f"docs: {folder} holds something that is not a site; name another folder", file=sys.stderr)

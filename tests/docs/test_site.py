@@ -235,3 +235,12 @@ def test_a_folder_that_holds_something_else_is_left_alone(tmp_path, monkeypatch,
     assert main() == 2
     assert "holds something that is not a site; name another folder" in capsys.readouterr().err
     assert (tmp_path / "letter.txt").read_text() == "mine"
+
+
+def test_an_option_is_not_a_folder(monkeypatch, capsys, tmp_path):
+    """`--help` once became a folder with a site in it."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["build.py", "--help"])
+    assert main() == 2
+    assert "usage: " in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -30,7 +30,7 @@ from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network import siren
+from wamnet.refimpl.network import domain, siren
 from wamnet.refimpl.network.dataset import Normalization, channels_of, feature_image
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -257,6 +257,28 @@ def test_blender_s_library_is_right_and_notices_other_weights(tmp_path):
     weights.write_bytes(weights.read_bytes()[:-1] + b"!")
     with pytest.raises(ValueError, match=r"weights\.bin is not as the manifest says"):
         module_of(folder, "denoiser").Denoiser(folder)
+
+
+def test_blender_says_what_the_network_has_not_learned(tmp_path):
+    """Distances are those of the reference; of a frame like the others nothing is said."""
+    rng = np.random.default_rng(8)
+    features = ("color", "normal")
+    images = [
+        np.concatenate([0.2 * rng.random((9, 7, 3)), rng.uniform(-1, 1, (9, 7, 3))], axis=-1)
+        for _ in range(12)
+    ]
+    learned = domain.domain_of(images, features)
+    model = replace(model_of(features), info={domain.DOMAIN: domain.to_json(learned)})
+    folder = written(export(Request(model, "c", host="blender")), tmp_path)
+    module = module_of(folder, "denoiser")
+    stated = json.loads((folder / "manifest.json").read_text())["model"]["domain"]
+    bright = images[0] + np.repeat([0.6, 0.0], 3)
+    for image in (*images, bright):
+        found = domain.measure(learned, image)
+        told = module.outside(stated, [image[..., :3], image[..., 3:]])
+        assert bool(told) == found.is_outside
+        assert not told or f"distance {found.distance:.3g}, threshold {found.threshold:.3g}" in told
+    assert domain.measure(learned, bright).is_outside
 
 
 @pytest.mark.needs("devices")

@@ -267,7 +267,8 @@ class Renderer {
     }
     const denoising = this.denoising(chosen, read, picture.result);
     const ms = await this.strips.run([...tracing, ...encoding, ...denoising]);
-    this.shown = picture;
+    // A picture of another size may have been begun meanwhile: this one's textures are gone then.
+    this.shown = this.pictures.includes(picture) ? picture : this.shown;
     return ms;
   }
 

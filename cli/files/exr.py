@@ -15,7 +15,7 @@
 from __future__ import annotations
 
 import os
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from io import StringIO
@@ -109,7 +109,7 @@ def write_beside(path: Path, source: Path, color: Floats, view_layer: str = "") 
 
     It is beside the colour of its view layer, in place of an earlier one. Returns the layer's name.
     """
-    channels, header = _read_channels(source)
+    channels, header = _read_channels(source, whole=True)
     planes = _layer(source, "color", _group(_of_view_layer(source, channels, view_layer)))
     if planes is None:
         names = ", ".join(sorted(channels))
@@ -171,8 +171,11 @@ def read_frame(
     return frame
 
 
-def _read_channels(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return all channels of all parts by name, and the first part's header."""
+def _read_channels(path: Path, whole: bool = False) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return all channels of all parts by name, and the first part's header.
+
+    `whole`: parts with a channel of one name are refused, since all but the last would be lost.
+    """
     check_input(path)
     openexr = need("OpenEXR", "to read EXR files", "files")
     try:
@@ -195,6 +198,12 @@ def _read_channels(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     if len(windows) > 1:
         text = ", ".join(sorted(windows))
         raise InputError(f"{path}: data windows", text, "all parts must have the same", "export full frames")
+    names = Counter(name for part in parts for name in part.channels)
+    twice = [name for name, count in names.items() if count > 1]
+    if whole and twice:
+        rule = "they are in several parts, and one part is written"
+        way_out = "export it with the layers' names in those of the channels"
+        raise InputError(f"{path}: channels", ", ".join(sorted(twice)), rule, way_out)
     return {name: channel for part in parts for name, channel in part.channels.items()}, parts[0].header
 
 

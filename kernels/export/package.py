@@ -131,7 +131,8 @@ def export(request: Request) -> Export:
     for kernel, folder in _folders(denoiser):
         files |= _written(kernel, folder)
         files |= {f"{folder}/{n}": data for n, data in row.files("denoise", kernel.source).items()}
-    if halves := _halves(denoiser):
+    halves = _halves(denoiser)
+    if halves:
         files[f"denoise/{HALVES_NAME}"] = halves
     programs = _programs(request, row)
     path, encoder, passes = _of_scene(request, row, programs)
@@ -150,7 +151,7 @@ def export(request: Request) -> Export:
         others = [request.motion.other(request.settings)]
     pair = check_pair.pair(plan, model, promised, programs, others)
     files |= {f"check/{name}": data for name, data in pair.files().items()}
-    facts = _facts(request, row, how, denoiser, limits) | {"schedules": list(place.schedules)}
+    facts = _facts(request, row, how, denoiser, limits, bool(halves)) | {"schedules": list(place.schedules)}
     facts["scene"] = _scene(request, programs)
     facts["kernels"] = bindings.kernels(row, denoiser, path, encoder, passes)
     return _finished(request, facts, files, denoiser, path, encoder, passes, pair)
@@ -254,7 +255,12 @@ def with_speed(export: Export, speed: Mapping[str, Any]) -> Export:
 
 
 def _facts(
-    request: Request, row: Row, how: str, denoiser: Artifact, limits: Sequence[Mapping[str, Any]]
+    request: Request,
+    row: Row,
+    how: str,
+    denoiser: Artifact,
+    limits: Sequence[Mapping[str, Any]],
+    halves: bool,
 ) -> dict[str, Any]:
     """Return the entries of a manifest other than kernels and files."""
     held = denoiser.manifest
@@ -275,7 +281,7 @@ def _facts(
             "count": held["weights"]["count"],
             "file": f"denoise/{artifacts.WEIGHTS_NAME}",
             "order": held["weights"]["order"],
-            **({"half": f"denoise/{HALVES_NAME}"} if _halves(denoiser) else {}),
+            **({"half": f"denoise/{HALVES_NAME}"} if halves else {}),
         },
         "limits": list(limits),
     }

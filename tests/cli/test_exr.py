@@ -371,3 +371,18 @@ def test_one_of_several_view_layers_is_read_by_its_name(tmp_path: Path) -> None:
         exr.read_frame(path, view_layer="left")
     with pytest.raises(InputError, match="no colour is among them"):
         exr.write_beside(tmp_path / "out.exr", write(tmp_path / "n.exr", {"Z": plane(1.0)}), read)
+
+
+def test_parts_that_share_names_are_not_made_one(tmp_path: Path) -> None:
+    """All but one of the channels of a name would be lost."""
+    parts = [
+        OpenEXR.Part(
+            {"type": OpenEXR.scanlineimage}, {name: plane(value) for name in "RGB"}, f"part{value:g}"
+        )
+        for value in (1.0, 2.0)
+    ]
+    path = tmp_path / "in.exr"
+    OpenEXR.File(parts).write(str(path))
+    with pytest.raises(InputError, match="channels is B, G, R: they are in several parts"):
+        exr.write_beside(tmp_path / "out.exr", path, np.zeros((2, 3, 3)))
+    assert not (tmp_path / "out.exr").exists()

@@ -179,21 +179,26 @@ def vectors(
             case = replace(case, expected={name: case.expected[name] for name in only})
         inputs = {name: given(value) for name, value in case.inputs.items()}
         results: Mapping[str, Any] = {}
+        given_back: Mapping[str, Any]
         try:
             results = answer(inputs)
             for name, value in results.items():
                 numbers_of(case.clause, f"{name} of {case.id}", value)
             found = {name: to_json(_plain(value)) for name, value in results.items()}
-            verdict = judge(kind, case, {"output": found})
+            given_back = {"output": found}
         except ValueError as error:
             # A case that has to be refused is; any other exception says what is wrong itself.
             if case.expected is not None:
                 raise
-            verdict = judge(kind, case, {"refused": str(error)})
+            given_back = {"refused": str(error)}
+        verdict = judge(kind, case, given_back)
         if verdict.failed:
             note = f" ({case.note})" if case.note else ""
             reason = (explain(case, inputs, results) if explain else "") or likely
             what = f"{verdict.stage} of {case.id}{note}" if verdict.stage else f"{case.id}{note}"
+            if case.expected is None and "output" in given_back:
+                text = f"it breaks {case.clause}: check it, and raise ValueError"
+                raise Wrong(case.clause, what, "ValueError: this input is invalid", "an answer", text)
             expected = verdict.expected if verdict.stage else "what the case says"
             raise Wrong(case.clause, what, expected, verdict.got or verdict.text, reason)
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...compiler.reading.lanes import Unread
-from ...compiler.reading.syntax import Function, Parser, Text
+from ...compiler.reading.syntax import Function, Parser, Text, Type
 
 
 class TextError(Exception):
@@ -92,7 +92,9 @@ def parsed(source: str) -> Text:
     if not isinstance(source, str):
         raise TextError(f"{type(source).__name__} is not a text", "return the text")
     try:
-        return Parser(source).parse()
+        parser = Parser(source)
+        parser.types["size_t"] = Type("uint32")
+        return parser.parse()
     except Unread as error:
         raise TextError(f"it does not parse: {error}", "a bracket, a semicolon or an operator") from None
     except (LookupError, ValueError, TypeError) as error:

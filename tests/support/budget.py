@@ -35,7 +35,7 @@ BUDGET = {
     "cli": 300,
     "cli/commands": 6075,
     "cli/common": 1160,
-    "cli/course": 5250,
+    "cli/course": 5400,
     "cli/files": 1325,
     "cli/reports": 1450,
 }

@@ -111,8 +111,8 @@ SINGLE = {
 }
 """Programs, and the likeliest mistake of each."""
 
-CONSTANTS = (2.0, -2.0, 0.1, 1.0 / 3.0, 1e-7, 1e30, -1.5e-20, 16777216.0, 0.0, 123456.789, 3)
-"""Constants that literals have to bring back."""
+CONSTANTS = (2.0, -2.0, 0.1, 1.0 / 3.0, 1e-7, 1e30, -1.5e-20, 16777216.0, 0.0, 123456.789, 3, 120408.766)
+"""Constants that literals have to bring back; the last one needs nine digits."""
 
 
 def inputs() -> dict[str, Any]:
@@ -160,21 +160,19 @@ def run_glsl(student: Any, program: Program, given: dict[str, Any]) -> Any:
     return np.array(found, np.float64)
 
 
-RUNS = {"opencl": ("KER-5", run_opencl), "glsl": ("KER-6", run_glsl)}
-"""What runs a language's text, and the clause of its interface."""
+RUNS = {"opencl": run_opencl, "glsl": run_glsl}
+"""What runs a language's text."""
 
 
 def compare(student: Any, language: str, name: str, program: Program, likely: str) -> None:
     """Compare a text with its program."""
-    clause, run = RUNS[language]
     given = inputs()
     try:
-        found = run(student, program, given)
+        found = RUNS[language](student, program, given)
     except TextError as error:
         what = f"the {language} text of {name}"
-        raise Wrong(
-            clause, what, "a text that compiles and runs", str(error), error.likely or likely
-        ) from None
+        wanted = "a text that compiles and runs"
+        raise Wrong("IR-3", what, wanted, str(error), error.likely or likely) from None
     wanted = evaluated(program, given).astype(np.float64)
     # The same operations in float32; one unit in the last place for those who write them otherwise.
     near = np.abs(found.astype(np.float64) - wanted) <= 2.0**-22 * np.abs(wanted)
@@ -184,7 +182,7 @@ def compare(student: Any, language: str, name: str, program: Program, likely: st
         missed = "not every number is written: the guard is i >= count" if np.isnan(found[at]) else likely
         if np.all(found == found[0]) and not np.all(wanted == wanted[0]):
             missed = "item i reads number i: in_a[i]"
-        raise Wrong(clause, what, f"{wanted[at]:.9g}", f"{found[at]:.9g}", missed)
+        raise Wrong("IR-3", what, f"{wanted[at]:.9g}", f"{found[at]:.9g}", missed)
 
 
 def _singles(language: str) -> Callable[[Any], None]:
@@ -202,24 +200,22 @@ def literals(student: Any) -> None:
     for language in RUNS:
         for value in CONSTANTS:
             found = student.literal(value, language)
-            hold("KER-1", "the result of literal", isinstance(found, str), "a text", type(found).__name__)
+            hold("IR-6", "the result of literal", isinstance(found, str), "a text", type(found).__name__)
             what = f"the {language} literal of {value!r}"
             try:
                 body = parsed(f"float compute(float x) {{ return {found}; }}").functions["compute"]
                 number = Lane(language, {}).call(body)
             except (TextError, KeyError) as error:
                 likely = getattr(error, "likely", "")
-                raise Wrong("KER-1", what, "a number", f"{found!r}: {error}", likely) from None
+                raise Wrong("IR-6", what, "a number", f"{found!r}: {error}", likely) from None
             text = "a literal needs a point: 2.0"
             text = "2.0 is a double in OpenCL, 2.0f is a float" if language == "opencl" else text
             right = isinstance(number, np.float32)
-            hold(
-                "KER-1", f"the kind of {what}", right, "float", f"{found!r}, a {type(number).__name__}", text
-            )
+            hold("IR-6", f"the kind of {what}", right, "float", f"{found!r}, a {type(number).__name__}", text)
             text = "nine digits bring every float32 back: %.9g, or repr(float(np.float32(value)))"
             text = "the sign is lost" if number == -np.float32(value) else text
             hold(
-                "KER-1",
+                "IR-6",
                 what,
                 number == np.float32(value),
                 f"{np.float32(value):.9g}",

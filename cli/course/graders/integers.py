@@ -8,7 +8,8 @@ import numpy as np
 
 from ....compiler.core.ir import Gather, Image, Type
 from ....compiler.core.trace import trace
-from ....compiler.proof.whole import Rounds, known
+from ....compiler.proof.whole import RULES, Rounds, known
+from ....refimpl.errors import CompileError
 from ....refimpl.network import siren
 from ....refimpl.network.dataset import Window
 from ....refimpl.network.whole import SINES, TURN, colour, rounded, whole_sine
@@ -88,12 +89,44 @@ def phases(student: Any) -> None:
         expect("WHO-4", what, np.asarray(found) % TURN, wanted, 0.0, likely, text)
 
 
+def folded(at: Any, amplitude: int, how: str = "") -> Any:
+    """Return the sine of WHO-5 with one mistake of [`SINE_MISTAKES`], in words of 32 bits that wrap."""
+    (c1, c3, c5), shift = SINES[amplitude].coefficients, SINES[amplitude].shift
+    at = np.asarray(at).astype(np.uint32)
+    one = np.uint32(1)
+    back = (at >> np.uint32(23 if how == "quarter" else 22)) & one
+    turned = 0 - at if how == "negative" else at if how == "forward" else ~at
+    m = np.where(back == 1, turned, at) >> np.uint32(6)
+    m = m & np.uint32({"mask": 0x7FFF, "unmasked": 2**32 - 1}.get(how, 0xFFFF))
+    z = (m * m) >> np.uint32(16)
+    inner = (z * np.uint32(c5)) >> np.uint32(16)
+    inner = np.uint32(c3) + inner if how == "plus" else np.uint32(c3) - inner
+    q = np.uint32(c1) - ((z * inner) >> np.uint32(16))
+    added = {"down": 0, "one": 1, "whole": 1 << shift}.get(how, 1 << (shift - 1))
+    size = np.minimum((m * q + np.uint32(added)) >> np.uint32(shift), amplitude).astype(np.float64)
+    half = (at >> np.uint32(22 if how == "half" else 23)) & one
+    return np.where(half == 1, -size, size)
+
+
+SINE_MISTAKES = (
+    ("down", "half of the last place, 1 << (shift - 1), is added before the shift: it is missing"),
+    ("one", "half of the last place is 1 << (shift - 1), not 1"),
+    ("whole", "half of the last place is 1 << (shift - 1), not 1 << shift"),
+    ("half", "the sign is that of bit 23, the half turn; bit 22 is the quarter"),
+    ("quarter", "bit 22 turns the phase around, not bit 23: the second and fourth quarter run backwards"),
+    ("forward", "the second and fourth quarter run backwards: bit 22 turns the phase around"),
+    ("negative", "backwards is the complement of all bits, ~k, not its negative"),
+    ("mask", "bits 6 to 21 are 16 bits: & 0xFFFF"),
+    ("unmasked", "bits 6 to 21 only: & 0xFFFF after the shift masks those above"),
+    ("plus", "the signs of the polynomial alternate: c3 - (z c5 >> 16)"),
+)
+"""Mistakes in a sine, and their explanations."""
+
+
 def single(student: Any) -> None:
     """Angles whose sines are known."""
     for amplitude in SINES:
-        at = np.array(
-            [0, TURN // 4, TURN // 2, 3 * TURN // 4, TURN // 12, TURN // 3, TURN - TURN // 12], np.uint32
-        )
+        at = np.arange(0, TURN, TURN // 48, dtype=np.uint32)
         found = numbers_of("WHO-5", "sines", student.sine(at, amplitude), at.shape)
         wanted = whole_sine(at, amplitude)
         kind_of_number("WHO-5", "sines", found, np.float32)
@@ -103,7 +136,8 @@ def single(student: Any) -> None:
             (wanted / amplitude, "integers in [-amplitude, amplitude], not numbers in [-1, 1]"),
             (np.round(amplitude * np.cos(2 * np.pi * at / TURN)), "a cosine"),
         ]
-        text = "the second and fourth quarter run backwards: bit 22 turns the phase around"
+        likely += [(folded(at, amplitude, how), told) for how, told in SINE_MISTAKES]
+        text = "fold by bit 22, bits 6 to 21, the polynomial, half of the last place, a shift, sign by bit 23"
         if not np.all(found == np.floor(found)):
             text = "a sine is an integer: shift, do not divide"
         expect("WHO-5", f"sines of amplitude {amplitude}", found, wanted, 0.0, likely, text)
@@ -117,10 +151,10 @@ def every_angle(student: Any) -> None:
         wanted = whole_sine(at, amplitude)
         off = np.flatnonzero(found != wanted)
         if off.size:
-            high = float(np.abs(found).max())
-            text = "half of the last place, 1 << (shift - 1), is added before the shift"
-            text = "np.minimum(..., amplitude): rounded up it may be one more" if high > amplitude else text
+            made = ((folded(at, amplitude, how), told) for how, told in SINE_MISTAKES)
+            text = "the last place: what is added before the shift, and the shift"
             text = "a coefficient, a shift, or the place of a shift" if off.size > at.size // 2 else text
+            text = next((told for values, told in made if np.array_equal(values, found)), text)
             what = f"sine({at[off[0]]}, {amplitude}); {off.size} of {at.size} angles differ"
             raise Wrong("WHO-5", what, f"{wanted[off[0]]:g}", f"{found[off[0]]:g}", text)
         beyond = at[::997] + np.uint32(TURN)
@@ -185,12 +219,19 @@ def nothing_rounds(student: Any) -> None:
     network = rounded(siren.init([12, 8, 8, 3], 30.0, 30.0, seed=1), 2)
     gather = Gather(Window(2), (Image("color", 3, -127.0, 127.0, whole=True),))
     types = {"window": Type(shape=(gather.n_inputs,))}
-    program = trace(lambda window: forward(student, network, window)[-1], types, gather)
+    what, wanted = "the compiler's proof", "that nothing rounds"
     try:
-        known(program)
+        known(trace(lambda window: forward(student, network, window)[-1], types, gather))
     except Rounds as reason:
+        # Without a rule is what the proof cannot follow; with one, what may round.
+        op = str(reason).partition(" ")[0]
         text = "right in NumPy perhaps; a kernel's words have 32 bits and its floats 24"
-        raise Wrong("WHO-3", "the compiler's proof", "that nothing rounds", str(reason), text) from None
+        if "(%" in str(reason) and op not in RULES:
+            text = f"the proof has no rule for {op}: use the operations that the task names"
+        raise Wrong("WHO-3", what, wanted, str(reason), text) from None
+    except CompileError as reason:
+        text = "an operation that cannot be traced: use those that the task names"
+        raise Wrong("WHO-3", what, wanted, str(reason).partition(";")[0], text) from None
 
 
 CHECKS = (

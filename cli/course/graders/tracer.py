@@ -291,25 +291,24 @@ def dead(student: Any) -> None:
 
 def shown(student: Any) -> None:
     """The text of a program."""
-    program = student.Program(
-        (student.Node("input", (), "a"), student.Node("const", (), 2.0), student.Node("multiply", (0, 1))), 2
-    )
-    wanted = "%0 = input a\n%1 = const 2.0\n%2 = multiply %0 %1\noutput %2\n"
+    value = np.float32(0.1)
+    nodes = ("input", (), "a"), ("const", (), value), ("multiply", (0, 1), None)
+    program = student.Program(tuple(student.Node(*node) for node in nodes), 2)
+    wanted = f"%0 = input a\n%1 = const {value!r}\n%2 = multiply %0 %1\noutput %2\n"
     found = student.text(program)
     hold("IR-1", "the result of text", isinstance(found, str), "a text", type(found).__name__)
-    if found != wanted:
-        lines, right = found.splitlines(), wanted.splitlines()
-        at = next(
-            (i for i, (x, y) in enumerate(zip(lines, right, strict=False)) if x != y),
-            min(len(lines), len(right)),
-        )
-        told = [repr(part[at]) if at < len(part) else "nothing" for part in (right, lines)]
-        text = (
-            "every line ends with a line's end"
-            if lines == right
-            else "%INDEX = OP, then %OPERANDS, or the name, or repr(value)"
-        )
-        raise Wrong("IR-1", f"line {at} of the text", told[0], told[1], text)
+    if found == wanted:
+        return
+    lines, right = found.splitlines(), wanted.splitlines()
+    if lines == right:
+        text = "every line ends with a line's end, the last one too"
+        raise Wrong("IR-1", "the end of the text", repr(wanted[-9:]), repr(found[-9:]), text)
+    pairs = zip(right, lines, strict=False)
+    at = next((i for i, (x, y) in enumerate(pairs) if x != y), min(len(lines), len(right)))
+    told = [repr(part[at]) if at < len(part) else "nothing" for part in (right, lines)]
+    text = "%INDEX = OP, then %OPERANDS, or the name, or repr(value)"
+    text = "repr(value), not str(value): f'{value!r}'" if at == 1 and str(value) in told[1] else text
+    raise Wrong("IR-1", f"line {at} of the text", told[0], told[1], text)
 
 
 def reference(student: Any) -> None:

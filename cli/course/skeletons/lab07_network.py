@@ -1,8 +1,10 @@
 """A network of sines, forwards and backwards.
 
 Layer l maps x to sin(omega (W x + b)), the last one to W x + b; omega is omegas[0] for the first layer and
-omegas[1] for the other sines. Backwards, the chain rule from the last layer to the first. Tutorial: page 5.
-Clauses: SIR-2, SIR-7.
+omegas[1] for the other sines. Backwards, the chain rule from the last layer to the first. What does not
+fit together, as a bias of another length than its layer or an x of another width than the first one's D_in,
+is refused with ValueError: NumPy would stretch some of it silently. Tutorial: page 5. Clauses: SIR-1, SIR-2,
+SIR-7.
 """
 
 from __future__ import annotations

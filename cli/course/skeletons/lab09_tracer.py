@@ -4,11 +4,13 @@ A program is a list of nodes; a node names its operands by their indices, which 
 calling: the function is called once with values that write down what is done to them. NumPy hands every
 ufunc on such a value to `__array_ufunc__`, and np.where to `__array_function__`; Python's operators come from
 NDArrayOperatorsMixin. The same operation on the same operands is the same node: look it up before you add
-one [value numbering]. Constants are kept as they are given, so that float32 stays float32; 0.0 and -0.0, and
-1 and 1.0, are different constants.
+one [value numbering]. Constants are kept as they are given, so that float32 stays float32, where IR-6 keeps
+all in float64; 0.0 and -0.0, and 1 and 1.0, are different constants. `trace` keeps what nobody uses: dropping
+it is the work of `live`.
 
 What is not in OPS is refused with TypeError. So is `if a > 0` on a traced value: Python asks its `__bool__`,
-and without one it takes every value as true, silently. Tutorial: page 7. Clauses: IR-1, IR-2, IR-3.
+and without one it takes every value as true, silently. Tutorial: page 7. Clauses: IR-1, IR-2, IR-3,
+IR-5, IR-6.
 """
 
 from __future__ import annotations
@@ -94,6 +96,6 @@ def text(program: Program) -> str:
     %2 = multiply %0 %1
     output %2
 
-    A constant is shown by repr(value).
+    A constant is shown by repr(value). Every line ends with a line's end, the last one too.
     """
     raise NotImplementedError("text")

@@ -11,7 +11,8 @@ Write one statement a node: `float v3 = v1 * v2;`. Both languages are like C, an
 * Nine digits bring every float32 back; %f has six places, and 1e-7 becomes 0.
 * More work items run than there are numbers: those beyond the end must not read or write.
 
-Tutorial: page 7. Clauses: KER-1, KER-5, KER-6.
+A constant may be any finite float32. The text may use float, int, uint, size_t and bool, `if`, `return`, and
+`?:`. Tutorial: page 7. Clauses: IR-3, IR-6, KER-1; what a kernel and a function take is said below.
 """
 
 from __future__ import annotations

@@ -22,7 +22,8 @@ U, TINY, WIDER = 2.0**-24, 2.0**-110, 1 + 2.0**-16
 """float32's rounding; a number above all that is flushed; a factor for float64's own rounding."""
 
 Step = tuple[Any, Any, Any]
-"""Of a layer, (m,) each: the largest argument, the error that rounding adds to it, and with the sine's."""
+"""Of a layer, (m,) each: the largest argument that a kernel may hold, which its own error makes larger; the
+error that rounding adds to it; that and the sine's."""
 
 
 def gamma(n: int) -> float:

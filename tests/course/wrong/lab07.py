@@ -1,6 +1,7 @@
 """Wrong answers to lab 7: the old text, the new one, the mistake, and words of the explanation."""
 
 WRONG = [
+    ("if any(len(b) != len(w) for", "if any(len(w) == 0 for", "shapes are not checked", "raise ValueError"),
     (
         "(x @ w.T + b) * omegas[min(layer, 1)]",
         "x @ w.T * omegas[min(layer, 1)] + b",

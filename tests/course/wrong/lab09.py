@@ -133,6 +133,8 @@ WRONG = [
         "another text of constants",
         "repr",
     ),
+    ("parts.append(repr(node.value))", "parts.append(str(node.value))", "str for repr", "not str"),
+    ('{program.output}\\n"', '{program.output}"', "no last line's end", "the last one too"),
     ('f"output %{program.output}\\n"', '""', "no output line", "%INDEX"),
 ]
 """Old, new, the mistake in words, and what the explanation must hold."""

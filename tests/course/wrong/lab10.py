@@ -4,6 +4,7 @@ WRONG = [
     ('digits += "f" if language == "opencl" else ""', "", "doubles in OpenCL", "2.0 is a double"),
     ('f"{float(value):.9g}"', 'f"{float(value):f}"', "six places", "nine digits"),
     ('f"{float(value):.9g}"', 'f"{float(value):.6g}"', "six digits", "nine digits"),
+    ('f"{float(value):.9g}"', 'f"{float(value):.8g}"', "eight digits", "nine digits"),
     ('        digits += ".0"\n', "        pass\n", "integers", "point"),
     (
         'return f"({digits})" if digits.startswith("-") else digits',

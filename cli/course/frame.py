@@ -12,6 +12,7 @@
 from __future__ import annotations
 
 import math
+import re
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -41,6 +42,10 @@ ALIKE = 1e-6
 
 Likely = Sequence[tuple[Any, str]]
 """Values that known mistakes give, and the explanation of each."""
+
+
+ROUGH = 2e-6
+"""What single precision or a constant of six digits is off by, relative to the largest number."""
 
 
 class Check(NamedTuple):
@@ -125,12 +130,17 @@ def expect(
     if np.all(good):
         return
     reason = next((text for value, text in likely if alike(array, value, bound)), otherwise)
+    if array.dtype == np.float32 and alike(array, expected) and np.all(bound < ALIKE / 100):
+        reason = "single precision: the result is in float32, and it is asked for in float64"
     if not reason and array.dtype.kind == "f" and np.any(np.isnan(array)):
         reason = "a root of a negative number, or 0 / 0"
     if array.ndim and array.size > 6:
         at = tuple(int(i) for i in np.argwhere(~good)[0])
         what, expected, found = f"{what} at {list(at)}", expected[at], array[at]
-    raise Wrong(clause, what, number_text(expected), number_text(found), reason)
+    told = number_text(expected), number_text(found)
+    if told[0] == told[1]:
+        told = repr(np.asarray(expected).tolist()), repr(np.asarray(found).tolist())
+    raise Wrong(clause, what, *told, reason)
 
 
 def alike(found: Any, value: Any, bound: float = 0.0) -> bool:
@@ -142,6 +152,23 @@ def alike(found: Any, value: Any, bound: float = 0.0) -> bool:
         finite = np.abs(b)[np.isfinite(b)]
         most = max(bound, ALIKE * float(finite.max(initial=0.0)))
         return bool(np.all((np.abs(a - b) <= most) | (a == b) | (np.isnan(a) & np.isnan(b))))
+
+
+def still(*arrays: Any) -> tuple[Any, ...]:
+    """Return copies of arrays that cannot be written to: who changes an argument gets an error."""
+    found = tuple(np.array(array) for array in arrays)
+    for array in found:
+        array.flags.writeable = False
+    return found
+
+
+def near(found: Any, wanted: Any) -> bool:
+    """Tell whether numbers differ by what float32, or a constant of a few digits, makes of them."""
+    return alike(found, wanted, ROUGH * max(1.0, float(np.abs(wanted).max(initial=0.0))))
+
+
+SINGLE = "single precision somewhere, or a constant of a few digits: np.pi, np.radians, float64 all the way"
+"""The explanation of numbers that are near the right ones."""
 
 
 def hold(clause: str, what: str, good: Any, expected: str, found: Any, likely: str = "") -> None:
@@ -156,6 +183,9 @@ def kind_of_number(clause: str, what: str, found: Any, dtype: Any) -> None:
     likely = f"a constant or an array of {array.dtype} among the operands: make it {wanted} first"
     hold(clause, f"the kind of {what}", array.dtype == wanted, str(wanted), str(array.dtype), likely)
 
+
+HEXADECIMAL = re.compile(r"-?0x[01]\.?[0-9a-f]*p[+-]\d+")
+"""A float as vectors write it."""
 
 Answer = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 """From a case's inputs, as arrays, to its outputs by name."""
@@ -177,7 +207,7 @@ def vectors(
             continue
         if only and case.expected is not None:
             case = replace(case, expected={name: case.expected[name] for name in only})
-        inputs = {name: given(value) for name, value in case.inputs.items()}
+        inputs = {name: _kept(given(value)) for name, value in case.inputs.items()}
         results: Mapping[str, Any] = {}
         given_back: Mapping[str, Any]
         try:
@@ -200,7 +230,17 @@ def vectors(
                 text = f"it breaks {case.clause}: check it, and raise ValueError"
                 raise Wrong(case.clause, what, "ValueError: this input is invalid", "an answer", text)
             expected = verdict.expected if verdict.stage else "what the case says"
-            raise Wrong(case.clause, what, expected, verdict.got or verdict.text, reason)
+            raise Wrong(case.clause, what, _decimal(expected), _decimal(verdict.got or verdict.text), reason)
+
+
+def _kept(value: Any) -> Any:
+    """Return an input that cannot be written to, where it is an array."""
+    return still(value)[0] if isinstance(value, np.ndarray) else value
+
+
+def _decimal(text: str) -> str:
+    """Return a text with its hexadecimal floats as decimal ones."""
+    return HEXADECIMAL.sub(lambda found: f"{float.fromhex(found[0]):.9g}", text)
 
 
 def _plain(value: Any) -> Any:
@@ -208,6 +248,9 @@ def _plain(value: Any) -> Any:
     array = np.asarray(value)
     return array if array.ndim else array[()]
 
+
+MASK = "a mask of another shape than the array: make that from the shape of a result, not of one argument"
+"""The explanation of a mask that does not fit."""
 
 EXPLAINED = (
     (NotImplementedError, "", "it is still to be written"),
@@ -222,6 +265,10 @@ EXPLAINED = (
     (ValueError, "broadcast", "axes that do not fit: a number per ray goes with vectors as t[..., None]"),
     (ValueError, "matmul", "the matrix is (D_out, D_in): x @ W.T"),
     (ValueError, "read-only", "an argument is changed: make a new array"),
+    (IndexError, "for array of dimension", "one ray has no axis beside its components: axis=-1, not axis=1"),
+    (IndexError, "too many indices for array: array is 0-dimensional, but 1 were", MASK),
+    (IndexError, "boolean index", MASK),
+    (IndexError, "too many indices", "one ray has no axis beside its components: [..., 0], not [:, 0]"),
     (IndexError, "", "an index beyond the end"),
     (KeyError, "", "a name that the dictionary does not hold"),
     (AttributeError, "'NoneType'", "a function without `return` gives None"),

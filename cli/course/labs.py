@@ -60,7 +60,7 @@ class Lab(NamedTuple):
 LABS = (
     Lab("lab01_sphere", "A ray and a sphere", "ISC-6, ISC-2", 60),
     Lab("lab02_camera", "A camera", "CAM-1, CAM-2", 45),
-    Lab("lab03_sampling", "Random numbers and a sampler", "RNG-1, RNG-3, SMP-2", 60),
+    Lab("lab03_sampling", "Random numbers and a sampler", "RNG-1, RNG-2, RNG-5, SMP-2", 60),
     Lab("lab04_light", "Light", "LAM-1, LTR-5", 75),
     Lab("lab05_picture", "A picture and its variance", "RND-1, RND-4, MET-3", 75),
     Lab("lab06_window", "Windows and features", "DAT-1, DAT-4, DAT-5, DAT-9", 45),

@@ -112,7 +112,7 @@ def test_the_folder_works_with_pytest_and_make(started):
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "lab08 or lab01"]
     done = subprocess.run(command, cwd=started, capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert "10 failed, 6 passed" in done.stdout
+    assert f"{len(LABS[0].checks)} failed, {len(LABS[7].checks)} passed" in done.stdout
     assert "it is still to be written" in done.stdout
     make = ["make", "--no-print-directory", "lab8", f"WAMNET={sys.executable} -m wamnet.cli"]
     done = subprocess.run(make, cwd=started, capture_output=True, text=True, check=False)

@@ -111,7 +111,7 @@ def test_an_unknown_lab_is_refused():
         ("x = 1", "AttributeError", "gone or renamed"),
         ("def meet_sphere(*a):\n    return meet_sphere(*a)", "RecursionError", "without an end"),
         (
-            "import numpy as np\ndef meet_sphere(c, r, o, d):\n    return o if o[0] > 1 else [o, d]",
+            "import numpy as np\ndef meet_sphere(c, r, o, d):\n    return [o, d, o]",
             "shape|",
             "",
         ),

@@ -31,11 +31,11 @@ BUDGET = {
     "kernels/blender": 500,
     "kernels/export": 4250,
     "kernels/verify": 2925,
-    "spec/conformance": 8400,
+    "spec/conformance": 8600,
     "cli": 300,
     "cli/commands": 6075,
     "cli/common": 1160,
-    "cli/course": 5400,
+    "cli/course": 5550,
     "cli/files": 1325,
     "cli/reports": 1450,
 }

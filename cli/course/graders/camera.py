@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from ....refimpl.light.scene import Camera
-from ..frame import Check, alike, expect, hold, numbers_of, vectors
+from ....spec.conformance.case import Case, given
+from ..frame import SINGLE, Check, alike, expect, hold, near, numbers_of, still, vectors
 
 CAMERA = Camera((0.5, 1.0, 4.0), (0.0, -0.2, 0.0), vertical_fov_deg=41.0)
 """The camera of the vectors; the image is 97 x 64."""
@@ -19,9 +20,11 @@ BOUND = 1e-12
 """A dozen operations on numbers below 10, in float64."""
 
 
-def ray(student: Any, camera: Camera, *given: Any) -> tuple[Any, Any]:
+def ray(student: Any, camera: Camera, *values: Any) -> tuple[Any, Any]:
     """Return origin and direction as arrays."""
-    found = student.camera_ray(camera, *given)
+    x, y, u, v, width, height = values
+    pixels = still(x, y, u, v) if np.ndim(x) else (x, y, u, v)
+    found = student.camera_ray(camera, *pixels, width, height)
     good = isinstance(found, tuple) and len(found) == 2
     text = "there is no `return`" if found is None else "return both: origin, direction"
     hold("CAM-2", "the result", good, "a pair", type(found).__name__, text)
@@ -38,7 +41,8 @@ def middle(student: Any) -> None:
     numbers_of("CAM-2", "the direction of one ray", direction, (3,))
     length = np.linalg.norm(direction)
     unit = "the direction is not divided by its length"
-    unit = "look_at is a point: forward is look_at - position" if np.isnan(length) else unit
+    if np.isnan(length):
+        unit = "nothing is left of it: forward, look_at - position, is one of the three terms that are added"
     hold("CAM-2", "the length of a direction", abs(length - 1.0) <= BOUND, "1", length, unit)
     likely = [
         (-wanted, "forward goes from position to look_at, not back"),
@@ -48,6 +52,7 @@ def middle(student: Any) -> None:
     text = "the middle, x + u = width / 2 and y + v = height / 2, is not in the middle of the image plane"
     if alike(other, wanted, BOUND):
         text = "u is left out, v is left out, or both are exchanged: the point is (x + u, y + v)"
+    text = SINGLE if near(direction, wanted) else text
     expect("CAM-2", "the direction of the middle", direction, wanted, BOUND, likely, text)
 
 
@@ -73,6 +78,7 @@ def across(student: Any) -> None:
     ]
     text = "the horizontal coordinate: (2 (x + u) - width) / height * tan(vertical_fov / 2)"
     found = _at(student, 4.0, 1.0)
+    text = SINGLE if near(found, (2.0, 0.0, -1.0)) else text
     large = abs(found[0]) > 1e6
     hold(
         "CAM-2",
@@ -100,12 +106,17 @@ def upwards(student: Any) -> None:
 
 def jitter(student: Any) -> None:
     """u and v count as x and y do."""
-    for name, moved in (("u", (2.0, 3.0, 0.25, 0.0)), ("v", (2.0, 3.0, 0.0, 0.25))):
+    for name, moved in (
+        ("u", (2.0, 3.0, 0.25, 0.0)),
+        ("v", (2.0, 3.0, 0.0, 0.25)),
+        ("u", (2.0, 3.0, 0.1, 0.0)),
+    ):
         _, here = ray(student, CAMERA, *moved, 97, 64)
         x, y, u, v = moved
         _, there = ray(student, CAMERA, x + u, y + v, 0.0, 0.0, 97, 64)
         text = f"{name} is left out, taken twice, or u and v are exchanged: the point is (x + u, y + v)"
-        expect("CAM-2", f"the direction for {name} = 0.25", here, there, BOUND, (), text)
+        text = SINGLE if near(here, there) else text
+        expect("CAM-2", f"the direction for {name} = {u + v:g}", here, there, BOUND, (), text)
 
 
 def tilted(student: Any) -> None:
@@ -115,7 +126,10 @@ def tilted(student: Any) -> None:
     ahead = np.array([0.0, -3.0, -1.0]) / 10**0.5
     wanted = (ahead + np.array([1.0, 0.0, 0.0])) / 2**0.5
     text = "right is not made a unit vector: forward x up is shorter where they are not at right angles"
-    expect("CAM-1", "the right edge of a camera that looks down", right, wanted, BOUND, (), text)
+    long = np.array([1.0, -3.0, -1.0]) / 11**0.5
+    likely = [(long, "forward is not made a unit vector before the coordinates are added to it")]
+    text = SINGLE if near(right, wanted) else text
+    expect("CAM-1", "the right edge of a camera that looks down", right, wanted, BOUND, likely, text)
     camera = Camera((0.0, 2.0, 2.0), (0.0, 0.0, 0.0), vertical_fov_deg=90.0)
     _, top = ray(student, camera, 1.0, 0.0, 0.0, 0.0, 2, 2)
     forward = np.array([0.0, -1.0, -1.0]) / 2**0.5
@@ -158,11 +172,17 @@ def arrays(student: Any) -> None:
 def the_vectors(student: Any) -> None:
     """The cases camera.ray."""
 
-    def answer(given: Any) -> Any:
-        origin, direction = ray(student, CAMERA, *(given[name] for name in "xyuv"), 97, 64)
+    def answer(values: Any) -> Any:
+        origin, direction = ray(student, CAMERA, *(values[name] for name in "xyuv"), 97, 64)
         return {"origin": origin, "direction": direction}
 
-    vectors("camera.ray", answer, likely="single precision somewhere, or a constant that is rounded")
+    def explain(case: Case, inputs: Any, found: Any) -> str:
+        if case.expected is None or not found:
+            return ""
+        close = all(near(found[name], given(part.value)) for name, part in case.expected.items())
+        return SINGLE if close else "/ and not //: neither coordinates nor width / height are whole numbers"
+
+    vectors("camera.ray", answer, explain=explain)
 
 
 CHECKS = (

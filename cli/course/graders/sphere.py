@@ -7,7 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from ..frame import Check, Likely, Wrong, expect, hold, kind_of_number, normals, numbers_of, spread, vectors
+from ..frame import (
+    Check,
+    Likely,
+    Wrong,
+    expect,
+    hold,
+    kind_of_number,
+    normals,
+    numbers_of,
+    spread,
+    still,
+    vectors,
+)
 
 CENTER, RADIUS = np.array([0.25, -0.5, 0.125]), 0.75
 """The sphere of the vectors."""
@@ -18,14 +30,23 @@ FAR = 1000.0
 BOUND = 1e-12
 """A dozen operations on numbers below 10, in float64."""
 
+NO_HIT = tuple(
+    (value, "it is known that nothing is met; the distance is MISS then, 1e30")
+    for value in (np.inf, -np.inf, np.nan, -1.0, 0.0, 1e38)
+)
+"""Other numbers for a miss."""
+
 NEAR_ROOT = "inside, the near root is behind the ray: take the far one where the near one is below 0"
 """The explanation of a distance below 0, and of its like."""
 
 
 def one(student: Any, center: Sequence[float], radius: float, origin: Any, direction: Any) -> Any:
     """Return the distance of one ray in float64."""
-    given = (np.array(v, np.float64) for v in (origin, direction))
-    found = student.meet_sphere(np.array(center, np.float64), np.float64(radius), *given)
+    given = still(*(np.array(v, np.float64) for v in (center, origin, direction)))
+    found = student.meet_sphere(given[0], np.float64(radius), *given[1:])
+    pair = isinstance(found, (tuple, list)) and len(found) == 2
+    text = "the nearer root that is above 0, or MISS: np.where chooses"
+    hold("ISC-6", "the distance of one ray", not pair, "one number", "two of them", text)
     return numbers_of("ISC-6", "the distance of one ray", found, ())
 
 
@@ -90,6 +111,7 @@ behind = _ray(
         (-7.0, "both roots are behind the ray: a miss, where the far root is not above 0"),
         (3.0, "an absolute value: the sphere is behind the ray"),
         (7.0, "an absolute value: the sphere is behind the ray"),
+        *NO_HIT,
     ],
     "a sphere behind the ray is a miss",
 )
@@ -98,17 +120,39 @@ beside = _ray(
     (3, 0, 0),
     (0, 0, 1),
     1e30,
-    [(5.0, "the root of max(discriminant, 0) is 0 where the discriminant is below 0: that is a miss")],
+    [
+        (5.0, "the root of max(discriminant, 0) is 0 where the discriminant is below 0: that is a miss"),
+        *NO_HIT,
+    ],
     "a discriminant below 0 is a miss: np.where(discriminant > 0, ..., MISS)",
 )
 
 
 def grazing(student: Any) -> None:
-    """A ray that cuts the edge of the sphere: a depth of 0.05 of a radius of 2."""
-    found = one(student, (0, 0, 5), 2.0, (1.95, 0, 0), (0, 0, 1))
-    wanted = 5.0 - (4.0 - 1.95**2) ** 0.5
+    """Rays that cut the edge of the sphere, the last one 1e-4 of its radius of 2 deep, and one that touches.
+
+    A discriminant of 1e-8 is a difference of numbers of 4, and known to 1e-15 or so: half of that over its
+    root, 1e-4, is what the distance may be off by.
+    """
     late = "a threshold other than 0 for the discriminant, or a radius that is too small"
-    expect("ISC-6", "the distance of a ray at the sphere's edge", found, wanted, BOUND, [(1e30, late)], late)
+    what = "the distance of a ray at the sphere's edge"
+    for square in (4.0 - 1.95**2, 1e-2, 1e-4, 1e-8):
+        aside_by = (4.0 - square) ** 0.5
+        found = one(student, (0, 0, 5), 2.0, (aside_by, 0, 0), (0, 0, 1))
+        wanted = 5.0 - max(4.0 - aside_by**2, 0.0) ** 0.5
+        expect("ISC-6", what, found, wanted, 1e-10, [(1e30, late)], late)
+    found = one(student, (0, 0, 5), 2.0, (2, 0, 0), (0, 0, 1))
+    text = "a ray that only touches misses: the discriminant is above 0, not at least 0"
+    expect("ISC-6", "the distance of a ray that touches the sphere", found, 1e30, BOUND, [(5.0, text)], text)
+
+
+def close(student: Any) -> None:
+    """Rays that begin a ten-thousandth before a surface: the entry, and from inside the exit."""
+    text = "t > 0, not t > a threshold: what a ray leaves is kept away by its origin (ISC-9)"
+    for what, z in (("outside", 3.0), ("inside", 7.0)):
+        found = one(student, (0, 0, 5), 2.0, (0, 0, z - 1e-4), (0, 0, 1))
+        likely = [(1e30, text), (7.0 - 3.0 + 1e-4, text)]
+        expect("ISC-6", f"the distance from just {what}", found, 1e-4, BOUND, likely, NEAR_ROOT)
 
 
 def many(student: Any) -> None:
@@ -117,16 +161,19 @@ def many(student: Any) -> None:
     origin[..., 1] = 2.0
     center = np.array([0.0, 2.0, 0.0])
     origin[..., 0] = np.arange(6.0).reshape(2, 3) / 4
-    kept = origin.copy()
     direction = np.broadcast_to(np.array([0.0, 0.0, 1.0]), origin.shape)
-    found = student.meet_sphere(center, np.float64(1.0), origin, direction)
+    found = student.meet_sphere(*still(center, 1.0, origin, direction))
     numbers_of("ISC-6", "the distances of rays (2, 3)", found, (2, 3))
-    same = np.array_equal(origin, kept)
-    hold("ISC-2", "the argument `origin`", same, "no change", "a change", "`-=` or `+=` on an argument")
-    square = 1.0 - kept[..., 0] ** 2
+    square = 1.0 - origin[..., 0] ** 2
     wanted = np.where(square > 0, 4.0 - np.sqrt(np.maximum(square, 0.0)), 1e30)
     text = "a sum over all rays: np.sum(..., axis=-1) is one for each"
     expect("ISC-6", "the distances of rays (2, 3)", found, wanted, BOUND, (), text)
+    rays = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+    found = student.meet_sphere(*still(center, 1.0, (0.0, 2.0, -4.0), rays))
+    text = (
+        "shapes of the origin where those of all operands are meant: np.full_like of a result, not of origin"
+    )
+    expect("ISC-6", "the distances of two rays from one origin", found, (3.0, 1e30), BOUND, (), text)
 
 
 def the_vectors(student: Any) -> None:
@@ -192,7 +239,8 @@ CHECKS = (
     Check("a ray from inside", from_inside),
     Check("a ray that looks away", behind),
     Check("a ray that misses", beside),
-    Check("a ray at the edge", grazing),
+    Check("rays at the edge", grazing),
+    Check("rays that begin close by", close),
     Check("arrays of rays", many),
     Check("the spec's vectors", the_vectors),
     Check("random rays", random_rays),

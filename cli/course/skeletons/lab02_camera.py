@@ -13,6 +13,7 @@ from typing import Any
 def camera_ray(camera: Any, x: Any, y: Any, u: Any, v: Any, width: int, height: int) -> tuple[Any, Any]:
     """Return origin and unit direction (..., 3) of rays through the points (x + u, y + v) (...) of the image.
 
-    camera has `position`, `look_at`, `up` (three numbers each) and `vertical_fov_deg`.
+    All is in float64; one origin (3,) may stand for all rays. camera has `position`, `look_at`, `up` (three
+    numbers each) and `vertical_fov_deg`.
     """
     raise NotImplementedError("camera_ray")

@@ -9,7 +9,8 @@ Then each v becomes v ^ (v >> 16), and the four lines come once more. All of it 
 
 A distribution is three functions that belong together: a sample from two uniform numbers, the density of a
 sample, and the way back. Any map is right whose density is cos(theta) / pi; Malley's lifts the points of a
-disk. Tutorial: page 3. Clauses: RNG-1, RNG-3, SMP-2.
+disk, for which SMP-1 is one map and polar coordinates are another. Arguments are not changed. Tutorial: page
+3. Clauses: RNG-1, RNG-2, RNG-5, SMP-2.
 """
 
 from __future__ import annotations

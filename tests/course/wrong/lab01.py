@@ -8,7 +8,12 @@ WRONG = [
     ("(square > 0) & (far > 0)", "square > 0", "a sphere behind the ray is met", "behind the ray"),
     ("(square > 0) & (far > 0)", "far > 0", "a ray beside the sphere meets it", "below 0"),
     ("(square > 0) & (far > 0)", "(square > 0.2) & (far > 0)", "a threshold", "threshold"),
-    ("(square > 0) & (far > 0)", "(square > 0) & (far > 2.5)", "a nearest distance", "on the sphere"),
+    ("(square > 0) & (far > 0)", "(square > 0) & (far > 2.5)", "a nearest distance", "a threshold"),
+    ("(square > 0) & (far > 0)", "(square > 1e-6) & (far > 0)", "a small threshold", "threshold other"),
+    ("(square > 0) & (far > 0)", "(square >= 0) & (far > 0)", "a touch is a hit", "only touches"),
+    ("(square > 0) & (far > 0)", "(square > 0) & (far > 1e-3)", "a least distance", "not t > a threshold"),
+    ("np.where(near > 0, near, far)", "np.where(near > 1e-3, near, far)", "a least distance", "not t > a"),
+    ("return np.where((square", "return near, far\n    return np.where((square", "both roots", "nearer root"),
     ("b = -np.sum(f * direction, axis=-1)", "b = np.sum(f * direction, axis=-1)", "the sign of b", "sign"),
     ("f = origin - center", "f = origin + center", "a sum of points", "other sign|sign of b"),
     ("f = origin - center", "f = origin", "the centre is left out", "centre is not subtracted"),
@@ -40,15 +45,31 @@ WRONG = [
         "root of the discriminant is missing",
     ),
     ("return np.where((square", "np.where((square", "no return", "no `return`"),
-    ("miss = np.full_like(near, MISS)", "miss = np.full_like(near, -1.0)", "-1 for a miss", "is a miss"),
-    ("miss = np.full_like(near, MISS)", "miss = np.full_like(near, np.inf)", "inf for a miss", "is a miss"),
+    ("miss = np.full_like(near, MISS)", "miss = np.full_like(near, -1.0)", "-1 for a miss", "MISS then"),
+    ("miss = np.full_like(near, MISS)", "miss = np.full_like(near, np.inf)", "inf for a miss", "MISS then"),
     (
         "miss = np.full_like(near, MISS)",
-        "miss = np.full(near.shape, MISS)",
+        "miss = np.full(near.shape, MISS, np.float64)",
         "float64 misses",
         "among the operands",
     ),
-    ("f = origin - center", "origin -= center\n    f = origin", "an argument is changed", "`-=`"),
+    ("f = origin - center", "origin -= center\n    f = origin", "a changed argument", "an argument is"),
+    (
+        "    miss = np.full_like(near, MISS)\n"
+        "    return np.where((square > 0) & (far > 0), np.where(near > 0, near, far), miss)",
+        "    found = np.full(origin.shape[:-1], MISS, origin.dtype)\n"
+        "    hit = (square > 0) & (far > 0)\n"
+        "    found[hit] = np.where(near > 0, near, far)[hit]\n"
+        "    return found",
+        "the origin's shape",
+        "a mask of another shape",
+    ),
+    (
+        "np.sum(f * direction, axis=-1)",
+        "np.sum(f * direction, axis=1)",
+        "the second axis",
+        "axis=-1, not axis=1",
+    ),
     ("b[..., None] * direction", "b * direction", "axes that do not fit", "t\\[..., None\\]|axis"),
     (
         "np.where((square > 0) & (far > 0)",

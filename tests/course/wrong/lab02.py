@@ -1,6 +1,37 @@
 """Wrong answers to lab 2: the old text, the new one, the mistake, and words of the explanation."""
 
 WRONG = [
+    (
+        "np.array(camera.look_at) - position",
+        "(np.array(camera.look_at) - position).astype(np.float32)",
+        "float32",
+        "single precision",
+    ),
+    (
+        "np.radians(camera.vertical_fov_deg)",
+        "camera.vertical_fov_deg * 3.14159 / 180",
+        "a short pi",
+        "few digits",
+    ),
+    (
+        "forward = unit(np.array(camera.look_at) - position)",
+        "forward = np.array(camera.look_at) - position",
+        "a long forward",
+        "forward is not made a unit vector",
+    ),
+    ("unit(forward + across", "unit(across", "forward is not added", "nothing is left of it"),
+    (
+        "(2 * (x + u) - width) / height",
+        "(2 * (x + u) - width) // height",
+        "whole coordinates",
+        "// and not //|/ and not //|horizontal|middle",
+    ),
+    (
+        "    position = np.array(",
+        "    x += u\n    y += v\n    u = v = 0\n    position = np.array(",
+        "an argument is changed",
+        "an argument is changed",
+    ),
     ("height - 2 * (y + v)", "2 * (y + v) - height", "up and down", "row 0 is at the top"),
     ("2 * (x + u) - width", "width - 2 * (x + u)", "left and right", "left and right"),
     ("np.cross(forward, camera.up)", "np.cross(camera.up, forward)", "right is left", "exchanged"),

@@ -1,6 +1,52 @@
 """Wrong answers to lab 3: the old text, the new one, the mistake, and words of the explanation."""
 
 WRONG = [
+    (
+        "def mix(v0, v1, v2, v3):\n",
+        "def mix(v0, v1, v2, v3):\n    v0 *= np.uint32(1)\n",
+        "a changed argument",
+        "an argument is",
+    ),
+    (
+        "return lines(*[v ^ (v >> np.uint32(16)) for v in words])",
+        "return lines(*[v ^ (v >> np.uint32(16)) for v in words])[::-1]",
+        "words backwards",
+        "in their order",
+    ),
+    (
+        "return lines(*[v ^ (v >> np.uint32(16)) for v in words])",
+        "return [v ^ (v >> np.uint32(16)) for v in words]",
+        "no second round",
+        "once more after",
+    ),
+    (".astype(np.float64) / 2.0**24", "// 2**24", "a whole division", "not // 2"),
+    (
+        "np.sqrt(u0), 2 * np.pi * u1",
+        "u0**0.49, 2 * np.pi * u1\n    u0 = radius * radius",
+        "nearly a root",
+        "uniform in the disk",
+    ),
+    (
+        "np.maximum(direction[..., 2], 0.0)",
+        "np.cos(np.maximum(direction[..., 2], 0.0))",
+        "a cosine of a cosine",
+        "already",
+    ),
+    (
+        "np.maximum(direction[..., 2], 0.0)",
+        "np.maximum(direction[..., 1], 0.0)",
+        "another component",
+        "third component",
+    ),
+    ("direction[..., 2]", "direction[:, 2]", "one axis only", "take components with"),
+    ("return x * x + y * y,", "return 1 - direction[..., 2],", "u0 from z", "u0 from 1 - z"),
+    (
+        "np.mod(np.arctan2(y, x) / (2 * np.pi), 1.0)",
+        "np.mod(np.arctan2(y, x), 1.0)",
+        "radians",
+        "makes turns",
+    ),
+    ("np.arctan2(y, x)", "np.arctan(y / x)", "half a turn only", "half a turn only"),
     ("    words = lines(*words)\n", "", "one round", "come twice|order of the lines"),
     ("(v >> np.uint32(16))", "(v >> np.uint32(8))", "another shift", "order of the lines|shift|16"),
     ("lines(*[v ^ (v >> np.uint32(16)) for v in words])", "lines(*words)", "no shift", "v \\^ \\(v >> 16\\)"),
@@ -100,7 +146,7 @@ WRONG = [
         "np.mod(np.arctan2(y, x) / (2 * np.pi), 1.0)",
         "np.mod(np.arctan2(y, x) / np.pi, 1.0)",
         "half a turn",
-        "another map",
+        "divide by 2 pi",
     ),
 ]
 """Old, new, the mistake in words, and what the explanation must hold."""

@@ -182,6 +182,23 @@ def test_a_sine_is_not_trained(refused, here, monkeypatch) -> None:
     assert "--variant is sine7: the degree of a sine is chosen when a kernel is compiled, not trained" in line
 
 
+def test_halves_are_not_trained(refused, here) -> None:
+    line = refused(
+        *(
+            "train",
+            "-i",
+            "noisy.exr",
+            "-t",
+            "reference.exr",
+            "--from",
+            "model.safetensors",
+            "--variant",
+            "half16",
+        )
+    )
+    assert "--variant is half16: weights are rounded to halves when a kernel is compiled, not trained" in line
+
+
 def test_a_data_set_without_test_frames_measures_nothing(refused, wamnet, here) -> None:
     assert (
         wamnet("dataset", "minicubes", "--frames", 1, "--test", 0, "--size", 12, "--spp", 1, "-o", "s").status

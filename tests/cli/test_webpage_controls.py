@@ -271,3 +271,28 @@ def test_it_works_on_a_telephone(chromium, path):
         assert page.locator("#compared").is_visible()
         assert page.evaluate("document.documentElement.scrollWidth") == 390
         assert tab.said == []
+
+
+OVERTAKEN = """async () => {
+  const { page } = wamnet;
+  const { renderer } = page;
+  const size = renderer.size;
+  const run = renderer.strips.run;
+  renderer.strips.run = async () => (renderer.resize(2 * size), 0);
+  try {
+    await renderer.draw(page.request(size));
+  } finally {
+    renderer.strips.run = run;
+  }
+  const shown = renderer.shown;
+  renderer.resize(size);
+  return shown;
+}"""
+"""Draw a picture while another size is chosen, and say what is shown afterwards."""
+
+
+def test_a_picture_whose_textures_are_gone_is_not_shown(still):
+    """A size that is chosen while a picture is drawn releases its textures: then there is none to show."""
+    still.page.evaluate("wamnet.go()")
+    still.until("!wamnet.page.renderer.strips.busy && !wamnet.page.preparing")
+    assert still.page.evaluate(OVERTAKEN) is None

@@ -131,7 +131,7 @@ def expect(
         return
     reason = next((text for value, text in likely if alike(array, value, bound)), otherwise)
     if array.dtype == np.float32 and alike(array, expected) and np.all(bound < ALIKE / 100):
-        reason = "single precision: the result is in float32, and it is asked for in float64"
+        reason = "single precision: the result is in float32, and float64 is expected"
     if not reason and array.dtype.kind == "f" and np.any(np.isnan(array)):
         reason = "a root of a negative number, or 0 / 0"
     if array.ndim and array.size > 6:

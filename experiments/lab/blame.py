@@ -2,7 +2,7 @@
 
 1. A clause of the spec names code: `path: names` [`named`].
 2. A mutant breaks the clauses that name its function, its class or its constant; where none does, those that
-   name the functions of its module that call it, and theirs [`Clauses.broken`].
+   name the functions that call it, of its module and of those that import it, and theirs [`Clauses.broken`].
 3. Blame is right if the blamed clause is among them, and near if it names anything of the module or is of the
    chapter of one of them.
 """
@@ -15,10 +15,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .mutation import Mutant
-from .trial import ROOT
+from .trial import ROOT, paths
 
 CLAUSE = re.compile(r"^\*\*([A-Z0-9]+-\d+[a-z]?)\*\*", re.MULTILINE)
 """How a clause begins."""
+
+Place = tuple[str, str]
+"""A module and a name in it."""
 
 CODE = re.compile(r"`((?:refimpl|compiler)/[\w/]+\.py): *([\w., ]+)`")
 """How it names code."""
@@ -44,7 +47,10 @@ class Clauses:
         for clause, module, name in named():
             self.of.setdefault((module, name), set()).add(clause)
             self.modules.setdefault(module, set()).add(clause)
-        self._trees: dict[str, ast.Module] = {}
+        texts = {path: (ROOT / path).read_text(encoding="utf-8") for path in paths()}
+        self._trees = {path: ast.parse(text) for path, text in texts.items()}
+        self._users = {path: list(_used(tree)) for path, tree in self._trees.items()}
+        self._imported = {path: set(_imported(tree)) for path, tree in self._trees.items()}
 
     def near(self, mutant: Mutant, clause: str) -> bool:
         """Tell whether a clause names anything of a mutant's module, or is of a chapter that it breaks."""
@@ -57,23 +63,24 @@ class Clauses:
         """Return the clauses that a mutant breaks."""
         if mutant.module.endswith(".c"):
             return set(mutant.function.split())
-        tree = self._tree(mutant.module)
-        waiting = self._names(mutant, tree)
-        seen: set[str] = set()
+        waiting = {(mutant.module, name) for name in self._names(mutant, self._trees[mutant.module])}
+        seen: set[Place] = set()
         while waiting:
-            found = set().union(*(self.of.get((mutant.module, name), set()) for name in waiting))
+            found = set().union(*(self.of.get(place, set()) for place in waiting))
             if found:
                 return found
             seen |= waiting
-            plain = {name.rpartition(".")[2] for name in waiting}
-            waiting = {name for name, used in _used(tree) if used & plain} - seen
+            waiting = set().union(*(self._callers(*place) for place in waiting)) - seen
         return self.modules.get(mutant.module, set())
 
-    def _tree(self, module: str) -> ast.Module:
-        """Return the syntax of a module."""
-        if module not in self._trees:
-            self._trees[module] = ast.parse((ROOT / module).read_text(encoding="utf-8"))
-        return self._trees[module]
+    def _callers(self, module: str, name: str) -> set[Place]:
+        """Return functions and classes, of a module and of those that import it, that use a name of it."""
+        plain, stem = name.rpartition(".")[2], Path(module).stem
+        found = set()
+        for path, used in self._users.items():
+            if path == module or stem in self._imported[path] or plain in self._imported[path]:
+                found |= {(path, user) for user, names in used if plain in names}
+        return found
 
     @staticmethod
     def _names(mutant: Mutant, tree: ast.Module) -> set[str]:
@@ -86,6 +93,14 @@ class Clauses:
                     return {node.name}
                 return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
         return set()
+
+
+def _imported(tree: ast.Module) -> Iterator[str]:
+    """Yield the names that a module imports, and the last words of the modules that it imports them from."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            yield (node.module or "").rpartition(".")[2]
+            yield from (alias.name for alias in node.names)
 
 
 def _used(tree: ast.Module) -> Iterator[tuple[str, set[str]]]:

@@ -232,7 +232,11 @@ def test_mutants_of_the_reference_are_caught_and_blamed(monkeypatch, name):
         ("file.camera", "as JSON is written", "RDG-3"),
         ("file.camera", "a key in escapes", "RDG-2"),
         ("file.scene", "camera only", "SCN-6"),
-        ("file.scene", "a sphere: its .radius", "SPH-1"),
+        # The first scene with a list of records.
+        ("file.scene", "a sphere: its .radius", "RDG-3"),
+        ("file.scene", "a box: its .rotation", "BOX-1"),
+        ("file.scene", "what may be left out is", "SCN-6"),
+        ("image.smoothed", "a row, level 1: the spline and its gap", "FRM-5"),
         ("file.scene", "background left out", "SCN-6"),
         ("picture.exact", "terrace", "RND-6"),
     ],

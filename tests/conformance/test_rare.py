@@ -1,14 +1,19 @@
-"""Cases that changes of the C program survived: they come last, are refused rightly, and do not tie."""
+"""Cases that changes of a program survived: they come last, and decide what they are for."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from wamnet.refimpl import rng
 from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.light import render
 from wamnet.refimpl.light.shapes.shape import LEAST_COMPONENT
+from wamnet.refimpl.network import siren
 from wamnet.refimpl.network import whole as reference
-from wamnet.spec.conformance.kinds import KINDS, network, rare, surfaces, whole
+from wamnet.spec.conformance.kinds import KINDS, light, network, rare, surfaces, whole
+from wamnet.spec.conformance.kinds.deep import RAIL
+from wamnet.spec.conformance.kinds.views import SEED
 
 
 def test_cases_come_after_the_kinds_own():
@@ -61,5 +66,42 @@ def test_windows_of_few_steps_are_decided_by_the_least_spread(monkeypatch):
 
 
 def test_the_first_of_two_equal_shapes_is_met():
-    found = [int(case.expected["surface"].value) for case in rare.MORE["path.arrive"]()]
+    found = [int(case.expected["surface"].value) for case in rare._twins()]
     assert found == [0, 0, 2, 2, 4]
+
+
+def of_note(kind, part):
+    return next(case for case in rare.MORE[kind]() if part in case.note)
+
+
+def test_a_lamp_ends_a_path_and_a_dim_one_is_sampled():
+    lamp, floor = (
+        of_note("path.scatter", "metal is the last kind"),
+        of_note("path.scatter", "under a dim lamp"),
+    )
+    assert not lamp.expected["alive"].value
+    assert np.all(np.asarray(floor.expected["radiance"].value) > np.asarray(floor.inputs["radiance"]))
+    assert 0.0 < RAIL.lights[0].power * sum(RAIL.lights[0].color) < 1.0
+
+
+def test_the_first_light_number_of_a_sample_is_a_half():
+    pixel = render.pixel_counter(np.array(8), np.array(13))
+    number, *_ = rng.uniforms(rng.counter(SEED), pixel, rng.counter(rare.HALF), rng.counter(1), np.float64)
+    assert float(np.squeeze(number)) == 0.5
+
+
+def test_the_far_root_of_a_sphere_is_one():
+    (case,) = rare.MORE["intersection.sphere"]()
+    assert float(np.asarray(case.expected["t"].value)) == 0.5
+    middle = np.array(light.SPHERE_CENTER) - case.inputs["origin"]
+    assert 2.0 * (middle @ case.inputs["direction"]) - 0.5 == 1.0
+
+
+def test_a_factor_is_another_with_a_step_more_of_room(monkeypatch):
+    case = of_note("whole.rounded", "a flat row")
+    factor = case.expected["factor_1"].value
+    total = (
+        np.abs(case.inputs["weight_1"]).sum() * reference._unit(siren.Siren((0, 0, 0), (), 1.0, 6.0), 1) / 511
+    )
+    rooms = [(2**24 - 1) // 511 - steps * 264 for steps in (2, 3)]
+    assert [float(np.ceil(total / room)) for room in rooms] == [float(factor[0]), float(factor[0]) + 2.0]

@@ -186,7 +186,7 @@ def test_one_mutant_is_shown_with_those_who_see_it(capsys):
     assert said[2].startswith("+ return np.where((discriminant > 0.0), ")
     asked = sum(kind.startswith("intersection.") for kind, _ in trial.in_order())
     assert said[3] == f"4 of {asked} cases see it:"
-    assert said[4] == "  intersection.sphere: 2 of 16 cases, blamed on ISC-6"
+    assert said[4] == "  intersection.sphere: 2 of 17 cases, blamed on ISC-6"
     assert said[5] == "  intersection.nearest: 1 of 14 cases, blamed on ISC-1"
     assert said[6] == "  intersection.occluded: 1 of 27 cases, blamed on ISC-10"
     assert said[7] == "look first at ISC-6: intersection.sphere/1 (away from it)"

@@ -180,7 +180,7 @@ def the_vectors(student: Any) -> None:
         if case.expected is None or not found:
             return ""
         close = all(near(found[name], given(part.value)) for name, part in case.expected.items())
-        return SINGLE if close else "/ and not //: neither coordinates nor width / height are whole numbers"
+        return SINGLE if close else "/ and not //: neither coordinates nor width / height are integers"
 
     vectors("camera.ray", answer, explain=explain)
 

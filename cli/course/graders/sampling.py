@@ -160,7 +160,7 @@ def distribution(student: Any) -> None:
         (RINGS, chi_square_p(np.bincount(ring, minlength=RINGS), COUNT / RINGS)),
         (SECTORS, chi_square_p(np.bincount(sector, minlength=SECTORS), COUNT / SECTORS)),
     )
-    # Each at a third of the level: one alone rejects a right answer with that of the level at most.
+    # Each at a third of the level: together they reject a right answer with that of the level at most.
     cells, p = min(tests, key=lambda test: test[1])
     if p >= SIGNIFICANCE / len(tests):
         return

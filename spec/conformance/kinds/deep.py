@@ -3,10 +3,12 @@
 1. [`DEEP`]: a floor under a lamp far out along each axis, at negative coordinates: what is in proportion to
    the size of a place must take its magnitude.
 2. [`TWINS`]: two equal boxes, balls and quads at one place: equal in their distances to the bit.
+3. [`RAIL`]: a lamp beside a matte floor and a quad of metal, whose kind is the last one (SHD-1).
 """
 
 from __future__ import annotations
 
+from ....refimpl.light.materials.conductor import Conductor
 from ....refimpl.light.scene import Box, Camera, Light, Quad, Scene, Sphere
 
 FAR = -1000.0
@@ -59,3 +61,14 @@ TWINS = Scene(
     quads=tuple(Quad((-4.0, -1.0, 0.5), (1.5, 0.0, 0.25), (0.25, 2.0, 0.0), r) for r in (GRAY, OTHER)),
 )
 """Two of each shape."""
+
+RAIL = Scene(
+    "rail",
+    EYE,
+    quads=(
+        Quad((-2.0, -1.0, -2.0), (0.0, 0.0, 4.0), (4.0, 0.0, 0.0), GRAY),
+        Quad((-2.0, -1.0, -2.0), (0.0, 2.0, 0.0), (0.0, 0.0, 4.0), OTHER, material=Conductor(0.25)),
+    ),
+    lights=(Light((-0.5, 1.0, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.75, 0.5), 0.25),),
+)
+"""A dim lamp, on which a metal's reflectance at grazing angles must not continue a path."""

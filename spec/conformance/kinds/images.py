@@ -138,7 +138,7 @@ def _end_cases(first: int) -> list[Case]:
             expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}
             note = "NaN is 0 before it is encoded, infinities are the ends of the range"
             name = f"image.features/{first + len(cases)}"
-            cases.append(Case(name, "DAT-10", inputs, expected, (), note, "DAT-9"))
+            cases.append(Case(name, "DAT-10", inputs, expected, (), note, "FRM-5"))
     return cases
 
 
@@ -177,7 +177,7 @@ def _later_feature_cases(first: int) -> list[Case]:
     def add(clause: str, inputs: Mapping[str, Any], valid: bool, note: str) -> None:
         expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)} if valid else None
         name = f"image.features/{first + len(cases)}"
-        cases.append(Case(name, clause, inputs, expected, (), note, "DAT-9" if valid else ""))
+        cases.append(Case(name, clause, inputs, expected, (), note, "FRM-5" if valid else ""))
 
     for names, note in LATER_ROWS:
         inputs = {**_layers_of(names, (2, 2)), "features": names, **OTHER_SCALES}
@@ -213,7 +213,9 @@ def _feature_cases() -> list[Case]:
         shown = {n: v if bad else v[1:] for n, v in layers.items() if n in wanted}  # bad ones are in row 0
         inputs = {**shown, "features": names, **SCALES}
         expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)}
-        cases.append(Case(f"image.features/{len(cases)}", clause, inputs, expected, (), note, "DAT-9"))
+        # A program that knows no feature refuses the first one; later ones have other layers.
+        refusal = "FRM-5" if cases else "DAT-9"
+        cases.append(Case(f"image.features/{len(cases)}", clause, inputs, expected, (), note, refusal))
     all_of = ("position", "depth", "color", "unshadowed", "normal")
     shown = {name: v for name, v in bad_layers(3, 2, 60).items() if name in all_of}
     shown["normal"] = single(-1.5 * shown["normal"])
@@ -457,7 +459,8 @@ def _metric_cases(name: str) -> list[Case]:
             None if value is None else {"value": Output(value, bound(value, int(np.prod(SHAPE))), text)}
         )
         inputs = {"image": image, "reference": reference}
-        cases.append(Case(f"metric.{name}/{len(cases)}", rule, inputs, expected, (), note))
+        refusal = "" if value is None else "MET-1"
+        cases.append(Case(f"metric.{name}/{len(cases)}", rule, inputs, expected, (), note, refusal))
 
     for image, reference, note in PAIRS:
         add(_in_file(image), _in_file(reference), function(pictures[image], pictures[reference]), note)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -251,36 +251,39 @@ def samples_of(exact: Exact) -> Iterator[tuple[Any, Any] | None]:
         yield paths.gathered(views.View(exact.scene, exact.settings, x, y, n, "", *size, exact.seed))
 
 
-@cache
-def _exact_cases() -> list[Case]:
-    """Return tiny pictures with the bounds of means and variances.
+def exact_case(exact: Exact, note: str = "") -> Case:
+    """Return a tiny picture with the bounds of its means and variances.
 
     A sample x is off by the width w of its range at most, a mean m by the mean of the widths. A variance, the
     sum of (x - m)^2 over n - 1, is off by the sum of 2 |x - m| e + e^2 over n - 1, e being both together; of
     one sample it is 0.
     """
-    cases = []
-    for index, exact in enumerate(EXACT):
-        inputs = {
-            "scene": {"file": f"scenes/{exact.scene}.json"},
-            **{name: getattr(exact, name) for name in ("width", "height", "spp", "seed")},
-            "settings": asdict(exact.settings),
-        }
-        found = _exact({**inputs, "scene": views.scene_text(exact.scene)})
-        ends = [ends for ends in samples_of(exact) if ends is not None]
-        shape = (exact.height, exact.width, exact.spp, 3)
-        low, high = (np.array([end[side] for end in ends]).reshape(shape) for side in (0, 1))
-        mean, variance, middle = found["mean"], found["variance"], (low + high) / 2
-        of_mean = np.mean(high - low, axis=2) + ROUNDED * mean
-        off = (high - low) + of_mean[:, :, np.newaxis]
-        spread = np.abs(middle - mean[:, :, np.newaxis]) + off
-        of_variance = np.sum(2 * spread * off + off**2, axis=2) / max(exact.spp - 1, 1) + ROUNDED * variance
-        expected = {
-            "mean": Output(mean, of_mean, OF_SAMPLES),
-            "variance": Output(variance, of_variance, OF_SAMPLES, clause="RND-4"),
-            "spp": Output(exact.spp),
-        }
-        cases.append(Case(f"picture.exact/{index}", "RND-1", inputs, expected, (), exact.scene, "RND-6"))
+    inputs = {
+        "scene": {"file": f"scenes/{exact.scene}.json"},
+        **{name: getattr(exact, name) for name in ("width", "height", "spp", "seed")},
+        "settings": asdict(exact.settings),
+    }
+    found = _exact({**inputs, "scene": views.scene_text(exact.scene)})
+    ends = [ends for ends in samples_of(exact) if ends is not None]
+    shape = (exact.height, exact.width, exact.spp, 3)
+    low, high = (np.array([end[side] for end in ends]).reshape(shape) for side in (0, 1))
+    mean, variance, middle = found["mean"], found["variance"], (low + high) / 2
+    of_mean = np.mean(high - low, axis=2) + ROUNDED * mean
+    off = (high - low) + of_mean[:, :, np.newaxis]
+    spread = np.abs(middle - mean[:, :, np.newaxis]) + off
+    of_variance = np.sum(2 * spread * off + off**2, axis=2) / max(exact.spp - 1, 1) + ROUNDED * variance
+    expected = {
+        "mean": Output(mean, of_mean, OF_SAMPLES),
+        "variance": Output(variance, of_variance, OF_SAMPLES, clause="RND-4"),
+        "spp": Output(exact.spp),
+    }
+    return Case("", "RND-1", inputs, expected, (), note or exact.scene, "RND-6")
+
+
+@cache
+def _exact_cases() -> list[Case]:
+    """Return tiny pictures, and what is refused."""
+    cases = [replace(exact_case(exact), id=f"picture.exact/{index}") for index, exact in enumerate(EXACT)]
     for name, value in WRONG_SIZES:
         wrong = {**cases[0].inputs, name: value}
         cases.append(Case(f"picture.exact/{len(cases)}", "RND-6", wrong, None, (), f"{name} = {value}"))

@@ -153,7 +153,7 @@ def _scene_cases() -> list[Case]:
         read = "SCN-10" if note in SCENE_LATER else "SCN-8"
         rule = next((known for part, known in OF_SHAPES.items() if part in note), "SCN-7")
         clause = read if not bad else "SCN-6" if form else rule
-        refusal = "" if bad else "RDG-2" if "letters" in note else "SCN-7"
+        refusal = "" if bad else "RDG-2" if "letters" in note else "SCN-6" if "left out" in note else "SCN-7"
         cases.append(Case(f"file.scene/{len(cases)}", clause, inputs, expected, (), note, refusal))
     for found, bad in (
         (rules.good(), False),

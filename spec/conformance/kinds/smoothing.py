@@ -193,7 +193,7 @@ def _smoothed_cases() -> list[Case]:
         inputs = {"color": color, **layers, "levels": levels}
         value = _smoothed(inputs)["color"]
         expected = {"color": Output(value, bound_of(color, layers, levels), SOURCE)}
-        cases.append(Case(f"image.smoothed/{len(cases)}", "SMO-3", inputs, expected, (), note))
+        cases.append(Case(f"image.smoothed/{len(cases)}", "SMO-3", inputs, expected, (), note, "FRM-5"))
     for name in GUIDE_LAYERS:
         inputs = {"color": colors(0, 3, 2), **alike(3, 2), "levels": 1, name: alike(2, 3)[name]}
         cases.append(

@@ -20,7 +20,7 @@ from ....refimpl.light import render, scenes, transport
 from ....refimpl.light import scene as scene_module
 from ....refimpl.light.transport import Settings
 from ..numbers import Decimal
-from .deep import DEEP, TWINS
+from .deep import DEEP, RAIL, TWINS
 from .terrace import (
     BARE,
     BUBBLE,
@@ -48,7 +48,7 @@ OWN = {
     for scene in (
         *(TERRACE, FOUNDRY, YARD, MIRRORS, PLATE, BARE, NIGHT, DARK, LENS, PANE, BUBBLE),
         *(GLOW, DUSK, LAMP, OVERCAST, SHEET),
-        *(DEEP, TWINS),
+        *(DEEP, TWINS, RAIL),
     )
 }
 """Scenes of the vectors' own."""

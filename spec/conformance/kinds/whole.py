@@ -175,6 +175,7 @@ def _forward_cases() -> list[Case]:
     one, most = _network(3), _at_the_limit(0.0)
     plain = replace(one, fraction=0, factors=(np.ones(3),), biases=(np.array([5.0, -300.0, 2e4]),))
     for note, clause, network, n in (
+        ("a hidden bias of 0", "WHO-1", _with_hidden_bias(0.0), np.full(8, 100)),
         ("a fraction of 5 digits", "WHO-6", replace(_network(0), fraction=5), np.full(8, 100)),
         ("a fraction of 0 digits", "WHO-6", plain, np.array([127, 90, -64, -5])),
         ("colours of 2^31 - 1", "WHO-6", most, np.full(4, INPUT_LEVELS)),

@@ -40,8 +40,8 @@ COURSE = Path(__file__).resolve().parents[1] / "tests/course"
 CHANGES = ((" + ", " - "), (" - ", " + "), (" * ", " / "), (" / ", " * "), (" < ", " >= "), (" > ", " <= "))
 """Signs and what replaces them; a number grows by one."""
 
-MUTANTS = 12
-"""Mechanical changes of each lab."""
+MUTANTS = 100
+"""Mechanical changes of each lab, at most: all that there are."""
 
 LONGEST_S = 60
 """A changed answer that takes longer does not end, and is caught."""

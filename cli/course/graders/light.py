@@ -8,10 +8,26 @@ from typing import Any
 import numpy as np
 
 from ....kernels.judge.welch import sidak
-from ..frame import SIGNIFICANCE, Check, alike, expect, hold, normal_p, numbers_of, uniforms, vectors
+from ..frame import (
+    SIGNIFICANCE,
+    SINGLE,
+    Check,
+    alike,
+    chi_square_p,
+    expect,
+    hold,
+    normal_p,
+    numbers_of,
+    still,
+    uniforms,
+    vectors,
+)
 
 COUNT = 20_000
 """Samples of each estimate."""
+
+SECTORS = 15
+"""Sectors around the normal, in which there are as many directions: an odd number of them."""
 
 SQUARES = ((1.0, 0.3), (1.0, 1.0), (1.0, 4.0), (0.5, 2.0))
 """Half the side and the height of the lights."""
@@ -19,7 +35,7 @@ SQUARES = ((1.0, 0.3), (1.0, 1.0), (1.0, 4.0), (0.5, 2.0))
 
 def bounced(student: Any, reflectance: float, block: int = 0) -> tuple[Any, Any, Any]:
     """Return directions, weights and densities of COUNT bounces."""
-    found = student.bounce(reflectance, *uniforms(9, COUNT, block)[:2])
+    found = student.bounce(reflectance, *still(*uniforms(9, COUNT, block)[:2]))
     hold(
         "LAM-1",
         "the result of bounce",
@@ -39,6 +55,7 @@ def density(student: Any) -> None:
     wi, _, pdf = bounced(student, 0.5)
     off = float(np.abs(np.sqrt(np.sum(wi * wi, axis=-1)) - 1.0).max())
     text = "x, y and z do not belong together: z = sqrt(1 - x^2 - y^2)"
+    text = SINGLE if off < 1e-6 else text
     hold("LAM-1", "the largest deviation of a length from 1", off <= 1e-12, "at most 1e-12", off, text)
     z = wi[:, 2]
     hold("LAM-1", "the least z", np.all(z >= 0.0), "at least 0", z.min(), "directions below the surface")
@@ -47,7 +64,14 @@ def density(student: Any) -> None:
     text = "uniform over the hemisphere: use the map of lab 3" if abs(z.mean() - 0.5) < 0.01 else ""
     text = "the radius in the disk is u0: it has to be sqrt(u0)" if z.mean() > 0.75 else text
     found = f"{z.mean():.4f}"
-    hold("LAM-1", "the mean of the cosine", normal_p(deviate) >= SIGNIFICANCE, "0.6667", found, text)
+    hold("LAM-1", "the mean of the cosine", normal_p(deviate) >= SIGNIFICANCE / 2, "0.6667", found, text)
+    sector = np.minimum(
+        (SECTORS * (np.arctan2(wi[:, 1], wi[:, 0]) / (2 * np.pi) + 0.5)).astype(int), SECTORS - 1
+    )
+    p = chi_square_p(np.bincount(sector, minlength=SECTORS), COUNT / SECTORS)
+    what, text = f"the p-value of a chi-square test in {SECTORS} sectors", "the angle around z is 2 pi u1"
+    # Both tests together reject a right answer with the significance at most.
+    hold("LAM-1", what, p >= SIGNIFICANCE / 2, f"at least {SIGNIFICANCE / 2:g}", p, text)
     likely = [
         (z, "the factor 1 / pi is missing"),
         (np.full(COUNT, 1 / (2 * np.pi)), "that is the uniform density: here it is cos(theta) / pi"),
@@ -116,7 +140,7 @@ def exact(half: float, height: float) -> float:
 
 def lights(student: Any, half: float, height: float, block: int = 1) -> tuple[Any, Any, Any]:
     """Return the student's samples of a light."""
-    found = student.by_light(0.8, half, height, *uniforms(9, COUNT, block)[:2])
+    found = student.by_light(0.8, half, height, *still(*uniforms(9, COUNT, block)[:2]))
     hold(
         "LTR-5",
         "the result of by_light",

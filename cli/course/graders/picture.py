@@ -264,6 +264,9 @@ def errors(student: Any) -> None:
     exact = np.float32(1e8), np.float32(1e8) + np.float32(8)
     found = student.mse(np.full((2, 2), exact[0]), np.full((2, 2), exact[1]).astype(np.float32))
     expect("MET-3", "the error of 1e8 and 1e8 + 8", found, 64.0, 0.0)
+    fine, text = np.ones((2, 2)) + 2.0**-30, "single precision: convert to float64 before subtracting"
+    for pair in ((fine, np.ones((2, 2))), (np.ones((2, 2)), fine)):
+        expect("MET-3", "the error of 1 + 2^-30 and 1", student.mse(*pair), 2.0**-60, 0.0, (), text)
     bytes_ = np.array([[0, 255]], np.uint8)
     found = student.mse(bytes_, bytes_[:, ::-1])
     text = "differences of bytes wrap: convert to float64 before subtracting"

@@ -195,6 +195,20 @@ def features(student: Any) -> None:
     )
 
 
+def scales(student: Any) -> None:
+    """Depths at scales that are not above 1."""
+    depth, zeros = spread(95, (2, 3, 1), 0.0, 2.0), np.zeros((2, 3, 3))
+    for scale in (0.5, 1.0):
+        text = "any scale above 0 is right"
+        try:
+            image = student.feature_image(zeros, zeros, depth, scale)
+        except ValueError as error:
+            raise Wrong("DAT-1", f"depth_scale {scale}", "an image", f"ValueError: {error}", text) from None
+        last = numbers_of("DAT-1", "the feature image", image, (2, 3, 7))[..., 6:]
+        scaled = np.clip(depth / scale, 0, 1).astype(np.float32)
+        expect("DAT-1", f"depths at a scale of {scale}", last, scaled, 0.0, (), text)
+
+
 def bad_scale(student: Any) -> None:
     """A scale that is not above 0."""
     layers = np.zeros((1, 1, 3)), np.zeros((1, 1, 3)), np.ones((1, 1, 1))
@@ -209,6 +223,7 @@ def bad_scale(student: Any) -> None:
 
 CHECKS = (
     Check("features", features),
+    Check("small scales", scales),
     Check("scales that are refused", bad_scale),
     Check("windows inside of the image", inside),
     Check("windows at the border", borders),

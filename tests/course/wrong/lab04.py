@@ -1,6 +1,8 @@
 """Wrong answers to lab 4: the old text, the new one, the mistake, and words of the explanation."""
 
 WRONG = [
+    ("2 * np.pi * u1", "3 * np.pi * u1", "more than a turn", "2 pi u1"),
+    ("2 * np.pi * u1", "2 * np.pi / np.maximum(u1, 1e-3)", "divided by u1", "2 pi u1"),
     ("reflectance * np.ones_like(z)", "reflectance * z / np.pi", "not divided by the density", "not divided"),
     (
         "reflectance * np.ones_like(z)",

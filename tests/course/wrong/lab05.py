@@ -2,6 +2,18 @@
 
 WRONG = [
     (
+        "np.asarray(image, np.float64)",
+        "np.asarray(image, np.float32)",
+        "an image in float32",
+        "before subtracting",
+    ),
+    (
+        "np.asarray(reference, np.float64)",
+        "np.asarray(reference, np.float32)",
+        "a reference in float32",
+        "before subtracting",
+    ),
+    (
         "(n * x - total) ** 2 / (n * (n + 1))",
         "x * x",
         "squares of samples",

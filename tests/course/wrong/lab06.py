@@ -1,6 +1,7 @@
 """Wrong answers to lab 6: the old text, the new one, the mistake, and words of the explanation."""
 
 WRONG = [
+    ("if not depth_scale > 0:", "if not depth_scale > 1:", "scales below 1 are refused", "any scale above 0"),
     ("np.clip(albedo, 0, 1)", "albedo", "albedo as it is", "albedo is clipped"),
     ("np.clip(albedo, 0, 1)", "np.clip(albedo, -1, 1)", "albedo below 0", "not to \\[-1, 1\\]"),
     ("np.clip(normal, -1, 1)", "np.clip(normal, 0, 1)", "normals above 0", "both signs"),

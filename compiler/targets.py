@@ -15,6 +15,7 @@ from .core.loops import USUAL, Forms
 from .core.profiles import SineContract
 from .languages import opencl_path, opencl_smooth
 from .languages.c import C
+from .languages.c_smooth import CSmooth
 from .languages.cuda import CUDA
 from .languages.dialect import Dialect
 from .languages.glsl import GLSL
@@ -139,7 +140,11 @@ TARGETS: Mapping[str, Target] = {
 
 DENOISERS: Mapping[str, Target] = {
     **TARGETS,
-    "c": replace(_dialect_target(C(), *C_LADDER, *C_FOURIER, *C_DOT), forms=Forms(trees=True)),
+    "c": replace(
+        _dialect_target(C(), *C_LADDER, *C_FOURIER, *C_DOT),
+        filters={1: CSmooth()},
+        forms=Forms(trees=True),
+    ),
 }
 """All targets that an executor of the registry runs."""
 

@@ -215,7 +215,7 @@ class C(Arguments):
             ALL_PIXELS,
             f"{self.heading.format(entry='wamnet_trace')}({listed})",
             "{",
-            *_loops(
+            *loops(
                 ("column", "row"),
                 ("part->width", "part->rows"),
                 ("++column", "++row"),
@@ -230,7 +230,7 @@ class C(Arguments):
     def _of_denoiser(self, kernel: Interface) -> list[str]:
         """Return the functions of a denoiser up to the statements of a pixel."""
         whole, name = super().listed(kernel), self.entries[DENOISE]
-        one = self._signature(name, [*whole, *(f"int {place}" for place in self.first_pixel)])
+        one = self.signature(name, [*whole, *(f"int {place}" for place in self.first_pixel)])
         given = ", ".join([*(array.name for array in kernel.arrays), *kernel.integers, "x", "y"])
         return [
             f"/* {self.pixels} */",
@@ -238,9 +238,9 @@ class C(Arguments):
             f"{one[-1]};",
             "",
             ALL_PIXELS,
-            *self._signature("wamnet_image", whole),
+            *self.signature("wamnet_image", whole),
             "{",
-            *_loops(("x", "y"), ("width", "height"), self.steps, f"{name}({given});"),
+            *loops(("x", "y"), ("width", "height"), self.steps, f"{name}({given});"),
             "}",
             "",
             "static inline int wamnet_clamp(int value, int low, int high)",
@@ -252,7 +252,7 @@ class C(Arguments):
             "{",
         ]
 
-    def _signature(self, name: str, listed: Sequence[str]) -> list[str]:
+    def signature(self, name: str, listed: Sequence[str]) -> list[str]:
         """Return the lines of a function's head."""
         inside = ",\n".join(f"    {each}" for each in listed)
         return [f"{self.heading.format(entry=name)}(", f"{inside})"]
@@ -286,7 +286,7 @@ Two = tuple[str, str]
 """What is said of columns, and of rows."""
 
 
-def _loops(places: Two, ends: Two, steps: Two, call: str) -> list[str]:
+def loops(places: Two, ends: Two, steps: Two, call: str) -> list[str]:
     """Return the loops over all pixels around a call."""
     (column, row), (columns, rows), (along, down) = places, ends, steps
     return [

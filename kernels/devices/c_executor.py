@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.languages.interface import DENOISE, ENCODE, PATH, WEIGHTS, Interface
+from ...compiler.languages.interface import DENOISE, ENCODE, GUIDE, PATH, SMOOTH, WEIGHTS, Interface
 from ...compiler.schedules.schedules import PLAIN
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor, Kernel, Memory, words
@@ -157,6 +157,14 @@ void wamnet_rows(float *const *arrays, const uint32_t *integers, int first, int 
 """
 """The function that is called: rows [first, end), arrays and integers in the interface's order."""
 
+OF_FILTER = """\
+    for (int y = first; y < end; ++y) {{{{
+        for (int x = 0; x < (int)integers[0]; ++x) {{{{
+            {{entry}}({{arrays}}, {integers}, x, y);
+        }}}}
+    }}}}"""
+"""What the filter's kernels do, by their number of integers."""
+
 BODIES = {
     DENOISE: """\
     int width = (int)integers[0], height = (int)integers[1];
@@ -177,6 +185,8 @@ BODIES = {
     (void)first;
     (void)end;
     {entry}({arrays}, (int)integers[0], (int)integers[1], (int)integers[2]);""",
+    GUIDE: OF_FILTER.format(integers=", ".join(f"(int)integers[{i}]" for i in range(3))),
+    SMOOTH: OF_FILTER.format(integers=", ".join(f"(int)integers[{i}]" for i in range(4))),
 }
 """What it does, by role; an encoding takes all rows at once: a thousandth of the time of the paths."""
 
@@ -196,6 +206,7 @@ class CExecutor(Executor):
 
     name = "c"
     paints = True
+    smooths = True
 
     def __init__(self) -> None:
         super().__init__()

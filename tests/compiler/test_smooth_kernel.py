@@ -81,9 +81,10 @@ def test_the_bound_is_small_and_below_that_of_all_layers():
         assert np.median(found) <= A_PRIORI / 100
 
 
-def test_golden_source(golden):
+@pytest.mark.parametrize(("target", "lanes"), [("opencl", 16), ("c", 1)])
+def test_golden_source(golden, target, lanes):
     """SMO-6: arguments, loops over taps, rows that are read beyond their ends."""
-    kernels = compile_smoothing(SCALES, "opencl", lanes=16)
+    kernels = compile_smoothing(SCALES, target, lanes=lanes)
     for made in (kernels.guide, kernels.smooth):
         golden(f"ieee.{made.source_name}", made.source)
 

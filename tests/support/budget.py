@@ -17,7 +17,7 @@ BUDGET = {
     "compiler": 1825,
     "compiler/core": 3500,
     "compiler/importing": 1150,
-    "compiler/languages": 2475,
+    "compiler/languages": 2575,
     "compiler/proof": 3100,
     "compiler/reading": 4050,
     "compiler/schedules": 4650,

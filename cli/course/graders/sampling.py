@@ -91,7 +91,7 @@ def mixing(student: Any) -> None:
     wanted = rng.pcg4d(*given)
     for number, (word, right) in enumerate(zip(found, wanted, strict=True)):
         kind_of_number("RNG-2", f"word {number}", word, np.uint32)
-        likely = [(_mixed(given, **how)[number], text) for how, text in MISTAKES]  # type: ignore[arg-type]
+        likely = [(_mixed(given, **how)[number], text) for how, text in MISTAKES]
         text = (
             "the order of the lines, or an operand of one: v0 += v1 v3, v1 += v2 v0, "
             "v2 += v0 v1, v3 += v1 v2;"

@@ -20,6 +20,7 @@ from ....refimpl.light import transport
 from ....refimpl.light.shapes.shape import BLACK
 from ....refimpl.light.transport import Settings
 from ....refimpl.network import siren
+from ....refimpl.network.dataset import Window
 from ....refimpl.network.siren import Siren
 from ....refimpl.network.whole import MOST_INPUTS
 from ..case import Case, Kind, Output
@@ -334,7 +335,7 @@ def _models() -> list[Case]:
         files.MODEL,
         siren=siren.init([14, 4, 3], 3.0, 1.0, seed=9, dtype=np.float32),
         features=("highlights", "history_weight", "history", "seen_depth", "smoothed", "seen_emission"),
-        window=files.Window(1, "zero"),
+        window=Window(1, "zero"),
     )
     good = {"content": base64.b64encode(files.file_of(later)).decode()}
     read = {name: Output(value) for name, value in files._model(good).items()}

@@ -288,6 +288,7 @@ def test_the_add_on_is_right_inside_blender(tmp_path):
         pytest.skip("MISSING: Blender as a Python module; pip install --no-deps bpy")
     told = run(written(made("blender"), tmp_path), "make", "-s", "run", f"PYTHON={sys.executable}")
     assert "the add-on has denoised a frame" in told
+    assert "the add-on has denoised a film" in told
     error, allowed = error_of(told)
     assert error <= allowed
 

@@ -1,7 +1,8 @@
 """`wamnet animate`: noisy, denoised and reference pictures of an animation side by side, as PNG, MP4 or GIF.
 
 1. Each time of the animation is rendered and denoised, and drawn as one labelled picture: by one pipeline
-   where one device does both [`draw_frames`], else one after the other [`draw_apart`].
+   where one device does both [`draw_frames`], else one after the other [`draw_apart`]. A model that reads
+   the history gets that of the film: pictures that are there already are rendered again for it, not denoised.
 2. A picture carries what it was made from, so that an interrupted run resumes; pictures of another animation
    are refused [`missing`].
 3. A film is made from the pictures when all are there; they lie in FILE.frames until then
@@ -168,7 +169,7 @@ def _draw(
         progress("drawing", len(left)) as advance,
     ):
         together = _one_device(executor, renderer, shots[0].noisy, watch.model.features)
-        draw = draw_frames if together else draw_apart
+        draw = draw_frames if together else partial(draw_apart, film=shots)
         for _ in draw(left, watch, runner, renderer.value, with_rank(FULL, rank)):
             advance(1)
     return len(left), watch
@@ -176,13 +177,12 @@ def _draw(
 
 def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job, features: Sequence[str]) -> bool:
     """Tell whether a pipeline can draw: one device does both, from what the paths of a pixel have seen."""
+    from ...kernels.run.before import wants
     from ...refimpl.light.render import feature_job
     from ...refimpl.network.dataset import FEATURES
 
-    smooths = any(FEATURES[name].guides for name in features)
-    return renderer.value == executor.value != "numpy" and not (
-        smooths or (noisy.seen and feature_job(noisy))
-    )
+    beside = any(FEATURES[name].guides for name in features) or wants(features)
+    return renderer.value == executor.value != "numpy" and not (beside or (noisy.seen and feature_job(noisy)))
 
 
 def _said_of(shots: Sequence[Shot], renderer: Renderer) -> list[str]:
@@ -293,17 +293,34 @@ def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
 
 
 def draw_apart(
-    shots: Sequence[Shot], watch: Watch, executor: Executor, renderer: str, variant: str
+    shots: Sequence[Shot],
+    watch: Watch,
+    executor: Executor,
+    renderer: str,
+    variant: str,
+    film: Sequence[Shot] = (),
 ) -> Iterator[None]:
-    """Render, denoise and write pictures, rendering and denoising on different devices."""
+    """Render, denoise and write pictures, rendering and denoising on different devices.
+
+    `film`: all pictures of the film, in order, of which they are some.
+    """
     from ...kernels import denoise_on
+    from ...kernels.run.before import Film, wants
     from ...kernels.run.render_frame import render_frame
     from ...kernels.run.render_on import Frames
     from ...refimpl.encoding import to_display
 
-    frames, model = Frames([shot.scene for shot in shots]), watch.model
-    for shot in shots:
+    film = film or shots
+    frames, model = Frames([shot.scene for shot in film]), watch.model
+    before, wanted = Film() if wants(model.features) else None, {shot.path for shot in shots}
+    # A history needs the pictures before those that are missing.
+    count = max((number for number, shot in enumerate(film, 1) if shot.path in wanted), default=0)
+    for shot in shots if before is None else film[:count]:
         frame = render_frame(renderer, shot.scene, shot.noisy, workers=None, frames=frames).frame
+        if before is not None:
+            frame = before.add(shot.scene, shot.noisy, frame)
+        if shot.path not in wanted:
+            continue
         watch.see_frame(shot.path.name, frame)
         noisy = to_display(frame["color"], model.normalization.exposure_stops)
         denoised = denoise_on(executor, model, frame, variant=variant, pictures=len(shots)).image

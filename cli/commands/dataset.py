@@ -40,6 +40,8 @@ wamnet dataset minicubes --frames 64 --yaw -45:45 --pitch -15:20 --saturation 0:
 
 wamnet dataset minicubes --frames 64 --saturation 0:0.9 --power 0.5:1.5 -o lamps
 
+wamnet dataset minicubes --frames 64 --before 8 -o film
+
 wamnet dataset minicubes --frames 1000 --test 100 --size 1024 --spp 1024 -o large
 
 wamnet dataset minicubes --frames 1000 --scheduler tcp://10.0.0.1:8786 -o large
@@ -87,6 +89,12 @@ Power = Annotated[
         metavar=LIMITS,
         help="Lamps of such factors of their own power.",
         show_default="the lamps' own power",
+    ),
+]
+Before = Annotated[
+    int,
+    typer.Option(
+        metavar="N", help="Pictures before each noisy one, 24 a second: layers of history after them."
     ),
 ]
 Workers = Annotated[
@@ -146,6 +154,7 @@ def dataset(
     distance: Distance = "1:1",
     saturation: Saturation = None,
     power: Power = None,
+    before: Before = 0,
     seed: options.Seed = 0,
     parameters: options.Parameters = None,
     max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
@@ -164,9 +173,8 @@ def dataset(
     """Render the frames of a data set: noisy pictures and their targets over an animation.
 
     Each frame draws a time, and a camera and lamps from the ranges that are given. Test frames that show what
-    another frame shows are refused. The folder gets a manifest with draws, seeds and checksums. After any
-    interruption the same command resumes where it was; a file that is damaged or missing is made again. The
-    number of workers changes no byte.
+    another frame shows are refused. The folder gets a manifest with draws, seeds and checksums. The same
+    command resumes after any interruption, and makes damaged files again. Workers change no byte.
     """
     from ...kernels.run.frame_plan import plan
 
@@ -178,25 +186,26 @@ def dataset(
         _make_from_blender(command, output, (from_blender, *numbers_of, view_layer, blender))
         return
     options.refuse_given(command, OF_BLENDER, "without --from-blender")
-    chosen = options.parse_parameters(parameters or [])
+    named = scene or _missing_scene(), options.parse_parameters(parameters or [])
     numbers = (start, seconds, frames, test, size, spp, seed, max_depth)
     ways = (executor.value, sampler.value, feature_spp, test_spp, outside, arc)
     limits = {"--yaw": yaw, "--pitch": pitch, "--distance": distance, "--saturation": saturation}
-    request = _request((scene or _missing_scene(), chosen, *numbers, *ways), limits, seen, power)
+    request = _request((*named, *numbers, *ways), limits, (seen, power, before))
     _check_workers(workers, scheduler)
     with hint_on_interrupt(lambda: f"the same command resumes where it was, in {output}"):
         make(output, request, plan(request), workers, scheduler)
 
 
 def _request(
-    first: tuple[Any, ...], limits: Mapping[str, str | None], seen: bool, power: str | None
+    first: tuple[Any, ...], limits: Mapping[str, str | None], last: tuple[bool, str | None, int]
 ) -> Request:
-    """Return the request of its first fields, of the texts of its ranges by option, and of the last two."""
+    """Return the request of its first fields, of the texts of its ranges by option, and of the last three."""
     from ...kernels.run.frame_plan import Request
 
+    seen, power, before = last
     ranges = (text and options.parse_limits(option, text) for option, text in limits.items())
     factors = None if power is None else options.parse_limits("--power", power)
-    return replace(Request(*first, *ranges), seen=seen, power=factors)
+    return replace(Request(*first, *ranges), seen=seen, power=factors, before=before)
 
 
 def _make_from_blender(command: typer.Context, folder: Path, asked: tuple[Any, ...]) -> None:

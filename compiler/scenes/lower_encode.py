@@ -46,7 +46,8 @@ def layers_of(features: Sequence[str]) -> tuple[str, ...]:
         raise InputError("features", ", ".join(smoothed), rule, "denoise frames: wamnet render, then denoise")
     if before := [layer for layer in layers if layer in HISTORY]:
         rule = "a path kernel makes layers of one picture, not of those before it"
-        raise InputError("features", ", ".join(before), rule, "make them with refimpl/light/history.py")
+        way_out = "denoise frames that have them: wamnet animate makes them"
+        raise InputError("features", ", ".join(before), rule, way_out)
     return layers
 
 

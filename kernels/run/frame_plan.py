@@ -7,7 +7,8 @@
    [`compared`].
 4. A picture is cut into bands of rows, each an independent task [`Picture.tasks`]; how is a function of the
    request only, so that an interrupted run finds its bands again whatever the number of workers is.
-5. A task is carried out anywhere [`carry_out`], and the bands of a picture are joined [`join`].
+5. A task is carried out anywhere [`carry_out`], and the bands of a picture are joined [`join`]. A noisy
+   picture with others before it is one task, since a history needs whole pictures [before.py].
 
 The pictures are a function of the request and of the version of this package.
 """
@@ -29,6 +30,7 @@ from ...refimpl.light.scene import Scene, scene_digest
 from ...refimpl.light.scenes import TURN_SECONDS, canonical
 from ...refimpl.light.transport import Settings
 from ...refimpl.light.variation import RANGES, Ranges, check_ranges, varied
+from .before import MOST_BEFORE, followed
 from .draws import Draw, drawn, drawn_outside
 from .geometry import Comparison, Shown, compare
 from .render_frame import Progress, Rows, render_frame, renderer
@@ -65,7 +67,8 @@ class Request:
     their power from the range `power` (None: the lamps' own). The features of noisy pictures are means over
     `feature_spp` camera rays; 0: over the colour's one; they come from `feature_sampler`, "" is an even
     spread. Targets have `spp` samples, those of test frames `test_spp`; 0: as many. `seen`: noisy pictures
-    have the layers of what is seen past mirrors and glass too.
+    have the layers of what is seen past mirrors and glass too. `before`: they have layers of history after so
+    many pictures, in which the animation runs and the camera rests.
     """
 
     scene: str
@@ -91,15 +94,17 @@ class Request:
     seen: bool = False
     feature_sampler: str = ""
     power: Pair | None = None
+    before: int = 0
 
     def as_data(self) -> dict[str, Any]:
-        """Return the request as JSON's types: `seen` and `power` if given, a source not the colour's."""
+        """Return the request as JSON's types: what came later only if given, a source not the colour's."""
         data = {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(self).items()}
         source = data.pop("feature_sampler") or spread(self.sampler, self.seen)
         if self.feature_spp > NOISY_SPP and source != self.sampler:
             data["feature_sampler"] = source
         lists = {k: list(v) if isinstance(v, tuple) else v for k, v in sorted(self.parameters.items())}
-        for name, given in (("seen", self.seen), ("power", self.power is not None)):
+        later = (("seen", self.seen), ("power", self.power is not None), ("before", self.before > 0))
+        for name, given in later:
             if not given:
                 del data[name]
         return {**data, "parameters": lists}
@@ -141,6 +146,15 @@ class Picture:
         """Return the number of its rows."""
         return self.job.height
 
+    @property
+    def before(self) -> int:
+        """Return the number of pictures before it, of which a target has none."""
+        return self.request.before if self.name.endswith(f"-{KINDS[0]}.exr") else 0
+
+    def scene_at(self, seconds: float) -> Scene:
+        """Return the scene so many seconds from the picture's own moment, seen by the same camera."""
+        return self.request.scene_at(replace(self.draw, time_s=self.draw.time_s + seconds))
+
     def tasks(self) -> list[Task]:
         """Return its tasks, top to bottom.
 
@@ -148,6 +162,7 @@ class Picture:
         """
         job = self.job
         rows = max(TASK_SAMPLES // (job.samples // job.height), TILE_PIXELS // job.width, 1)
+        rows = job.height if self.before else rows
         bands = [(first, min(first + rows, job.height)) for first in range(0, job.height, rows)]
         here = version()
         return [Task(self, band, here) for band in bands]
@@ -203,7 +218,8 @@ class Task:
     def samples(self) -> int:
         """Return the number of paths to be traced."""
         job = self.picture.job
-        return job.samples // job.height * (self.rows[1] - self.rows[0])
+        earlier = job.width * job.height * job.spp * self.picture.before
+        return job.samples // job.height * (self.rows[1] - self.rows[0]) + earlier
 
 
 def version() -> str:
@@ -277,6 +293,8 @@ def _check(request: Request) -> None:
     if not (math.isfinite(request.arc_s) and 0.0 <= request.arc_s < request.seconds):
         rule = "training leaves it out of the animation: it must be 0 or more and shorter"
         raise InputError("arc_s", request.arc_s, rule, "use a shorter --arc")
+    if not 0 <= request.before <= MOST_BEFORE:
+        raise InputError("before", request.before, f"from 0 to {MOST_BEFORE} pictures", "choose fewer")
     check_ranges(request.ranges)
     if "time" in request.parameters:
         value = request.parameters["time"]
@@ -307,6 +325,8 @@ def carry_out(task: Task, on_progress: Progress | None = None) -> Frame:
         raise InputError("version of wamnet on a worker", version(), rule, "install that one there")
     picture = task.picture
     executor = picture.request.executor
+    if picture.before:
+        return followed(executor, picture.scene_at, picture.job, picture.before, on_progress)
     return render_frame(executor, picture.scene, picture.job, rows=task.rows, on_progress=on_progress).frame
 
 

@@ -18,6 +18,8 @@ from wamnet.cli.files import images
 from wamnet.cli.files.images import LABEL_PX, read_png
 from wamnet.compiler.model_file import load_model, save_model
 from wamnet.refimpl import encoding
+from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.light import history
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.variation import Ranges, Variation, varied
@@ -91,6 +93,40 @@ def test_a_network_that_sees_smoothed_colour_is_drawn_apart(
     got = read_png(tmp_path / "a" / "00000.png")[LABEL_PX:-1, 13:26]
     # Half a level of 8 bits; weights below 1 leave an error of the images (SMO-5) far below the other half.
     assert np.abs(got - denoise(load_model(tmp_path / "s.safetensors"), noisy)).max() <= 1.0 / 255
+
+
+@pytest.mark.parametrize("name", ["numpy", "opencl"])
+def test_a_network_that_sees_the_history_gets_that_of_the_film(
+    wamnet, tmp_path, monkeypatch, executor_named, name
+) -> None:
+    """One that is made again has the same bytes, for which those before it are rendered again."""
+    executor_named(name)
+    features, window = ("history", "history_weight", "normal"), Window(2)
+    network = siren.init((n_inputs(features, window), 4, 3), 1.0, 1.0, 0)
+    save_model(tmp_path / "h.safetensors", Model(network, features, window, Normalization()))
+    monkeypatch.setattr(animate, "draw_frames", None)
+    film = ("--seconds", 0.3, "--fps", 10, "--size", 13, "--executor", name, "--renderer", name)
+    assert wamnet("animate", "h.safetensors", *film, "-o", "a").status == 0
+    past = None
+    for number in range(3):
+        scene, job = canonical("minicubes", time=number / 10), Job(13, 13, 1, 2 * number)
+        frame = render(scene, job).frame
+        past = (
+            history.begin(scene, job, frame["color"])
+            if past is None
+            else history.follow(past, scene, job, frame["color"])
+        )
+    whole = Frame({**frame.layers, **history.layers_of(past)})
+    last = tmp_path / "a" / "00002.png"
+    got = read_png(last)[LABEL_PX:-1, 13:26]
+    # Half a level of 8 bits; weights below 1 leave an error of the images far below the other half.
+    assert np.abs(got - denoise(load_model(tmp_path / "h.safetensors"), whole)).max() <= 1.0 / 255
+    before = last.read_bytes()
+    last.unlink()
+    assert wamnet("animate", "h.safetensors", *film, "-o", "a").out.endswith(
+        "3 pictures, 1 of them made now\n"
+    )
+    assert last.read_bytes() == before
 
 
 def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:

@@ -10,6 +10,7 @@
    the variance from picture to picture [`measure`].
 
     python experiments/history.py
+    python experiments/history.py --rays 16 -o out/history-16
     python experiments/history.py --scene glossy --limits 16:8:64 -o out/history-glossy
 """
 
@@ -74,11 +75,12 @@ NOISE_SEED, SEEDS_APART = 20_000, 100
 
 @dataclass
 class Study:
-    """A scene, the limits of its histories, and a plan; frames and networks are kept on its ground."""
+    """A scene, limits of its histories, rays of its features, and a plan; its ground keeps what is made."""
 
     ground: Ground
     scene: str
     limits: Limits
+    rays: int = 0
 
     def takes(self, first: int, count: int, kept: int, rests: Callable[[int], bool]) -> list[Take]:
         """Return the takes of draws `first` to before `first + count`."""
@@ -90,6 +92,7 @@ class Study:
                 self.ground.plan.size,
                 seed=NOISE_SEED + SEEDS_APART * (first + k),
                 variation=draw.variation,
+                feature_spp=self.rays,
             )
             for k, draw in enumerate(draws)
         ]
@@ -206,6 +209,7 @@ def parser() -> argparse.ArgumentParser:
     made = command.parser(__doc__ or "", "history")
     made.add_argument("--scene", choices=("minicubes", "glossy", "cornell"), default="minicubes")
     usual = ":".join(f"{limit:g}" for limit in vars(LIMITS).values())
+    made.add_argument("--rays", type=int, default=0, help="camera rays of the features; 0: the colour's")
     made.add_argument("--limits", default=usual, help="most samples: in motion, of mirrors then, at rest")
     return made
 
@@ -215,12 +219,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser().parse_args(arguments)
     plan = plan_of(options.scale)
     ground = Ground(plan, options.cache, options.executor)
-    study = Study(ground, options.scene, limits_of(options.limits))
+    study = Study(ground, options.scene, limits_of(options.limits), options.rays)
     settings = {
         **asdict(plan),
         "executor": options.executor,
         "scene": study.scene,
         "limits": vars(study.limits),
+        **({"rays": study.rays} if study.rays else {}),
     }
     results = Results.open(Path(options.output) / "results.json", "history", settings)
     work = {name: partial(measure, study, method) for name, method in rows(study).items()}

@@ -139,7 +139,7 @@ def references(folder: Path, takes: Sequence[Take], spp: int, executor: str) -> 
 
 def _job(shot: Shot) -> Job:
     """Return the job of a noisy picture: seeds of pictures are even and those of references odd."""
-    return Job(shot.size, shot.size, shot.spp, 2 * shot.seed)
+    return Job(shot.size, shot.size, shot.spp, 2 * shot.seed, feature_spp=shot.feature_spp)
 
 
 def _render(scene: Scene, job: Job, executor: str, kernels: Frames) -> Frame:

@@ -39,7 +39,7 @@ def bounced(student: Any, reflectance: float, block: int = 0) -> tuple[Any, Any,
     hold(
         "LAM-1",
         "the result of bounce",
-        isinstance(found, tuple) and len(found) == 3,
+        isinstance(found, (tuple, list)) and len(found) == 3,
         "three arrays",
         str(type(found)),
     )
@@ -52,7 +52,7 @@ def bounced(student: Any, reflectance: float, block: int = 0) -> tuple[Any, Any,
 
 def density(student: Any) -> None:
     """The density is that of the directions."""
-    wi, _, pdf = bounced(student, 0.5)
+    wi, _, pdf = bounced(student, 0.3)
     off = float(np.abs(np.sqrt(np.sum(wi * wi, axis=-1)) - 1.0).max())
     text = "x, y and z do not belong together: z = sqrt(1 - x^2 - y^2)"
     text = SINGLE if off < 1e-6 else text
@@ -76,10 +76,21 @@ def density(student: Any) -> None:
         (z, "the factor 1 / pi is missing"),
         (np.full(COUNT, 1 / (2 * np.pi)), "that is the uniform density: here it is cos(theta) / pi"),
         (np.full(COUNT, 1 / np.pi), "the cosine is missing"),
-        (0.5 * z / np.pi, "the reflectance does not belong to the density"),
+        (0.3 * z / np.pi, "the reflectance does not belong to the density"),
+        (np.full(COUNT, 0.3), "the order is directions, f cos / pdf, density"),
         (z / (2 * np.pi), "1 / pi, not 1 / (2 pi)"),
     ]
     expect("LAM-1", "densities", pdf, z / np.pi, 1e-12, likely, "cos(theta) / pi")
+
+
+def mapped(student: Any) -> None:
+    """A bounce is a map of its two numbers, whatever their shape."""
+    u0, u1 = still(*(part[:6].reshape(2, 3) for part in uniforms(9, 6, 2)[:2]))
+    found = student.bounce(0.5, u0, u1)
+    wi = numbers_of("LAM-1", "directions of (2, 3) numbers", found[0], (2, 3, 3))
+    numbers_of("LAM-1", "f cos / pdf of (2, 3) numbers", found[1], (2, 3))
+    again, text = student.bounce(0.5, u0, u1)[0], "directions are made of u0 and u1, and of nothing else"
+    expect("LAM-1", "directions of the same numbers again", again, wi, 0.0, (), text)
 
 
 def furnace(student: Any) -> None:
@@ -123,6 +134,13 @@ def weights(student: Any) -> None:
     large = student.power_weight(np.float32(1e30), np.float32(1e30))
     text = "a square of 1e30 is beyond float32: square the ratio other / pdf"
     expect("LTR-5", "the weight of densities 1e30 and 1e30 in float32", large, 0.5, 1e-6, (), text)
+    for pdf, other, right, text in (
+        (1e-15, 1e-15, 0.5, "a pdf below 1e-15 counts as 1e-15, another one as it is: np.maximum, not a sum"),
+        (1.0, 1e6, 1e-12, "the ratio is cut at 1e15, not sooner"),
+    ):
+        weight = student.power_weight(*still(np.array([pdf]), np.array([other])))
+        what = f"the weight of densities {pdf:g} and {other:g}"
+        expect("LTR-5", what, weight, np.array([right]), 1e-6 * right, (), text)
     vectors(
         "transport.mis_weight",
         lambda given: {"power": student.power_weight(given["pdf"], given["other"])},
@@ -144,7 +162,7 @@ def lights(student: Any, half: float, height: float, block: int = 1) -> tuple[An
     hold(
         "LTR-5",
         "the result of by_light",
-        isinstance(found, tuple) and len(found) == 3,
+        isinstance(found, (tuple, list)) and len(found) == 3,
         "three arrays",
         str(type(found)),
     )
@@ -233,6 +251,7 @@ def both(student: Any) -> None:
 
 CHECKS = (
     Check("the density of a bounce", density),
+    Check("a bounce is a map", mapped),
     Check("a furnace", furnace),
     Check("the weights", weights),
     Check("points of a light", light_density),

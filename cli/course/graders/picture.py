@@ -211,6 +211,15 @@ def predicts(student: Any) -> None:
     )
 
 
+def bright(student: Any) -> None:
+    """A picture around 1e9 has the variance of the same one around 0, up to what the recurrence rounds."""
+    _, wanted, _ = taken(student)
+    found = student.picture(lambda x, y, n: 1e9 + colours(x, y, n), WIDTH, HEIGHT, SPP)[1]
+    text = "a mean of squares minus a square of means loses all digits: add_sample for each sample"
+    right = np.asarray(wanted, np.float64)
+    expect("RND-4", "the variance of a picture around 1e9", found, right, 1e-4 * (HEIGHT + 1) ** 2, (), text)
+
+
 def one_sample(student: Any) -> None:
     """A picture of one sample."""
     mean, variance, _ = taken(student, 1)
@@ -228,6 +237,9 @@ def needed(student: Any) -> None:
         (np.array([8.0, 0.0, 2.0, 4.5]), "the error counts as its square: n = variance / error^2"),
         (np.array([8.0, 1.0, 2.0, 5.0]), "the error counts as its square: n = variance / error^2"),
         (np.array([16.0, 0.0, 4.0, 9.0]), "at least one sample"),
+        (np.array([17.0, 1.0, 5.0, 10.0]), "one too many where the quotient is an integer: np.ceil"),
+        (np.array([16.0, 2.0, 4.0, 9.0]), "at least one sample, not two"),
+        (np.array([4.0, 1.0, 2.0, 3.0]), "the variance is the square already: divide it by error^2"),
         (np.array([1.0, 1.0, 1.0, 1.0]), "multiplied by the error's square: divide"),
         (np.array([64.0, 1.0, 4.0, 21.0]), "the variance is squared already"),
         (np.array([8.0, 1.0, 4.0, 6.0]), "variance / error^2: the variance has no root here"),
@@ -242,6 +254,9 @@ def needed(student: Any) -> None:
         "variance / error^2",
     )
     found = student.samples_needed(np.array([1.1]), 0.5)
+    large = student.samples_needed(np.array([2.0**24 + 1.0]), 1.0)
+    text = "single precision: float32 does not hold 2^24 + 1"
+    expect("RND-4", "samples for a variance of 2^24 + 1", large, np.array([2.0**24 + 1.0]), 0.0, (), text)
     text = "4.4 samples: round up, so that the error is not above what is asked"
     expect("RND-4", "samples for a variance of 1.1", found, np.array([5.0]), 0.0, (), text)
 
@@ -307,6 +322,7 @@ CHECKS = (
     Check("the variance of one sample", divided),
     Check("samples far from 0", cancellation),
     Check("a picture", whole),
+    Check("a picture around 1e9", bright),
     Check("a picture of one sample", one_sample),
     Check("the same picture again", no_memory),
     Check("the error that the variance predicts", predicts),

@@ -1,6 +1,20 @@
 """Wrong answers to lab 4: the old text, the new one, the mistake, and words of the explanation."""
 
 WRONG = [
+    (
+        "reflectance * np.ones_like(z), z / np.pi",
+        "z / np.pi, reflectance * np.ones_like(z)",
+        "exchanged",
+        "the order is",
+    ),
+    ("np.maximum(pdf, 1e-15)", "(pdf + 1e-15)", "a sum in place of a maximum", "not a sum"),
+    ("1e-15), 1e15)", "1e-15), 1e3)", "a ratio that is cut early", "not sooner"),
+    (
+        "radius, angle = np.sqrt(u0), 2 * np.pi * u1",
+        "u0, u1 = np.random.random((2, *np.shape(u0)))\n    radius, angle = np.sqrt(u0), 2 * np.pi * u1",
+        "numbers of its own",
+        "nothing else",
+    ),
     ("2 * np.pi * u1", "3 * np.pi * u1", "more than a turn", "2 pi u1"),
     ("2 * np.pi * u1", "2 * np.pi / np.maximum(u1, 1e-3)", "divided by u1", "2 pi u1"),
     ("reflectance * np.ones_like(z)", "reflectance * z / np.pi", "not divided by the density", "not divided"),

@@ -1,6 +1,21 @@
 """Wrong answers to lab 5: the old text, the new one, the mistake, and words of the explanation."""
 
 WRONG = [
+    ("np.ceil(variance / error**2)", "np.floor(variance / error**2) + 1", "one too many", "one too many"),
+    (
+        "np.ceil(variance / error**2)",
+        "np.ceil((variance / error**2).astype(np.float32))",
+        "numbers in float32",
+        "single precision",
+    ),
+    (
+        "        n, total, squares = add_sample(n, total, squares, radiance(x, y, sample))\n",
+        "        value = radiance(x, y, sample)\n"
+        "        n, total, squares = n + 1, total + value, squares + value**2\n"
+        "    squares = squares - total**2 / n\n",
+        "the school's formula",
+        "loses all digits|recurrence",
+    ),
     (
         "np.asarray(image, np.float64)",
         "np.asarray(image, np.float32)",

@@ -555,7 +555,7 @@ TABLES: Mapping[str, TableOf] = {
     **{f"claims{end}": claims(kind) for end, kind in {"": "verdicts", "-exposures": "exposures"}.items()},
     **{name: as_printed(name, 1) for name in ("reference-mutants", "c99-mutants")},
     "held-back-left": as_printed("held-back", 2),
-    **{f"held-back-{which}-left": as_printed(f"held-back-{which}", 2) for which in ("second", "third")},
+    **{f"held-back-{n}-left": as_printed(f"held-back-{n}", 2) for n in ("second", "third", "fourth")},
     **{n: lambda records, n=n: importlib.import_module(n).rows(records[n]) for n in ("blender", "domain")},
     "demo-pictures": demo_pictures,
     "demo-runs": demo_runs,

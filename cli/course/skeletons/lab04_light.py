@@ -2,7 +2,7 @@
 
 A Lambertian surface sends f = reflectance / pi of what arrives, times the cosine. Draw the next direction
 by the cosine density and little is left of that: what? Then combine this way to find a light with the other
-one, points of the light, by the power heuristic. Tutorial: page 3. Clauses: LAM-1, LTR-5.
+one, points of the light, by the power heuristic. Tutorial: page 3. Clauses: LAM-1, SMP-2, LTR-5.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ def add_sample(n: int, total: Any, squares: Any, x: Any) -> tuple[int, Any, Any]
 
 
 def variance(n: int, squares: Any) -> Any:
-    """Return the variance of one sample (...), from the sum of squares of n samples; 0 for n = 1."""
+    """Return the variance of one sample (...), from the squares (...) of n samples; zeros for n = 1."""
     raise NotImplementedError("variance")
 
 

@@ -1,6 +1,18 @@
 """Wrong answers to lab 6: the old text, the new one, the mistake, and words of the explanation."""
 
 WRONG = [
+    (
+        "np.clip(depth / depth_scale, 0, 1)",
+        "np.minimum(depth / depth_scale, 1)",
+        "no lower end",
+        "clip|concatenate",
+    ),
+    (
+        "    parts = [np.clip(albedo, 0, 1)",
+        "    depth /= depth_scale\n    depth_scale = 1.0\n    parts = [np.clip(albedo, 0, 1)",
+        "a changed argument",
+        "an argument is",
+    ),
     ("if not depth_scale > 0:", "if not depth_scale > 1:", "scales below 1 are refused", "any scale above 0"),
     ("np.clip(albedo, 0, 1)", "albedo", "albedo as it is", "albedo is clipped"),
     ("np.clip(albedo, 0, 1)", "np.clip(albedo, -1, 1)", "albedo below 0", "not to \\[-1, 1\\]"),

@@ -313,7 +313,7 @@ def draw_apart(
     film = film or shots
     frames, model = Frames([shot.scene for shot in film]), watch.model
     before, wanted = Film() if wants(model.features) else None, {shot.path for shot in shots}
-    # A history needs the pictures before those that are missing.
+    # The history of a missing picture is made of all pictures before it.
     count = max((number for number, shot in enumerate(film, 1) if shot.path in wanted), default=0)
     for shot in shots if before is None else film[:count]:
         frame = render_frame(renderer, shot.scene, shot.noisy, workers=None, frames=frames).frame

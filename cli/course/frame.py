@@ -43,7 +43,6 @@ ALIKE = 1e-6
 Likely = Sequence[tuple[Any, str]]
 """Values that known mistakes give, and the explanation of each."""
 
-
 ROUGH = 2e-6
 """What single precision or a constant of six digits is off by, relative to the largest number."""
 

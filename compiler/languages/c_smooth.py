@@ -8,7 +8,7 @@ from __future__ import annotations
 from .c import ALL_PIXELS, POPPED, PRAGMAS, C, includes, loops
 from .dialect import Parts
 from .interface import GUIDE, SMOOTH, Interface
-from .openings import IMAGES
+from .openings import IMAGES, PLANES
 
 CLAMP = """\
 /* The nearest of `count` places to one that may be outside. */
@@ -18,9 +18,6 @@ static inline int wamnet_tap(int place, int count)
 }
 """
 """The function that keeps taps inside of the picture."""
-
-PLANES = "float, one plane of height rows of row_stride numbers for each of"
-"""What planes are."""
 
 OF_ALL = {GUIDE: "wamnet_guide", SMOOTH: "wamnet_smooth"}
 """The functions of all pixels."""

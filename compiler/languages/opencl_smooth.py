@@ -10,7 +10,7 @@ from .dialect import Parts
 from .interface import GUIDE, SMOOTH, Interface
 from .opencl import OpenCL
 from .opencl_path import OpenCLPath, OpenCLVectorPath
-from .openings import IMAGES
+from .openings import IMAGES, PLANES
 
 READS = """\
 /* Numbers of a row from a column on; beyond the row's ends they are those at its ends. */
@@ -34,9 +34,6 @@ OF_VECTORS = """\
     }}
     return vload{lanes}(0, all);"""
 """Its statements where a work item computes several."""
-
-PLANES = "float, one plane of height rows of row_stride numbers for each of"
-"""What planes are."""
 
 
 class _Opening(OpenCL):

@@ -1,8 +1,8 @@
 """Which clauses a piece of the reference is governed by, and whether a blamed clause is one of them.
 
 1. A clause of the spec names code: `path: names` [`named`].
-2. A mutant breaks the clauses that name its function, its class or its constant; where none does, those that
-   name the functions that call it, of its module and of those that import it, and theirs [`Clauses.broken`].
+2. A mutant breaks the clauses that name its function, its class or its constant. Where no clause does, it
+   breaks those that name its callers, and so on up [`Clauses.broken`].
 3. Blame is right if the blamed clause is among them, and near if it names anything of the module or is of the
    chapter of one of them.
 """
@@ -74,7 +74,7 @@ class Clauses:
         return self.modules.get(mutant.module, set())
 
     def _callers(self, module: str, name: str) -> set[Place]:
-        """Return functions and classes, of a module and of those that import it, that use a name of it."""
+        """Return what uses a module's name, in that module or in one that imports it."""
         plain, stem = name.rpartition(".")[2], Path(module).stem
         found = set()
         for path, used in self._users.items():

@@ -161,41 +161,21 @@ def test_refusals(refused, here, message) -> None:
     assert message in refused(*REFUSED[message])
 
 
+AGAIN = ("train", "-i", "noisy.exr", "-t", "reference.exr", "--from", "model.safetensors")
+"""A model is trained further."""
+
+
 def test_a_sine_is_not_trained(refused, here, monkeypatch) -> None:
     from wamnet.compiler.core import sine
 
     polynomial = sine.POLYNOMIALS[sine.DEGREE]
     monkeypatch.setattr(sine, "POLYNOMIALS", {7: polynomial, sine.DEGREE: polynomial})
-    line = refused(
-        *(
-            "train",
-            "-i",
-            "noisy.exr",
-            "-t",
-            "reference.exr",
-            "--from",
-            "model.safetensors",
-            "--variant",
-            "sine7",
-        )
-    )
+    line = refused(*AGAIN, "--variant", "sine7")
     assert "--variant is sine7: the degree of a sine is chosen when a kernel is compiled, not trained" in line
 
 
 def test_halves_are_not_trained(refused, here) -> None:
-    line = refused(
-        *(
-            "train",
-            "-i",
-            "noisy.exr",
-            "-t",
-            "reference.exr",
-            "--from",
-            "model.safetensors",
-            "--variant",
-            "half16",
-        )
-    )
+    line = refused(*AGAIN, "--variant", "half16")
     assert "--variant is half16: weights are rounded to halves when a kernel is compiled, not trained" in line
 
 

@@ -230,7 +230,7 @@ def nothing_rounds(student: Any) -> None:
             text = f"the proof has no rule for {op}: use the operations that the task names"
         raise Wrong("WHO-3", what, wanted, str(reason), text) from None
     except CompileError as reason:
-        text = "an operation that cannot be traced: use those that the task names"
+        text = "an operation that cannot be traced: use only the operations that the task names"
         raise Wrong("WHO-3", what, wanted, str(reason).partition(";")[0], text) from None
 
 

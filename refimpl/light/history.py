@@ -225,13 +225,26 @@ def _shows(scene: Scene) -> NDArray[np.bool_]:
     return shows
 
 
-def point_before(moves: Motion, first: First) -> tuple[Points, Normals]:
+class Moved(NamedTuple):
+    """Rows of a motion: turn, three of (..., 3); center and shift (..., 3); rests (...)."""
+
+    turn: Sequence[Floats]
+    center: Points
+    shift: Points
+    rests: Truths
+
+
+def row_of(moves: Motion, number: Ids) -> Moved:
+    """Return the rows of the primitives of these numbers (...)."""
+    turn = [vectors.look_up_rows(moves.turn[:, i], number) for i in range(3)]
+    center, shift = (vectors.look_up_rows(table, number) for table in (moves.center, moves.shift))
+    return Moved(turn, center, shift, vectors.look_up(moves.rests, number))
+
+
+def point_before(row: Moved, first: First) -> tuple[Points, Normals]:
     """Return where first hits were (..., 3), and their normals then, of any length."""
-    turn = [vectors.look_up_rows(moves.turn[:, i], first.number) for i in range(3)]
-    offset = first.point - vectors.look_up_rows(moves.center, first.number)
-    shift = vectors.look_up_rows(moves.shift, first.number)
-    point: Points = first.point + (vectors.rotate(turn, offset) + shift)
-    normal: Normals = first.normal + vectors.rotate(turn, first.normal)
+    point: Points = first.point + (vectors.rotate(row.turn, first.point - row.center) + row.shift)
+    normal: Normals = first.normal + vectors.rotate(row.turn, first.normal)
     return point, normal
 
 
@@ -269,14 +282,15 @@ def projected(
 
 
 def displacement(
-    moves: Motion, basis: CameraBasis, basis_before: CameraBasis, first: First, width: float, height: float
+    row: Moved, found: Truths, cameras: Sequence[CameraBasis], first: First, width: float, height: float
 ) -> tuple[Floats, Floats, Truths]:
     """Return how far first hits were, x and y (...) in pixels, from where they are, and whether (...) ahead.
 
-    What is at infinity stays in its direction.
+    `cameras` are the one now and the one before. What is not `found` (...) is at infinity, and stays in its
+    direction.
     """
-    found = first.number < len(moves.rests) - 1
-    point, _ = point_before(moves, first)
+    basis, basis_before = cameras
+    point, _ = point_before(row, first)
     towards = vectors.choose(found, first.point - basis.position, first.direction)
     towards_before = vectors.choose(found, point - basis_before.position, first.direction)
     x, y, _ = projected(basis, towards, width, height)
@@ -284,34 +298,68 @@ def displacement(
     return x_before - x, y_before - y, in_front
 
 
+class Sums(NamedTuple):
+    """What up to four pixels of the last picture add up to: weights (...), color (..., 3), count (...).
+
+    low and high (..., 3) are the least and the largest of their colours.
+    """
+
+    weights: Floats
+    color: Floats
+    count: Floats
+    low: Floats
+    high: Floats
+
+
 def gathered(past: History, moves: Motion, first: First, shift: tuple[Floats, Floats, Truths]) -> Known:
     """Return what the last picture knows of each pixel (H, W), displaced by `shift`.
 
     Its pixels are added in the order (0, 0), (1, 0), (0, 1), (1, 1) of x and y.
     """
-    (x, fraction_x), (y, fraction_y) = (_split(part) for part in shift[:2])
-    color, count = np.zeros_like(past.color), np.zeros_like(past.count)
-    total, low, high = count, np.full_like(color, np.inf), np.full_like(color, -np.inf)
-    for dy, dx in product((0, 1), (0, 1)):
-        inside, pixel = _pixel(past.count.shape, y + dy, x + dx)
-        valid = inside & shift[2] & same_surface(past, moves, first, pixel)
-        weight = (fraction_x if dx else 1.0 - fraction_x) * (fraction_y if dy else 1.0 - fraction_y)
-        weight = np.where(valid, weight, 0.0)
-        total = total + weight
-        color = color + vectors.scale(past.color[pixel], weight)
-        count = count + past.count[pixel] * weight
-        used = weight > 0.0
-        low = vectors.choose(used, np.minimum(low, past.color[pixel]), low)
-        high = vectors.choose(used, np.maximum(high, past.color[pixel]), high)
-    some = np.where(total > 0.0, total, 1.0)
-    return Known(color / some[..., np.newaxis], count / some, low, high)
+    (x, fraction_x), (y, fraction_y) = (split(part) for part in shift[:2])
+    row, none = row_of(moves, first.number), np.zeros_like(past.count)
+    _, before = point_before(row, first)
+    ends = np.full_like(past.color, np.inf)
+    sums = Sums(none, np.zeros_like(past.color), none, ends, -ends)
+    for below, right in product((0, 1), (0, 1)):
+        inside, pixel = _pixel(past.count.shape, y + below, x + right)
+        rests = row.rests & vectors.look_up(moves.rests, past.number[pixel])
+        same = same_surface(past.number[pixel] == first.number, past.normal[pixel], before, rests)
+        weight = share(fraction_x, right > 0) * share(fraction_y, below > 0)
+        weight = np.where(inside & shift[2] & same, weight, 0.0)
+        sums = added(sums, weight, past.color[pixel], past.count[pixel])
+    return known_of(sums)
 
 
-def _split(shift: Floats) -> tuple[NDArray[np.int64], Floats]:
+def split(shift: Floats) -> tuple[NDArray[np.int32], Floats]:
     """Return pixels (...) and the fraction (...) in [0, 1] of the next one; what is NaN is far away."""
     kept = np.where(np.abs(shift) <= FARTHEST_PX, shift, FARTHEST_PX)
     whole = np.floor(kept)
-    return whole.astype(np.int64), kept - whole
+    return whole.astype(np.int32), kept - whole
+
+
+def share(fraction: Floats, beyond: Truths) -> Floats:
+    """Return the bilinear weight (...) along an axis, of a pixel or of the one beyond it."""
+    found: Floats = np.where(beyond, fraction, 1.0 - fraction)
+    return found
+
+
+def added(sums: Sums, weight: Floats, color: Floats, count: Floats) -> Sums:
+    """Return the sums with one more pixel (...) of the last picture."""
+    used = weight > 0.0
+    return Sums(
+        sums.weights + weight,
+        sums.color + vectors.scale(color, weight),
+        sums.count + count * weight,
+        vectors.choose(used, np.minimum(sums.low, color), sums.low),
+        vectors.choose(used, np.maximum(sums.high, color), sums.high),
+    )
+
+
+def known_of(sums: Sums) -> Known:
+    """Return the means of the pixels that were added."""
+    some = np.where(sums.weights > 0.0, sums.weights, 1.0)
+    return Known(sums.color / some[..., np.newaxis], sums.count / some, sums.low, sums.high)
 
 
 def _pixel(shape: Sequence[int], down: Ids, right: Ids) -> tuple[Truths, tuple[Ids, Ids]]:
@@ -322,23 +370,21 @@ def _pixel(shape: Sequence[int], down: Ids, right: Ids) -> tuple[Truths, tuple[I
     return inside, (np.clip(y, 0, height - 1), np.clip(x, 0, width - 1))
 
 
-def same_surface(past: History, moves: Motion, first: First, pixel: tuple[Ids, Ids]) -> Truths:
-    """Tell (H, W) whether pixels of the last picture are of the same side of the primitives that are met now.
+def same_surface(same_number: Truths, normal: Normals, before: Normals, rests: Truths) -> Truths:
+    """Tell (...) whether pixels of the last picture show the same side of the primitives that are met now.
 
-    Where neither camera nor both primitives moved, that does not matter.
+    `normal` is theirs, `before` that of the first hit as it was, of any length. Where neither camera nor both
+    primitives moved, it does not matter.
     """
-    number, normal = past.number[pixel], past.normal[pixel]
-    _, before = point_before(moves, first)
     length = np.sqrt(vectors.dot(before, before))
     side = vectors.dot(before, normal) >= SAME_SIDE * length
-    rest: Truths = vectors.look_up(moves.rests, first.number) & vectors.look_up(moves.rests, number)
-    same: Truths = ((number == first.number) & side) | rest
+    same: Truths = (same_number & side) | rests
     return same
 
 
 def begin(scene: Scene, job: Job, color: Image) -> History:
     """Return the history after its first picture, of a linear colour (H, W, 3)."""
-    _check(job, color)
+    check_picture(job, color)
     first = first_hits(scene, job)
     own = color.astype(job.dtype)
     return History(scene, first.number, first.normal, own, np.ones_like(own[..., 0]))
@@ -350,10 +396,11 @@ def follow(past: History, scene: Scene, job: Job, color: Image, limits: Limits =
     Raises InputError for a scene with other primitives, a picture of another size, and colours that are not
     finite.
     """
-    _check(job, color, past)
+    check_picture(job, color, past)
     first, moves = first_hits(scene, job), motion(scene, past.scene, job.dtype)
-    basis, basis_before = (camera_basis(each.camera, job.dtype) for each in (scene, past.scene))
-    shift = displacement(moves, basis, basis_before, first, job.width, job.height)
+    cameras = [camera_basis(each.camera, job.dtype) for each in (scene, past.scene)]
+    found = first.number < len(moves.rests) - 1
+    shift = displacement(row_of(moves, first.number), found, cameras, first, job.width, job.height)
     limit = vectors.look_up(limits.of(moves).astype(job.dtype), first.number)
     mean, count = blend(gathered(past, moves, first, shift), color.astype(job.dtype), limit)
     return History(scene, first.number, first.normal, mean, count)
@@ -385,7 +432,7 @@ def error_bound(limit: float, largest: float, dtype: DTypeLike = np.float32) -> 
     return (60.0 * limit + 8.0) * float(np.finfo(np.dtype(dtype)).eps) / 2.0 * largest
 
 
-def _check(job: Job, color: Image, past: History | None = None) -> None:
+def check_picture(job: Job, color: Image, past: History | None = None) -> None:
     """Refuse a picture of another size than the job's and the last one's, and colours that are not finite."""
     sizes = {"the job": (job.height, job.width)}
     if past is not None:

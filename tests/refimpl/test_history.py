@@ -39,6 +39,11 @@ def noise(seed: int, *shape: int) -> np.ndarray:
     return np.random.default_rng(seed).random((*shape, 3), np.float32)
 
 
+def displacement(moves: H.Motion, cameras, first: H.First, size: int):
+    found = first.number < len(moves.rests) - 1
+    return H.displacement(H.row_of(moves, first.number), found, cameras, first, size, size)
+
+
 # ---- primitives and their motion -------------------------------------------------------------------------
 
 
@@ -69,7 +74,7 @@ def test_a_point_of_a_primitive_was_where_the_primitive_was(kind):
     moves = H.motion(now, before, np.float64)
     number = np.zeros(500, np.int32)
     first = H.First(number, placed[0], np.zeros((500, 3)), np.zeros((500, 3)))
-    point, _ = H.point_before(moves, first)
+    point, _ = H.point_before(H.row_of(moves, first.number), first)
     assert np.abs(point - placed[1]).max() <= 10 * 5 * 20 * U["float64"]
     assert not moves.rests[0]
 
@@ -98,7 +103,7 @@ def test_what_rests_has_no_displacement_to_the_bit(name):
     scene = canonical(name, time=0.7)
     first, moves = H.first_hits(scene, job()), H.motion(scene, canonical(name, time=0.7))
     basis = camera_basis(scene.camera, np.float32)
-    x, y, ahead = H.displacement(moves, basis, basis, first, 24, 24)
+    x, y, ahead = displacement(moves, (basis, basis), first, 24)
     assert not x.any()
     assert not y.any()
     assert ahead.all()
@@ -112,11 +117,11 @@ def test_the_camera_before_sees_the_point_where_the_displacement_says(name):
     now, before = moment(name, 1), moment(name, 0)
     first, moves = H.first_hits(now, job(24, 3, "float64")), H.motion(now, before, np.float64)
     basis, basis_before = (camera_basis(scene.camera) for scene in (now, before))
-    dx, dy, _ = H.displacement(moves, basis, basis_before, first, 24, 24)
+    dx, dy, _ = displacement(moves, (basis, basis_before), first, 24)
     x, y, _ = H.projected(basis, first.point - basis.position, 24, 24)
     zero = np.zeros_like(x)
     origin, direction = camera_ray(basis_before, x + dx, y + dy, zero, zero, 24, 24)
-    point, _ = H.point_before(moves, first)
+    point, _ = H.point_before(H.row_of(moves, first.number), first)
     found = first.number < len(moves.rests) - 1
     away = vectors.cross(direction, point - origin)[found]
     assert np.abs(away).max() <= 10 * 200 * U["float64"] * 10
@@ -136,7 +141,7 @@ def test_a_camera_that_moves_sideways_displaces_by_distance():
     before = replace(now, camera=Camera((0.5, 0.25, 0.0), (0.5, 0.25, -1.0), vertical_fov_deg=90.0))
     bases = [camera_basis(scene.camera, np.float32) for scene in (now, before)]
     first = H.first_hits(now, job(16))
-    x, y, _ = H.displacement(H.motion(now, before), *bases, first, 16, 16)
+    x, y, _ = displacement(H.motion(now, before), bases, first, 16)
     assert np.abs(x + 1.0).max() <= 64 * 16 * U["float32"]
     assert np.abs(y - 0.5).max() <= 64 * 16 * U["float32"]
 
@@ -149,7 +154,7 @@ def test_what_was_behind_the_camera_is_not_known():
     turned = replace(scene, camera=replace(CAMERA, look_at=(0.0, 0.0, 1.0)))
     first = H.first_hits(scene, job())
     bases = [camera_basis(each.camera, np.float32) for each in (scene, turned)]
-    assert not H.displacement(H.motion(scene, turned), *bases, first, 24, 24)[2].any()
+    assert not displacement(H.motion(scene, turned), bases, first, 24)[2].any()
     past, moves, first = by_hand()
     nowhere = (*shifted(0.0, 0.0)[:2], np.zeros((2, 2), bool))
     assert not H.gathered(past, moves, first, nowhere).count.any()
@@ -186,7 +191,8 @@ def test_normals_turn_with_their_primitive_and_have_any_length():
     now, before = (Scene("box", CAMERA, boxes=(box,)) for box in (pose, then))
     own = np.array([[0.0, 0.0, 1.0]])
     first = H.First(np.zeros(1, np.int32), own, own @ np.array(pose.rotation), own)
-    _, normal = H.point_before(H.motion(now, before, np.float64), first)
+    row = H.row_of(H.motion(now, before, np.float64), first.number)
+    _, normal = H.point_before(row, first)
     assert np.abs(normal - [0.0, 0.0, 0.5]).max() <= 16 * U["float64"]
     past, moves, first = by_hand()
     smaller = replace(moves, turn=np.broadcast_to(-0.5 * np.eye(3), (3, 3, 3)))

@@ -13,9 +13,9 @@ from typing import Any
 from ..refimpl.errors import CompileError
 from .core.loops import USUAL, Forms
 from .core.profiles import SineContract
-from .languages import opencl_path, opencl_smooth
+from .languages import opencl_path, opencl_planes
 from .languages.c import C
-from .languages.c_smooth import CSmooth
+from .languages.c_planes import CPlanes
 from .languages.cuda import CUDA
 from .languages.dialect import Dialect
 from .languages.glsl import GLSL
@@ -59,9 +59,10 @@ class Target:
 
     `dialect` is the language's, which the interpreter lacks; `paths` are the dialects of path kernels by the
     number of paths that they follow at once, none where there are no path kernels, and `forms` says what
-    becomes of a scene's primitives. `filters` are the dialects of the edge-avoiding filter by the number of
-    pixels in a work item. `widest`: most channels of an image that a kernel reads, `most` of all that it
-    writes; None: any number. `assumes`: what a bound rests on that the language does not promise.
+    becomes of a scene's primitives. `planes` are the dialects of kernels on planes, the edge-avoiding
+    filter and the history, by the number of pixels in a work item. `widest`: most channels of an image that a
+    kernel reads, `most` of all that it writes; None: any number. `assumes`: what a bound rests on that the
+    language does not promise.
     """
 
     name: str
@@ -72,7 +73,7 @@ class Target:
     schedules: tuple[Schedule, ...]
     dialect: Dialect | None = None
     paths: Mapping[int, Dialect | None] = field(default_factory=dict)
-    filters: Mapping[int, Dialect | None] = field(default_factory=dict)
+    planes: Mapping[int, Dialect | None] = field(default_factory=dict)
     forms: Forms = USUAL
     widest: int | None = None
     most: int | None = None
@@ -123,14 +124,14 @@ TARGETS: Mapping[str, Target] = {
             SineContract("np.sin, whose documentation promises nothing", None),
             (Printed(),),
             paths={1: None},
-            filters={1: None},
+            planes={1: None},
         ),
         replace(
             _dialect_target(
                 OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_DOT, *OPENCL_GROUPS, *OPENCL_GROUP_DOT
             ),
             paths={lanes: opencl_path.of_lanes(lanes) for lanes in opencl_path.LANES},
-            filters={lanes: opencl_smooth.of_lanes(lanes) for lanes in opencl_path.LANES},
+            planes={lanes: opencl_planes.of_lanes(lanes) for lanes in opencl_path.LANES},
             forms=Forms(trees=True),
         ),
         replace(_dialect_target(GLSL(), Inlined(GLSLInlined()), *GLSL_COMPUTE), forms=MESA),
@@ -142,7 +143,7 @@ DENOISERS: Mapping[str, Target] = {
     **TARGETS,
     "c": replace(
         _dialect_target(C(), *C_LADDER, *C_FOURIER, *C_DOT),
-        filters={1: CSmooth()},
+        planes={1: CPlanes()},
         forms=Forms(trees=True),
     ),
 }

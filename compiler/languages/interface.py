@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..core.ir import Image
 
 DENOISE, PATH, ENCODE = "denoise", "path", "encode"
@@ -16,6 +18,9 @@ DENOISE, PATH, ENCODE = "denoise", "path", "encode"
 
 GUIDE, SMOOTH = "guide", "smooth"
 """What the two kernels of the filter do: clip a frame's layers, and take the means of a level."""
+
+FOLLOW = "follow"
+"""What the kernel of a history does: it adds a picture."""
 
 READ, WRITE = "read", "write"
 """What a kernel does with an array."""
@@ -29,6 +34,13 @@ WEIGHTS, RESULT, SUMS, IMAGE = "weights", "result", "sums", "image_"
 GUIDES, LIGHT = "guides", "light"
 """Names of the filter's arrays: planes that it compares, and planes of light that it takes means of."""
 
+FIRST, PAST, MOTIONS, CAMERAS = "first", "past", "motions", "cameras"
+"""Names of a history's arrays: planes of first hits and of the last picture, rows of primitives' motions, and
+the numbers of both cameras."""
+
+PRIMITIVES = "primitives"
+"""What the rows of motions are counted by: no kernel is given their number."""
+
 SCENE_NUMBERS = "scene_numbers"
 """Name of the array of the numbers of a scene that are inputs of its path kernel."""
 
@@ -41,6 +53,7 @@ INTEGERS: Mapping[str, tuple[str, ...]] = {
     ENCODE: ("width", "height", "sample_count"),
     GUIDE: ("width", "height", "row_stride"),
     SMOOTH: ("width", "height", "row_stride", "gap"),
+    FOLLOW: ("width", "height", "row_stride"),
 }
 """The integers that a kernel is given, in order, by role; a dialect may know some of them by itself."""
 
@@ -154,6 +167,22 @@ def smoothing(guides: int, light: int, integers: Sequence[str]) -> Interface:
     """Return what a level of a filter is given: planes of guides and of light, and a result like light."""
     planes = (_planes(GUIDES, READ, guides), _planes(LIGHT, READ, light), _planes(RESULT, WRITE, light))
     return Interface(SMOOTH, planes, tuple(integers))
+
+
+def following(counts: Mapping[str, int], integers: Sequence[str]) -> Interface:
+    """Return what a history is given: so many planes of first hits and of the last picture, as many to write.
+
+    Beside them are the new colour, rows of so many numbers of a motion, and numbers of cameras.
+    """
+    arrays = (
+        _planes(FIRST, READ, counts["first"]),
+        _planes(PAST, READ, counts["past"]),
+        _image(Image("color", 3, -np.inf, np.inf), READ),
+        Array(MOTIONS, READ, (PRIMITIVES, counts["motion"])),
+        Array(CAMERAS, READ, (counts["cameras"],)),
+        _planes(RESULT, WRITE, counts["past"]),
+    )
+    return Interface(FOLLOW, arrays, tuple(integers))
 
 
 def _planes(name: str, access: str, count: int) -> Array:

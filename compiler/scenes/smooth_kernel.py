@@ -13,7 +13,6 @@ tap and level by level, give one for every channel of every pixel [`error_at`].
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,22 +20,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.errors import CompileError
 from ...refimpl.network import smoothing
 from ...refimpl.network.dataset import Normalization
-from ...refimpl.reading import SIZES
-from ..artifact import OneSource
-from ..core import ir, profiles
+from ..core import profiles
 from ..core.ir import Program
 from ..core.passes import pipeline
 from ..languages import interface
-from ..languages.dialect import Dialect, Parts
-from ..languages.interface import GUIDE, LIGHT, RESULT, SMOOTH, Interface
+from ..languages.dialect import Dialect
+from ..languages.interface import GUIDE, LIGHT, RESULT, SMOOTH
 from ..plan import sine_contract
 from ..proof import bounds
 from ..proof.bounds import Enclosure
-from ..schedules.emit import framed
-from ..targets import target_named
+from . import plane_kernel
 from .encode_kernel import EncodeArtifact, compile_encode, statements
 from .lower_encode import SAMPLES, channel_name
 from .lower_smooth import (
@@ -52,36 +47,27 @@ from .lower_smooth import (
     lower_smooth,
 )
 from .lower_smooth import LIGHT as LIGHT_PLANES
+from .plane_kernel import Draft, PlaneArtifact
 
 SCHEMA = "wamnet-smooth-kernel-1"
 """Name and version of the manifest's form; described in spec/smoothing.md."""
+
+SAID = "the filter", "smooth by refimpl/network/smoothing.py"
+"""What is said where a target has no such kernels."""
+
+TITLES = {GUIDE: "a frame's light and guides", SMOOTH: "one level of means"}
+"""What both kernels do, by role."""
 
 FEATURE = "color"
 """The feature as which light is encoded after the filter, and the name of its image."""
 
 
 @dataclass(frozen=True)
-class SmoothArtifact(OneSource):
-    """One of the filter's kernels, by its role; `lanes` pixels in a work item."""
-
-    role: str
-    target: str
-    profile: str
-    entry_point: str
-    source: str
-    source_name: str
-    programs: SmoothPrograms
-    lanes: int
-    interface: Interface
-    manifest: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
 class SmoothKernels:
     """What runs one after another: `guide`, `smooth` once a level, `encode`."""
 
-    guide: SmoothArtifact
-    smooth: SmoothArtifact
+    guide: PlaneArtifact
+    smooth: PlaneArtifact
     encode: EncodeArtifact
 
 
@@ -89,13 +75,8 @@ def compile_smoothing(
     normalization: Normalization, target: str, profile: str = "ieee", lanes: int = 1
 ) -> SmoothKernels:
     """Return the kernels that make the smoothed features of frames; `lanes` pixels in a work item."""
-    chosen, promised = target_named(target), profiles.unpinned(profile, "smoothed features")
-    if lanes not in chosen.filters:
-        known = ", ".join(map(str, chosen.filters)) or "none"
-        raise CompileError(
-            f"target {target}, {lanes} pixels in a work item: there are kernels of the filter for {known}; "
-            "smooth by refimpl/network/smoothing.py"
-        )
+    promised = profiles.unpinned(profile, "smoothed features")
+    plane_kernel.dialect_of(target, lanes, *SAID)
     programs = _of_profile(lower_smooth(normalization), promised.passes)
     pair = [_compiled(programs, role, target, profile, lanes) for role in (GUIDE, SMOOTH)]
     encode = compile_encode((FEATURE,), normalization, target, profile, LIGHT_PLANES)
@@ -108,65 +89,35 @@ def _of_profile(programs: SmoothPrograms, passes: Sequence[str]) -> SmoothProgra
     return SmoothPrograms(guide, tap, mean, programs.guides)
 
 
-def _compiled(programs: SmoothPrograms, role: str, target: str, profile: str, lanes: int) -> SmoothArtifact:
+def _compiled(programs: SmoothPrograms, role: str, target: str, profile: str, lanes: int) -> PlaneArtifact:
     """Return one of both kernels."""
-    chosen, promised = target_named(target), profiles.profile_named(profile)
     lanes = lanes if role == SMOOTH else 1
-    dialect = chosen.filters[lanes]
-    names = dialect.integers[role] if dialect else interface.INTEGERS[role]
-    counts = len(programs.guides), len(LIGHT_PLANES)
+    dialect = plane_kernel.dialect_of(target, lanes, *SAID)
+    names, counts = plane_kernel.integers_of(dialect, role), (len(programs.guides), len(LIGHT_PLANES))
     made = (
         interface.smoothing(*counts, names)
         if role == SMOOTH
         else interface.guiding(LAYERS_READ, *counts, names)
     )
-    used = [programs.guide] if role == GUIDE else [programs.tap, programs.mean]
-    digests = [ir.digest(each) for each in used]
-    arguments = dialect.said[role] if dialect else chosen.schedules[0].arguments
-    listed = ("\n".join(textwrap.wrap(", ".join(planes), 98)) for planes in (programs.guides, LIGHT_PLANES))
-    arguments = arguments.format(**dict(zip(("guides", "light"), listed, strict=True)), lanes=lanes)
-    header = _header(role, digests, dialect.language if dialect else chosen.language, arguments)
-    if dialect is None:
-        text = "".join(f"# {line}".rstrip() + "\n" for line in header) + "".join(map(ir.text, used))
-    else:
-        body = _guide_body(programs, dialect) if role == GUIDE else _smooth_body(programs, dialect)
-        parts = Parts(_table(dialect), promised.sine is not None)
-        text = framed(dialect, made, parts, header, [f"    {line}" for line in body])
-    name = f"{role}{chosen.suffix}"
-    entry = dialect.entries[role] if dialect else chosen.entry
-    manifest = {
-        "schema": SCHEMA,
-        "digest": ir.sha256(text.encode()),
-        "role": role,
-        "programs": digests,
-        "target": target,
-        "language": chosen.language,
-        "entry_point": entry,
-        "profile": {"name": promised.name, "text": promised.text},
-        "passes": [*PASSES, *promised.passes],
-        "layers": [layer.name for layer in LAYERS_READ],
-        "guides": list(programs.guides),
-        "light": list(LIGHT_PLANES),
-        "lanes": lanes,
-        "arguments": arguments,
-        "bound": None,
-        "files": {name: ir.sha256(text.encode())},
-        SIZES: {name: len(text.encode())},
-    }
-    return SmoothArtifact(role, target, profile, entry, text, name, programs, lanes, made, manifest)
-
-
-def _header(role: str, digests: Sequence[str], language: str, arguments: str) -> list[str]:
-    """Return the lines of the comment at the top of the source."""
-    what = {GUIDE: "a frame's light and guides", SMOOTH: "one level of means"}[role]
-    first, *others = arguments.split("\n")
-    return [
-        f"wamnet edge-avoiding filter: {what}, {language}. Generated: change the compiler, not this text.",
-        *(f"program   {digest[:32]}" for digest in digests),
-        "bound     at given layers: see the rules for each operation",
-        f"arguments {first}",
-        *(f"          {line}" for line in others),
-    ]
+    body = _guide_body if role == GUIDE else _smooth_body
+    draft = Draft(
+        role,
+        f"edge-avoiding filter: {TITLES[role]}",
+        [programs.guide] if role == GUIDE else [programs.tap, programs.mean],
+        programs,
+        made,
+        body(programs, dialect) if dialect else (),
+        _table(dialect) if dialect else "",
+        {"guides": programs.guides, "light": LIGHT_PLANES},
+        {
+            "schema": SCHEMA,
+            "passes": [*PASSES, *profiles.profile_named(profile).passes],
+            "layers": [layer.name for layer in LAYERS_READ],
+            "guides": list(programs.guides),
+            "light": list(LIGHT_PLANES),
+        },
+    )
+    return plane_kernel.put_together(draft, target, profile, lanes)
 
 
 # ---- text ---------------------------------------------------------------------------------------------

@@ -25,7 +25,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.languages.interface import DENOISE, ENCODE, GUIDE, PATH, SMOOTH, WEIGHTS, Interface
+from ...compiler.languages.interface import (
+    DENOISE,
+    ENCODE,
+    FOLLOW,
+    GUIDE,
+    INTEGERS,
+    PATH,
+    SMOOTH,
+    WEIGHTS,
+    Interface,
+)
 from ...compiler.schedules.schedules import PLAIN
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor, Kernel, Memory, words
@@ -157,13 +167,13 @@ void wamnet_rows(float *const *arrays, const uint32_t *integers, int first, int 
 """
 """The function that is called: rows [first, end), arrays and integers in the interface's order."""
 
-OF_FILTER = """\
+OF_PLANES = """\
     for (int y = first; y < end; ++y) {{{{
         for (int x = 0; x < (int)integers[0]; ++x) {{{{
             {{entry}}({{arrays}}, {integers}, x, y);
         }}}}
     }}}}"""
-"""What the filter's kernels do, by their number of integers."""
+"""What kernels on planes do, by their number of integers."""
 
 BODIES = {
     DENOISE: """\
@@ -185,8 +195,10 @@ BODIES = {
     (void)first;
     (void)end;
     {entry}({arrays}, (int)integers[0], (int)integers[1], (int)integers[2]);""",
-    GUIDE: OF_FILTER.format(integers=", ".join(f"(int)integers[{i}]" for i in range(3))),
-    SMOOTH: OF_FILTER.format(integers=", ".join(f"(int)integers[{i}]" for i in range(4))),
+    **{
+        role: OF_PLANES.format(integers=", ".join(f"(int)integers[{i}]" for i in range(len(INTEGERS[role]))))
+        for role in (GUIDE, SMOOTH, FOLLOW)
+    },
 }
 """What it does, by role; an encoding takes all rows at once: a thousandth of the time of the paths."""
 

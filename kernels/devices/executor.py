@@ -4,7 +4,8 @@
     trace    path kernel -> sums
     encode   sums -> encoding kernel -> images
     passes   all three, without leaving the device [passes.py]
-    smooth   layers -> edge-avoiding filter -> image [smoothing.py]
+    smooth   layers -> edge-avoiding filter -> image [planes.py]
+    follow   first hits, last picture, colour -> history -> this picture [planes.py]
 
 These are written once, here. A device makes a kernel ready [`Executor._prepare`] and starts it [`_start`].
 One with memory of its own also makes memory, with a content or without one [`_store`, `_memory`], copies from
@@ -32,7 +33,8 @@ from ...compiler.core.ir import Image
 from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS, UNSIGNED, Interface
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
-from ...compiler.scenes.smooth_kernel import SmoothArtifact, SmoothKernels
+from ...compiler.scenes.plane_kernel import PlaneArtifact
+from ...compiler.scenes.smooth_kernel import SmoothKernels
 from ...compiler.schedules.emit import output_channels
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.training.step_kernel import StepKernel
@@ -43,7 +45,7 @@ from .images import Images, black, checked, gather_of
 if TYPE_CHECKING:
     from .passes import Passes
 
-Kernel = Artifact | PathArtifact | EncodeArtifact | SmoothArtifact
+Kernel = Artifact | PathArtifact | EncodeArtifact | PlaneArtifact
 """A kernel of any role."""
 
 Size = tuple[int, int]
@@ -114,7 +116,7 @@ class Executor(ABC):
     version, where `device` does not name it. `trains` says whether it has a compiled trainer. `homes` are the
     homes of weights, apart from the target's usual one, whose kernels it runs
     [compiler/languages/interface.py]. `paints`: it runs path kernels that write encoded images;
-    `smooths`: it filters a frame in far less time than the reference.
+    `smooths`: it filters a frame, and adds a picture to a history, in far less time than the reference.
     """
 
     name: str
@@ -243,8 +245,8 @@ class Executor(ABC):
             (self._paint if kernel.images else self._trace)(
                 kernel, Part(size[1], size[0], 0, size[0], 0, 1, 0)
             )
-        elif isinstance(kernel, SmoothArtifact):
-            from .smoothing import run_once
+        elif isinstance(kernel, PlaneArtifact):
+            from .planes import run_once
 
             run_once(self, kernel, size)
         elif isinstance(kernel, EncodeArtifact):
@@ -403,11 +405,21 @@ class Executor(ABC):
 
         They are color, normal, albedo, position and depth; NaN counts as 0.
         """
-        from .smoothing import smoothed
+        from .planes import smoothed
 
         with np.errstate(over="ignore"):
             given = {name: known(values.astype(np.float32)) for name, values in layers.items()}
         return smoothed(self, kernels, given)
+
+    def follow(self, kernel: PlaneArtifact, arrays: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+        """Return the planes (P, H, W) that a picture leaves for the next one (refimpl/light/history.py).
+
+        `arrays` are those of the kernel by name: planes of first hits and of the last picture, the colour
+        (H, W, 3), rows of motions, numbers of cameras.
+        """
+        from .planes import followed
+
+        return followed(self, kernel, arrays)
 
     def passes(self, encode: EncodeArtifact, denoise: Artifact, size: Size) -> Passes:
         """Return passes over a picture of `size` (height, width), whose images stay on the device."""

@@ -14,26 +14,17 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.core.interpret import interpret
-from ...compiler.languages.interface import GUIDE, GUIDES, IMAGE, LIGHT, RESULT, SCENE_NUMBERS
+from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS
 from ...compiler.languages.interface import SUMS as PATH_SUMS
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.lower_encode import SAMPLES, channel_name
 from ...compiler.scenes.lower_scene import WAY, PathPrograms
-from ...compiler.scenes.lower_smooth import (
-    GUIDED,
-    HERE,
-    LAYERS_READ,
-    SPLINE,
-    SUMS,
-    THERE,
-    WEIGHTS,
-)
-from ...compiler.scenes.lower_smooth import LIGHT as LIGHT_PLANES
 from ...compiler.scenes.path_kernel import PathArtifact
-from ...compiler.scenes.smooth_kernel import SmoothArtifact
-from ...refimpl.network import dataset, smoothing
+from ...compiler.scenes.plane_kernel import PlaneArtifact
+from ...refimpl.network import dataset
 from .executor import Executor, Kernel, Memory
 from .images import Images, gather_of
+from .numpy_planes import INTERPRETED
 
 BLOCK_NUMBERS = 2**22
 """Numbers in the windows of one block of rows: 16 MiB in float32, for images of any height."""
@@ -64,8 +55,8 @@ class NumpyExecutor(Executor):
         elif isinstance(kernel, EncodeArtifact):
             for name, image in _encoded(kernel, held[PATH_SUMS], integers["sample_count"]).items():
                 held[f"{IMAGE}{name}"][:] = image
-        elif isinstance(kernel, SmoothArtifact):
-            (_guided if kernel.role == GUIDE else _smoothed)(kernel, held, integers)
+        elif isinstance(kernel, PlaneArtifact):
+            INTERPRETED[kernel.role](kernel, held, integers)
         else:
             images = [held[f"{IMAGE}{image.name}"] for image in gather_of(kernel).images]
             _denoised(kernel, np.concatenate(images, axis=-1), held[RESULT])
@@ -111,35 +102,6 @@ def _encoded(kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) ->
         image.name: np.stack([found[channel_name(image.name, c)] for c in range(image.channels)], axis=-1)
         for image in kernel.images
     }
-
-
-def _guided(kernel: SmoothArtifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
-    """Fill the planes of guides and light (n, H, W) for layers (H, W, C)."""
-    given = {
-        f"{layer.name}_{c}": held[f"{IMAGE}{layer.name}"][..., c]
-        for layer in LAYERS_READ
-        for c in range(layer.channels)
-    }
-    found = interpret(kernel.programs.guide, given)
-    for array, names in ((GUIDES, kernel.programs.guides), (LIGHT, LIGHT_PLANES)):
-        held[array][:] = [found[name] for name in names]
-
-
-def _smoothed(kernel: SmoothArtifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
-    """Fill the planes of light (3, H, W) after one level."""
-    programs, (_, height, width) = kernel.programs, held[LIGHT].shape
-    guides = dict(zip(programs.guides, held[GUIDES], strict=True))
-    here = {f"{HERE}{name}": plane for name, plane in guides.items()}
-    sums = dict.fromkeys((*SUMS, WEIGHTS), np.zeros((height, width), np.float32))
-    for spline, rows, columns in smoothing.taps(height, width, integers["gap"]):
-        at = np.ix_(rows, columns)
-        there = {f"{THERE}{name}": guides[name][at] for name in GUIDED}
-        light = {name: plane[at] for name, plane in zip(LIGHT_PLANES, held[LIGHT], strict=True)}
-        sums = interpret(
-            programs.tap, {**here, **there, **light, **sums, SPLINE: np.asarray(spline, np.float32)}
-        )
-    found = interpret(programs.mean, sums)
-    held[RESULT][:] = [found[name] for name in LIGHT_PLANES]
 
 
 def _denoised(artifact: Artifact, image: NDArray[np.float32], result: NDArray[np.float32]) -> None:

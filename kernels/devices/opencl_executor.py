@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.languages.interface import BLOCK, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
 from ...compiler.scenes.path_kernel import PathArtifact
-from ...compiler.scenes.smooth_kernel import SmoothArtifact
+from ...compiler.scenes.plane_kernel import PlaneArtifact
 from ...compiler.training.step_kernel import StepKernel
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
@@ -141,7 +141,7 @@ class OpenCLExecutor(Executor):
         if isinstance(kernel, Artifact):
             schedule = kernel.manifest["schedule"]
             local, extent = self._local_size(kernel), (schedule["pixels"], schedule.get("rows", 1))
-        elif isinstance(kernel, PathArtifact | SmoothArtifact):
+        elif isinstance(kernel, PathArtifact | PlaneArtifact):
             local, extent = PATH_LOCAL_SIZE[min(kernel.lanes, 2)], (kernel.lanes, 1)
         else:
             local, extent = LOCAL_SIZE, (1, 1)

@@ -1,6 +1,12 @@
-"""The edge-avoiding filter on a device: layers of a frame go there, an encoded feature image comes back.
+"""Kernels on planes on a device: the edge-avoiding filter, and a history.
+
+Layers of a frame go there, an encoded feature image comes back:
 
     layers -> guide -> guides, light -> smooth, gaps of 1, 2, 4 -> light -> encode -> feature image
+
+First hits, the last picture and a new colour go there, this picture comes back:
+
+    first, past, color, motions, cameras -> follow -> result
 
 Light is in two arrays that change places from level to level. Rows of planes are filled up to whole work
 items; what is beyond the picture means nothing, and is not read.
@@ -15,8 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import GUIDES, IMAGE, LIGHT, READ, RESULT
-from ...compiler.scenes.smooth_kernel import FEATURE, SmoothArtifact, SmoothKernels
+from ...compiler.languages.interface import GUIDES, IMAGE, LIGHT, PAST, PRIMITIVES, READ, RESULT
+from ...compiler.scenes.plane_kernel import PlaneArtifact
+from ...compiler.scenes.smooth_kernel import FEATURE, SmoothKernels
 from ...refimpl.network.smoothing import LEVELS
 from .executor import Executor, Memory, Size
 
@@ -49,10 +56,27 @@ def smoothed(
         return executor._fetch(f"{IMAGE}{FEATURE}", images[FEATURE])
 
 
-def run_once(executor: Executor, kernel: SmoothArtifact, size: Size) -> None:
+def followed(
+    executor: Executor, kernel: PlaneArtifact, arrays: Mapping[str, NDArray[np.float32]]
+) -> NDArray[np.float32]:
+    """Return the planes (P, H, W) that a picture leaves, of a history's arrays by the kernel's names."""
+    executor._check_target(kernel)
+    executor.build(kernel)
+    _, height, width = arrays[PAST].shape
+    with executor._session((height, width)), ExitStack() as made:
+        integers = _integers(kernel, (height, width))
+        given = {name: executor._stored(name, values, made) for name, values in arrays.items()}
+        result = kernel.interface.named(RESULT)
+        assert result is not None
+        memory = _memory(executor, RESULT, result.shape, integers, made)
+        _start(executor, kernel, {**given, RESULT: memory}, integers)
+        return executor._fetch(RESULT, memory)
+
+
+def run_once(executor: Executor, kernel: PlaneArtifact, size: Size) -> None:
     """Run a kernel once on zeros."""
     with executor._session(size), ExitStack() as made:
-        integers = {**_integers(kernel, size), "gap": 1}
+        integers = {**_integers(kernel, size), "gap": 1, PRIMITIVES: 1}
         arrays = {}
         for array in kernel.interface.arrays:
             shape = _shape(array.shape, integers)
@@ -64,7 +88,7 @@ def run_once(executor: Executor, kernel: SmoothArtifact, size: Size) -> None:
         executor._finish()
 
 
-def _integers(kernel: SmoothArtifact, size: Size) -> dict[str, int]:
+def _integers(kernel: PlaneArtifact, size: Size) -> dict[str, int]:
     """Return a kernel's integers for a picture: rows of planes are whole work items."""
     height, width = size
     return {"width": width, "height": height, "row_stride": -(-width // kernel.lanes) * kernel.lanes}
@@ -85,7 +109,7 @@ def _memory(
 
 
 def _start(
-    executor: Executor, kernel: SmoothArtifact, arrays: Mapping[str, Memory], integers: Mapping[str, Any]
+    executor: Executor, kernel: PlaneArtifact, arrays: Mapping[str, Memory], integers: Mapping[str, Any]
 ) -> None:
     """Start a built kernel."""
     executor._start(kernel, executor._built[kernel.digest].prepared, arrays, integers)

@@ -1,4 +1,4 @@
-"""C99 for the filter: planes of guides and light, one pixel a call, and a function that does all of them.
+"""C99 for kernels on planes, of the filter and the history: one pixel a call, and a function that does all.
 
 A tap beyond the picture reads the nearest pixel of it: rows and columns are clamped where they are read.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .c import ALL_PIXELS, POPPED, PRAGMAS, C, includes, loops
 from .dialect import Parts
-from .interface import GUIDE, SMOOTH, Interface
+from .interface import FOLLOW, GUIDE, SMOOTH, Interface
 from .openings import IMAGES, PLANES
 
 CLAMP = """\
@@ -19,18 +19,18 @@ static inline int wamnet_tap(int place, int count)
 """
 """The function that keeps taps inside of the picture."""
 
-OF_ALL = {GUIDE: "wamnet_guide", SMOOTH: "wamnet_smooth"}
+OF_ALL = {GUIDE: "wamnet_guide", SMOOTH: "wamnet_smooth", FOLLOW: "wamnet_follow"}
 """The functions of all pixels."""
 
 
-class CSmooth(C):
+class CPlanes(C):
     """The dialect's table."""
 
     load = "float {name} = image_{image}[pixel * {channels} + {channel}];"
     plane_load = "{array}[{plane} * plane + {row} + (size_t)wamnet_tap({column}, width)]"
     plane_store = "{array}[{plane} * plane + at] = {value};"
-    entries = {GUIDE: "wamnet_guide_pixel", SMOOTH: "wamnet_smooth_pixel"}
-    ends = dict.fromkeys((GUIDE, SMOOTH), POPPED)
+    entries = {role: f"{name}_pixel" for role, name in OF_ALL.items()}
+    ends = dict.fromkeys(OF_ALL, POPPED)
     said = {
         GUIDE: (
             f"{IMAGES}, not encoded, without NaN;\nguides: {PLANES}:\n{{guides}};\n"
@@ -42,6 +42,16 @@ class CSmooth(C):
             f"light, result: the same of:\n{{light}};\n"
             "width; height; row_stride: at least width; gap: pixels between taps.\n"
             "wamnet_smooth does all pixels, wamnet_smooth_pixel one: call that from your own loops"
+        ),
+        FOLLOW: (
+            f"first: {PLANES}:\n{{first}};\n"
+            f"past, result: the same of:\n{{past}};\n"
+            "image_color: width * height * 3 floats, finite;\n"
+            'motions: a row for each primitive by its number, and one for "nothing", of:\n{motion};\n'
+            "cameras: one number for each of:\n{cameras};\n"
+            "width; height; row_stride: at least width.\n"
+            'A first picture has a past of primitive "nothing", and of zeros.\n'
+            "wamnet_follow does all pixels, wamnet_follow_pixel one: call that from your own loops"
         ),
     }
 
@@ -79,7 +89,11 @@ class CSmooth(C):
             "    const size_t at = (size_t)y * stride + (size_t)x;",
         ]
         pixel = "    const size_t pixel = (size_t)y * (size_t)width + (size_t)x;"
-        return [*places, pixel] if kernel.role == GUIDE else places
+        return places if kernel.role == SMOOTH else [*places, pixel]
+
+    def place_of(self, row: str, column: str) -> str:
+        """Return the place of a pixel in a plane."""
+        return f"(size_t){row} * stride + (size_t){column}"
 
     def tap_row(self) -> str:
         """Return the declaration of the first place of a tap's row."""

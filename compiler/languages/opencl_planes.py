@@ -1,4 +1,4 @@
-"""OpenCL C 1.2 for the filter: planes of guides and light, several pixels of a row in a work item on CPUs.
+"""OpenCL C 1.2 for kernels on planes: the history, and the filter, of several pixels of a row in a work item.
 
 A level reads whole vectors of a row at any column. Where these reach beyond the row's ends they are gathered,
 number by number. The branch is in each read: one around all of them took half as long again on PoCL.
@@ -7,7 +7,7 @@ number by number. The branch is in each read: one around all of them took half a
 from __future__ import annotations
 
 from .dialect import Parts
-from .interface import GUIDE, SMOOTH, Interface
+from .interface import FOLLOW, GUIDE, SMOOTH, Interface
 from .opencl import OpenCL
 from .opencl_path import OpenCLPath, OpenCLVectorPath
 from .openings import IMAGES, PLANES
@@ -43,8 +43,8 @@ class _Opening(OpenCL):
     load = "float {name} = image_{image}[pixel * {channels} + {channel}];"
     plane_load = "row_at({array} + {plane} * plane + {row}, {column}, width)"
     plane_store = "{array}[{plane} * plane + at] = {value};"
-    entries = {GUIDE: "wamnet_guide", SMOOTH: "wamnet_smooth"}
-    ends = dict.fromkeys((GUIDE, SMOOTH), "}")
+    entries = {GUIDE: "wamnet_guide", SMOOTH: "wamnet_smooth", FOLLOW: "wamnet_follow"}
+    ends = dict.fromkeys((GUIDE, SMOOTH, FOLLOW), "}")
     said = {
         GUIDE: (
             f"{IMAGES}, not encoded, without NaN;\nguides: {PLANES}:\n{{guides}};\n"
@@ -58,12 +58,22 @@ class _Opening(OpenCL):
             "Work item (i, j) computes {lanes} pixels from {lanes} * i of row j on:\n"
             "global size at least (ceil(width / {lanes}), height)"
         ),
+        FOLLOW: (
+            f"first: {PLANES}:\n{{first}};\n"
+            f"past, result: the same of:\n{{past}};\n"
+            "image_color: width * height * 3 floats, finite;\n"
+            'motions: a row for each primitive by its number, and one for "nothing", of:\n{motion};\n'
+            "cameras: one number for each of:\n{cameras};\n"
+            "width; height; row_stride: at least width.\n"
+            'A first picture has a past of primitive "nothing", and of zeros.\n'
+            "Global size: at least (width, height)"
+        ),
     }
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
         defined = [f"#define LANES {self.lanes}"]
-        return defined if kernel.role == GUIDE else [*defined, parts.top, self.reader()]
+        return [*defined, parts.top, self.reader()] if kernel.role == SMOOTH else defined
 
     def reader(self) -> str:
         """Return the function that reads a plane."""
@@ -72,7 +82,7 @@ class _Opening(OpenCL):
 
     def start(self, kernel: Interface) -> list[str]:
         """Return the first statements: places in planes and images."""
-        pixel = ["    size_t pixel = (size_t)y * (size_t)width + (size_t)x;"] * (kernel.role == GUIDE)
+        pixel = ["    size_t pixel = (size_t)y * (size_t)width + (size_t)x;"] * (kernel.role != SMOOTH)
         return [
             "    size_t stride = (size_t)row_stride;",
             "    size_t plane = (size_t)height * stride;",
@@ -80,16 +90,24 @@ class _Opening(OpenCL):
             *pixel,
         ]
 
+    def offset(self, name: str, value: str) -> str:
+        """Return the declaration of a place in memory."""
+        return f"size_t {name} = {value};"
+
+    def place_of(self, row: str, column: str) -> str:
+        """Return the place of a pixel in a plane."""
+        return f"(size_t){row} * stride + (size_t){column}"
+
     def tap_row(self) -> str:
         """Return the declaration of the first place of a tap's row."""
         return "size_t line = (size_t)clamp(y + gap * dy, 0, height - 1) * stride;"
 
 
-class OpenCLSmooth(_Opening, OpenCLPath):
+class OpenCLPlanes(_Opening, OpenCLPath):
     """The dialect's table for one pixel in a work item."""
 
 
-class OpenCLVectorSmooth(_Opening, OpenCLVectorPath):
+class OpenCLVectorPlanes(_Opening, OpenCLVectorPath):
     """The dialect's table for 4, 8 or 16 pixels in a work item."""
 
     def __init__(self, lanes: int) -> None:
@@ -97,6 +115,6 @@ class OpenCLVectorSmooth(_Opening, OpenCLVectorPath):
         self.plane_store = f"vstore{lanes}({{value}}, 0, {{array}} + {{plane}} * plane + at);"
 
 
-def of_lanes(lanes: int) -> OpenCLSmooth | OpenCLVectorSmooth:
+def of_lanes(lanes: int) -> OpenCLPlanes | OpenCLVectorPlanes:
     """Return the dialect for a number of pixels in a work item."""
-    return OpenCLSmooth() if lanes == 1 else OpenCLVectorSmooth(lanes)
+    return OpenCLPlanes() if lanes == 1 else OpenCLVectorPlanes(lanes)

@@ -1,0 +1,96 @@
+"""Kernels on planes, interpreted: all pixels at once, each program by NumPy's operations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ...compiler.core.interpret import interpret
+from ...compiler.languages.interface import (
+    CAMERAS,
+    FIRST,
+    FOLLOW,
+    GUIDE,
+    GUIDES,
+    IMAGE,
+    LIGHT,
+    MOTIONS,
+    PAST,
+    RESULT,
+    SMOOTH,
+)
+from ...compiler.scenes import lower_history
+from ...compiler.scenes.lower_history import BEYOND, COLOR, MOTION, NUMBER, RESTS, SIZE, STARTS, TOTALS
+from ...compiler.scenes.lower_smooth import GUIDED, HERE, LAYERS_READ, SPLINE, SUMS, THERE, WEIGHTS
+from ...compiler.scenes.lower_smooth import LIGHT as LIGHT_PLANES
+from ...compiler.scenes.plane_kernel import PlaneArtifact
+from ...refimpl.network import smoothing
+
+
+def _guided(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
+    """Fill the planes of guides and light (n, H, W) for layers (H, W, C)."""
+    given = {
+        f"{layer.name}_{c}": held[f"{IMAGE}{layer.name}"][..., c]
+        for layer in LAYERS_READ
+        for c in range(layer.channels)
+    }
+    found = interpret(kernel.programs.guide, given)
+    for array, names in ((GUIDES, kernel.programs.guides), (LIGHT, LIGHT_PLANES)):
+        held[array][:] = [found[name] for name in names]
+
+
+def _smoothed(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
+    """Fill the planes of light (3, H, W) after one level."""
+    programs, (_, height, width) = kernel.programs, held[LIGHT].shape
+    guides = dict(zip(programs.guides, held[GUIDES], strict=True))
+    here = {f"{HERE}{name}": plane for name, plane in guides.items()}
+    sums = dict.fromkeys((*SUMS, WEIGHTS), np.zeros((height, width), np.float32))
+    for spline, rows, columns in smoothing.taps(height, width, integers["gap"]):
+        at = np.ix_(rows, columns)
+        there = {f"{THERE}{name}": guides[name][at] for name in GUIDED}
+        light = {name: plane[at] for name, plane in zip(LIGHT_PLANES, held[LIGHT], strict=True)}
+        sums = interpret(
+            programs.tap, {**here, **there, **light, **sums, SPLINE: np.asarray(spline, np.float32)}
+        )
+    found = interpret(programs.mean, sums)
+    held[RESULT][:] = [found[name] for name in LIGHT_PLANES]
+
+
+def _followed(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
+    """Fill the planes (P, H, W) of a history with one picture more."""
+    programs, (_, height, width) = kernel.programs, held[PAST].shape
+    motions, color = held[MOTIONS], held[f"{IMAGE}color"]
+    here = dict(zip(lower_history.FIRST, held[FIRST], strict=True))
+    here |= {name: color[..., c] for c, name in enumerate(COLOR)}
+    here |= dict(zip(MOTION, np.moveaxis(motions[here[NUMBER].astype(np.int32)], -1, 0), strict=True))
+    sizes = dict(zip(SIZE, (np.float32(width), np.float32(height)), strict=True))
+    here |= {**dict(zip(lower_history.CAMERAS, held[CAMERAS], strict=True)), **sizes}
+    here |= interpret(programs.find, here)
+    sums = {
+        name: np.full((height, width), start, np.float32) for name, start in zip(TOTALS, STARTS, strict=True)
+    }
+    y, x = np.indices((height, width))
+    for beyond in product((False, True), (False, True)):
+        line, column = y + here["down"] + beyond[0], x + here["across"] + beyond[1]
+        inside = here["ahead"] & (line >= 0) & (line < height) & (column >= 0) & (column < width)
+        at = np.where(inside, line, 0), np.where(inside, column, 0)
+        there = {
+            f"{THERE}{name}": plane[at] for name, plane in zip(lower_history.PAST, held[PAST], strict=True)
+        }
+        rests = motions[there[f"{THERE}{NUMBER}"].astype(np.int32), MOTION.index(RESTS)]
+        flags = dict(zip(BEYOND, (np.asarray(beyond[1]), np.asarray(beyond[0])), strict=True))
+        found = interpret(programs.take, {**here, **there, **flags, **sums, f"{THERE}{RESTS}": rests})
+        sums = {name: np.where(inside, found[name], sums[name]) for name in TOTALS}
+    here |= interpret(programs.blend, {**here, **sums})
+    held[RESULT][:] = [here[name] for name in lower_history.PAST]
+
+
+INTERPRETED: Mapping[str, Callable[[PlaneArtifact, Mapping[str, Any], Mapping[str, int]], None]] = {
+    GUIDE: _guided,
+    SMOOTH: _smoothed,
+    FOLLOW: _followed,
+}
+"""What interprets kernels on planes, by role."""

@@ -312,7 +312,8 @@ def draw_apart(
 
     film = film or shots
     frames, model = Frames([shot.scene for shot in film]), watch.model
-    before, wanted = Film() if wants(model.features) else None, {shot.path for shot in shots}
+    wanted = {shot.path for shot in shots}
+    before = Film(renderer, [shot.scene for shot in film]) if wants(model.features) else None
     # The history of a missing picture is made of all pictures before it.
     count = max((number for number, shot in enumerate(film, 1) if shot.path in wanted), default=0)
     for shot in shots if before is None else film[:count]:

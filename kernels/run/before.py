@@ -4,23 +4,29 @@
 2. A frame of a data set has so many pictures before it, 1 / PER_S apart, by samples that the frame itself
    does not use [`followed`].
 
-A history is defined in refimpl/light/history.py; any executor renders the pictures.
+A history is defined in refimpl/light/history.py; any executor renders the pictures, and those that have a
+kernel for it follow them too [follow_on.py].
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 
-from ...refimpl.frame import HISTORY, Frame
+from ...refimpl.frame import HISTORY, Floats, Frame
 from ...refimpl.light import history
 from ...refimpl.light.history import History
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
-from .render_frame import Progress, render_frame
+from .follow_on import follow_on
+from .render_frame import Progress, device_of, render_frame
+from .render_on import Frames
 
 PER_S = 24.0
 """Pictures per second before a frame of a data set."""
+
+REFERENCE = "numpy"
+"""The executor whose histories are those of the definition itself."""
 
 MOST_BEFORE = 256
 """Most pictures before a frame: at rest a history counts to 64, and studies to four times as many."""
@@ -32,21 +38,32 @@ def wants(features: Collection[str]) -> bool:
 
 
 class Film:
-    """Pictures that follow each other, of one size; the first one begins a history."""
+    """Pictures that follow each other, of one size; the first one begins a history.
 
-    def __init__(self) -> None:
+    It is computed by the executor of this name where that has a kernel for it, else by the reference.
+    `scenes` are those to come, where they are known: one kernel traces them all.
+    """
+
+    def __init__(self, executor: str = REFERENCE, scenes: Sequence[Scene] = ()) -> None:
         self._past: History | None = None
+        self._executor, self._frames = executor, Frames(scenes)
 
     def add(self, scene: Scene, job: Job, frame: Frame) -> Frame:
         """Return the next frame with its layers of history.
 
         Raises InputError for a scene with other primitives than the last one's.
         """
-        color = frame["color"]
+        self._past = self._next(scene, job, frame["color"])
+        return Frame({**frame.layers, **history.layers_of(self._past)}, frame.info)
+
+    def _next(self, scene: Scene, job: Job, color: Floats) -> History:
+        """Return the history after a picture."""
         past = self._past
-        now = history.begin(scene, job, color) if past is None else history.follow(past, scene, job, color)
-        self._past = now
-        return Frame({**frame.layers, **history.layers_of(now)}, frame.info)
+        if self._executor != REFERENCE and job.dtype == "float32":
+            device = device_of(self._executor)
+            if device.smooths:
+                return follow_on(device, past, scene, job, color, frames=self._frames)
+        return history.begin(scene, job, color) if past is None else history.follow(past, scene, job, color)
 
 
 def jobs_before(job: Job, count: int) -> Iterator[Job]:
@@ -63,9 +80,9 @@ def followed(
     on_progress: Progress | None = None,
 ) -> Frame:
     """Return a job's frame with layers of history after `count` pictures, of a scene by its time from now."""
-    film = Film()
-    for number, each in enumerate(jobs_before(job, count)):
-        scene = scene_at((number - count) / PER_S)
-        film.add(scene, each, render_frame(executor, scene, each, on_progress=on_progress).frame)
-    scene = scene_at(0.0)
-    return film.add(scene, job, render_frame(executor, scene, job, on_progress=on_progress).frame)
+    scenes = [scene_at((number - count) / PER_S) for number in range(count + 1)]
+    film, kernels = Film(executor, scenes), Frames(scenes)
+    for each, now in zip([*jobs_before(job, count), job], scenes, strict=True):
+        rendered = render_frame(executor, now, each, on_progress=on_progress, frames=kernels).frame
+        frame = film.add(now, each, rendered)
+    return frame

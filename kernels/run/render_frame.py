@@ -3,7 +3,7 @@
 1. The registry says how an executor renders, and whether it uses all cores by itself [`RENDERERS`].
 2. [`render_frame`] renders all of a frame, or a band of rows of it.
 3. A device stays open in the thread that opened it: opening it and building a kernel take longer than a
-   small picture [`_device`].
+   small picture [`device_of`].
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ _opened = threading.local()
 """The devices that are open, by name: a thread's own, since a graphics context belongs to one."""
 
 
-def _device(name: str) -> Executor:
+def device_of(name: str) -> Executor:
     """Return this thread's device, open."""
     devices: dict[str, Executor] = _opened.__dict__
     if name not in devices:
@@ -90,7 +90,7 @@ def _by_kernel(name: str) -> RenderRows:
         on_progress: Progress | None,
         frames: Frames | None,
     ) -> Render:
-        return render_on(_device(name), scene, job, rows=rows, on_progress=on_progress, frames=frames)
+        return render_on(device_of(name), scene, job, rows=rows, on_progress=on_progress, frames=frames)
 
     return render_rows
 

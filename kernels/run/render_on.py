@@ -80,9 +80,14 @@ class Frames:
         self._scenes = tuple(scenes)
         self._paths: dict[tuple[object, ...], MovingPaths] = {}
 
-    def of(self, executor: Executor, scene: Scene, job: Job, profile: str = "ieee") -> Moment:
-        """Return the kernel that renders a job's scene on an executor, and the scene's numbers."""
-        settings, groups = job.settings, groups_of(job)
+    def of(
+        self, executor: Executor, scene: Scene, job: Job, profile: str = "ieee", groups: Sequence[str] = ()
+    ) -> Moment:
+        """Return the kernel that renders a job's scene on an executor, and the scene's numbers.
+
+        `groups` are those of its planes, by default what the job's frame is made of.
+        """
+        settings, groups = job.settings, tuple(groups) or groups_of(job)
         key = (executor.name, executor.lanes, profile, settings, groups)
         if key not in self._paths:
             target, lanes = executor.name, executor.lanes
@@ -131,19 +136,36 @@ def render_on(
             "kernel", "features of their own rays", rule, "render with frames=, or without either"
         )
     numbers = None if moment is None else moment.numbers
+    totals = _totals(executor, kernel, numbers, job, (first, last), on_progress)
+    return _render(kernel, totals, job.layers, render_info(scene, job))
+
+
+def sums_of(executor: Executor, moment: Moment, job: Job) -> NDArray[np.float64]:
+    """Return the sums (planes, H, W) of a scene's kernel over a job's samples, in its order of planes."""
+    return _totals(executor, moment.kernel, moment.numbers, job, (0, job.height), None).planes
+
+
+def _totals(
+    executor: Executor,
+    kernel: PathArtifact,
+    numbers: NDArray[np.float32] | None,
+    job: Job,
+    band: tuple[int, int],
+    on_progress: Callable[[int], None] | None,
+) -> Totals:
+    """Return the sums of a kernel over a job's samples, in a band of rows."""
     executor.build(kernel)
     keep_freed_memory()
-    totals = Totals(0, np.zeros((len(kernel.planes), last - first, job.width)))
-    for parts in sample_ranges(job, (first, last)):
+    totals = Totals(0, np.zeros((len(kernel.planes), band[1] - band[0], job.width)))
+    for parts in sample_ranges(job, band):
         sums = []
         for part in parts:
             sums.append(executor.trace(kernel, part, numbers))
             if on_progress is not None:
                 on_progress(part.rows * part.width * part.samples)
-        totals = merge(
-            kernel, totals, Totals(parts[0].samples, np.concatenate(sums, axis=1, dtype=np.float64))
-        )
-    return _render(kernel, totals, job.layers, render_info(scene, job))
+        joined_sums = np.concatenate(sums, axis=1, dtype=np.float64)
+        totals = merge(kernel, totals, Totals(parts[0].samples, joined_sums))
+    return totals
 
 
 def sample_ranges(job: Job, band: tuple[int, int]) -> Iterator[list[Part]]:

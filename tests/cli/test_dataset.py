@@ -19,7 +19,7 @@ from wamnet.cli.common import cluster
 from wamnet.cli.files import dataset_files, exr
 from wamnet.kernels.run import draws, frame_plan, render_frame
 from wamnet.refimpl.errors import ExecutorUnavailable
-from wamnet.refimpl.frame import SEEN, USUAL
+from wamnet.refimpl.frame import HISTORY, SEEN, USUAL
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scene import scene_digest
 from wamnet.refimpl.light.scenes import canonical
@@ -261,11 +261,23 @@ def test_test_frames_that_were_seen_are_refused(refused, tmp_path) -> None:
         (["minicubes", "--outside", 1], "number of frames outside is 1: a data set whose frames differ"),
         (["minicubes", "--arc", 9], "arc_s is 9.0: training leaves it out of the animation"),
         (["minicubes", "--spp", 0], "spp is 0: it must be an integer from 1"),
+        (["minicubes", "--before", 257], "before is 257: from 0 to 256 pictures; choose fewer"),
+        (["minicubes", "--before=-1"], "before is -1: from 0 to 256 pictures"),
     ],
 )
 def test_refusals(refused, arguments, text) -> None:
     """Before any work, and without a folder."""
     assert text in refused("dataset", *arguments)
+
+
+def test_noisy_pictures_have_the_history_of_those_before(wamnet, tmp_path) -> None:
+    """By the reference here; targets have none."""
+    assert wamnet("dataset", *TINY, "--before", 2, "-o", "film").status == 0
+    noisy, target = (
+        exr.read_frame(tmp_path / f"film/train/00000-{kind}.exr") for kind in ("noisy", "target")
+    )
+    assert [(name in noisy, name in target) for name in HISTORY] == [(True, False)] * len(HISTORY)
+    assert 0.5 < noisy["history_weight"].max() <= 2 / 3  # of three samples: 1 - 1/3
 
 
 def test_a_missing_device_leaves_no_folder(refused, monkeypatch) -> None:

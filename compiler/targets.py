@@ -13,9 +13,8 @@ from typing import Any
 from ..refimpl.errors import CompileError
 from .core.loops import USUAL, Forms
 from .core.profiles import SineContract
-from .languages import opencl_path, opencl_planes
+from .languages import opencl_path, planes
 from .languages.c import C
-from .languages.c_planes import CPlanes
 from .languages.cuda import CUDA
 from .languages.dialect import Dialect
 from .languages.glsl import GLSL
@@ -131,10 +130,14 @@ TARGETS: Mapping[str, Target] = {
                 OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_DOT, *OPENCL_GROUPS, *OPENCL_GROUP_DOT
             ),
             paths={lanes: opencl_path.of_lanes(lanes) for lanes in opencl_path.LANES},
-            planes={lanes: opencl_planes.of_lanes(lanes) for lanes in opencl_path.LANES},
+            planes={lanes: planes.of_lanes(lanes) for lanes in opencl_path.LANES},
             forms=Forms(trees=True),
         ),
-        replace(_dialect_target(GLSL(), Inlined(GLSLInlined()), *GLSL_COMPUTE), forms=MESA),
+        replace(
+            _dialect_target(GLSL(), Inlined(GLSLInlined()), *GLSL_COMPUTE),
+            planes={1: planes.GLSLPlanes()},
+            forms=MESA,
+        ),
     )
 }
 """The targets that the demo and the benchmark show, by the name of the executor that runs them."""
@@ -143,7 +146,7 @@ DENOISERS: Mapping[str, Target] = {
     **TARGETS,
     "c": replace(
         _dialect_target(C(), *C_LADDER, *C_FOURIER, *C_DOT),
-        planes={1: CPlanes()},
+        planes={1: planes.CPlanes()},
         forms=Forms(trees=True),
     ),
 }

@@ -38,6 +38,9 @@ FIRST, PAST, MOTIONS, CAMERAS = "first", "past", "motions", "cameras"
 """Names of a history's arrays: planes of first hits and of the last picture, rows of primitives' motions, and
 the numbers of both cameras."""
 
+PLANES = (SUMS, GUIDES, LIGHT, FIRST, PAST)
+"""Names of memory that holds planes, rows of a picture each."""
+
 PRIMITIVES = "primitives"
 """What the rows of motions are counted by: no kernel is given their number."""
 
@@ -74,6 +77,12 @@ class Array:
     def is_image(self) -> bool:
         """Return whether it is a feature's image, before or after its encoding."""
         return self.name.startswith(IMAGE)
+
+    @property
+    def planes(self) -> int:
+        """Return how many planes of whole pictures it has, for a kernel on planes, or 0."""
+        count, *size = self.shape
+        return int(count) if size == ["height", "row_stride"] else 0
 
     @property
     def quads(self) -> int:

@@ -16,9 +16,6 @@ from .interface import ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
 IMAGES = "each image: width * height * channels floats, rows from the top, channels interleaved"
 """What images are."""
 
-PLANES = "float, one plane of height rows of row_stride numbers for each of"
-"""What the filter's planes are."""
-
 WEIGHTS_RESULT = (
     "weights; result: width * height * {channels} floats in the same order, encoded as `output` says"
 )

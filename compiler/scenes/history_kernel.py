@@ -47,7 +47,7 @@ from .lower_history import (
     HistoryPrograms,
     lower_history,
 )
-from .plane_kernel import Draft, PlaneArtifact
+from .plane_kernel import Draft, PlaneArtifact, place_of
 
 SCHEMA = "wamnet-history-kernel-1"
 """Name and version of the manifest's form; described in spec/history.md."""
@@ -100,23 +100,23 @@ def _of_profile(programs: HistoryPrograms, passes: Sequence[str]) -> HistoryProg
 
 def _body(programs: HistoryPrograms, dialect: Any) -> list[str]:
     """Return the statements."""
-    lines = [_number(dialect, name, FIRST_ARRAY, f"{i} * plane + at") for i, name in enumerate(FIRST)]
+    lines = [_plane(dialect, name, FIRST_ARRAY, i, "at") for i, name in enumerate(FIRST)]
     lines += [
         dialect.load.format(name=name, image="color", channels=3, channel=i) for i, name in enumerate(COLOR)
     ]
-    lines.append(dialect.index("row", f"{dialect.cast('int32', NUMBER)} * {len(MOTION)}"))
-    lines += [_number(dialect, name, MOTIONS, f"row + {i}") for i, name in enumerate(MOTION)]
-    lines += [_number(dialect, name, CAMERAS_ARRAY, str(i)) for i, name in enumerate(CAMERAS)]
+    lines.append(dialect.index("row", dialect.cast("int32", NUMBER)))
+    lines += [_entry(dialect, name, MOTIONS, "row", i, MOTION) for i, name in enumerate(MOTION)]
+    lines += [_entry(dialect, name, CAMERAS_ARRAY, "0", i, CAMERAS) for i, name in enumerate(CAMERAS)]
     lines += [
         dialect.let("float32", name, dialect.cast("float32", integer))
         for name, integer in zip(SIZE, ("width", "height"), strict=True)
     ]
     kinds = dict(zip(PLACE, ("int32", "float32", "int32", "float32", "bool"), strict=True))
     kinds |= dict.fromkeys(BEFORE, "float32")
-    lines += [dialect.var(kind, name) for name, kind in kinds.items()]
+    lines += [dialect.var(kind, name, kept=True) for name, kind in kinds.items()]
     lines += _block(programs.find, dialect, {name: name for name in kinds})
     lines += [
-        dialect.var("float32", name, dialect.number(start, "float32"))
+        dialect.var("float32", name, dialect.number(start, "float32"), kept=True)
         for name, start in zip(TOTALS, STARTS, strict=True)
     ]
     lines += _loops(programs.take, dialect)
@@ -125,13 +125,19 @@ def _body(programs: HistoryPrograms, dialect: Any) -> list[str]:
     lines += _block(programs.blend, dialect, {name: f"new_{name}" for name in results})
     for plane, name in enumerate(PAST):
         value = f"new_{name}" if name in results else name
-        lines.append(dialect.plane_store.format(array=RESULT, plane=plane, value=value))
+        lines.append(dialect.plane_store.format(**place_of(RESULT, plane), value=value))
     return lines
 
 
-def _number(dialect: Any, name: str, array: str, place: str) -> str:
-    """Return the declaration of a number that is read."""
-    return str(dialect.let("float32", name, f"{array}[{place}]"))
+def _plane(dialect: Any, name: str, array: str, plane: int, where: str) -> str:
+    """Return the declaration of a plane's number."""
+    return str(dialect.let("float32", name, dialect.plane_at.format(**place_of(array, plane), where=where)))
+
+
+def _entry(dialect: Any, name: str, array: str, row: str, column: int, columns: Sequence[str]) -> str:
+    """Return the declaration of a number in a row of a table."""
+    place = {"row": row, "column": column, "columns": len(columns)}
+    return str(dialect.let("float32", name, dialect.table_at.format(array=array, **place)))
 
 
 def _block(program: Program, dialect: Any, outputs: Mapping[str, str]) -> list[str]:
@@ -145,14 +151,13 @@ def _block(program: Program, dialect: Any, outputs: Mapping[str, str]) -> list[s
 def _loops(take: Program, dialect: Any) -> list[str]:
     """Return the loops over the pixels of the last picture."""
     inside = "ahead && column >= 0 && column < width && line >= 0 && line < height"
-    reads = [
-        _number(dialect, f"{THERE}{name}", PAST_ARRAY, f"{i} * plane + there") for i, name in enumerate(PAST)
-    ]
-    moving = f"{dialect.cast('int32', f'{THERE}{NUMBER}')} * {len(MOTION)} + {MOTION.index(RESTS)}"
+    reads = [_plane(dialect, f"{THERE}{name}", PAST_ARRAY, i, "there") for i, name in enumerate(PAST)]
+    of_row = dialect.index(f"{THERE}row", dialect.cast("int32", f"{THERE}{NUMBER}"))
     flags = [dialect.let("bool", name, f"{name.removeprefix('beyond_')}_too > 0") for name in BEYOND]
     body = [
         *reads,
-        _number(dialect, f"{THERE}{RESTS}", MOTIONS, moving),
+        of_row,
+        _entry(dialect, f"{THERE}{RESTS}", MOTIONS, f"{THERE}row", MOTION.index(RESTS), MOTION),
         *flags,
         *_block(take, dialect, {name: name for name in TOTALS}),
     ]
@@ -162,7 +167,7 @@ def _loops(take: Program, dialect: Any) -> list[str]:
         f"    {dialect.loop('across_too', 2)}",
         f"        {dialect.index('column', 'x + across + across_too')}",
         f"        if ({inside}) {{",
-        f"            {dialect.offset('there', dialect.place_of('line', 'column'))}",
+        f"            {dialect.pixel_place('there', 'line', 'column')}",
         *(f"            {line}" for line in body),
         "        }",
         "    }",

@@ -70,6 +70,16 @@ def dialect_of(target: str, lanes: int, what: str, way_out: str) -> Any:
     return planes[lanes]
 
 
+PLANES_A_BUFFER = 4
+"""Planes of a texture, where planes are textures."""
+
+
+def place_of(array: str, plane: int) -> dict[str, Any]:
+    """Return what fills a dialect's words for a plane: where planes are textures, four to each."""
+    buffer, component = divmod(plane, PLANES_A_BUFFER)
+    return {"array": array, "plane": plane, "buffer": buffer, "component": component}
+
+
 def integers_of(dialect: Dialect | None, role: str) -> Sequence[str]:
     """Return the integers of a role."""
     return (dialect.integers if dialect else interface.INTEGERS)[role]

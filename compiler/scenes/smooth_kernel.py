@@ -47,7 +47,7 @@ from .lower_smooth import (
     lower_smooth,
 )
 from .lower_smooth import LIGHT as LIGHT_PLANES
-from .plane_kernel import Draft, PlaneArtifact
+from .plane_kernel import Draft, PlaneArtifact, place_of
 
 SCHEMA = "wamnet-smooth-kernel-1"
 """Name and version of the manifest's form; described in spec/smoothing.md."""
@@ -141,7 +141,7 @@ def _guide_body(programs: SmoothPrograms, dialect: Any) -> list[str]:
     for name, index in programs.guide.outputs:
         array, plane = places[name]
         # Of one pixel, also where a level computes several.
-        lines.append(f"{array}[{plane} * plane + at] = {texts[index]};")
+        lines.append(dialect.own_store.format(**place_of(array, plane), value=texts[index]))
     return lines
 
 
@@ -149,11 +149,11 @@ def _smooth_body(programs: SmoothPrograms, dialect: Any) -> list[str]:
     """Return the statements of `smooth`: the pixel's guides, loops over taps, means."""
 
     def read(name: str, array: str, plane: int, row: str, column: str) -> str:
-        text = dialect.plane_load.format(array=array, plane=plane, row=row, column=column)
+        text = dialect.plane_load.format(**place_of(array, plane), row=row, column=column)
         return str(dialect.let("float32", name, text))
 
     guides = list(enumerate(programs.guides))
-    lines = ["size_t own = (size_t)y * stride;"]
+    lines = [dialect.own_row]
     lines += [read(f"{HERE}{name}", interface.GUIDES, i, "own", "x") for i, name in guides]
     lines += [dialect.var("float32", name, dialect.number(0.0, "float32")) for name in (*SUMS, WEIGHTS)]
     tap = [
@@ -175,7 +175,7 @@ def _smooth_body(programs: SmoothPrograms, dialect: Any) -> list[str]:
     ]
     texts = statements(programs.mean, dialect, lines)
     for plane, (_, index) in enumerate(programs.mean.outputs):
-        lines.append(dialect.plane_store.format(array=RESULT, plane=plane, value=texts[index]))
+        lines.append(dialect.plane_store.format(**place_of(RESULT, plane), value=texts[index]))
     return lines
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.languages.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
-from ...compiler.languages.interface import SCENE_NUMBERS, SUMS, WEIGHTS, WRITE, Interface
+from ...compiler.languages.interface import PLANES, SCENE_NUMBERS, WEIGHTS, WRITE, Interface
 from ...compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
 from ...compiler.schedules.glsl_compute import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
@@ -110,6 +110,7 @@ class OpenGLExecutor(Executor):
 
     name = "opengl"
     version = "#version 330 core"
+    smooths = True
 
     def __init__(self, context: str | None = None) -> None:
         super().__init__()
@@ -214,11 +215,12 @@ class OpenGLExecutor(Executor):
         return self._texture("weights", padded)
 
     def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
-        """Return an image as one texture, sums as textures of four planes, a scene's numbers as they are."""
+        """Return an image or a table as a texture, planes as textures of four, numbers as uniforms."""
         if name == SCENE_NUMBERS:
             return Memory(array.shape, [_Uniforms(np.pad(array, (0, -len(array) % 4)))])
-        if name != SUMS:
-            return Memory(array.shape, [self._texture(name, array)])
+        if name not in PLANES:
+            image = array if array.ndim == 3 else np.atleast_2d(array)[..., np.newaxis]
+            return Memory(array.shape, [self._texture(name, image)])
         planes, made = np.pad(array, ((0, -len(array) % 4), (0, 0), (0, 0))), ExitStack()
         with made:
             textures = []
@@ -231,7 +233,7 @@ class OpenGLExecutor(Executor):
 
     def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
         """Return textures of four channels, or planes, each."""
-        numbers, size = (shape[0], shape[1:]) if name == SUMS else (shape[2], shape[:2])
+        numbers, size = (shape[0], shape[1:]) if name in PLANES else (shape[2], shape[:2])
         with ExitStack() as made:
             textures = []
             for _ in range(-(-numbers // 4)):
@@ -247,10 +249,10 @@ class OpenGLExecutor(Executor):
             texture.release()
 
     def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
-        size = memory.shape[1:] if name == SUMS else memory.shape[:2]
+        size = memory.shape[1:] if name in PLANES else memory.shape[:2]
         read = [np.frombuffer(texture.read(), np.float32).reshape(*size, 4) for texture in memory.held]
         pixels = np.concatenate(read, axis=-1)
-        if name == SUMS:
+        if name in PLANES:
             return np.moveaxis(pixels, -1, 0)[: memory.shape[0]]
         return pixels[..., : memory.shape[2]].copy()
 
@@ -298,8 +300,8 @@ class OpenGLExecutor(Executor):
             if array.access == WRITE or array.name in (WEIGHTS, SCENE_NUMBERS):
                 continue
             textures = left[id(arrays[array.name])]
-            if array.name == SUMS:
-                named |= {f"{SUMS}_{number}": texture for number, texture in enumerate(textures)}
+            if array.name in PLANES:
+                named |= {f"{array.name}_{number}": texture for number, texture in enumerate(textures)}
             else:
                 named[array.name] = textures.pop(0)
         return named

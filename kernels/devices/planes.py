@@ -44,7 +44,7 @@ def smoothed(
         }
         shapes = {array.name: array.shape for array in kernels.smooth.interface.arrays}
         guides, light, other = (
-            _memory(executor, name, shapes[name], integers, made) for name in (GUIDES, LIGHT, RESULT)
+            _memory(executor, name, shapes[name], integers, made) for name in (GUIDES, LIGHT, LIGHT)
         )
         _start(executor, kernels.guide, {**arrays, GUIDES: guides, LIGHT: light}, integers)
         for level in range(LEVELS):
@@ -68,9 +68,9 @@ def followed(
         given = {name: executor._stored(name, values, made) for name, values in arrays.items()}
         result = kernel.interface.named(RESULT)
         assert result is not None
-        memory = _memory(executor, RESULT, result.shape, integers, made)
+        memory = _memory(executor, PAST, result.shape, integers, made)
         _start(executor, kernel, {**given, RESULT: memory}, integers)
-        return executor._fetch(RESULT, memory)
+        return executor._fetch(PAST, memory)
 
 
 def run_once(executor: Executor, kernel: PlaneArtifact, size: Size) -> None:
@@ -83,7 +83,8 @@ def run_once(executor: Executor, kernel: PlaneArtifact, size: Size) -> None:
             if array.access == READ:
                 arrays[array.name] = executor._stored(array.name, np.zeros(shape, np.float32), made)
             else:
-                arrays[array.name] = _memory(executor, array.name, array.shape, integers, made)
+                name = LIGHT if array.name == RESULT else array.name
+                arrays[array.name] = _memory(executor, name, array.shape, integers, made)
         _start(executor, kernel, arrays, integers)
         executor._finish()
 

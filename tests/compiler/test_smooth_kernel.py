@@ -102,7 +102,7 @@ def test_manifests_name_what_was_made():
 @pytest.mark.parametrize(
     ("target", "profile", "lanes", "match"),
     [
-        ("opengl", "ieee", 1, r"target opengl, 1 pixels .* for none; smooth by"),
+        ("wgsl", "ieee", 1, r"target wgsl, 1 pixels .* for none; smooth by"),
         ("opencl", "ieee", 3, r"target opencl, 3 pixels .* for 1, 4, 8, 16;"),
         ("opencl", "exact", 1, r"smoothed features divide .* use profile ieee"),
     ],

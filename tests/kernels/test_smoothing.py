@@ -43,7 +43,7 @@ def excess(kernels, found, layers, scales=SCALES):
     return float((np.abs(found - wanted) / bound_of(kernels, clean)).max())
 
 
-@pytest.fixture(params=["numpy", "opencl", "c"])
+@pytest.fixture(params=["numpy", "opencl", "c", "opengl"])
 def device(request, executor_named):
     return executor_named(request.param)
 

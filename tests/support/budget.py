@@ -17,7 +17,7 @@ BUDGET = {
     "compiler": 1850,
     "compiler/core": 3500,
     "compiler/importing": 1150,
-    "compiler/languages": 2625,
+    "compiler/languages": 2725,
     "compiler/proof": 3100,
     "compiler/reading": 4050,
     "compiler/schedules": 4650,

@@ -69,6 +69,7 @@ LAYERS: Mapping[str, Layer] = {
         ),
         Layer("history", 3, "linear radiance: mean of this colour and those of the pictures before"),
         Layer("history_weight", 1, "share of the pictures before in the history, in [0, 1); 0: it is new"),
+        Layer("sun", 3, "unit direction in world space towards the sun of the sky: the same in all pixels"),
     )
 }
 """Every layer that a frame may have; a new one is one line here."""
@@ -87,7 +88,10 @@ SEEN = (*FIRST_HIT, "seen_emission")
 HISTORY = ("history", "history_weight")
 """The layers that a frame has which follows others (light/history.py)."""
 
-USUAL = tuple(name for name in LAYERS if name not in SEEN and name not in HISTORY)
+SUN = "sun"
+"""The layer that a frame has whose scene has a sun (light/environment.py)."""
+
+USUAL = tuple(name for name in LAYERS if name not in (*SEEN, *HISTORY, SUN))
 """The layers that any rendered frame has."""
 
 

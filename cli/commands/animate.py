@@ -178,10 +178,11 @@ def _draw(
 def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job, features: Sequence[str]) -> bool:
     """Tell whether a pipeline can draw: one device does both, from what the paths of a pixel have seen."""
     from ...kernels.run.before import wants
+    from ...refimpl.frame import SUN
     from ...refimpl.light.render import feature_job
     from ...refimpl.network.dataset import FEATURES
 
-    beside = any(FEATURES[name].guides for name in features) or wants(features)
+    beside = any(FEATURES[name].guides or name == SUN for name in features) or wants(features)
     return renderer.value == executor.value != "numpy" and not (beside or (noisy.seen and feature_job(noisy)))
 
 

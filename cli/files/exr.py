@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...refimpl.errors import InputError
-from ...refimpl.frame import HISTORY, LAYERS, SEEN, Floats, Frame, validate
+from ...refimpl.frame import HISTORY, LAYERS, SEEN, SUN, Floats, Frame, validate
 from ...refimpl.network.dataset import FARTHEST_DEPTH
 from ...refimpl.reading import check_room, refusing
 from ..common.inputs import check_input
@@ -47,6 +47,7 @@ CHANNELS: Mapping[str, tuple[str, ...]] = {
     "seen_emission": ("seen_emission.R", "seen_emission.G", "seen_emission.B"),
     "history": ("history.R", "history.G", "history.B"),
     "history_weight": ("history_weight.V",),
+    "sun": ("sun.X", "sun.Y", "sun.Z"),
 }
 """The channels that hold each layer in the files that are written here."""
 
@@ -58,7 +59,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "position": ("position", "p"),
     "direction": ("direction", "raydirection"),
     "unshadowed": ("unshadowed",),
-    **{name: (name,) for name in (*SEEN, *HISTORY)},
+    **{name: (name,) for name in (*SEEN, *HISTORY, SUN)},
 }
 """Names of each layer on reading, lower case, best first: as in Blender, pbrt, Mitsuba, Arnold and here."""
 

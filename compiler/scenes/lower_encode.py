@@ -12,7 +12,7 @@ from typing import Any
 
 from ...refimpl import vectors
 from ...refimpl.errors import InputError
-from ...refimpl.frame import HISTORY, SEEN
+from ...refimpl.frame import HISTORY, SEEN, SUN
 from ...refimpl.light.render import FEATURE_SAMPLER, spread, spread_rays
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.dataset import (
@@ -48,6 +48,9 @@ def layers_of(features: Sequence[str]) -> tuple[str, ...]:
         rule = "a path kernel makes layers of one picture, not of those before it"
         way_out = "denoise frames that have them: wamnet animate makes them"
         raise InputError("features", ", ".join(before), rule, way_out)
+    if SUN in layers:
+        rule = "a path kernel knows what a pixel's paths meet, not where the sun is"
+        raise InputError("features", SUN, rule, "denoise frames: wamnet render, then denoise")
     return layers
 
 

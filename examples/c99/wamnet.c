@@ -1733,7 +1733,8 @@ static double to_display(double linear, double stops) { return srgb_encode(clamp
 static const char *const FEATURES[] = {"color",       "albedo",        "normal",     "depth",
                                        "position",    "direction",     "unshadowed", "highlights",
                                        "seen_albedo", "seen_normal",   "seen_depth", "seen_position",
-                                       "seen_emission", "history", "history_weight", "smoothed", "seen_smoothed"};
+                                       "seen_emission", "history", "history_weight", "smoothed", "seen_smoothed",
+                                       "sun"};
 
 typedef enum {
     COLOR,
@@ -1753,6 +1754,7 @@ typedef enum {
     HISTORY_WEIGHT,
     SMOOTHED,
     SEEN_SMOOTHED,
+    SUN,
     FEATURE_COUNT
 } feature;
 

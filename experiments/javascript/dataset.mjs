@@ -53,6 +53,7 @@ export const FEATURES = {
   history_weight: feature("history_weight", 1, asShare),
   smoothed: smoothed(""),
   seen_smoothed: smoothed("seen_"),
+  sun: feature("sun", 3, asSigned),
 };
 
 // FRM-2: the layers that features are made of, and the channels of each.

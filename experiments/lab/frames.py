@@ -27,7 +27,8 @@ from wamnet.kernels.run.frame_plan import version
 from wamnet.kernels.run.render_frame import render_frame
 from wamnet.kernels.run.render_on import Frames
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.frame import FIRST_HIT, Frame
+from wamnet.refimpl.frame import FIRST_HIT, SUN, Frame
+from wamnet.refimpl.light.environment import sun_of
 from wamnet.refimpl.light.render import Job, feature_job, render_info
 from wamnet.refimpl.light.scene import Scene, scene_digest
 from wamnet.refimpl.light.scenes import canonical
@@ -88,7 +89,9 @@ def path_of(folder: Path, shot: Shot, executor: str) -> Path:
         del job["feature_spp"]  # these files are older than it is
     if not shot.feature_spp or shot.feature_sampler == RANDOM:
         del job["feature_sampler"]  # and so are these
-    made_from = [scene_digest(shot.build()), job, executor, sorted(shot.job.layers), version()]
+    scene = shot.build()
+    layers = sorted([*shot.job.layers, *([SUN] if sun_of(scene) is not None else [])])
+    made_from = [scene_digest(scene), job, executor, layers, version()]
     digest = hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:DIGITS]
     return folder / f"{shot.scene}-{shot.time:.4g}s-{shot.size}px-{shot.spp}spp-{digest}"
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from ...refimpl.errors import InputError
+from ...refimpl.light.environment import with_sun
 from ...refimpl.light.render import Job, Render, render
 from ...refimpl.light.scene import Scene
 from ..devices.executor import Executor
@@ -122,8 +123,11 @@ def render_frame(
 ) -> Render:
     """Render a scene on an executor: all rows, or the band [first, last); `frames` may have its kernel.
 
+    The frame has the layer `sun` where the scene has one.
+
     `workers` is the number of processes that may share the work, None one per processor; it changes no bit. A
     device shares the work by itself, with none.
     """
     band = rows or (0, job.height)
-    return renderer(executor).render_rows(scene, job, band, workers, on_progress, frames)
+    found = renderer(executor).render_rows(scene, job, band, workers, on_progress, frames)
+    return replace(found, frame=with_sun(scene, found.frame))

@@ -5,6 +5,8 @@
 2. [`sample`] draws a direction towards the sun's lobe or, for the sky, from all directions alike; in which
    proportion follows from their light [`build`]. Both are one density with two concentrations.
 3. [`pdf`] is the mixture's density, for multiple importance sampling.
+4. Where the sun is, is a layer of a frame: what it lights through glass, no path of the pixel tells
+   [`with_sun`].
 
 The lobe is rational: exponentials, powers and tables are not among the operations that all executors have in
 common, and a table of an image of the sky would be read at random by every path of a work item. Its wide
@@ -15,12 +17,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import DTypeLike, NDArray
 
 from .. import vectors
+from ..frame import SUN, Frame
 from ..vectors import Directions, Floats, Radiance
 from . import sampling
-from .scene import Sky
+from .scene import Scene, Sky
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,24 @@ def build(sky: Sky, dtype: DTypeLike) -> Environment:
     sun = vectors.normalize(np.array(sky.sun_direction, np.float64))
     parts = (sky.zenith, sky.horizon, sky.ground, sun, sky.sun_irradiance, sky.sun_concentration, share)
     return Environment(*(np.asarray(part, dtype) for part in parts))
+
+
+def sun_of(scene: Scene) -> NDArray[np.float64] | None:
+    """Return the unit direction (3,) towards the sun of a scene, or None where there is none."""
+    sky = scene.environment
+    if sky is None or not any(sky.sun_irradiance):
+        return None
+    return vectors.normalize(np.array(sky.sun_direction, np.float64))
+
+
+def with_sun(scene: Scene, frame: Frame) -> Frame:
+    """Return a scene's frame with the layer `sun`, if the scene has one."""
+    sun = sun_of(scene)
+    if sun is None:
+        return frame
+    shape = (frame.height, frame.width, 3)
+    layer = np.broadcast_to(sun.astype(frame.layers[next(iter(frame.layers))].dtype), shape).copy()
+    return Frame({**frame.layers, SUN: layer}, frame.info)
 
 
 def radiance(sky: Environment, direction: Directions) -> Radiance:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..encoding import to_display
 from ..errors import InputError
-from ..frame import FIRST_HIT, Frame, check_finite
+from ..frame import FIRST_HIT, SUN, Frame, check_finite
 from ..reading import parse_json, to_dataclass
 from ..rng import counter, random_block
 from ..vectors import vector
@@ -246,6 +246,14 @@ PICTURES_BEFORE: Mapping[str, Feature] = {
 }
 """Features of a picture that follows others (light/history.py)."""
 
+SUNS: Mapping[str, Feature] = {
+    SUN: Feature(
+        *(SUN, SUN, 3, -1.0, 1.0, encode_signed),
+        "unit direction in world space towards the sun, the same in all pixels",
+    )
+}
+"""Where the sun of the sky is (light/environment.py)."""
+
 SMOOTHED: Mapping[str, Feature] = {
     f"{past}smoothed": Feature(
         f"{past}smoothed",
@@ -270,6 +278,7 @@ FEATURES: Mapping[str, Feature] = {
     ),
     **PICTURES_BEFORE,
     **SMOOTHED,
+    **SUNS,
 }
 """Every feature that a model may use. Those of what is seen past mirrors and glass are encoded as those of
 the first hit are, by the same scales."""

@@ -145,7 +145,17 @@ MIRRORS = replace(
 """For scenes with mirrors, metal and glass, whose frames have layers of what is seen past these; chosen by
 `experiments/quality.py --sets glossy`."""
 
-PRESETS: Mapping[str, Recipe] = {"best": BEST, "mirrors": MIRRORS, "paper": PAPER, "short": SHORT}
+SKY = replace(MIRRORS, features=(*MIRRORS.features, "sun"), window=Window(7, "clamp"))
+"""The same for scenes under a sky whose sun moves: what it lights through glass, only its place tells; chosen
+by `experiments/quality.py --sets daylight`."""
+
+PRESETS: Mapping[str, Recipe] = {
+    "best": BEST,
+    "mirrors": MIRRORS,
+    "paper": PAPER,
+    "short": SHORT,
+    "sky": SKY,
+}
 """Recipes by name; change single choices with `dataclasses.replace`."""
 
 

@@ -17,6 +17,7 @@ from wamnet.cli.commands import animate
 from wamnet.cli.files import images
 from wamnet.cli.files.images import LABEL_PX, read_png
 from wamnet.compiler.model_file import load_model, save_model
+from wamnet.kernels.run.render_frame import render_frame
 from wamnet.refimpl import encoding
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import history
@@ -127,6 +128,25 @@ def test_a_network_that_sees_the_history_gets_that_of_the_film(
         "3 pictures, 1 of them made now\n"
     )
     assert last.read_bytes() == before
+
+
+def test_a_network_that_sees_the_sun_gets_it(wamnet, tmp_path, monkeypatch, executor_named) -> None:
+    """Rendered and denoised apart, although one device could do both: its path kernel knows no sun."""
+    executor_named("opencl")
+    features, window = ("color", "sun"), Window(2)
+    network = siren.init((n_inputs(features, window), 4, 3), 1.0, 1.0, 0)
+    save_model(tmp_path / "sun.safetensors", Model(network, features, window, Normalization()))
+    monkeypatch.setattr(animate, "draw_frames", None)
+    film = ("--scene", "daylight", "--seconds", 0.1, "--fps", 10, "--size", 13)
+    by = ("--executor", "opencl", "--renderer", "opencl")
+    assert wamnet("animate", "sun.safetensors", *film, *by, "-o", "day").status == 0
+    scene = canonical("daylight")
+    whole = render_frame("opencl", scene, Job(13, 13)).frame
+    got = read_png(tmp_path / "day" / "00000.png")[LABEL_PX:-1, 13:26]
+    # As for the history above.
+    assert np.abs(got - denoise(load_model(tmp_path / "sun.safetensors"), whole)).max() <= 1.0 / 255
+    text = "features is sun: a path kernel knows what a pixel's paths meet, not where the sun is"
+    assert text in wamnet("view", "sun.safetensors", "--scene", "daylight", "-o", "page.html").err
 
 
 def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:

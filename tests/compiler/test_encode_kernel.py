@@ -13,11 +13,20 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
 from wamnet.compiler.scenes.lower_encode import SAMPLES, channel_name, layers_of, lower_encode, planes_of
 from wamnet.refimpl.errors import CompileError, InputError
-from wamnet.refimpl.network.dataset import FEATURES, FIRST_HITS, PICTURES_BEFORE, Normalization, encode_sums
+from wamnet.refimpl.network.dataset import (
+    FEATURES,
+    FIRST_HITS,
+    PICTURES_BEFORE,
+    SUNS,
+    Normalization,
+    encode_sums,
+)
 
 SCALES = Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 ALL = tuple(FIRST_HITS)
-OF_ONE_PICTURE = tuple(f.name for f in FEATURES.values() if f.name not in PICTURES_BEFORE and not f.guides)
+OF_ONE_PICTURE = tuple(
+    f.name for f in FEATURES.values() if f.name not in (*PICTURES_BEFORE, *SUNS) and not f.guides
+)
 
 
 def sums_of(samples, seed=1):
@@ -152,3 +161,9 @@ def test_features_of_pictures_before_are_refused(name):
     """HIS-7: a path kernel makes no history."""
     with pytest.raises(InputError, match=f"features is {name}: a path kernel makes layers of one picture"):
         layers_of(("color", name))
+
+
+def test_the_feature_sun_is_refused():
+    """ENV-6: a path kernel sums up what paths meet."""
+    with pytest.raises(InputError, match="features is sun: a path kernel knows what a pixel's paths meet"):
+        layers_of(("color", "sun"))

@@ -10,6 +10,7 @@ import pytest
 
 from wamnet.kernels.run.render_frame import RENDERERS, render_frame
 from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.light.environment import sun_of
 from wamnet.refimpl.light.render import Job, join_rows, render
 from wamnet.refimpl.light.scenes import canonical
 
@@ -29,6 +30,18 @@ def test_bands_are_the_frame(executor_named, name) -> None:
     assert whole.frame.height == 5
     parts = join_rows([render_frame(name, SCENE, job, rows=rows) for rows in ((0, 2), (2, 5))])
     assert all((parts.frame[layer] == values).all() for layer, values in whole.frame.layers.items())
+
+
+@pytest.mark.parametrize("name", ["numpy", "opencl"])
+def test_a_frame_says_where_the_sun_is(executor_named, name) -> None:
+    """ENV-6: in bands too, and beside features of their own rays; the scene of above has no sun."""
+    executor_named(REQUIRED[name])
+    scene, job = canonical("daylight", time=1.0), Job(7, 5, feature_spp=2, seen=True)
+    parts = join_rows([render_frame(name, scene, job, rows=rows) for rows in ((0, 2), (2, 5))])
+    assert parts.frame["sun"].shape == (5, 7, 3)
+    assert np.allclose(parts.frame["sun"], sun_of(scene), rtol=0, atol=2.0**-24)
+    assert set(parts.frame.layers) == {*job.layers, "sun"}
+    assert "sun" not in render_frame(name, SCENE, job).frame
 
 
 @pytest.mark.parametrize("name", ["opencl", "opengl"])

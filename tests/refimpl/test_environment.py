@@ -12,6 +12,7 @@ from statistical import SIGNIFICANCE, assert_all_plausible, chi_square_p, sidak,
 from vertices import uniforms
 
 from wamnet.refimpl import vectors
+from wamnet.refimpl.frame import Frame, validate
 from wamnet.refimpl.light import environment, scenes, transport
 from wamnet.refimpl.light import render as R
 from wamnet.refimpl.light.scene import Camera, Light, Quad, Scene, Sky, Sphere
@@ -173,6 +174,30 @@ def test_a_wrong_density_is_caught(monkeypatch):
     mean, error = plane_radiance(WHITE, strategy="light")
     with pytest.raises(AssertionError):
         assert_all_plausible(z_p(mean - 0.5, error))
+
+
+def test_the_sun_is_a_layer_where_there_is_one():
+    """ENV-6: a unit vector, the same in all pixels, in the frame's kind of numbers; else no layer."""
+    frame = Frame({"depth": np.ones((2, 3, 1), np.float32)}, {"spp": "1"})
+    sky = Sky(WHITE, WHITE, WHITE, sun_direction=(0.0, 3.0, 4.0), sun_irradiance=(0.0, 0.0, 1e-3))
+    scene = Scene("lit", Camera((0.0, 0.0, 0.0), (0.0, 0.0, -1.0)), environment=sky)
+    found = environment.with_sun(scene, frame)
+    assert found["sun"].tolist() == [[[0.0, np.float32(0.6), np.float32(0.8)]] * 3] * 2
+    assert (found["sun"].dtype, found.info) == (np.float32, frame.info)
+    validate(found)
+    for dark in (replace(sky, sun_irradiance=(0.0,) * 3), None):
+        assert environment.sun_of(replace(scene, environment=dark)) is None
+        assert environment.with_sun(replace(scene, environment=dark), frame) is frame
+
+
+def test_the_sun_of_the_layer_is_the_one_that_lights():
+    """ENV-6: nowhere does the sky send more than from there."""
+    scene = scenes.canonical("daylight", time=1.0)
+    sun = environment.sun_of(scene)
+    built = environment.build(scene.environment, np.float64)
+    others = np.random.default_rng(0).standard_normal((1000, 3))
+    others /= np.linalg.norm(others, axis=1, keepdims=True)
+    assert environment.radiance(built, sun)[0] > environment.radiance(built, others)[:, 0].max()
 
 
 def test_daylight_has_a_sky_and_no_lamp():

@@ -272,6 +272,15 @@ def test_mirrors_is_best_with_other_inputs_and_sizes() -> None:
     assert changed == kept
 
 
+def test_sky_is_mirrors_with_the_sun() -> None:
+    """TRN-9b: 24 channels of 7 x 7 pixels."""
+    mirrors, sky = PRESETS["mirrors"], PRESETS["sky"]
+    assert replace(sky, features=sky.features[:-1], window=mirrors.window) == mirrors
+    assert (sky.features[-1], sky.layer_widths[0]) == ("sun", 24 * 49)
+    network = train.start(sky, Normalization(), "").siren
+    assert sum(array.size for array in network.weights + network.biases) == 88_003 < 100_000
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

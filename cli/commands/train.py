@@ -109,7 +109,7 @@ def train(
     preset: Annotated[
         Preset | None,
         typer.Option(
-            help="Protocol: the project's best, one for mirrors and glass, the paper's, or a short one.",
+            help="Protocol: the project's best, for mirrors and glass, the paper's, short, or under a sky.",
             show_default="best",
         ),
     ] = None,

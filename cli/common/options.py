@@ -127,6 +127,7 @@ class Preset(str, Enum):
     mirrors = "mirrors"
     paper = "paper"
     short = "short"
+    sky = "sky"
 
 
 Executor = Annotated[

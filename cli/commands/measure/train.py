@@ -29,7 +29,7 @@ LONGEST_S = 600.0
 
 def train(
     presets: Annotated[
-        str, typer.Option(metavar="NAME,...", help="Training protocols: best, mirrors, paper, short.")
+        str, typer.Option(metavar="NAME,...", help="Training protocols: best, mirrors, paper, short, sky.")
     ] = "paper,short",
     trainers: Annotated[
         str | None,

@@ -55,6 +55,9 @@ SCHEMA = "wamnet-history-kernel-1"
 SAID = "the history", "follow pictures by refimpl/light/history.py"
 """What is said where a target has no such kernel."""
 
+BOUND = "(60 L + 8) u M after any number of pictures: largest limit L, largest colour M, u = 2^-24"
+"""What the text says of rounding, where divisions and roots are rounded correctly (HIS-6)."""
+
 LANES = 1
 """Pixels in a work item: each of them looks at other places."""
 
@@ -76,6 +79,7 @@ def compile_history(target: str, profile: str = "ieee") -> PlaneArtifact:
         _body(programs, dialect) if dialect else (),
         "",
         {"first": FIRST, "past": PAST, "motion": MOTION, "cameras": CAMERAS},
+        BOUND,
         {
             "schema": SCHEMA,
             "passes": [*PASSES, *promised.passes],

@@ -41,7 +41,7 @@ class PlaneArtifact(OneSource):
 
 @dataclass(frozen=True)
 class Draft:
-    """What is particular to a kernel: its title, programs, interface, statements and facts.
+    """What is particular to a kernel: its title, programs, interface, statements, bound in words, and facts.
 
     `said` are names of planes by what they fill in the words on arguments. `written` are all programs, for
     what interprets them, `used` those whose text this kernel is.
@@ -55,6 +55,7 @@ class Draft:
     lines: Sequence[str]
     top: str
     said: Mapping[str, Sequence[str]]
+    bound: str
     facts: Mapping[str, Any]
 
 
@@ -126,7 +127,7 @@ def _header(draft: Draft, language: str, arguments: str) -> list[str]:
     return [
         f"wamnet {draft.title}, {language}. Generated: change the compiler, not this text.",
         *(f"program   {ir.digest(each)[:32]}" for each in draft.used),
-        "bound     at given layers: see the rules for each operation",
+        f"bound     {draft.bound}",
         f"arguments {first}",
         *(f"          {line}" for line in others),
     ]

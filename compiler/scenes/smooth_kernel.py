@@ -109,6 +109,7 @@ def _compiled(programs: SmoothPrograms, role: str, target: str, profile: str, la
         body(programs, dialect) if dialect else (),
         _table(dialect) if dialect else "",
         {"guides": programs.guides, "light": LIGHT_PLANES},
+        "at given layers: see the rules for each operation",
         {
             "schema": SCHEMA,
             "passes": [*PASSES, *profiles.profile_named(profile).passes],

@@ -1,17 +1,30 @@
-"""What an exported kernel is bound to, as a manifest says it: numbers, names, registers and so on."""
+"""What an exported kernel is bound to, as a manifest says it: numbers, names, registers and so on.
+
+Where a model reads colour smoothed, or a mean over the pictures before, and the target's language has the
+kernels, an export has these too [`inputs_of`], each in a folder of `inputs/`. Elsewhere the host makes the
+images by the formulas of the manifest.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from ...compiler.artifact import Artifact
+from ...compiler.artifact import MANIFEST_NAME, Artifact, manifest_text
 from ...compiler.core.ir import OUTPUT_ENCODING
 from ...compiler.core.lower import lower
 from ...compiler.languages.interface import BLOCK, PATH, READ, SCENE_NUMBERS, SUMS, WEIGHTS, WRITE, Interface
 from ...compiler.scenes.encode_kernel import EncodeArtifact
+from ...compiler.scenes.history_kernel import compile_history
 from ...compiler.scenes.path_kernel import PathArtifact
+from ...compiler.scenes.plane_kernel import PlaneArtifact
+from ...compiler.scenes.smooth_kernel import compile_smoothing
+from ...compiler.targets import target_named
+from ...refimpl.frame import HISTORY
+from ...refimpl.network.dataset import FEATURES
 from ...refimpl.network.denoise import Model
+from ...refimpl.network.smoothing import LEVELS
 from .targets import Row
 
 Binding = dict[str, Any]
@@ -164,3 +177,82 @@ SLOTS: Mapping[str, Callable[[Interface], list[Binding]]] = {
     "channels": _channels,
 }
 """How a target's kernels are bound, by the name in its row."""
+
+
+# ---- kernels of inputs ------------------------------------------------------------------------------------
+
+FOLDER = "inputs"
+"""The folder of these kernels."""
+
+GAPS = ", ".join(str(2**level) for level in range(LEVELS))
+"""What the filter's level is given, in turn."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """A kernel, its folder's name, what it does, and the features whose images it is for."""
+
+    kernel: PlaneArtifact | EncodeArtifact
+    name: str
+    does: str
+    features: tuple[str, ...]
+
+
+def inputs_of(model: Model, target: str) -> list[Input]:
+    """Return the kernels of a model's inputs, in the order in which they run; none where there are none."""
+    if 1 not in target_named(target).planes:
+        return []
+    smoothed = tuple(name for name in model.features if FEATURES[name].guides)
+    before = tuple(name for name in model.features if FEATURES[name].layer in HISTORY)
+    found = []
+    if smoothed:
+        kernels = compile_smoothing(model.normalization, target)
+        found += [
+            Input(kernels.guide, "guide", "Light and guides of a frame's layers, once a frame.", smoothed),
+            Input(kernels.smooth, "smooth", f"A level of the filter: with gap {GAPS}, in turn.", smoothed),
+            Input(kernels.encode, "encode", "The feature's image, of the last level's light.", smoothed),
+        ]
+    if before:
+        found.append(Input(compile_history(target), "follow", "A history with one picture more.", before))
+    return found
+
+
+def inputs_written(inputs: Sequence[Input]) -> dict[str, bytes]:
+    """Return the files of these kernels by path."""
+    files = {}
+    for each in inputs:
+        held = {
+            **each.kernel.contents(),
+            MANIFEST_NAME: manifest_text(each.kernel).encode(),
+        }
+        files |= {f"{FOLDER}/{each.name}/{name}": data for name, data in held.items()}
+    return files
+
+
+def input_facts(inputs: Sequence[Input]) -> list[dict[str, Any]]:
+    """Return what an export's manifest says of these kernels."""
+    return [
+        {
+            "role": each.name,
+            "does": each.does,
+            "features": list(each.features),
+            "files": [f"{FOLDER}/{each.name}/{each.kernel.source_name}"],
+            "entry_point": each.kernel.entry_point,
+            "arguments": each.kernel.manifest["arguments"],
+        }
+        for each in inputs
+    ]
+
+
+def input_section(facts: Mapping[str, Any]) -> list[str]:
+    """Return the section of a README about these kernels."""
+    if "inputs" not in facts:
+        return []
+    lines = ["## Kernels of inputs", "", "A frame's layers become images by these, before the denoiser:", ""]
+    for each in facts["inputs"]:
+        features = ", ".join(each["features"])
+        lines += [
+            f"* `{each['files'][0]}`, entry point `{each['entry_point']}`, for {features}:",
+            f"  {each['does']}",
+        ]
+    return [*lines, "", "The comment at the top of each says what its arguments are.", ""]

@@ -151,9 +151,12 @@ def export(request: Request) -> Export:
         others = [request.motion.other(request.settings)]
     pair = check_pair.pair(plan, model, promised, programs, others)
     files |= {f"check/{name}": data for name, data in pair.files().items()}
+    made_by = [] if request.model.is_imported else bindings.inputs_of(model, _usual(row))
+    files |= bindings.inputs_written(made_by)
     facts = _facts(request, row, how, denoiser, limits, bool(halves)) | {"schedules": list(place.schedules)}
     facts["scene"] = _scene(request, programs)
     facts["kernels"] = bindings.kernels(row, denoiser, path, encoder, passes)
+    facts |= {"inputs": bindings.input_facts(made_by)} if made_by else {}
     return _finished(request, facts, files, denoiser, path, encoder, passes, pair)
 
 

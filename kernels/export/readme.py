@@ -11,6 +11,7 @@ from ...compiler.languages.c import whole
 from ...compiler.languages.interface import SCENE_NUMBERS, WEIGHTS
 from ...compiler.reading.languages import is_read
 from ...compiler.schedules.schedules import text
+from .bindings import input_section
 from .hosts.host import Host
 from .targets import DISPATCHED, ONNX, TARGETS, Row
 
@@ -101,6 +102,7 @@ def readme(
         "",
         f"Rows: row 0 of every image is the picture's TOP row.{_encoded(facts)}",
         "",
+        *input_section(facts),
         *_moving(facts),
         "## Proof",
         "",

@@ -29,7 +29,7 @@ BUDGET = {
     "kernels/judge": 1475,
     "kernels/bench": 4850,
     "kernels/blender": 500,
-    "kernels/export": 4250,
+    "kernels/export": 4350,
     "kernels/verify": 2925,
     "spec/conformance": 8600,
     "cli": 300,

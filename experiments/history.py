@@ -210,6 +210,8 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--scene", choices=("minicubes", "glossy", "cornell"), default="minicubes")
     usual = ":".join(f"{limit:g}" for limit in vars(LIMITS).values())
     made.add_argument("--rays", type=int, default=0, help="camera rays of the features; 0: the colour's")
+    made.add_argument("--takes", type=int, help="takes that networks learn from")
+    made.add_argument("--steps", type=int, help="steps of a training")
     made.add_argument("--limits", default=usual, help="most samples: in motion, of mirrors then, at rest")
     return made
 
@@ -217,7 +219,10 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure whatever is missing, then report."""
     options = parser().parse_args(arguments)
-    plan = plan_of(options.scale)
+    chosen = {"train_frames": options.takes, "steps": options.steps}
+    plan = replace(
+        plan_of(options.scale), **{name: value for name, value in chosen.items() if value is not None}
+    )
     ground = Ground(plan, options.cache, options.executor)
     study = Study(ground, options.scene, limits_of(options.limits), options.rays)
     settings = {

@@ -42,11 +42,11 @@ from .lower_history import (
     RESTS,
     SIZE,
     STARTS,
-    THERE,
     TOTALS,
     HistoryPrograms,
     lower_history,
 )
+from .lower_smooth import THERE
 from .plane_kernel import Draft, PlaneArtifact, place_of
 
 SCHEMA = "wamnet-history-kernel-1"

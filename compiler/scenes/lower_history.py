@@ -180,7 +180,7 @@ def _sums(given: Named) -> Sums:
 
 def _totals(sums: Sums) -> dict[str, Any]:
     """Return the numbers of sums."""
-    parts = (sums.weights, *_numbers(sums.color), sums.count, *_numbers(sums.low), *_numbers(sums.high))
+    parts = (sums.weights, *_numbers(sums.color), sums.samples, *_numbers(sums.low), *_numbers(sums.high))
     return dict(zip(TOTALS, parts, strict=True))
 
 

@@ -33,11 +33,23 @@ from .frames import DIGITS, Pair
 
 def path_of(folder: Path, recipe: Recipe, pairs: Sequence[Pair], executor: str) -> Path:
     """Return the file of a network."""
-    scales = dataset.normalization_of([noisy for noisy, _ in pairs])
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        data = dataset.build(pairs, recipe.features, recipe.window, scales, pool.map).digest
-    text = json.dumps([recipe_to_json(recipe), data, executor])
+    text = json.dumps([recipe_to_json(recipe), _digest(recipe, pairs), executor])
     return folder / f"{hashlib.sha256(text.encode()).hexdigest()[:DIGITS]}.safetensors"
+
+
+_LAST: list[tuple[Sequence[Pair], object, str]] = []
+"""Pairs, the inputs that were made of them, and their digest: smoothing some hundred frames takes minutes."""
+
+
+def _digest(recipe: Recipe, pairs: Sequence[Pair]) -> str:
+    """Return the digest of the data that a recipe makes of pairs; of the same list as before it is known."""
+    inputs = recipe.features, recipe.window
+    if not _LAST or _LAST[0][0] is not pairs or _LAST[0][1] != inputs:
+        scales = dataset.normalization_of([noisy for noisy, _ in pairs])
+        with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+            data = dataset.build(pairs, *inputs, scales, pool.map)
+        _LAST[:] = [(pairs, inputs, data.digest)]
+    return _LAST[0][2]
 
 
 def trained(

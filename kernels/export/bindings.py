@@ -219,7 +219,7 @@ def inputs_of(model: Model, target: str) -> list[Input]:
 
 def inputs_written(inputs: Sequence[Input]) -> dict[str, bytes]:
     """Return the files of these kernels by path."""
-    files = {}
+    files: dict[str, bytes] = {}
     for each in inputs:
         held = {
             **each.kernel.contents(),

@@ -61,7 +61,7 @@ def sun_of(scene: Scene) -> NDArray[np.float64] | None:
     sky = scene.environment
     if sky is None or not any(sky.sun_irradiance):
         return None
-    return vectors.normalize(np.array(sky.sun_direction, np.float64))
+    return np.asarray(vectors.normalize(np.array(sky.sun_direction, np.float64)), np.float64)
 
 
 def with_sun(scene: Scene, frame: Frame) -> Frame:

@@ -299,14 +299,14 @@ def displacement(
 
 
 class Sums(NamedTuple):
-    """What up to four pixels of the last picture add up to: weights (...), color (..., 3), count (...).
+    """What up to four pixels of the last picture add up to: weights (...), color (..., 3), samples (...).
 
     low and high (..., 3) are the least and the largest of their colours.
     """
 
     weights: Floats
     color: Floats
-    count: Floats
+    samples: Floats
     low: Floats
     high: Floats
 
@@ -338,7 +338,7 @@ def split(shift: Floats) -> tuple[NDArray[np.int32], Floats]:
     return whole.astype(np.int32), kept - whole
 
 
-def share(fraction: Floats, beyond: Truths) -> Floats:
+def share(fraction: Floats, beyond: Truths | bool) -> Floats:
     """Return the bilinear weight (...) along an axis, of a pixel or of the one beyond it."""
     found: Floats = np.where(beyond, fraction, 1.0 - fraction)
     return found
@@ -350,7 +350,7 @@ def added(sums: Sums, weight: Floats, color: Floats, count: Floats) -> Sums:
     return Sums(
         sums.weights + weight,
         sums.color + vectors.scale(color, weight),
-        sums.count + count * weight,
+        sums.samples + count * weight,
         vectors.choose(used, np.minimum(sums.low, color), sums.low),
         vectors.choose(used, np.maximum(sums.high, color), sums.high),
     )
@@ -359,7 +359,7 @@ def added(sums: Sums, weight: Floats, color: Floats, count: Floats) -> Sums:
 def known_of(sums: Sums) -> Known:
     """Return the means of the pixels that were added."""
     some = np.where(sums.weights > 0.0, sums.weights, 1.0)
-    return Known(sums.color / some[..., np.newaxis], sums.count / some, sums.low, sums.high)
+    return Known(sums.color / some[..., np.newaxis], sums.samples / some, sums.low, sums.high)
 
 
 def _pixel(shape: Sequence[int], down: Ids, right: Ids) -> tuple[Truths, tuple[Ids, Ids]]:

@@ -246,14 +246,6 @@ PICTURES_BEFORE: Mapping[str, Feature] = {
 }
 """Features of a picture that follows others (light/history.py)."""
 
-SUNS: Mapping[str, Feature] = {
-    SUN: Feature(
-        *(SUN, SUN, 3, -1.0, 1.0, encode_signed),
-        "unit direction in world space towards the sun, the same in all pixels",
-    )
-}
-"""Where the sun of the sky is (light/environment.py)."""
-
 SMOOTHED: Mapping[str, Feature] = {
     f"{past}smoothed": Feature(
         f"{past}smoothed",
@@ -278,7 +270,7 @@ FEATURES: Mapping[str, Feature] = {
     ),
     **PICTURES_BEFORE,
     **SMOOTHED,
-    **SUNS,
+    SUN: Feature(SUN, SUN, 3, -1.0, 1.0, encode_signed, "unit direction in world space towards the sun"),
 }
 """Every feature that a model may use. Those of what is seen past mirrors and glass are encoded as those of
 the first hit are, by the same scales."""

@@ -13,19 +13,12 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
 from wamnet.compiler.scenes.lower_encode import SAMPLES, channel_name, layers_of, lower_encode, planes_of
 from wamnet.refimpl.errors import CompileError, InputError
-from wamnet.refimpl.network.dataset import (
-    FEATURES,
-    FIRST_HITS,
-    PICTURES_BEFORE,
-    SUNS,
-    Normalization,
-    encode_sums,
-)
+from wamnet.refimpl.network.dataset import FEATURES, FIRST_HITS, PICTURES_BEFORE, Normalization, encode_sums
 
 SCALES = Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 ALL = tuple(FIRST_HITS)
 OF_ONE_PICTURE = tuple(
-    f.name for f in FEATURES.values() if f.name not in (*PICTURES_BEFORE, *SUNS) and not f.guides
+    f.name for f in FEATURES.values() if f.name not in (*PICTURES_BEFORE, "sun") and not f.guides
 )
 
 

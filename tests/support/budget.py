@@ -21,7 +21,7 @@ BUDGET = {
     "compiler/proof": 3100,
     "compiler/reading": 4050,
     "compiler/schedules": 4650,
-    "compiler/scenes": 3125,
+    "compiler/scenes": 3150,
     "compiler/training": 1200,
     "kernels": 150,
     "kernels/devices": 2625,

@@ -8,7 +8,10 @@
 3. Inputs are compared [`INPUTS`]: the paper's colour and normal, also with the ray's direction; the preset
    `short`; the lamps' light without shadows in place of its albedo (spec/transport.md, LTR-11), which tells
    their colours; and both.
-4. Every test frame has colours of its own, within the range and never trained on, at an unseen time; scores
+4. The last network has the preset's inputs for lamps and colour smoothed, learns from ten times the plan's
+   frames for fifteen times its steps, and has features of 16 camera rays [`measure_long`]; so has Open Image
+   Denoise, if it is installed, which denoises them first [`measure_other`].
+5. Every test frame has colours of its own, within the range and never trained on, at an unseen time; scores
    and the error of colour [`lab/colors.py`] are those of these frames, and of the same times under A.
 
     python experiments/lights.py
@@ -20,9 +23,10 @@ camera does not move, so that the ray's direction only says the place in the pic
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -48,10 +52,12 @@ from lab.ground import (
 from lab.results import PER_FRAME, Results, Values
 from lab.tables import Column
 
+from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
 from wamnet.kernels.run.draws import variation_of
+from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.variation import AT_REST, Ranges, Variation
-from wamnet.refimpl.network.train import PAPER, SHORT
+from wamnet.refimpl.network.train import MIRRORS, PAPER, SHORT
 
 EACH = 0
 """Number of light sets that stands for colours of its own in each frame."""
@@ -84,8 +90,8 @@ SET_SEED = 61
 COLORS = Ranges(saturation=(0.3, 0.9))
 """Range of the colours of trained and tested sets; it contains A's saturations."""
 
-FIRST_OF_FRAMES, FIRST_OF_TESTS = 1000, 5000
-"""Numbers of the first set of frames with colours of their own, and of tests."""
+FIRST_OF_FRAMES, FIRST_OF_TESTS, FIRST_OF_LONG = 1000, 5000, 6000
+"""Numbers of the first set of frames with colours of their own, of tests, of the last network's frames."""
 
 NOISE_SEED = 4000
 """Seed of the first training frame here."""
@@ -133,6 +139,22 @@ def seen_colors(pictures: Sequence[Any], pairs: Sequence[Pair]) -> dict[str, Any
     return together(judged(pictures, pairs), each)
 
 
+LONG = "smoothed, 64 neurons, 16 rays, ten times the frames: colours of each frame"
+"""The configuration of the network that has what the other studies found."""
+
+OTHER = "Open Image Denoise, high, prefiltered, 16 rays"
+"""The configuration of the general denoiser."""
+
+MORE_FRAMES, MORE_STEPS, RAYS = 10, 15, 16
+"""Times the plan's training frames, and its steps; camera rays of features."""
+
+LAMPS_SMOOTHED = replace(
+    MIRRORS,
+    features=("color", "highlights", "smoothed", "normal", "albedo", "position", "unshadowed"),
+)
+"""The preset `mirrors` where nothing mirrors: what is seen at the first hit, and the lamps' light without
+shadows."""
+
 NAMES = (*KEPT, "color")
 """The scores that are kept."""
 
@@ -145,6 +167,48 @@ def measure(ground: Ground, features: tuple[str, ...], count: int, seed: int) ->
     for shots, where in ((recoloured(ground), ""), (ground.test_shots(), "on A")):
         pairs = ground.tested(shots)
         parts.append(told(seen_colors(ground.pictures(model, pairs), pairs), where, NAMES))
+    return together(*parts)
+
+
+def by_more_rays(shots: Sequence[Shot]) -> list[Shot]:
+    """Return the same shots with features of more camera rays."""
+    return [replace(shot, feature_spp=RAYS) for shot in shots]
+
+
+def long_shots(ground: Ground) -> list[Shot]:
+    """Return the training frames of the last network, each under colours of its own; none is a test's."""
+    plan = ground.plan
+    count = MORE_FRAMES * plan.train_frames
+    first = plan.train_frames + plan.test_frames + FRAMES * plan.train_frames
+    shots = ground.shots(ground.draws(AS_IT_IS, first, count), NOISE_SEED + FRAMES * plan.train_frames)
+    sets = [FIRST_OF_LONG + k for k in range(count)]
+    return by_more_rays(under(shots, sets))
+
+
+def measure_long(ground: Ground, seed: int) -> Values:
+    """Return the scores of the network that has what the other studies found."""
+    steps = MORE_STEPS * ground.plan.steps
+    recipe = replace(ground.plan.adapt(LAMPS_SMOOTHED, seed=seed), steps=steps)
+    model, _ = ground.train(recipe, ground.learned(long_shots(ground)))
+    return _both(ground, lambda pairs: ground.pictures(model, pairs))
+
+
+def measure_other(ground: Ground, seed: int) -> Values:
+    """Return the scores of Open Image Denoise on the same frames; it has no seeds."""
+
+    def denoised(pairs: Sequence[Pair]) -> list[Any]:
+        noisy = [frame for frame, _ in pairs]
+        return [to_display(filtered(frame, prefiltered(frame), True)) for frame in noisy]
+
+    return _both(ground, denoised)
+
+
+def _both(ground: Ground, pictures: Callable[[Sequence[Pair]], Sequence[Any]]) -> Values:
+    """Return the scores of pictures on unseen colours, and on A, of frames with features of more rays."""
+    parts = []
+    for shots, where in ((recoloured(ground), ""), (ground.test_shots(), "on A")):
+        pairs = ground.tested(by_more_rays(shots))
+        parts.append(told(seen_colors(pictures(pairs), pairs), where, NAMES))
     return together(*parts)
 
 
@@ -169,9 +233,11 @@ def rows(scale: str) -> dict[str, tuple[str, int]]:
 def works(ground: Ground, scale: str) -> dict[str, partial[Values]]:
     """Return what measures each configuration for a seed."""
     found = {"input": partial(measure_input, ground)}
-    return found | {
+    found |= {
         text: partial(measure, ground, INPUTS[name], count) for text, (name, count) in rows(scale).items()
     }
+    found[LONG] = partial(measure_long, ground)
+    return found | ({OTHER: partial(measure_other, ground)} if find_spec("pyoidn") else {})
 
 
 def cost(ground: Ground, scale: str) -> Cost:
@@ -179,6 +245,7 @@ def cost(ground: Ground, scale: str) -> Cost:
     plan = ground.plan
     needed = [(trained_on(ground, count), plan.train_spp) for count in COUNTS[scale]]
     needed += [(recoloured(ground), plan.test_spp), (ground.test_shots(), plan.test_spp)]
+    needed += [(long_shots(ground), plan.train_spp)]
     return Cost(needed, 2 * plan.test_frames)
 
 
@@ -196,7 +263,7 @@ COLUMNS = (
 def report(ground: Ground, results: Results, scale: str, seed: int, folder: Path) -> None:
     """Write the table, two curves, and pictures of one seed."""
     found = rows(scale)
-    names = {name: name for name in ("input", *found)}
+    names = {name: name for name in ("input", *found, LONG, OTHER)}
     write_table(folder / "table.md", tables.table(results, COLUMNS, names, "inputs: trained on"))
     for value, label in (("psnr", "PSNR, dB"), ("color", "colour error")):
         lines: dict[str, Any] = {

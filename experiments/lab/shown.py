@@ -528,6 +528,7 @@ FIGURES: Mapping[str, Callable[[Records], str]] = {
     "hard-ms": frame_ms("lit-16", "hard-light-times"),
     "hard-oidn-ms": frame_ms("oidn-past-prefiltered16", "hard-light-times"),
     "hard-oidn-clean-ms": frame_ms("oidn-past-clean16", "hard-light-times"),
+    "sky-ms": frame_ms("sun-16", "hard-light-times"),
     "moving-mitsuba": moving("mitsuba", "whole picture, denoised fast", "times opencl, moving", 1),
     "moving-ms": moving("opencl", "one pipeline, moving", "ms, median", 0),
     "oidn-fast-ms": frame_ms("oidn-fast16"),

@@ -6,7 +6,9 @@ the network, runs on the device [`images_on`].
 
 from __future__ import annotations
 
+import os
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -57,7 +59,10 @@ class RunResult:
 
 def images_of(model: Model, frame: Frame) -> Images:
     """Return the encoded feature images (H, W, C) that the model's kernel reads, by name."""
-    return {name: input_image(model, frame, (name,)) for name in model.features}
+    # NumPy works without the interpreter's lock: features are encoded beside each other.
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        made = pool.map(lambda name: input_image(model, frame, (name,)), model.features)
+        return dict(zip(model.features, made, strict=True))
 
 
 def filter_of(executor: Executor, model: Model, frame: Frame, profile: str) -> SmoothKernels | None:

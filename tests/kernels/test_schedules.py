@@ -10,15 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from kit import LONG, trained_sizes
 
-from wamnet.compiler.compile import compile_program
+from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.schedules import emit_fourier
 from wamnet.compiler.targets import DENOISERS
+from wamnet.compiler.variants import plan_model
 from wamnet.kernels import denoise_on
 from wamnet.kernels.devices import opencl_executor, opengl_executor
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.network import dataset, denoise
+from wamnet.refimpl.network import dataset, denoise, siren
+from wamnet.refimpl.network.train import PRESETS
 
 EXAMPLES = max(settings.default.max_examples // 20, 1)
 """Each example compiles a kernel, up to a second: a twentieth of what other tests draw."""
@@ -320,6 +322,29 @@ def test_no_compute_shader_before_opengl_4_3(executor_named, kit, monkeypatch):
         match=r"has OpenGL 4\.5: schedule compute is a compute shader, which OpenGL 4\.6 has; use",
     ):
         executor.build(artifact)
+
+
+@pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft32"), ("c", "fft32x8")])
+def test_layers_of_64_neurons_have_spectra(executor_named, target, schedule):
+    """Arrays of 800 kB fit a thread's stack; both kernels are within their bounds of the exact picture."""
+    recipe = PRESETS["sky"]
+    network = siren.init(recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden, 3, np.float32)
+    model = denoise.Model(network, recipe.features, recipe.window, dataset.Normalization())
+    rng = np.random.default_rng(4)
+    images = {
+        name: rng.uniform(
+            dataset.FEATURES[name].low, dataset.FEATURES[name].high, (33, 57, dataset.FEATURES[name].channels)
+        ).astype(np.float32)
+        for name in recipe.features
+    }
+    device, made = executor_named(target), {}
+    plans = {name: plan_model(model, target, schedule=name) for name in ("plain", schedule)}
+    for name, plan in plans.items():
+        kernel = compile_plan(plan)
+        assert kernel.manifest["schedule"]["name"] == name
+        made[name] = device.run(kernel, images)
+    bound = sum(max(plan.bound.output) for plan in plans.values())
+    assert np.abs(made["plain"] - made[schedule]).max() <= bound
 
 
 def test_the_time_of_a_kernel_alone(executor_named, kit):

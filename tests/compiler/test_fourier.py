@@ -270,7 +270,7 @@ REFUSED = {
     "small": (lambda: paper(size=3), "tile16", r"the direct sum takes 108 operations .*, spectra 7\d"),
     "large": (lambda: paper(size=32, channels=1), "tile16", "a window of 32 x 32 pixels in a tile of 32"),
     "private": (
-        lambda: paper(hidden=100),
+        lambda: paper(hidden=160),
         "tile16",
         rf"its arrays take \d+ bytes a work item, of at most {LARGEST_PRIVATE}",
     ),

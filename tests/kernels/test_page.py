@@ -22,7 +22,7 @@ SETTINGS = Settings(max_depth=1)
 OF_ONE_PICTURE = tuple(
     name
     for name, feature in dataset.FEATURES.items()
-    if name not in dataset.PICTURES_BEFORE and not feature.guides
+    if name not in (*dataset.PICTURES_BEFORE, "sun") and not feature.guides
 )
 SCALES = dataset.Normalization(0.0, 12.0, (0.0, 0.0, 0.0), 6.0)
 

@@ -4,8 +4,8 @@
 2. A frame of a data set has so many pictures before it, 1 / PER_S apart, by samples that the frame itself
    does not use [`followed`].
 
-A history is defined in refimpl/light/history.py; any executor renders the pictures, and those that have a
-kernel for it follow them too [follow_on.py].
+A history is defined in refimpl/light/history.py. Any executor renders the pictures; one that has the
+history's kernel computes the history too [follow_on.py].
 """
 
 from __future__ import annotations

@@ -67,7 +67,8 @@ def follow_on(
 
 def first_hits_on(executor: Executor, scene: Scene, job: Job, frames: Frames | None = None) -> First:
     """Return the first hits (H, W) of a job's first sample."""
-    plain = replace(job, spp=1, feature_spp=0, feature_sampler="", seen=False, settings=_unscattered(job))
+    unscattered = replace(job.settings, max_depth=0)
+    plain = replace(job, spp=1, feature_spp=0, feature_sampler="", seen=False, settings=unscattered)
     moment = (frames or Frames([scene])).of(executor, scene, plain, groups=END)
     sums = sums_of(executor, moment, plain)
     found = dict(zip(planes(END), sums, strict=True))
@@ -77,11 +78,6 @@ def first_hits_on(executor: Executor, scene: Scene, job: Job, frames: Frames | N
     )
     surface = found["last_surface"].astype(np.int32)
     return First(vectors.look_up(history.surface_numbers(scene), surface), point, normal, direction)
-
-
-def _unscattered(job: Job) -> Any:
-    """Return the job's settings, with no scatterings."""
-    return replace(job.settings, max_depth=0)
 
 
 def _nothing(scene: Scene, job: Job, first: First) -> History:

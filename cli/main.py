@@ -1,7 +1,7 @@
 """The command `wamnet`: its commands, and the one place where errors become a line and an exit status.
 
-1. Commands are registered with typer in the order of a first session [`app`]; `bench`, which has commands
-   of its own [common/default_command.py], comes last, and `course` before it.
+1. Commands are registered with typer in the order of a first session [`COMMANDS`]; the module of a command
+   is imported when it is the one that runs, or all are listed [`application`].
 2. [`main`] runs one of them. Whatever a user can cause ends in one line on standard error and status 2;
    Ctrl-C ends in status 130 and SIGTERM in 143; anything else is a bug and shows its traceback.
 
@@ -13,38 +13,14 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
 
 from ..refimpl.errors import WamnetError
-from .commands import (
-    animate,
-    bench,
-    certify,
-    compare,
-    conformance,
-    dataset,
-    demo,
-    denoise,
-    export,
-    listing,
-    render,
-    train,
-    triage,
-    tune,
-    view,
-)
-from .commands.compile import EXAMPLES as COMPILE_EXAMPLES
-from .commands.compile import compile_model
-from .commands.course import labs as course
-from .commands.measure import exports, pipeline, primitives
-from .commands.measure import render as measure_render
-from .commands.measure import train as measure_train
-from .commands.networks import importing
-from .commands.verify import renderer as verify_renderer
 from .common.default_command import CommandWithOthers
 from .common.terminal import tell
 
@@ -60,72 +36,88 @@ STATUS_INTERRUPTED = 130
 AGAIN_S = 0.01
 """Seconds after which a dropped interrupt is sent again: by then the object is gone."""
 
-app = typer.Typer(
-    name="wamnet",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+VERSION = "--version"
+"""The option that runs no command."""
+
+COMMANDS: Mapping[str, tuple[str, str, str]] = {
+    "render": ("render", "render", "RENDER_EXAMPLES"),
+    "scene": ("render", "scene", "SCENE_EXAMPLES"),
+    "dataset": ("dataset", "dataset", "EXAMPLES"),
+    "train": ("train", "train", "EXAMPLES"),
+    "import": ("networks.importing", "import_model", "EXAMPLES"),
+    "compile": ("compile", "compile_model", "EXAMPLES"),
+    "listing": ("listing", "listing", "EXAMPLES"),
+    "export": ("export", "export", "EXAMPLES"),
+    "certify": ("certify", "certify", "EXAMPLES"),
+    "denoise": ("denoise", "denoise", "DENOISE_EXAMPLES"),
+    "compare": ("compare", "compare", "EXAMPLES"),
+    "triage": ("triage", "triage", "EXAMPLES"),
+    "animate": ("animate", "animate", "EXAMPLES"),
+    "view": ("view", "view", "EXAMPLES"),
+    "tune": ("tune", "tune", "EXAMPLES"),
+    "executors": ("denoise", "executors", "EXECUTORS_EXAMPLES"),
+    "conformance": ("conformance", "conformance", "EXAMPLES"),
+    "verify-renderer": ("verify.renderer", "verify_renderer", "EXAMPLES"),
+    "demo": ("demo", "demo", "EXAMPLES"),
+    "course": ("course.labs", "course", ""),
+    "course start": ("course.labs", "start", "START_EXAMPLES"),
+    "course check": ("course.labs", "check", "CHECK_EXAMPLES"),
+    "course grade": ("course.labs", "grade", "GRADE_EXAMPLES"),
+    "bench": ("bench", "bench", "EXAMPLES"),
+    "bench render": ("measure.render", "render", "EXAMPLES"),
+    "bench train": ("measure.train", "train", "EXAMPLES"),
+    "bench pipeline": ("measure.pipeline", "pipeline", "EXAMPLES"),
+    "bench exports": ("measure.exports", "exports", "EXAMPLES"),
+    "bench primitives": ("measure.primitives", "primitives", "EXAMPLES"),
+}
+"""Each command's module in `commands`, function and examples; one of a group follows the group."""
+
+GROUPS: Mapping[str, Mapping[str, Any]] = {
+    "course": {},
+    "bench": {"cls": CommandWithOthers, "subcommand_metavar": "| COMMAND [OPTIONS]"},
+}
+"""Commands with commands of their own, and how typer makes the group."""
 
 
-benches = typer.Typer(
-    cls=CommandWithOthers, invoke_without_command=True, subcommand_metavar="| COMMAND [OPTIONS]"
-)
+def application(arguments: Sequence[str] = ()) -> typer.Typer:
+    """Return the command line, with only the command that `arguments` begin with, or else with all.
 
-courses = typer.Typer(invoke_without_command=True)
-
-
-def _help(command: Callable[..., None]) -> str:
-    """Return a command's docstring, each paragraph on one line, as typer wants it."""
-    paragraphs = (command.__doc__ or "").split("\n\n")
-    return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
-
-
-def _register(
-    command: Callable[..., None], examples: str, name: str | None = None, to: typer.Typer = app
-) -> None:
-    """Add a command, whose help is its docstring."""
-    to.command(name, help=_help(command), epilog=examples)(command)
-
-
-_register(render.render, render.RENDER_EXAMPLES)
-_register(render.scene, render.SCENE_EXAMPLES)
-_register(dataset.dataset, dataset.EXAMPLES)
-_register(train.train, train.EXAMPLES)
-_register(importing.import_model, importing.EXAMPLES, "import")
-_register(compile_model, COMPILE_EXAMPLES, "compile")
-_register(listing.listing, listing.EXAMPLES)
-_register(export.export, export.EXAMPLES)
-_register(certify.certify, certify.EXAMPLES)
-_register(denoise.denoise, denoise.DENOISE_EXAMPLES)
-_register(compare.compare, compare.EXAMPLES)
-_register(triage.triage, triage.EXAMPLES)
-_register(animate.animate, animate.EXAMPLES)
-_register(view.view, view.EXAMPLES)
-_register(tune.tune, tune.EXAMPLES)
-_register(denoise.executors, denoise.EXECUTORS_EXAMPLES)
-_register(conformance.conformance, conformance.EXAMPLES)
-_register(verify_renderer.verify_renderer, verify_renderer.EXAMPLES, "verify-renderer")
-_register(demo.demo, demo.EXAMPLES)
-_register(measure_render.render, measure_render.EXAMPLES, to=benches)
-_register(measure_train.train, measure_train.EXAMPLES, to=benches)
-_register(pipeline.pipeline, pipeline.EXAMPLES, to=benches)
-_register(exports.exports, exports.EXAMPLES, to=benches)
-_register(primitives.primitives, primitives.EXAMPLES, to=benches)
-_register(course.start, course.START_EXAMPLES, to=courses)
-_register(course.check, course.CHECK_EXAMPLES, to=courses)
-_register(course.grade, course.GRADE_EXAMPLES, to=courses)
-courses.callback(help=_help(course.course))(course.course)
-app.add_typer(courses, name="course")
-benches.callback(help=_help(bench.bench), epilog=bench.EXAMPLES)(bench.bench)
-app.add_typer(benches, name="bench")
+    Importing all commands takes longer than denoising a frame.
+    """
+    app = typer.Typer(
+        name="wamnet",
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode="rich",
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback(invoke_without_command=True)(root)
+    first = arguments[0] if arguments and arguments[0] in (*COMMANDS, VERSION) else None
+    groups = {"": app}
+    for path, (module, function, examples) in COMMANDS.items():
+        if first in (None, path.partition(" ")[0]):
+            _register(groups, path, import_module(f".commands.{module}", __package__), function, examples)
+    return app
 
 
-@app.callback(invoke_without_command=True)
+def _register(groups: dict[str, typer.Typer], path: str, module: Any, function: str, examples: str) -> None:
+    """Add a command, whose help is its docstring, to its group; a group joins the others."""
+    command = getattr(module, function)
+    # Each paragraph on one line, as typer wants it.
+    shown = "\n\n".join(" ".join(part.split()) for part in (command.__doc__ or "").split("\n\n"))
+    group, _, name = path.rpartition(" ")
+    how: dict[str, Any] = {"help": shown, "epilog": getattr(module, examples) if examples else None}
+    if path in GROUPS:
+        groups[path] = typer.Typer(invoke_without_command=True, **GROUPS[path])
+        groups[path].callback(**how)(command)
+        groups[group].add_typer(groups[path], name=name)
+    else:
+        groups[group].command(name, **how)(command)
+
+
 def root(
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Show the version and end.")] = False,
+    version: Annotated[bool, typer.Option(VERSION, help="Show the version and end.")] = False,
 ) -> None:
     """Render a scene, train a small network that denoises it, and run that network anywhere.
 
@@ -191,9 +183,8 @@ def _losing_no_interrupt() -> Iterator[None]:
 def _run(arguments: Sequence[str] | None) -> int:
     """Run the command line and return its exit status."""
     try:
-        status = app(
-            None if arguments is None else list(arguments), prog_name="wamnet", standalone_mode=False
-        )
+        words = list(sys.argv[1:] if arguments is None else arguments)
+        status = application(words)(words, prog_name="wamnet", standalone_mode=False)
     except WamnetError as error:
         return _fail(str(error))
     except MemoryError:

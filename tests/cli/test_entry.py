@@ -68,7 +68,7 @@ def test_an_interrupt_while_an_object_is_deleted_is_not_lost() -> None:
         "def work(*_, **__):\n"
         "    Deleted()\n"
         "    time.sleep(60)\n"
-        "main.app = work\n"
+        "main.application = lambda _: work\n"
         "sys.exit(main.main([]))\n"
     )
     command = [sys.executable, "-c", program]

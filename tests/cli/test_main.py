@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from wamnet.cli import main as module
+from wamnet.cli.commands import compile as compile_command
 from wamnet.cli.common import options
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import EXECUTORS
@@ -70,9 +71,7 @@ def test_choices_equal_the_registries() -> None:
     assert {name.value for name in options.Preset} == set(PRESETS)
     assert [name.value for name in options.Sampler] == list(SAMPLERS)
     assert options.SCENES.split(", ") == list(CANONICAL)
-    assert {module.compile_model.__globals__["EXECUTOR_OF"][target] for target in options.Target} <= set(
-        DENOISERS
-    )
+    assert {compile_command.EXECUTOR_OF[target] for target in options.Target} <= set(DENOISERS)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +95,7 @@ def test_errors_of_the_system_are_one_line(refused, monkeypatch) -> None:
     def fail(*_args: object, **_options: object) -> None:
         raise OSError(28, "No space left on device", "a.exr")
 
-    monkeypatch.setattr(module, "app", fail)
+    monkeypatch.setattr(module, "application", lambda _: fail)
     assert refused("render") == "wamnet: error: No space left on device: a.exr\n"
 
 
@@ -106,7 +105,7 @@ def test_errors_without_four_parts_are_one_line(refused, monkeypatch) -> None:
     def fail(*_args: object, **_options: object) -> None:
         raise TrainingError("the loss\nis nan")
 
-    monkeypatch.setattr(module, "app", fail)
+    monkeypatch.setattr(module, "application", lambda _: fail)
     assert refused("train") == "wamnet: error: the loss is nan\n"
 
 
@@ -116,7 +115,7 @@ def test_bugs_keep_their_traceback(wamnet, monkeypatch) -> None:
     def fail(*_args: object, **_options: object) -> None:
         raise ZeroDivisionError("a bug")
 
-    monkeypatch.setattr(module, "app", fail)
+    monkeypatch.setattr(module, "application", lambda _: fail)
     with pytest.raises(ZeroDivisionError, match="a bug"):
         wamnet("render")
 
@@ -127,7 +126,7 @@ def test_ctrl_c(wamnet, monkeypatch) -> None:
     def interrupt(*_args: object, **_options: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(module, "app", interrupt)
+    monkeypatch.setattr(module, "application", lambda _: interrupt)
     assert wamnet("render") == (130, "", "wamnet: interrupted\n")
     monkeypatch.undo()
     monkeypatch.setattr("wamnet.cli.commands.render.load_scene", interrupt)
@@ -185,7 +184,7 @@ def test_too_little_memory_is_one_line(refused, monkeypatch) -> None:
     def fail(*_args: object, **_options: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(module, "app", fail)
+    monkeypatch.setattr(module, "application", lambda _: fail)
     assert "the memory does not suffice; use smaller frames" in refused("render")
 
 
